@@ -1,0 +1,24 @@
+# Warnings and sanitizers of our own code; components built outside this tree
+# get neither.
+add_library(rtcf_compiler_settings INTERFACE)
+target_compile_options(
+  rtcf_compiler_settings
+  INTERFACE -Wall -Wextra -Wconversion -Wshadow
+            # One compiler is the judge; what others warn of changes with each version.
+            $<$<CXX_COMPILER_ID:GNU>:-Werror>)
+
+if(RTCF_SANITIZE)
+  set(known thread address,undefined realtime)
+  if(NOT RTCF_SANITIZE IN_LIST known)
+    message(FATAL_ERROR "RTCF_SANITIZE=${RTCF_SANITIZE} is none of: ${known}")
+  endif()
+  if(RTCF_SANITIZE STREQUAL "realtime" AND NOT CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+    message(FATAL_ERROR "RTCF_SANITIZE=realtime needs -DCMAKE_CXX_COMPILER=clang++-22")
+  endif()
+  add_compile_options(-fsanitize=${RTCF_SANITIZE} -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${RTCF_SANITIZE})
+  if(RTCF_SANITIZE MATCHES "undefined")
+    # Undefined behaviour ends the test, as the other sanitizers' findings do.
+    add_compile_options(-fno-sanitize-recover=undefined)
+  endif()
+endif()

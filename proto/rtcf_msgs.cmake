@@ -1,0 +1,49 @@
+# The ROS messages: C++ headers by the target rtcf_msgs, the Python module
+# rtcf_msgs among the build tree's modules. The package is a project of its
+# own, as catkin changes the output folders of the project it is in.
+set(package ${CMAKE_CURRENT_SOURCE_DIR}/rtcf_msgs)
+set(build ${CMAKE_CURRENT_BINARY_DIR}/rtcf_msgs)
+set(stage ${CMAKE_CURRENT_BINARY_DIR}/rtcf_msgs-stage)
+set(staged ${stage}${CMAKE_INSTALL_PREFIX})
+set(python_modules lib/python3/dist-packages)
+
+file(GLOB definitions CONFIGURE_DEPENDS ${package}/msg/*.msg)
+set(headers)
+foreach(definition IN LISTS definitions)
+  cmake_path(GET definition STEM name)
+  list(APPEND headers ${staged}/include/rtcf_msgs/${name}.h)
+endforeach()
+
+set(stamp ${CMAKE_CURRENT_BINARY_DIR}/rtcf_msgs.stamp)
+add_custom_command(
+  OUTPUT ${stamp}
+  BYPRODUCTS ${headers}
+  # Lisp has no users here.
+  COMMAND
+    ${CMAKE_COMMAND} -E env ROS_LANG_DISABLE=genlisp ${CMAKE_COMMAND} -S ${package} -B ${build} -G
+    ${CMAKE_GENERATOR} --log-level=WARNING -DCMAKE_INSTALL_PREFIX=${CMAKE_INSTALL_PREFIX}
+    -DCMAKE_INSTALL_MESSAGE=NEVER -DPYTHON_EXECUTABLE=${PYTHON_EXECUTABLE}
+    -DCATKIN_BUILD_BINARY_PACKAGE=ON -DCATKIN_ENABLE_TESTING=OFF
+  COMMAND ${CMAKE_COMMAND} --build ${build}
+  COMMAND ${CMAKE_COMMAND} -E env DESTDIR=${stage} ${CMAKE_COMMAND} --install ${build}
+  COMMAND ${CMAKE_COMMAND} -E create_symlink ${staged}/${python_modules}/rtcf_msgs
+          ${PROJECT_BINARY_DIR}/python/rtcf_msgs
+  COMMAND ${CMAKE_COMMAND} -E touch ${stamp}
+  DEPENDS ${definitions} ${package}/package.xml ${package}/CMakeLists.txt
+  COMMENT "Building the ROS package rtcf_msgs"
+  VERBATIM)
+add_custom_target(rtcf_msgs_build ALL DEPENDS ${stamp})
+
+file(MAKE_DIRECTORY ${staged}/include)
+add_library(rtcf_msgs INTERFACE)
+target_include_directories(rtcf_msgs SYSTEM INTERFACE ${staged}/include)
+add_dependencies(rtcf_msgs rtcf_msgs_build)
+
+install(DIRECTORY ${staged}/include/rtcf_msgs DESTINATION include COMPONENT ros-rtcf)
+install(DIRECTORY ${staged}/share/rtcf_msgs ${staged}/share/pkgconfig DESTINATION share
+        COMPONENT ros-rtcf)
+install(
+  DIRECTORY ${staged}/${python_modules}/rtcf_msgs
+  DESTINATION ${python_modules}
+  COMPONENT ros-rtcf
+  PATTERN __pycache__ EXCLUDE)
