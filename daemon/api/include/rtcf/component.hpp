@@ -1,0 +1,230 @@
+/// @file
+/// The component: a controller, filter, driver or any other block of a control
+/// loop, with a lifecycle, typed ports and parameters.
+///
+/// The hooks run in the order configure, start, update…, stop, cleanup. Only
+/// update() and safe() run in the real-time thread: they must not allocate,
+/// lock, block or call the system. Ports and parameters are members, declared
+/// before the component is configured.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "rtcf/logging.hpp"
+#include "rtcf/parameter.hpp"
+#include "rtcf/port.hpp"
+#include "rtcf/realtime.hpp"
+#include "rtcf/slot.hpp"
+
+namespace rtcf {
+
+/// What the executor lends to a component; outlives it.
+struct ComponentContext {
+    std::string full_name;             ///< namespace and name, e.g. "/arm/H1"
+    std::string name;                  ///< base name, e.g. "H1"
+    std::string ns = "/";              ///< namespace
+    std::string runner;                ///< name of the runner
+    const LoopClock* clock = nullptr;  ///< the loop's clock
+    std::int64_t period_ns = 0;        ///< of this component, ns
+    std::int64_t elapsed_ns = 0;       ///< whole periods since its last update, ns
+    LogSink* log = nullptr;            ///< never null once attached
+    std::atomic<LogLevel> log_level{LogLevel::Info};  ///< calls below it are not logged
+};
+
+/// Base class of all components.
+class Component {
+   public:
+    Component() = default;
+    virtual ~Component() = default;
+    Component(const Component&) = delete;
+    Component& operator=(const Component&) = delete;
+
+    /// @name Hooks
+    /// A hook that returns false or throws refuses what was asked for; fail() says why.
+    /// @{
+    virtual bool configure() { return true; }  ///< Acquire what is needed. Not real-time.
+    virtual bool start() { return true; }      ///< The loop is about to run. Not real-time.
+    virtual void update() = 0;                 ///< One cycle. Real-time.
+    /// Once, in schedule order, when the loop ends for any reason but a crash:
+    /// write safe commands here. Real-time.
+    virtual void safe() noexcept {}
+    virtual void stop() {}     ///< The loop has ended. Not real-time.
+    virtual void cleanup() {}  ///< Undo configure(). Not real-time.
+    /// At the cycle boundary in which this component takes the place of `previous`. Real-time.
+    virtual void takeOver(const Component& previous) noexcept { (void)previous; }
+    /// @}
+
+    /// @name Identity; valid from configure() on
+    /// @{
+    const std::string& name() const noexcept { return context_->name; }          ///< e.g. "H1"
+    const std::string& fullName() const noexcept { return context_->full_name; } ///< e.g. "/arm/H1"
+    const std::string& runner() const noexcept { return context_->runner; }      ///< e.g. "rt_runner"
+    /// @}
+
+    /// @name Time; real-time safe. There is no other clock in a loop.
+    /// @{
+    std::int64_t time() const noexcept RTCF_NONBLOCKING { return context_->clock->time_ns; }   ///< Monotonic, ns.
+    std::int64_t stamp() const noexcept RTCF_NONBLOCKING { return context_->clock->stamp_ns; } ///< ROS time, ns.
+    std::uint64_t iteration() const noexcept RTCF_NONBLOCKING { return context_->clock->iteration; }
+    /// This component's nominal period, ns.
+    std::int64_t period() const noexcept RTCF_NONBLOCKING { return context_->period_ns; }
+    /// Time since this component's last update in whole periods, ns; never below period().
+    std::int64_t elapsed() const noexcept RTCF_NONBLOCKING { return context_->elapsed_ns; }
+    /// This component's nominal frequency, Hz.
+    double frequency() const noexcept RTCF_NONBLOCKING {
+        return 1e9 / static_cast<double>(context_->period_ns);
+    }
+    /// @}
+
+    /// @name For the logging macros; real-time safe
+    /// @{
+    bool logs(LogLevel level) const noexcept RTCF_NONBLOCKING {
+        return context_->log != nullptr && level >= context_->log_level.load(std::memory_order_relaxed);
+    }
+    LogSink& logSink() const noexcept RTCF_NONBLOCKING { return *context_->log; }
+    /// @}
+
+    /// @name For the executor
+    /// @{
+    void attach(ComponentContext& context) noexcept { context_ = &context; }
+    /// Nothing can be declared from here on.
+    void freeze() noexcept { frozen_ = true; }
+    const std::vector<InputBase*>& inputs() const noexcept { return inputs_; }
+    const std::vector<OutputBase*>& outputs() const noexcept { return outputs_; }
+    const std::vector<ParameterBase*>& parameters() const noexcept { return parameters_; }
+    const std::string& failure() const noexcept { return failure_; }
+    const LoopClock& clock() const noexcept RTCF_NONBLOCKING { return *context_->clock; }
+    /// @}
+
+    /// @name Called by the members' constructors
+    /// Throw std::logic_error on a name that is taken or not a ROS base name, and after freeze().
+    /// @{
+    void declare(InputBase* input) { declareIn(inputs_, input, input->name(), "port"); }
+    void declare(OutputBase* output) { declareIn(outputs_, output, output->name(), "port"); }
+    void declare(ParameterBase* parameter) {
+        declareIn(parameters_, parameter, parameter->declaration().name, "parameter");
+    }
+    /// @}
+
+   protected:
+    /// Says why a hook fails: `return fail("no reply from {}", device);`. @return false
+    template <typename... Arguments>
+    bool fail(std::string_view text, const Arguments&... arguments) {
+        failure_ = fmt::vformat(text, fmt::make_format_args(arguments...));
+        return false;
+    }
+
+   private:
+    template <typename T>
+    void declareIn(std::vector<T*>& members, T* member, const std::string& name, const char* what);
+    static ComponentContext& detached() {
+        static const LoopClock clock{};
+        static ComponentContext context;
+        context.clock = &clock;
+        return context;
+    }
+
+    ComponentContext* context_ = &detached();
+    bool frozen_ = false;
+    std::vector<InputBase*> inputs_;
+    std::vector<OutputBase*> outputs_;
+    std::vector<ParameterBase*> parameters_;
+    std::string failure_;
+};
+
+template <typename T>
+void Component::declareIn(std::vector<T*>& members, T* member, const std::string& name, const char* what) {
+    const auto legal = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; };
+    if (name.empty() || std::isalpha(static_cast<unsigned char>(name[0])) == 0 ||
+        !std::all_of(name.begin(), name.end(), legal)) {
+        throw std::logic_error(fmt::format("{} '{}': not a legal name (a letter, then letters, digits and _)", what, name));
+    }
+    if (frozen_) throw std::logic_error(fmt::format("{} '{}' declared after configure()", what, name));
+    const auto taken = [&](const auto& list) {
+        return std::any_of(list.begin(), list.end(), [&](const auto* other) {
+            if constexpr (std::is_same_v<T, ParameterBase>) {
+                return other->declaration().name == name;
+            } else {
+                return other->name() == name;
+            }
+        });
+    };
+    bool duplicate = false;
+    if constexpr (std::is_same_v<T, ParameterBase>) {
+        duplicate = taken(parameters_);
+    } else {
+        duplicate = taken(inputs_) || taken(outputs_);
+    }
+    if (duplicate) throw std::logic_error(fmt::format("{} '{}' is declared twice", what, name));
+    members.push_back(member);
+}
+
+inline InputBase::InputBase(Component* owner, std::string name, const TypeInfo& type, const SlotHeader& empty)
+    : source_(&empty), current_(&empty), owner_(owner), name_(std::move(name)), type_(type) {
+    owner_->declare(this);
+}
+
+inline std::int64_t InputBase::age() const noexcept RTCF_NONBLOCKING {
+    return current_->sequence == 0 ? -1 : owner_->time() - current_->time_ns;
+}
+
+inline OutputBase::OutputBase(Component* owner, std::string name, std::string unit, const TypeInfo& type)
+    : owner_(owner), slot_(type.make_slot(nullptr)), name_(std::move(name)), unit_(std::move(unit)), type_(type) {
+    raw_ = slot_.get();
+    owner_->declare(this);
+}
+
+inline void OutputBase::stampWrite() noexcept RTCF_NONBLOCKING {
+    const LoopClock& clock = owner_->clock();
+    ++raw_->sequence;
+    raw_->iteration = clock.iteration;
+    raw_->time_ns = clock.time_ns;
+}
+
+inline ParameterBase::ParameterBase(Component* owner, ParameterDeclaration declaration)
+    : declaration_(std::move(declaration)) {
+    owner->declare(this);
+}
+
+inline std::string ParameterBase::check(ParameterValue& value) const {
+    const auto& [name, type, initial, minimum, maximum, unit, doc, choices] = declaration_;
+    if (type == "double" && std::holds_alternative<std::int64_t>(value)) {
+        value = static_cast<double>(std::get<std::int64_t>(value));
+    }
+    if (value.index() != initial.index()) {
+        static constexpr std::array<const char*, 4> kNames{"a bool", "an int", "a double", "a string"};
+        return fmt::format("parameter {} takes {}, not {}", name, type == "enum" ? "a name" : kNames[initial.index()],
+                           kNames[value.index()]);
+    }
+    double number = 0.0;
+    if (const auto* real = std::get_if<double>(&value)) {
+        if (!std::isfinite(*real)) return fmt::format("parameter {} must be finite", name);
+        number = *real;
+    } else if (const auto* integer = std::get_if<std::int64_t>(&value)) {
+        number = static_cast<double>(*integer);
+    }
+    if (minimum && number < *minimum) {
+        return fmt::format("parameter {} = {} is below its minimum {} {}", name, number, *minimum, unit);
+    }
+    if (maximum && number > *maximum) {
+        return fmt::format("parameter {} = {} is above its maximum {} {}", name, number, *maximum, unit);
+    }
+    if (!choices.empty()) {
+        std::string names;
+        for (const Choice& choice : choices) {
+            if (choice.name == std::get<std::string>(value)) return {};
+            names += (names.empty() ? "" : ", ") + choice.name;
+        }
+        return fmt::format("parameter {} = {} is none of {}", name, std::get<std::string>(value), names);
+    }
+    return {};
+}
+
+}  // namespace rtcf
+
+#include "rtcf/registration.hpp"

@@ -1,0 +1,164 @@
+/// @file
+/// Fixed-size Eigen types as port types. Include it beside component.hpp in a
+/// component that has such ports.
+///
+/// | C++ | on ROS |
+/// | --- | --- |
+/// | `Eigen::Vector3d` | geometry_msgs/Vector3 |
+/// | `Eigen::Quaterniond` | geometry_msgs/Quaternion |
+/// | `Eigen::Isometry3d` | geometry_msgs/Pose |
+/// | any other fixed-size matrix of double or float | std_msgs/Float64MultiArray or Float32MultiArray, row by row |
+#pragma once
+
+#include <geometry_msgs/Pose.h>
+#include <geometry_msgs/Quaternion.h>
+#include <geometry_msgs/Vector3.h>
+#include <std_msgs/Float32MultiArray.h>
+#include <std_msgs/Float64MultiArray.h>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstring>
+#include <stdexcept>
+
+#include "rtcf/message_type.hpp"
+
+namespace rtcf {
+
+namespace detail {
+
+struct Vector3Conversion {
+    static const char* name() { return "Eigen::Vector3d"; }
+    static void toMessage(const Eigen::Vector3d& value, geometry_msgs::Vector3& message) {
+        message.x = value.x();
+        message.y = value.y();
+        message.z = value.z();
+    }
+    static void fromMessage(const geometry_msgs::Vector3& message, Eigen::Vector3d& value) {
+        value = {message.x, message.y, message.z};
+    }
+};
+
+struct QuaternionConversion {
+    static const char* name() { return "Eigen::Quaterniond"; }
+    static void toMessage(const Eigen::Quaterniond& value, geometry_msgs::Quaternion& message) {
+        message.x = value.x();
+        message.y = value.y();
+        message.z = value.z();
+        message.w = value.w();
+    }
+    static void fromMessage(const geometry_msgs::Quaternion& message, Eigen::Quaterniond& value) {
+        value = Eigen::Quaterniond(message.w, message.x, message.y, message.z);
+    }
+};
+
+struct IsometryConversion {
+    static const char* name() { return "Eigen::Isometry3d"; }
+    static void toMessage(const Eigen::Isometry3d& value, geometry_msgs::Pose& message) {
+        message.position.x = value.translation().x();
+        message.position.y = value.translation().y();
+        message.position.z = value.translation().z();
+        QuaternionConversion::toMessage(Eigen::Quaterniond(value.linear()), message.orientation);
+    }
+    static void fromMessage(const geometry_msgs::Pose& message, Eigen::Isometry3d& value) {
+        Eigen::Quaterniond rotation;
+        QuaternionConversion::fromMessage(message.orientation, rotation);
+        value.setIdentity();
+        value.linear() = rotation.normalized().toRotationMatrix();
+        value.translation() = Eigen::Vector3d(message.position.x, message.position.y, message.position.z);
+    }
+};
+
+template <typename Scalar>
+struct MultiArray;
+template <>
+struct MultiArray<double> {
+    using Message = std_msgs::Float64MultiArray;
+    static constexpr const char* scalar = "double";
+};
+template <>
+struct MultiArray<float> {
+    using Message = std_msgs::Float32MultiArray;
+    static constexpr const char* scalar = "float";
+};
+
+}  // namespace detail
+
+template <>
+struct PortType<Eigen::Vector3d>
+    : detail::MappedPortType<Eigen::Vector3d, geometry_msgs::Vector3, detail::Vector3Conversion> {};
+
+template <>
+struct PortType<Eigen::Quaterniond>
+    : detail::MappedPortType<Eigen::Quaterniond, geometry_msgs::Quaternion, detail::QuaternionConversion> {};
+
+template <>
+struct PortType<Eigen::Isometry3d>
+    : detail::MappedPortType<Eigen::Isometry3d, geometry_msgs::Pose, detail::IsometryConversion> {};
+
+/// Any other fixed-size matrix. Written to the wire by hand, since filling a
+/// MultiArray message would allocate.
+template <typename Scalar, int Rows, int Cols, int Options, int MaxRows, int MaxCols>
+struct PortType<Eigen::Matrix<Scalar, Rows, Cols, Options, MaxRows, MaxCols>,
+                std::enable_if_t<(Rows > 0 && Cols > 0 &&
+                                  !(std::is_same_v<Scalar, double> && Rows == 3 && Cols == 1))>> {
+    using T = Eigen::Matrix<Scalar, Rows, Cols, Options, MaxRows, MaxCols>;
+    using Message = typename detail::MultiArray<Scalar>::Message;
+    static constexpr bool kFixedSize = true;
+
+    static const char* name() {
+        static const std::string text = std::string("Eigen::Matrix<") + detail::MultiArray<Scalar>::scalar +
+                                        "," + std::to_string(Rows) + "," + std::to_string(Cols) + ">";
+        return text.c_str();
+    }
+    static const char* md5() { return PortType<Message>::md5(); }
+    static const char* rosType() { return PortType<Message>::name(); }
+    static const char* rosMd5() { return PortType<Message>::md5(); }
+    static const char* rosDefinition() { return PortType<Message>::rosDefinition(); }
+
+    static std::uint32_t length(const T&) {
+        // dim count, two dims of (label length, label, size, stride), offset, data count, data
+        return 4 + 2 * (4 + kLabelLength + 4 + 4) + 4 + 4 + sizeof(Scalar) * Rows * Cols;
+    }
+    static void serialize(const T& value, std::uint8_t* to, std::uint32_t size) {
+        ros::serialization::OStream stream(to, size);
+        stream.next(std::uint32_t{2});
+        dimension(stream, "rows", Rows, Rows * Cols);
+        dimension(stream, "cols", Cols, Cols);
+        stream.next(std::uint32_t{0});
+        stream.next(static_cast<std::uint32_t>(Rows * Cols));
+        for (int row = 0; row < Rows; ++row) {
+            for (int col = 0; col < Cols; ++col) stream.next(value(row, col));
+        }
+    }
+    static void deserialize(T& value, const std::uint8_t* from, std::uint32_t size) {
+        Message message;
+        PortType<Message>::deserialize(message, from, size);
+        const std::size_t offset = message.layout.data_offset;
+        if (message.data.size() < offset || message.data.size() - offset != Rows * Cols) {
+            throw std::length_error("matrix of another size");
+        }
+        for (int row = 0; row < Rows; ++row) {
+            for (int col = 0; col < Cols; ++col) {
+                value(row, col) = message.data[offset + static_cast<std::size_t>(row * Cols + col)];
+            }
+        }
+    }
+    static std::string print(const T& value) {
+        std::ostringstream text;
+        text << value.format(Eigen::IOFormat(Eigen::StreamPrecision, Eigen::DontAlignCols, ", ", "; ", "", "", "[", "]"));
+        return text.str();
+    }
+
+   private:
+    static constexpr std::uint32_t kLabelLength = 4;  // "rows", "cols"
+
+    static void dimension(ros::serialization::OStream& stream, const char* label, int size, int stride) {
+        stream.next(kLabelLength);
+        std::memcpy(stream.advance(kLabelLength), label, kLabelLength);
+        stream.next(static_cast<std::uint32_t>(size));
+        stream.next(static_cast<std::uint32_t>(stride));
+    }
+};
+
+}  // namespace rtcf

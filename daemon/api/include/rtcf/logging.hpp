@@ -1,0 +1,197 @@
+/// @file
+/// Logging that is safe in the cycle. A call stores its arguments in a fixed
+/// record; the text is made later, outside the real-time thread. Format
+/// strings are libfmt's and checked at compile time.
+///
+///     RTCF_INFO(this, "gripper at {:.3f} m", position);
+///     RTCF_WARN_THROTTLE(this, 1.0, "{} lost packets", lost);   // at most once a second
+///     RTCF_ERROR_ONCE(this, "no reply from {}", device);
+#pragma once
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <new>
+#include <string>
+#include <string_view>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+
+#include "rtcf/realtime.hpp"
+
+namespace rtcf {
+
+/// Severity, as in ROS.
+enum class LogLevel : std::uint8_t { Debug = 1, Info = 2, Warn = 3, Error = 4, Fatal = 5 };
+
+/// Where a logging call stands in the source.
+struct LogSite {
+    LogLevel level;
+    const char* file;
+    std::uint32_t line;
+    const char* function;
+    const char* format;
+};
+
+/// Bytes that one record has for its arguments.
+constexpr std::size_t kLogPayload = 320;
+
+/// One call on its way to the log.
+struct LogRecord {
+    const LogSite* site;
+    const char* component;      ///< full name; lives until the record is consumed
+    std::int64_t time_ns;       ///< CLOCK_REALTIME at the call, ns since 1970
+    std::uint64_t iteration;    ///< of the loop at the call
+    bool realtime;              ///< called by the real-time thread
+    /// Makes the text; not real-time safe.
+    void (*render)(const LogRecord& record, std::string& text);
+    alignas(std::max_align_t) std::array<std::byte, kLogPayload> payload;
+};
+
+/// Where records go; implemented by the executor.
+class LogSink {
+   public:
+    /// A record to fill, its time, iteration and thread already noted; null if the log is
+    /// full, which is counted and reported. Real-time safe.
+    virtual LogRecord* claim() noexcept RTCF_NONBLOCKING = 0;
+    /// Hands over the record that claim() gave. Real-time safe.
+    virtual void commit(LogRecord* record) noexcept RTCF_NONBLOCKING = 0;
+
+   protected:
+    ~LogSink() = default;
+};
+
+namespace detail {
+
+/// A text argument, cut to what a record can hold.
+struct LogText {
+    static constexpr std::size_t kCapacity = 94;
+    std::uint16_t size;
+    std::array<char, kCapacity> bytes;
+
+    explicit LogText(std::string_view text) noexcept
+        : size(static_cast<std::uint16_t>(std::min(text.size(), kCapacity))) {
+        std::memcpy(bytes.data(), text.data(), size);
+    }
+    std::string_view view() const noexcept { return {bytes.data(), size}; }
+};
+
+template <typename T>
+auto logStore(const T& value) noexcept {
+    if constexpr (std::is_convertible_v<const T&, std::string_view>) {
+        return LogText(value);
+    } else if constexpr (std::is_enum_v<T>) {
+        return static_cast<std::underlying_type_t<T>>(value);
+    } else if constexpr (std::is_pointer_v<T>) {
+        return static_cast<const void*>(value);
+    } else {
+        static_assert(std::is_arithmetic_v<T>,
+                      "log arguments are numbers, enums, pointers and strings: log an object's members");
+        return value;
+    }
+}
+
+inline std::string_view logLoad(const LogText& text) noexcept { return text.view(); }
+template <typename T>
+const T& logLoad(const T& value) noexcept {
+    return value;
+}
+
+template <typename Stored>
+void renderLog(const LogRecord& record, std::string& text) {
+    const auto& stored = *std::launder(reinterpret_cast<const Stored*>(record.payload.data()));
+    std::apply(
+        [&](const auto&... values) {
+            // The loaded values must outlive the format arguments that refer to them.
+            const auto loaded = std::make_tuple(logLoad(values)...);
+            std::apply(
+                [&](const auto&... arguments) {
+                    text = fmt::vformat(record.site->format, fmt::make_format_args(arguments...));
+                },
+                loaded);
+        },
+        stored);
+}
+
+/// Fills and commits one record. Real-time safe.
+template <typename... Arguments>
+void logCall(LogSink& sink, const char* component, const LogSite& site,
+             const Arguments&... arguments) noexcept {
+    using Stored = std::tuple<decltype(logStore(arguments))...>;
+    static_assert(sizeof(Stored) <= kLogPayload, "too many log arguments for one record");
+    static_assert(std::is_trivially_destructible_v<Stored>);
+    LogRecord* record = sink.claim();
+    if (record == nullptr) return;
+    record->site = &site;
+    record->component = component;
+    record->render = &renderLog<Stored>;
+    new (record->payload.data()) Stored(logStore(arguments)...);
+    sink.commit(record);
+}
+
+/// Lets one call in `period_ns` pass, over all threads. Real-time safe.
+inline bool logThrottle(std::atomic<std::int64_t>& next_ns, std::int64_t now_ns,
+                        std::int64_t period_ns) noexcept {
+    std::int64_t due = next_ns.load(std::memory_order_relaxed);
+    return now_ns >= due && next_ns.compare_exchange_strong(due, now_ns + period_ns, std::memory_order_relaxed);
+}
+
+}  // namespace detail
+
+}  // namespace rtcf
+
+/// @name Internals of the macros below
+/// @{
+#define RTCF_LOG_IF_(self, log_level, condition, text, ...)                                       \
+    do {                                                                                          \
+        const ::rtcf::Component& rtcf_log_self = *(self);                                         \
+        if (rtcf_log_self.logs(log_level) && (condition)) {                                       \
+            static constexpr ::rtcf::LogSite rtcf_log_site{                                       \
+                log_level, __FILE__, __LINE__, RTCF_LOG_FUNCTION_, text};                         \
+            if (false) (void)fmt::formatted_size(FMT_STRING(text), ##__VA_ARGS__);                \
+            ::rtcf::detail::logCall(rtcf_log_self.logSink(), rtcf_log_self.fullName().c_str(),    \
+                                    rtcf_log_site, ##__VA_ARGS__);                                \
+        }                                                                                         \
+    } while (false)
+#define RTCF_LOG_FUNCTION_ static_cast<const char*>(__builtin_FUNCTION())
+#define RTCF_LOG_(self, log_level, text, ...) \
+    RTCF_LOG_IF_(self, log_level, true, text, ##__VA_ARGS__)
+#define RTCF_LOG_ONCE_(self, log_level, text, ...)                                           \
+    do {                                                                                     \
+        static std::atomic<bool> rtcf_log_done{false};                                       \
+        RTCF_LOG_IF_(self, log_level, !rtcf_log_done.exchange(true), text, ##__VA_ARGS__);   \
+    } while (false)
+#define RTCF_LOG_THROTTLE_(self, log_level, period_s, text, ...)                                   \
+    do {                                                                                           \
+        static std::atomic<std::int64_t> rtcf_log_next{std::numeric_limits<std::int64_t>::min()};  \
+        RTCF_LOG_IF_(self, log_level,                                                              \
+                     ::rtcf::detail::logThrottle(rtcf_log_next, (self)->time(),                    \
+                                                 static_cast<std::int64_t>((period_s)*1e9)),       \
+                     text, ##__VA_ARGS__);                                                         \
+    } while (false)
+/// @}
+
+/// @name Logging, usable in every hook; real-time safe
+/// `self` is the component, usually `this`; throttled by loop time.
+/// @{
+#define RTCF_DEBUG(self, ...) RTCF_LOG_(self, ::rtcf::LogLevel::Debug, __VA_ARGS__)
+#define RTCF_INFO(self, ...) RTCF_LOG_(self, ::rtcf::LogLevel::Info, __VA_ARGS__)
+#define RTCF_WARN(self, ...) RTCF_LOG_(self, ::rtcf::LogLevel::Warn, __VA_ARGS__)
+#define RTCF_ERROR(self, ...) RTCF_LOG_(self, ::rtcf::LogLevel::Error, __VA_ARGS__)
+#define RTCF_FATAL(self, ...) RTCF_LOG_(self, ::rtcf::LogLevel::Fatal, __VA_ARGS__)
+#define RTCF_DEBUG_ONCE(self, ...) RTCF_LOG_ONCE_(self, ::rtcf::LogLevel::Debug, __VA_ARGS__)
+#define RTCF_INFO_ONCE(self, ...) RTCF_LOG_ONCE_(self, ::rtcf::LogLevel::Info, __VA_ARGS__)
+#define RTCF_WARN_ONCE(self, ...) RTCF_LOG_ONCE_(self, ::rtcf::LogLevel::Warn, __VA_ARGS__)
+#define RTCF_ERROR_ONCE(self, ...) RTCF_LOG_ONCE_(self, ::rtcf::LogLevel::Error, __VA_ARGS__)
+#define RTCF_DEBUG_THROTTLE(self, s, ...) RTCF_LOG_THROTTLE_(self, ::rtcf::LogLevel::Debug, s, __VA_ARGS__)
+#define RTCF_INFO_THROTTLE(self, s, ...) RTCF_LOG_THROTTLE_(self, ::rtcf::LogLevel::Info, s, __VA_ARGS__)
+#define RTCF_WARN_THROTTLE(self, s, ...) RTCF_LOG_THROTTLE_(self, ::rtcf::LogLevel::Warn, s, __VA_ARGS__)
+#define RTCF_ERROR_THROTTLE(self, s, ...) RTCF_LOG_THROTTLE_(self, ::rtcf::LogLevel::Error, s, __VA_ARGS__)
+/// @}

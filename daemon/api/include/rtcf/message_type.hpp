@@ -1,0 +1,92 @@
+/// @file
+/// ROS messages as port types, any message, by roscpp's own traits.
+#pragma once
+
+#include <ros/message_operations.h>
+#include <ros/message_traits.h>
+#include <ros/serialization.h>
+
+#include <sstream>
+
+#include "rtcf/port_type.hpp"
+
+namespace rtcf {
+
+namespace detail {
+
+/// ROS prints a message over several lines; a port's value is shown on one.
+inline std::string joinLines(const std::string& lines) {
+    std::string joined;
+    for (const char c : lines) {
+        if (c != '\n') {
+            joined += c;
+        } else if (!joined.empty() && joined.back() != ' ') {
+            joined += ' ';
+        }
+    }
+    while (!joined.empty() && joined.back() == ' ') joined.pop_back();
+    return joined;
+}
+
+}  // namespace detail
+
+template <typename T>
+struct PortType<T, std::enable_if_t<ros::message_traits::IsMessage<T>::value>> {
+    static constexpr bool kFixedSize = ros::message_traits::IsFixedSize<T>::value;
+    static const char* name() { return ros::message_traits::datatype<T>(); }
+    static const char* md5() { return ros::message_traits::md5sum<T>(); }
+    static const char* rosType() { return name(); }
+    static const char* rosMd5() { return md5(); }
+    static const char* rosDefinition() { return ros::message_traits::definition<T>(); }
+    static std::uint32_t length(const T& value) { return ros::serialization::serializationLength(value); }
+    static void serialize(const T& value, std::uint8_t* to, std::uint32_t size) {
+        ros::serialization::OStream stream(to, size);
+        ros::serialization::serialize(stream, value);
+    }
+    static void deserialize(T& value, const std::uint8_t* from, std::uint32_t size) {
+        // roscpp's stream takes a mutable pointer although it only reads.
+        ros::serialization::IStream stream(const_cast<std::uint8_t*>(from), size);
+        ros::serialization::deserialize(stream, value);
+    }
+    static std::string print(const T& value) {
+        std::ostringstream text;
+        ros::message_operations::Printer<T>::stream(text, "", value);
+        return detail::joinLines(text.str());
+    }
+};
+
+namespace detail {
+
+/// A port type that travels as the ROS message `Message`. `Conversion` has
+/// `name()`, `toMessage(const T&, Message&)` and `fromMessage(const Message&, T&)`.
+template <typename T, typename Message, typename Conversion>
+struct MappedPortType {
+    using Wire = PortType<Message>;
+    static constexpr bool kFixedSize = true;
+    static const char* name() { return Conversion::name(); }
+    static const char* md5() { return Wire::md5(); }
+    static const char* rosType() { return Wire::rosType(); }
+    static const char* rosMd5() { return Wire::rosMd5(); }
+    static const char* rosDefinition() { return Wire::rosDefinition(); }
+    static std::uint32_t length(const T& value) { return Wire::length(message(value)); }
+    static void serialize(const T& value, std::uint8_t* to, std::uint32_t size) {
+        Wire::serialize(message(value), to, size);
+    }
+    static void deserialize(T& value, const std::uint8_t* from, std::uint32_t size) {
+        Message wire;
+        Wire::deserialize(wire, from, size);
+        Conversion::fromMessage(wire, value);
+    }
+    static std::string print(const T& value) { return Wire::print(message(value)); }
+
+   private:
+    static Message message(const T& value) {
+        Message wire;
+        Conversion::toMessage(value, wire);
+        return wire;
+    }
+};
+
+}  // namespace detail
+
+}  // namespace rtcf

@@ -1,0 +1,178 @@
+/// @file
+/// Ports: how components exchange values. Declare them as members; they
+/// register themselves with their component. Inside a runner a connection is a
+/// pointer to the writer's value.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "rtcf/arithmetic_type.hpp"
+#include "rtcf/message_type.hpp"
+#include "rtcf/port_type.hpp"
+#include "rtcf/realtime.hpp"
+#include "rtcf/slot.hpp"
+
+namespace rtcf {
+
+class Component;
+
+/// What a read found. Ordered, so that `status >= DataStatus::Old` means "there is a value".
+enum class DataStatus {
+    None,  ///< never written
+    Old,   ///< nothing new since this input's last read
+    New,   ///< written since this input's last read
+};
+
+/// What the executor handles of any input.
+class InputBase {
+   public:
+    InputBase(Component* owner, std::string name, const TypeInfo& type, const SlotHeader& empty);
+    InputBase(const InputBase&) = delete;
+    InputBase& operator=(const InputBase&) = delete;
+
+    const std::string& name() const noexcept { return name_; }
+    const TypeInfo& type() const noexcept { return type_; }
+
+    /// True if an output or a ROS topic feeds this input. Real-time safe.
+    bool connected() const noexcept RTCF_NONBLOCKING { return connected_; }
+    /// Loop time since the current value was written, ns; -1 without a value. Real-time safe.
+    std::int64_t age() const noexcept RTCF_NONBLOCKING;
+    /// Writes of its source that this input has read so far. Real-time safe.
+    std::uint64_t seen() const noexcept RTCF_NONBLOCKING { return seen_; }
+
+    /// @name For the executor, at a cycle boundary
+    /// @{
+    /// Reads from `source` on. A new writer's value counts once it writes; until then the present
+    /// value stays as old data. `continued`: the same writer's values by another slot.
+    void rewire(const SlotHeader* source, bool continued) noexcept RTCF_NONBLOCKING {
+        if (continued || (current_->sequence == 0 && seen_ == 0)) {
+            current_ = source;
+        } else {
+            seen_ = source->sequence;
+        }
+        source_ = source;
+        connected_ = true;
+    }
+    /// Has no writer any more; the present value stays.
+    void disconnect() noexcept RTCF_NONBLOCKING { connected_ = false; }
+    /// A value from outside the loop has arrived in `source`; the slot of the last one is given back.
+    void inject(const SlotHeader* source) noexcept RTCF_NONBLOCKING {
+        source_ = source;
+        current_ = source;
+    }
+    /// The slot whose value the component has, or would get by read().
+    const SlotHeader& newest() const noexcept { return source_->sequence != seen_ ? *source_ : *current_; }
+    /// The slot whose value the component has.
+    const SlotHeader* current() const noexcept RTCF_NONBLOCKING { return current_; }
+    /// @}
+
+   protected:
+    ~InputBase() = default;
+
+    DataStatus readStatus() noexcept RTCF_NONBLOCKING {
+        if (source_->sequence != seen_) {
+            seen_ = source_->sequence;
+            current_ = source_;
+            return DataStatus::New;
+        }
+        return current_->sequence != 0 ? DataStatus::Old : DataStatus::None;
+    }
+   private:
+    const SlotHeader* source_;    // where the writer writes
+    const SlotHeader* current_;   // where the component's value is
+    std::uint64_t seen_ = 0;      // the source's sequence at the last read
+    bool connected_ = false;
+    Component* owner_;
+    std::string name_;
+    const TypeInfo& type_;
+};
+
+/// An input port carrying values of type T.
+template <typename T>
+class Input final : public InputBase {
+   public:
+    /// @param owner the component, `this`
+    /// @param name  ROS base name, unique among the component's ports
+    Input(Component* owner, std::string name) : InputBase(owner, std::move(name), typeInfo<T>(), empty()) {}
+
+    /// Takes note of the newest value, which value() then gives. Real-time safe.
+    DataStatus read() noexcept RTCF_NONBLOCKING { return readStatus(); }
+
+    /// As read(), and copies the value if there is a new one, or any with `copy_old`.
+    /// Real-time safe for types whose assignment is.
+    DataStatus read(T& copy, bool copy_old = true) {
+        const DataStatus status = readStatus();
+        if (status == DataStatus::New || (copy_old && status == DataStatus::Old)) copy = value();
+        return status;
+    }
+
+    /// The value of the last read(); default-constructed before there was one. Real-time safe.
+    const T& value() const noexcept RTCF_NONBLOCKING {
+        return static_cast<const Slot<T>*>(current())->value;
+    }
+
+   private:
+    static const SlotHeader& empty() {
+        static const Slot<T> slot{};
+        return slot;
+    }
+};
+
+/// What the executor handles of any output.
+class OutputBase {
+   public:
+    OutputBase(Component* owner, std::string name, std::string unit, const TypeInfo& type);
+    OutputBase(const OutputBase&) = delete;
+    OutputBase& operator=(const OutputBase&) = delete;
+
+    const std::string& name() const noexcept { return name_; }
+    const std::string& unit() const noexcept { return unit_; }
+    const TypeInfo& type() const noexcept { return type_; }
+    /// The slot that this output writes; inputs may keep it alive beyond the component.
+    const std::shared_ptr<SlotHeader>& slot() const noexcept { return slot_; }
+
+   protected:
+    ~OutputBase() = default;
+
+    void stampWrite() noexcept RTCF_NONBLOCKING;
+
+    SlotHeader* raw_;  // slot_'s object, one load less in the cycle
+
+   private:
+    Component* owner_;
+    std::shared_ptr<SlotHeader> slot_;
+    std::string name_;
+    std::string unit_;
+    const TypeInfo& type_;
+};
+
+/// An output port carrying values of type T.
+template <typename T>
+class Output final : public OutputBase {
+   public:
+    /// @param owner the component, `this`
+    /// @param name  ROS base name, unique among the component's ports
+    /// @param unit  what a value means, for people
+    Output(Component* owner, std::string name, std::string unit = {})
+        : OutputBase(owner, std::move(name), std::move(unit), typeInfo<T>()) {}
+
+    /// Writes a value. Real-time safe for types whose assignment is; for messages
+    /// of variable size once reserve() has been given the largest one.
+    void write(const T& value) noexcept(std::is_nothrow_copy_assignable_v<T>) {
+        static_cast<Slot<T>*>(raw_)->value = value;
+        stampWrite();
+    }
+
+    /// The value in place, to be changed and then published. Real-time safe.
+    T& value() noexcept RTCF_NONBLOCKING { return static_cast<Slot<T>*>(raw_)->value; }
+    /// Makes what value() gave a new value. Real-time safe.
+    void publish() noexcept RTCF_NONBLOCKING { stampWrite(); }
+
+    /// Takes the capacity of `sample`, so that later values up to its size are
+    /// written without allocation. For constructor and configure(); not real-time safe.
+    void reserve(const T& sample) { static_cast<Slot<T>*>(raw_)->value = sample; }
+};
+
+}  // namespace rtcf

@@ -1,0 +1,133 @@
+/// @file
+/// What the executor knows of a port's type: its identity, and the functions
+/// that handle its values without knowing the type. One TypeInfo exists per
+/// type and component library.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "rtcf/slot.hpp"
+
+namespace rtcf {
+
+/// Type-erased description of a port's type. All functions take slots of this
+/// very type.
+struct TypeInfo {
+    /// @name Identity: two ports can be connected if all four are equal.
+    /// @{
+    const char* name;  ///< e.g. "std_msgs/Float64", "double"
+    const char* md5;   ///< of the ROS definition; of the mapped message for other types
+    std::size_t size;
+    std::size_t alignment;
+    /// @}
+
+    /// @name The ROS message that carries such values
+    /// @{
+    const char* ros_type;
+    const char* ros_md5;
+    const char* ros_definition;
+    /// @}
+
+    bool fixed_size;  ///< every value has the same serialised length, and copying never allocates
+
+    /// A new slot, with a copy of the sample's value if there is one. Not real-time safe.
+    std::shared_ptr<SlotHeader> (*make_slot)(const SlotHeader* sample);
+    /// Copies value and header. Real-time safe for fixed-size types, and for
+    /// others as long as the target's capacity suffices.
+    void (*copy)(SlotHeader& to, const SlotHeader& from);
+    /// Serialised length in bytes. Real-time safe.
+    std::uint32_t (*length)(const SlotHeader& slot);
+    /// Writes length() bytes. Real-time safe.
+    void (*serialize)(const SlotHeader& slot, std::uint8_t* to, std::uint32_t size);
+    /// Reads a message into the slot's value; false if the bytes are not one. Not real-time safe.
+    bool (*deserialize)(SlotHeader& slot, const std::uint8_t* from, std::uint32_t size);
+    /// The value as text of one line. Not real-time safe.
+    std::string (*print)(const SlotHeader& slot);
+};
+
+/// True if values of the two types may share a connection.
+bool sameType(const TypeInfo& a, const TypeInfo& b) noexcept;
+
+/// How a type becomes a port's type; specialised in message_type.hpp,
+/// arithmetic_type.hpp and eigen_type.hpp. A specialisation has
+///  - `static const char* name()`, `md5()`, `rosType()`, `rosMd5()`, `rosDefinition()`
+///  - `static constexpr bool kFixedSize`
+///  - `static std::uint32_t length(const T&)`
+///  - `static void serialize(const T&, std::uint8_t*, std::uint32_t)`
+///  - `static void deserialize(T&, const std::uint8_t*, std::uint32_t)`, which throws on bad bytes
+///  - `static std::string print(const T&)`
+template <typename T, typename Enable = void>
+struct PortType;
+
+namespace detail {
+
+template <typename T>
+std::shared_ptr<SlotHeader> makeSlot(const SlotHeader* sample) {
+    auto slot = std::make_shared<Slot<T>>();
+    if (sample != nullptr) slot->value = static_cast<const Slot<T>*>(sample)->value;
+    return slot;
+}
+
+template <typename T>
+void copySlot(SlotHeader& to, const SlotHeader& from) {
+    static_cast<Slot<T>&>(to).value = static_cast<const Slot<T>&>(from).value;
+    to = from;
+}
+
+template <typename T>
+std::uint32_t slotLength(const SlotHeader& slot) {
+    return PortType<T>::length(static_cast<const Slot<T>&>(slot).value);
+}
+
+template <typename T>
+void serializeSlot(const SlotHeader& slot, std::uint8_t* to, std::uint32_t size) {
+    PortType<T>::serialize(static_cast<const Slot<T>&>(slot).value, to, size);
+}
+
+template <typename T>
+bool deserializeSlot(SlotHeader& slot, const std::uint8_t* from, std::uint32_t size) {
+    try {
+        PortType<T>::deserialize(static_cast<Slot<T>&>(slot).value, from, size);
+        return true;
+    } catch (...) {
+        return false;
+    }
+}
+
+template <typename T>
+std::string printSlot(const SlotHeader& slot) {
+    return PortType<T>::print(static_cast<const Slot<T>&>(slot).value);
+}
+
+}  // namespace detail
+
+/// The description of T. Not real-time safe on the first call.
+template <typename T>
+const TypeInfo& typeInfo() {
+    static const TypeInfo info{PortType<T>::name(),
+                               PortType<T>::md5(),
+                               sizeof(T),
+                               alignof(T),
+                               PortType<T>::rosType(),
+                               PortType<T>::rosMd5(),
+                               PortType<T>::rosDefinition(),
+                               PortType<T>::kFixedSize,
+                               &detail::makeSlot<T>,
+                               &detail::copySlot<T>,
+                               &detail::slotLength<T>,
+                               &detail::serializeSlot<T>,
+                               &detail::deserializeSlot<T>,
+                               &detail::printSlot<T>};
+    return info;
+}
+
+inline bool sameType(const TypeInfo& a, const TypeInfo& b) noexcept {
+    // Libraries have TypeInfo objects of their own, so identity is by content.
+    return &a == &b || (a.size == b.size && a.alignment == b.alignment &&
+                        std::string_view(a.name) == b.name && std::string_view(a.md5) == b.md5);
+}
+
+}  // namespace rtcf

@@ -1,0 +1,68 @@
+/// @file
+/// How a library offers its component types. `RTCF_COMPONENT(Pid, "…")`, once
+/// per type in any source file, is all that is needed.
+#pragma once
+
+#include <cstdint>
+
+#include "rtcf/version.hpp"
+
+namespace rtcf {
+
+class Component;
+
+/// One component type of a library; static, in a list.
+struct ComponentRecord {
+    const char* type;       ///< e.g. "Pid"
+    const char* doc;        ///< one line
+    Component* (*create)(); ///< a new component; the caller owns it
+    const ComponentRecord* next;
+};
+
+/// What a library's entry point gives. Its first two members never change.
+struct PluginDescriptor {
+    std::uint32_t abi_version;  ///< RTCF_ABI_VERSION of the headers it was built with
+    std::uint32_t size;         ///< of this struct
+    const char* version;        ///< release of the headers it was built with
+    const ComponentRecord* components;
+};
+
+/// The entry point that the executor looks up in a library.
+#define RTCF_ENTRY_POINT rtcf_plugin_descriptor
+#define RTCF_ENTRY_POINT_NAME "rtcf_plugin_descriptor"
+
+namespace detail {
+
+/// The list of this library's types. Hidden, so that each library has its own.
+__attribute__((visibility("hidden"))) inline const ComponentRecord* component_records = nullptr;
+
+struct __attribute__((visibility("hidden"))) Registration {
+    explicit Registration(ComponentRecord& record) {
+        record.next = component_records;
+        component_records = &record;
+    }
+};
+
+}  // namespace detail
+
+}  // namespace rtcf
+
+// Weak, as every source file with a component has one; they are all the same.
+extern "C" __attribute__((weak, visibility("default"))) const rtcf::PluginDescriptor* RTCF_ENTRY_POINT() {
+    static rtcf::PluginDescriptor descriptor{RTCF_ABI_VERSION, sizeof(rtcf::PluginDescriptor), RTCF_VERSION, nullptr};
+    descriptor.components = rtcf::detail::component_records;
+    return &descriptor;
+}
+
+/// Registers a component class, in the global namespace or by its qualified
+/// name with RTCF_COMPONENT_NAMED.
+#define RTCF_COMPONENT(CLASS, DOC) RTCF_COMPONENT_NAMED(CLASS, #CLASS, DOC, CLASS)
+
+/// As RTCF_COMPONENT for a class in a namespace: `RTCF_COMPONENT_NAMED(arm::Pid, "Pid", "…", ArmPid)`;
+/// TAG is any identifier unique in the source file.
+#define RTCF_COMPONENT_NAMED(CLASS, NAME, DOC, TAG)                                        \
+    namespace {                                                                            \
+    ::rtcf::ComponentRecord rtcf_record_##TAG{                                             \
+        NAME, DOC, []() -> ::rtcf::Component* { return new CLASS(); }, nullptr};           \
+    const ::rtcf::detail::Registration rtcf_registration_##TAG{rtcf_record_##TAG};         \
+    }

@@ -1,0 +1,34 @@
+/// @file
+/// The place where a port's value lives. The output's component writes it in
+/// the real-time thread; inputs read it there by pointer, without a copy. The
+/// graph keeps a slot alive as long as any input refers to it.
+#pragma once
+
+#include <cstdint>
+
+namespace rtcf {
+
+/// When a value was written. Plain data: only the real-time thread touches it
+/// while the loop runs.
+struct SlotHeader {
+    std::uint64_t sequence = 0;   ///< writes so far; 0 = never written
+    std::uint64_t iteration = 0;  ///< the loop's iteration at the last write
+    std::int64_t time_ns = 0;     ///< the loop's time at the last write, ns
+};
+
+/// A value with its bookkeeping.
+template <typename T>
+struct Slot final : SlotHeader {
+    T value{};
+};
+
+/// The loop's time base as components see it. Written by the executor at the
+/// beginning of each cycle.
+struct LoopClock {
+    std::uint64_t iteration = 0;         ///< cycles since the loop started, from 0
+    std::int64_t time_ns = 0;            ///< monotonic loop time, ns; simulated under sim time
+    std::int64_t stamp_ns = 0;           ///< ROS time for message headers, ns since 1970
+    std::int64_t period_ns = 1'000'000;  ///< nominal period of the loop, ns
+};
+
+}  // namespace rtcf
