@@ -1,0 +1,67 @@
+/// @file
+/// An injector brings values into the loop: one thread deserialises a message
+/// into the free slot of a triple buffer, the real-time thread takes the newest
+/// at the next cycle boundary. Neither ever waits; only the newest value counts.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "rtcf/port.hpp"
+#include "rtcf/port_type.hpp"
+#include "rtcf/realtime.hpp"
+
+namespace rtcf::executor {
+
+/// Triple buffer of one connection's values from outside.
+class Injector {
+   public:
+    /// @param topic mapped name of the connection
+    /// @param type  of all inputs that read it
+    Injector(std::string topic, const TypeInfo& type);
+
+    const std::string& topic() const noexcept { return topic_; }
+    const TypeInfo& type() const noexcept { return type_; }
+
+    /// Takes one serialised message. One thread at a time; not real-time safe.
+    /// @return false if the bytes are not a message of this type; nothing has changed then
+    bool deliver(const std::uint8_t* bytes, std::uint32_t size);
+
+    /// Messages delivered and refused so far. Any thread.
+    std::uint64_t delivered() const noexcept { return delivered_.load(std::memory_order_relaxed); }
+    std::uint64_t refused() const noexcept { return refused_.load(std::memory_order_relaxed); }
+
+    /// The slot that inputs read. Loop side only.
+    const SlotHeader* front() const noexcept { return slots_[front_].get(); }
+
+    /// Makes the newest delivered value the front, stamped with `clock`. Loop side only; real-time safe.
+    /// @return true if there was a new one; the inputs are then to be told by InputBase::inject()
+    bool adopt(const LoopClock& clock) noexcept RTCF_NONBLOCKING {
+        if ((middle_.load(std::memory_order_relaxed) & kFresh) == 0) return false;
+        front_ = middle_.exchange(front_, std::memory_order_acq_rel) & ~kFresh;
+        SlotHeader& slot = *slots_[front_];
+        slot.sequence = ++sequence_;
+        slot.iteration = clock.iteration;
+        slot.time_ns = clock.time_ns;
+        return true;
+    }
+
+   private:
+    static constexpr std::uint32_t kFresh = 4;  // set in middle_ by deliver(), beside an index 0 to 2
+
+    std::string topic_;
+    const TypeInfo& type_;
+    std::array<std::shared_ptr<SlotHeader>, 3> slots_;
+    std::uint32_t front_ = 0;                // loop side
+    std::uint64_t sequence_ = 0;             // loop side
+    std::atomic<std::uint32_t> middle_{1};
+    std::uint32_t back_ = 2;                 // delivering side
+    std::atomic<std::uint64_t> delivered_{0};
+    std::atomic<std::uint64_t> refused_{0};
+};
+
+}  // namespace rtcf::executor

@@ -1,0 +1,45 @@
+#include "bridge/tap.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace rtcf::executor {
+
+Tap::Tap(std::string topic, const TypeInfo& type, std::shared_ptr<const SlotHeader> source, std::size_t capacity)
+    : topic_(std::move(topic)), type_(type), source_(std::move(source)), last_sequence_(0) {
+    // Of a value of its own: the loop may be writing the source's.
+    const std::size_t one = kAlign + padded(type_.length(*type_.make_slot(nullptr)));
+    ring_.resize(padded(std::max(capacity, 2 * one)));
+}
+
+std::uint32_t Tap::lengthAt(std::size_t offset) const noexcept {
+    std::uint32_t length = 0;
+    std::memcpy(&length, ring_.data() + offset, sizeof length);
+    return length;
+}
+
+void Tap::push() noexcept RTCF_NONBLOCKING {
+    if (source_->sequence == last_sequence_) return;
+    last_sequence_ = source_->sequence;
+    const std::uint32_t length = type_.length(*source_);
+    const std::size_t record = kAlign + padded(length);
+    std::size_t head = head_.load(std::memory_order_relaxed);
+    const std::size_t free = ring_.size() - (head - tail_.load(std::memory_order_acquire));
+    std::size_t offset = head % ring_.size();
+    const std::size_t to_end = ring_.size() - offset;
+    const std::size_t skipped = record > to_end ? to_end : 0;
+    if (record + skipped > free) {
+        dropped_.store(dropped_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+        return;
+    }
+    if (skipped != 0) {
+        std::memcpy(ring_.data() + offset, &kSkip, sizeof kSkip);
+        head += skipped;
+        offset = 0;
+    }
+    std::memcpy(ring_.data() + offset, &length, sizeof length);
+    type_.serialize(*source_, ring_.data() + offset + kAlign, length);
+    head_.store(head + record, std::memory_order_release);
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,77 @@
+/// @file
+/// A tap copies an output's values out of the loop: the real-time thread
+/// serialises each new value into a byte ring, one other thread takes them
+/// out. A value that does not fit is dropped and counted, never waited for.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "rtcf/port_type.hpp"
+#include "rtcf/realtime.hpp"
+
+namespace rtcf::executor {
+
+/// Single-producer single-consumer ring of serialised values of one output.
+class Tap {
+   public:
+    /// @param topic    mapped name of the connection
+    /// @param type     of the output
+    /// @param source   the output's slot, kept alive by the tap
+    /// @param capacity bytes of the ring; at least one value of fixed-size types always fits
+    Tap(std::string topic, const TypeInfo& type, std::shared_ptr<const SlotHeader> source, std::size_t capacity);
+
+    const std::string& topic() const noexcept { return topic_; }
+    const TypeInfo& type() const noexcept { return type_; }
+    const SlotHeader* source() const noexcept { return source_.get(); }
+
+    /// Copies the source's value if it was written since the last call. Producer only; real-time safe.
+    void push() noexcept RTCF_NONBLOCKING;
+
+    /// Gives the oldest message's bytes to `use(const std::uint8_t*, std::uint32_t)` and removes it.
+    /// Consumer only; the bytes are valid during the call. @return false if the ring is empty
+    template <typename Use>
+    bool pop(Use&& use);
+
+    /// Values lost because the ring was full or the value larger than it. Any thread.
+    std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
+
+   private:
+    // A record is a length and its bytes, padded to kAlign. kSkip: the rest of the ring is empty.
+    static constexpr std::size_t kAlign = 8;
+    static constexpr std::uint32_t kSkip = 0xffffffffU;
+
+    static constexpr std::size_t padded(std::size_t bytes) { return (bytes + kAlign - 1) / kAlign * kAlign; }
+    std::uint32_t lengthAt(std::size_t offset) const noexcept;
+
+    std::string topic_;
+    const TypeInfo& type_;
+    std::shared_ptr<const SlotHeader> source_;
+    std::uint64_t last_sequence_ = 0;
+    std::vector<std::uint8_t> ring_;
+    std::atomic<std::size_t> head_{0};  // bytes ever written, by the producer
+    std::atomic<std::size_t> tail_{0};  // bytes ever read, by the consumer
+    std::atomic<std::uint64_t> dropped_{0};
+};
+
+template <typename Use>
+bool Tap::pop(Use&& use) {
+    std::size_t tail = tail_.load(std::memory_order_relaxed);
+    const std::size_t head = head_.load(std::memory_order_acquire);
+    if (tail == head) return false;
+    std::size_t offset = tail % ring_.size();
+    std::uint32_t length = lengthAt(offset);
+    if (length == kSkip) {
+        tail += ring_.size() - offset;
+        offset = 0;
+        length = lengthAt(0);
+    }
+    use(static_cast<const std::uint8_t*>(ring_.data() + offset + kAlign), length);
+    tail_.store(tail + kAlign + padded(length), std::memory_order_release);
+    return true;
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,31 @@
+/// @file
+/// All that defines one component of a graph: what a person wrote, checked.
+#pragma once
+
+#include <cstdint>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "graph/names.hpp"
+#include "rtcf/parameter.hpp"
+
+namespace rtcf::executor {
+
+struct ComponentDefinition {
+    std::string name;       ///< base name
+    std::string ns = "/";   ///< canonical namespace
+    std::string package;
+    std::string type;
+    Remaps remaps;
+    std::vector<std::pair<std::string, ParameterValue>> parameters;  ///< load-time values
+    bool first = false;     ///< all connections into it are loop breaks
+    std::string ignore;     ///< regular expression of connections that are loop breaks for it
+    std::set<std::string> breaks;  ///< inputs whose connection is a loop break
+    std::uint32_t every = 1;       ///< runs each n-th cycle
+
+    std::string fullName() const { return joinName(ns, name); }
+};
+
+}  // namespace rtcf::executor

@@ -1,0 +1,47 @@
+/// @file
+/// The graph of a runner as a value: which components there are and where
+/// their loops are broken. A change makes a new graph; the old one stays as it
+/// is until the loop has adopted the new one. Graph thread only.
+#pragma once
+
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "graph/instance.hpp"
+
+namespace rtcf::executor {
+
+struct GraphNode {
+    std::shared_ptr<Instance> instance;
+    std::set<std::string> breaks;  ///< inputs whose connection is a loop break, set at load or since
+};
+
+class Graph {
+   public:
+    const std::vector<GraphNode>& nodes() const noexcept { return nodes_; }
+
+    /// @param full_name with namespace. @return null if there is none
+    const GraphNode* find(const std::string& full_name) const noexcept;
+    /// @throws Refusal that lists what there is
+    const GraphNode& get(const std::string& full_name) const;
+
+    /// @name Changes; each throws Refusal and changes nothing
+    /// @{
+    void add(GraphNode node);                     ///< the name must be free
+    void remove(const std::string& full_name);
+    void replace(const std::string& full_name, GraphNode node);
+    void setBreak(const std::string& full_name, const std::string& port, bool broken);
+    /// @}
+
+    /// Refuses a name that is taken. For before a component is constructed.
+    void requireFree(const std::string& full_name) const;
+
+   private:
+    std::size_t indexOf(const std::string& full_name) const;
+
+    std::vector<GraphNode> nodes_;
+};
+
+}  // namespace rtcf::executor

@@ -1,0 +1,183 @@
+#include "graph/instance.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <exception>
+
+#include "refusal.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+const ComponentRecord& findRecord(const Library& library, const ComponentDefinition& definition) {
+    if (const ComponentRecord* record = library.find(definition.type)) return *record;
+    std::string names;
+    for (const ComponentRecord* record : library.types()) names += (names.empty() ? "" : ", ") + std::string(record->type);
+    throw Refusal(RefusalKind::NotFound, fmt::format("{} has no component type {}; it has {}", library.path(),
+                                                     definition.type, names.empty() ? "none" : names));
+}
+
+std::string parameterNames(const Component& component) {
+    std::string names;
+    for (const ParameterBase* parameter : component.parameters()) {
+        names += (names.empty() ? "" : ", ") + parameter->declaration().name;
+    }
+    return names.empty() ? "none" : names;
+}
+
+}  // namespace
+
+Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library> library, const std::string& runner,
+                   const LoopClock& clock, LogSink& log)
+    : definition_(std::move(definition)),
+      library_(std::move(library)),
+      record_(&findRecord(*library_, definition_)),
+      ignore_("ignore of " + definition_.fullName(), definition_.ignore),
+      log_(log) {
+    context_.full_name = definition_.fullName();
+    context_.name = definition_.name;
+    context_.ns = definition_.ns;
+    context_.runner = runner;
+    context_.clock = &clock;
+    context_.period_ns = clock.period_ns;
+    context_.elapsed_ns = clock.period_ns;
+    context_.log = &log;
+    callHook("constructor", [this] {
+        component_.reset(record_->create());
+        return true;
+    });
+    component_->attach(context_);
+    for (const ParameterBase* parameter : component_->parameters()) {
+        parameter_values_.push_back(parameter->declaration().default_value);
+    }
+    for (ParameterBase* parameter : stageParameters(definition_.parameters)) parameter->commit();
+}
+
+Instance::~Instance() {
+    stop();
+    cleanup();
+}
+
+// A failing hook's own words, or its exception's, in one line.
+void Instance::callHook(const char* hook, const std::function<bool()>& call) {
+    std::string why;
+    try {
+        if (call()) return;
+        why = component_->failure().empty() ? "it returned false and did not say why" : component_->failure();
+    } catch (const Refusal&) {
+        throw;
+    } catch (const std::exception& error) {
+        why = fmt::format("it threw: {}", error.what());
+    } catch (...) {
+        why = "it threw an exception of unknown type";
+    }
+    throw Refusal(RefusalKind::FailedPrecondition,
+                  fmt::format("{} ({}/{}): {} failed: {}", context_.full_name, definition_.package, definition_.type,
+                              hook, why));
+}
+
+void Instance::configure() {
+    if (configured_) return;
+    // cleanup() undoes what a configure() that fails has begun.
+    configured_ = true;
+    try {
+        callHook("configure", [this] { return component_->configure(); });
+    } catch (const Refusal&) {
+        cleanup();
+        throw;
+    }
+    component_->freeze();
+    const auto mapped = [this](const std::string& port) {
+        return mappedName(port, definition_.ns, context_.full_name, definition_.remaps);
+    };
+    for (const InputBase* input : component_->inputs()) input_names_.push_back(mapped(input->name()));
+    for (const OutputBase* output : component_->outputs()) {
+        output_names_.push_back(mapped(output->name()));
+        samples_.push_back(output->type().make_slot(output->slot().get()));
+    }
+    for (const std::string& port : definition_.breaks) {
+        if (findInput(port) != nullptr) continue;
+        throw Refusal(RefusalKind::NotFound, fmt::format("{} has no input {} to break", context_.full_name, port));
+    }
+}
+
+void Instance::start() {
+    if (started_) return;
+    callHook("start", [this] { return component_->start(); });
+    started_ = true;
+}
+
+void Instance::stop() noexcept {
+    if (!started_) return;
+    started_ = false;
+    try {
+        component_->stop();
+    } catch (...) {
+        // There is nobody left to refuse to: the component is on its way out.
+        if (component_->logs(LogLevel::Error)) RTCF_ERROR(component_.get(), "stop() threw an exception");
+    }
+}
+
+void Instance::cleanup() noexcept {
+    if (!configured_) return;
+    configured_ = false;
+    try {
+        component_->cleanup();
+    } catch (...) {
+        if (component_->logs(LogLevel::Error)) RTCF_ERROR(component_.get(), "cleanup() threw an exception");
+    }
+}
+
+std::vector<std::string> Instance::uselessRemaps() const {
+    std::vector<std::string> useless;
+    for (const auto& [from, to] : definition_.remaps) {
+        const std::string resolved = resolveName(from, definition_.ns, context_.full_name);
+        const auto is_port = [&](const auto* port) {
+            return resolveName(port->name(), definition_.ns, context_.full_name) == resolved;
+        };
+        const auto& inputs = component_->inputs();
+        const auto& outputs = component_->outputs();
+        if (std::none_of(inputs.begin(), inputs.end(), is_port) && std::none_of(outputs.begin(), outputs.end(), is_port)) {
+            useless.push_back(from + ":=" + to);
+        }
+    }
+    return useless;
+}
+
+InputBase* Instance::findInput(const std::string& port) const noexcept {
+    for (InputBase* input : component_->inputs()) {
+        if (input->name() == port) return input;
+    }
+    return nullptr;
+}
+
+std::vector<ParameterBase*> Instance::stageParameters(
+    const std::vector<std::pair<std::string, ParameterValue>>& batch) {
+    const auto& declared = component_->parameters();
+    std::vector<std::pair<std::size_t, ParameterValue>> checked;
+    for (const auto& [name, given] : batch) {
+        const auto found = std::find_if(declared.begin(), declared.end(), [&name = name](const ParameterBase* parameter) {
+            return parameter->declaration().name == name;
+        });
+        if (found == declared.end()) {
+            throw Refusal(RefusalKind::NotFound, fmt::format("{} has no parameter {}; it has {}", context_.full_name,
+                                                             name, parameterNames(*component_)));
+        }
+        ParameterValue value = given;
+        if (const std::string why = (*found)->check(value); !why.empty()) {
+            throw Refusal(RefusalKind::InvalidArgument, fmt::format("{}: {}", context_.full_name, why));
+        }
+        checked.emplace_back(found - declared.begin(), std::move(value));
+    }
+    std::vector<ParameterBase*> staged;
+    for (auto& [index, value] : checked) {
+        declared[index]->stage(value);
+        parameter_values_[index] = std::move(value);
+        if (std::find(staged.begin(), staged.end(), declared[index]) == staged.end()) staged.push_back(declared[index]);
+    }
+    return staged;
+}
+
+}  // namespace rtcf::executor

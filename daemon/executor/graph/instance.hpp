@@ -1,0 +1,89 @@
+/// @file
+/// One loaded component: the object, its names, its lifecycle. Owned by the
+/// graphs it is in; all calls come from the graph thread. Hooks may throw and
+/// fail: what comes out is a Refusal that names component and hook.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "graph/definition.hpp"
+#include "graph/name_pattern.hpp"
+#include "loop/schedule.hpp"
+#include "plugins/library.hpp"
+#include "rtcf/component.hpp"
+
+namespace rtcf::executor {
+
+class Instance {
+   public:
+    /// Constructs the component and checks and sets its load-time parameters.
+    /// @throws Refusal and leaves nothing behind
+    Instance(ComponentDefinition definition, std::shared_ptr<const Library> library, const std::string& runner,
+             const LoopClock& clock, LogSink& log);
+    /// Stops and cleans up what still is started and configured.
+    ~Instance();
+    Instance(const Instance&) = delete;
+    Instance& operator=(const Instance&) = delete;
+
+    /// @name Lifecycle; idempotent
+    /// @{
+    void configure();  ///< then freezes the ports. @throws Refusal, after cleanup()
+    void start();      ///< @throws Refusal
+    void stop() noexcept;
+    void cleanup() noexcept;
+    /// @}
+
+    const ComponentDefinition& definition() const noexcept { return definition_; }
+    const std::string& fullName() const noexcept { return context_.full_name; }
+    const Library& library() const noexcept { return *library_; }
+    const ComponentRecord& record() const noexcept { return *record_; }
+    const NamePattern& ignore() const noexcept { return ignore_; }
+    Component& component() const noexcept { return *component_; }
+    ComponentContext& context() noexcept { return context_; }
+    const std::shared_ptr<ComponentFigures>& figures() const noexcept { return figures_; }
+
+    /// Mapped names, in the order of the component's inputs() and outputs(); after configure().
+    const std::vector<std::string>& inputNames() const noexcept { return input_names_; }
+    const std::vector<std::string>& outputNames() const noexcept { return output_names_; }
+    /// A slot with the capacity that configure() gave the output, for copies of it.
+    const SlotHeader* sample(std::size_t output) const noexcept { return samples_[output].get(); }
+    /// Remaps that name no port of it; after configure().
+    std::vector<std::string> uselessRemaps() const;
+    InputBase* findInput(const std::string& port) const noexcept;
+
+    /// The parameters' values as last staged, in the order of declaration.
+    const std::vector<ParameterValue>& parameterValues() const noexcept { return parameter_values_; }
+    /// Takes back a batch that the loop did not adopt.
+    void restoreParameterValues(std::vector<ParameterValue> values) { parameter_values_ = std::move(values); }
+    /// Checks a batch and stages it. @return the parameters to commit at the boundary
+    /// @throws Refusal naming the first bad one; nothing is staged then
+    std::vector<ParameterBase*> stageParameters(const std::vector<std::pair<std::string, ParameterValue>>& batch);
+
+    /// What it threw out of update(); empty = nothing.
+    const std::string& faultText() const noexcept { return fault_; }
+    void setFault(std::string text) { fault_ = std::move(text); }
+
+   private:
+    void callHook(const char* hook, const std::function<bool()>& call);
+
+    ComponentDefinition definition_;
+    std::shared_ptr<const Library> library_;
+    const ComponentRecord* record_;
+    NamePattern ignore_;
+    LogSink& log_;
+    ComponentContext context_;
+    std::unique_ptr<Component> component_;
+    std::vector<ParameterValue> parameter_values_;
+    std::vector<std::string> input_names_;
+    std::vector<std::string> output_names_;
+    std::vector<std::shared_ptr<SlotHeader>> samples_;
+    std::shared_ptr<ComponentFigures> figures_ = std::make_shared<ComponentFigures>();
+    bool configured_ = false;
+    bool started_ = false;
+    std::string fault_;
+};
+
+}  // namespace rtcf::executor

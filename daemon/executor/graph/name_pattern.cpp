@@ -1,0 +1,44 @@
+#include "graph/name_pattern.hpp"
+
+#include <fmt/format.h>
+
+#include "refusal.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+const char* reason(std::regex_constants::error_type code) {
+    using namespace std::regex_constants;
+    if (code == error_badrepeat) return "a repeat (*, +, ?) has nothing before it; 'any text' is .*";
+    if (code == error_brack) return "a [ is not closed";
+    if (code == error_paren) return "a ( is not closed, or a ) not opened";
+    if (code == error_brace || code == error_badbrace) return "a { } is not complete";
+    if (code == error_escape) return "a \\ stands before what cannot be escaped";
+    if (code == error_range) return "a range in [ ] is the wrong way round";
+    if (code == error_complexity || code == error_stack || code == error_space) return "it is too complex";
+    return "it is not an ECMAScript expression";
+}
+
+}  // namespace
+
+NamePattern::NamePattern(const std::string& what, const std::string& expression) {
+    if (expression.empty()) return;
+    try {
+        regex_.emplace(expression, std::regex::ECMAScript | std::regex::optimize);
+    } catch (const std::regex_error& error) {
+        throw Refusal(RefusalKind::InvalidArgument,
+                      fmt::format("{}: bad regular expression '{}': {}", what, expression, reason(error.code())));
+    }
+}
+
+bool NamePattern::matches(const std::string& name) const {
+    try {
+        return regex_ && std::regex_match(name, *regex_);
+    } catch (const std::regex_error& error) {
+        throw Refusal(RefusalKind::InvalidArgument,
+                      fmt::format("a regular expression takes too long on '{}': {}", name, reason(error.code())));
+    }
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,174 @@
+#include "graph/plan.hpp"
+
+#include <algorithm>
+
+namespace rtcf::executor {
+
+namespace {
+
+// A tap holds what is written in half a second: its reader is a thread that
+// has to share the machine with everything else.
+constexpr double kTapSeconds = 0.5;
+constexpr std::size_t kVariableTapBytes = 256 * 1024;
+
+std::size_t tapCapacity(const TypeInfo& type, double frequency_hz) {
+    if (!type.fixed_size) return kVariableTapBytes;
+    const std::size_t record = 16 + type.length(*type.make_slot(nullptr));
+    return record * static_cast<std::size_t>(std::clamp(frequency_hz * kTapSeconds, 64.0, 16384.0));
+}
+
+class Builder {
+   public:
+    Builder(Plan& plan, const Plan& previous, double frequency_hz, Adoption& adoption)
+        : plan_(plan), previous_(previous), frequency_hz_(frequency_hz), adoption_(adoption) {}
+
+    void build() {
+        plan_.schedule.generation = previous_.schedule.generation + 1;
+        positions_.resize(plan_.graph.nodes().size());
+        for (std::size_t i = 0; i < plan_.wiring.order.size(); ++i) positions_[plan_.wiring.order[i]] = i;
+        for (const auto& [name, connection] : plan_.wiring.connections) addConnection(name, connection);
+        addSteps();
+        adoption_.schedule = &plan_.schedule;
+    }
+
+   private:
+    void addConnection(const std::string& name, const ConnectionPlan& connection) {
+        if (connection.published) addTap(name, connection);
+        if (connection.writer) {
+            for (const Reader& reader : connection.readers) bindToWriter(connection, reader);
+        } else if (connection.subscribed) {
+            addFeed(name, connection);
+        } else {
+            for (const Reader& reader : connection.readers) unbind(reader.input);
+        }
+    }
+
+    void addTap(const std::string& name, const ConnectionPlan& connection) {
+        const OutputBase& output = *connection.writer->output;
+        std::shared_ptr<Tap> tap;
+        if (const auto found = previous_.taps.find(name);
+            found != previous_.taps.end() && found->second->source() == output.slot().get()) {
+            tap = found->second;
+        } else {
+            tap = std::make_shared<Tap>(name, output.type(), output.slot(), tapCapacity(output.type(), frequency_hz_));
+        }
+        plan_.schedule.taps.push_back(tap.get());
+        plan_.taps.emplace(name, std::move(tap));
+    }
+
+    void addFeed(const std::string& name, const ConnectionPlan& connection) {
+        std::shared_ptr<Injector> injector;
+        if (const auto found = previous_.injectors.find(name);
+            found != previous_.injectors.end() && sameType(found->second->type(), *connection.type)) {
+            injector = found->second;
+        } else {
+            injector = std::make_shared<Injector>(name, *connection.type);
+        }
+        Feed feed{injector.get(), {}};
+        for (const Reader& reader : connection.readers) {
+            feed.readers.push_back(reader.input);
+            Binding binding = present(reader.input);
+            if (binding.writer != injector.get()) {
+                adoption_.rewires.push_back({reader.input, nullptr, injector.get(), false});
+                binding.writer = injector.get();
+                binding.source = nullptr;
+                binding.source_owner = injector;
+            }
+            plan_.bindings.emplace(reader.input, std::move(binding));
+        }
+        plan_.schedule.feeds.push_back(std::move(feed));
+        plan_.injectors.emplace(name, std::move(injector));
+    }
+
+    void bindToWriter(const ConnectionPlan& connection, const Reader& reader) {
+        const std::shared_ptr<SlotHeader>& slot = connection.writer->output->slot();
+        // A loop break means the previous cycle, also where the writer runs earlier in this one.
+        const bool latched = reader.broken && positions_[connection.writer->node] <= positions_[reader.node];
+        const std::shared_ptr<SlotHeader> source = latched ? latchOf(*connection.writer, slot) : slot;
+        Binding binding = present(reader.input);
+        if (binding.writer != slot.get() || binding.source != source.get()) {
+            adoption_.rewires.push_back({reader.input, source.get(), nullptr, binding.writer == slot.get()});
+            binding.writer = slot.get();
+            binding.source = source.get();
+            binding.source_owner = source;
+        }
+        plan_.bindings.emplace(reader.input, std::move(binding));
+    }
+
+    std::shared_ptr<SlotHeader> latchOf(const Writer& writer, const std::shared_ptr<SlotHeader>& slot) {
+        std::shared_ptr<SlotHeader>& latch = plan_.latches[slot.get()];
+        if (!latch) {
+            const TypeInfo& type = writer.output->type();
+            const auto found = previous_.latches.find(slot.get());
+            const bool is_new = found == previous_.latches.end();
+            latch = is_new ? type.make_slot(plan_.graph.nodes()[writer.node].instance->sample(writer.port))
+                           : found->second;
+            plan_.schedule.latches.push_back({&type, latch.get(), slot.get()});
+            if (is_new) adoption_.new_latches.push_back(plan_.schedule.latches.back());
+        }
+        return latch;
+    }
+
+    void unbind(InputBase* input) {
+        Binding binding = present(input);
+        if (binding.source_owner == nullptr) return;  // never had a writer
+        if (binding.writer != nullptr) adoption_.rewires.push_back({input, nullptr, nullptr, false});
+        binding.writer = nullptr;
+        plan_.bindings.emplace(input, std::move(binding));
+    }
+
+    Binding present(const InputBase* input) const {
+        const auto found = previous_.bindings.find(input);
+        return found == previous_.bindings.end() ? Binding{} : found->second;
+    }
+
+    void addSteps() {
+        for (const std::size_t index : plan_.wiring.order) {
+            Instance& instance = *plan_.graph.nodes()[index].instance;
+            plan_.schedule.steps.push_back({&instance.component(), &instance.context(), instance.figures().get()});
+        }
+    }
+
+    Plan& plan_;
+    const Plan& previous_;
+    double frequency_hz_;
+    Adoption& adoption_;
+    std::vector<std::size_t> positions_;  // in the order, by node
+};
+
+}  // namespace
+
+void Plan::noteKept(const Adoption& adoption, const Plan& previous) {
+    for (const Rewire& rewire : adoption.rewires) {
+        const auto found = bindings.find(rewire.input);
+        if (found == bindings.end()) continue;
+        Binding& binding = found->second;
+        const auto before = previous.bindings.find(rewire.input);
+        const bool nothing_kept = rewire.continued || before == previous.bindings.end() || rewire.kept == binding.source;
+        if (nothing_kept) {
+            binding.kept = nullptr;
+            binding.kept_owner = nullptr;
+        } else if (rewire.kept != before->second.kept) {
+            binding.kept = rewire.kept;
+            binding.kept_owner = before->second.source_owner;
+        }
+    }
+}
+
+BridgeTable Plan::bridgeTable() const {
+    BridgeTable table;
+    for (const auto& [name, tap] : taps) table.outputs.push_back(tap);
+    for (const auto& [name, injector] : injectors) table.inputs.push_back(injector);
+    return table;
+}
+
+std::unique_ptr<Plan> buildPlan(Graph graph, Wiring wiring, const Plan& previous, double frequency_hz,
+                                Adoption& adoption) {
+    auto plan = std::make_unique<Plan>();
+    plan->graph = std::move(graph);
+    plan->wiring = std::move(wiring);
+    Builder(*plan, previous, frequency_hz, adoption).build();
+    return plan;
+}
+
+}  // namespace rtcf::executor

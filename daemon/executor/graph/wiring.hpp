@@ -1,0 +1,57 @@
+/// @file
+/// From names to connections and an order: who writes what, who reads it, what
+/// leaves the loop for ROS. Pure function of a graph; graph thread only.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "graph/graph.hpp"
+#include "graph/name_pattern.hpp"
+
+namespace rtcf::executor {
+
+/// Which connections become topics.
+struct MappingFilter {
+    NamePattern whitelist;
+    NamePattern blacklist;
+    bool matches(const std::string& name) const { return whitelist.matches(name) && !blacklist.matches(name); }
+};
+
+/// An input within a graph.
+struct Reader {
+    std::size_t node;   ///< index into Graph::nodes()
+    InputBase* input;
+    bool broken;        ///< its connection is a loop break
+};
+
+/// An output within a graph.
+struct Writer {
+    std::size_t node;
+    std::size_t port;    ///< index into the component's outputs()
+    OutputBase* output;
+};
+
+/// All ports of one mapped name.
+struct ConnectionPlan {
+    const TypeInfo* type = nullptr;
+    std::optional<Writer> writer;
+    std::vector<Reader> readers;
+    bool published = false;   ///< to ROS
+    bool subscribed = false;  ///< from ROS
+};
+
+struct Wiring {
+    std::map<std::string, ConnectionPlan> connections;  ///< by mapped name
+    std::vector<std::size_t> order;                     ///< node indices in order of execution
+};
+
+/// Connects and orders a graph. @param loading full name of a component that is not part of the
+/// running graph yet, for the advice how to break a loop; may be empty
+/// @throws Refusal for two types or two writers of one name, and for a loop
+Wiring wire(const Graph& graph, const MappingFilter& filter, const std::string& loading);
+
+}  // namespace rtcf::executor

@@ -1,0 +1,97 @@
+#include "logging/log.hpp"
+
+#include <fmt/format.h>
+
+#include <ctime>
+#include <exception>
+
+namespace rtcf::executor {
+
+namespace {
+
+thread_local bool on_realtime_thread = false;
+
+std::int64_t wallClockNow() noexcept {
+    timespec now{};
+    clock_gettime(CLOCK_REALTIME, &now);
+    return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
+
+}  // namespace
+
+void Log::setRealtimeThread(bool realtime) noexcept { on_realtime_thread = realtime; }
+
+LogRecord* Log::claim() noexcept RTCF_NONBLOCKING {
+    if (!on_realtime_thread) others_mutex_.lock();
+    LogRecord* record = (on_realtime_thread ? realtime_ : others_).claim();
+    if (record == nullptr) {
+        if (!on_realtime_thread) others_mutex_.unlock();
+        return nullptr;
+    }
+    record->time_ns = wallClockNow();
+    record->iteration = iteration_ != nullptr ? iteration_->load(std::memory_order_relaxed) : 0;
+    record->realtime = on_realtime_thread;
+    return record;
+}
+
+void Log::commit(LogRecord* /*record*/) noexcept RTCF_NONBLOCKING {
+    if (on_realtime_thread) {
+        realtime_.commit();
+    } else {
+        others_.commit();
+        others_mutex_.unlock();
+    }
+}
+
+void Log::write(LogLevel level, const std::string& component, std::string message) {
+    LogEntry entry;
+    entry.level = level;
+    entry.time_ns = wallClockNow();
+    entry.iteration = iteration_ != nullptr ? iteration_->load(std::memory_order_relaxed) : 0;
+    entry.component = component;
+    entry.message = std::move(message);
+    const std::lock_guard<std::mutex> lock(drain_mutex_);
+    consumer_(std::move(entry));
+}
+
+void Log::drain() {
+    const std::lock_guard<std::mutex> lock(drain_mutex_);
+    drainRing(others_);
+    drainRing(realtime_);
+    reportDrops();
+}
+
+void Log::drainRing(Ring& ring) {
+    while (const LogRecord* record = ring.front()) {
+        LogEntry entry;
+        entry.level = record->site->level;
+        entry.time_ns = record->time_ns;
+        entry.iteration = record->iteration;
+        entry.component = record->component;
+        entry.file = record->site->file;
+        entry.line = record->site->line;
+        entry.function = record->site->function;
+        entry.realtime = record->realtime;
+        try {
+            record->render(*record, entry.message);
+        } catch (const std::exception& error) {
+            entry.message = fmt::format("{} (cannot be formatted: {})", record->site->format, error.what());
+        }
+        ring.pop();
+        consumer_(std::move(entry));
+    }
+}
+
+void Log::reportDrops() {
+    const std::uint64_t now = dropped();
+    if (now == reported_drops_) return;
+    LogEntry entry;
+    entry.level = LogLevel::Warn;
+    entry.time_ns = wallClockNow();
+    entry.message = fmt::format("{} log records were lost: components log more than can be written",
+                                now - reported_drops_);
+    reported_drops_ = now;
+    consumer_(std::move(entry));
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,73 @@
+/// @file
+/// The executor's log: the sink that components' macros write to, and the
+/// executor's own records. The real-time thread has a ring of its own; all
+/// other threads share another behind a lock. drain() makes texts of what has
+/// come and hands them on.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <string>
+
+#include "rtcf/logging.hpp"
+#include "spsc_ring.hpp"
+
+namespace rtcf::executor {
+
+/// A record as text.
+struct LogEntry {
+    LogLevel level = LogLevel::Info;
+    std::int64_t time_ns = 0;  ///< CLOCK_REALTIME, ns since 1970
+    std::uint64_t iteration = 0;
+    std::string component;     ///< full name; empty = the executor
+    std::string message;
+    std::string file;
+    std::uint32_t line = 0;
+    std::string function;
+    bool realtime = false;
+};
+
+class Log final : public LogSink {
+   public:
+    using Consumer = std::function<void(LogEntry&&)>;
+
+    /// @param consumer gets every record, in drain()
+    explicit Log(Consumer consumer) : consumer_(std::move(consumer)) {}
+
+    LogRecord* claim() noexcept RTCF_NONBLOCKING override;
+    void commit(LogRecord* record) noexcept RTCF_NONBLOCKING override;
+
+    /// A record of the executor's own. Not real-time safe.
+    void write(LogLevel level, const std::string& component, std::string message);
+
+    /// Hands all pending records to the consumer, oldest first in each ring. Any
+    /// thread that is not real-time. Called before a component goes away, as
+    /// records refer to its name and library.
+    void drain();
+
+    /// Records lost in full rings.
+    std::uint64_t dropped() const noexcept { return realtime_.dropped() + others_.dropped(); }
+
+    /// Marks the calling thread as the one real-time thread (or not any more).
+    /// @param iteration the loop's counter, read at each claim of any thread
+    static void setRealtimeThread(bool realtime) noexcept;
+    void setIteration(const std::atomic<std::uint64_t>* iteration) noexcept { iteration_ = iteration; }
+
+   private:
+    static constexpr std::size_t kCapacity = 1024;
+    using Ring = SpscRing<LogRecord, kCapacity>;
+
+    void drainRing(Ring& ring);
+    void reportDrops();
+
+    Consumer consumer_;
+    Ring realtime_;
+    Ring others_;
+    std::mutex others_mutex_;   // held from claim() to commit() by threads that are not real-time
+    std::mutex drain_mutex_;
+    std::uint64_t reported_drops_ = 0;
+    const std::atomic<std::uint64_t>* iteration_ = nullptr;
+};
+
+}  // namespace rtcf::executor

@@ -1,0 +1,61 @@
+/// @file
+/// The processor's own clock: one instruction to read, no system call. Used
+/// for all durations inside a cycle; its ticks are scaled to ns by a factor
+/// measured against CLOCK_MONOTONIC.
+#pragma once
+
+#include <cstdint>
+#if defined(__x86_64__)
+#include <x86intrin.h>
+#endif
+#include <ctime>
+
+#include "rtcf/realtime.hpp"
+
+namespace rtcf::executor {
+
+/// CLOCK_MONOTONIC in ns; read in user space (vdso). Real-time safe.
+inline std::int64_t monotonicNow() noexcept RTCF_NONBLOCKING {
+    timespec now{};
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
+
+/// Ticks of the time stamp counter, or of the generic timer on arm64. Real-time safe.
+inline std::int64_t readCycleCounter() noexcept RTCF_NONBLOCKING {
+#if defined(__x86_64__)
+    return static_cast<std::int64_t>(__rdtsc());
+#elif defined(__aarch64__)
+    std::int64_t ticks = 0;
+    asm volatile("mrs %0, cntvct_el0" : "=r"(ticks));
+    return ticks;
+#else
+    return monotonicNow();
+#endif
+}
+
+/// The counter's scale.
+class CycleCounter {
+   public:
+    /// Measures for about 20 ms. Not real-time safe.
+    static CycleCounter calibrate();
+
+    double nsPerTick() const noexcept { return ns_per_tick_; }
+    /// Real-time safe.
+    std::int64_t toNs(std::int64_t ticks) const noexcept RTCF_NONBLOCKING {
+        return static_cast<std::int64_t>((static_cast<__int128>(ticks) * multiplier_) >> kShift);
+    }
+
+    /// Real-time safe.
+    std::int64_t toTicks(std::int64_t ns) const noexcept RTCF_NONBLOCKING {
+        return static_cast<std::int64_t>((static_cast<__int128>(ns) * inverse_) >> kShift);
+    }
+
+   private:
+    static constexpr unsigned kShift = 32;
+    double ns_per_tick_ = 1.0;
+    std::int64_t multiplier_ = std::int64_t{1} << kShift;  // ns per tick, fixed point
+    std::int64_t inverse_ = std::int64_t{1} << kShift;     // ticks per ns, fixed point
+};
+
+}  // namespace rtcf::executor

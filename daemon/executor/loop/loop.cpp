@@ -1,0 +1,325 @@
+#include "loop/loop.hpp"
+
+#include <fmt/format.h>
+#include <sys/syscall.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <exception>
+
+#include "logging/log.hpp"
+#include "refusal.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::uint64_t kBucketLeak = 1000;  // cycles on time that make good one overrun
+
+std::int64_t clockNow(clockid_t clock) {
+    timespec now{};
+    clock_gettime(clock, &now);
+    return std::int64_t{now.tv_sec} * kSecond + now.tv_nsec;
+}
+
+timespec toTimespec(std::int64_t ns) { return {ns / kSecond, ns % kSecond}; }
+
+void bump(std::atomic<std::uint64_t>& counter, std::uint64_t by = 1) {
+    counter.store(counter.load(std::memory_order_relaxed) + by, std::memory_order_relaxed);
+}
+
+}  // namespace
+
+Loop::Loop(Log& log) : log_(log), counter_(CycleCounter::calibrate()), schedule_(&empty_) {
+    log_.setIteration(&figures_.iteration);
+}
+
+Loop::~Loop() {
+    requestStop();
+    join(INT64_MAX);
+    log_.setIteration(nullptr);
+}
+
+void Loop::reset(const LoopSettings& settings) {
+    clock_ = {};
+    clock_.period_ns = settings.period_ns;
+    elapsed_ns_ = settings.period_ns;
+    for (const Step& step : schedule_->steps) step.context->period_ns = settings.period_ns;
+    figures_.iteration.store(0, std::memory_order_relaxed);
+    bucket_ = 0;
+    cycles_on_time_ = 0;
+    fault_ = {};
+    stack_bytes_ = settings.realtime.stack_bytes;
+    stop_requested_.store(false, std::memory_order_release);
+}
+
+void Loop::beginStepping(const LoopSettings& settings) {
+    reset(settings);
+    stamp_offset_ns_.store(0, std::memory_order_relaxed);
+}
+
+std::uint64_t Loop::step(std::uint64_t cycles) noexcept {
+    for (std::uint64_t done = 0; done < cycles; ++done) {
+        if (stop_requested_.load(std::memory_order_acquire) || fault_.kind != LoopFault::Kind::None) return done;
+        const std::int64_t now = clock_.time_ns + (clock_.iteration == 0 ? 0 : clock_.period_ns);
+        cycle(now, now);
+    }
+    return cycles;
+}
+
+RealtimeProblems Loop::start(const LoopSettings& settings) {
+    RealtimeProblems problems;
+    retune(settings);
+    reset(settings);
+    refreshWallClock();
+    idle_guard_ = std::make_unique<IdleStateGuard>();
+    if (!idle_guard_->problem().empty()) problems.push_back({idle_guard_->problem(), false});
+
+    running_.store(true, std::memory_order_release);
+    joinable_.store(true, std::memory_order_release);
+    const RealtimeAttributes attributes(settings.realtime);
+    if (const int error = pthread_create(&thread_, attributes.get(), &Loop::threadMain, this); error != 0) {
+        running_.store(false, std::memory_order_release);
+        joinable_.store(false, std::memory_order_release);
+        idle_guard_.reset();
+        throw Refusal(RefusalKind::FailedPrecondition,
+                      fmt::format("no real-time thread: {} (CPU {}, priority {})", std::strerror(error),
+                                  chooseCpu(settings.realtime), settings.realtime.priority));
+    }
+    return problems;
+}
+
+bool Loop::join(std::int64_t timeout_ns) {
+    if (!joinable()) return true;
+    int error = 0;
+    if (timeout_ns == INT64_MAX) {
+        error = pthread_join(thread_, nullptr);
+    } else {
+        const timespec until = toTimespec(clockNow(CLOCK_MONOTONIC) + timeout_ns);
+        error = pthread_clockjoin_np(thread_, nullptr, CLOCK_MONOTONIC, &until);
+    }
+    if (error != 0) return false;
+    joinable_.store(false, std::memory_order_release);
+    idle_guard_.reset();
+    thread_id_.store(0, std::memory_order_relaxed);
+    // A change that came too late for the last cycle is made here.
+    takeAdoption();
+    return true;
+}
+
+bool Loop::adopt(Adoption& adoption, std::int64_t timeout_ns) {
+    pending_.store(&adoption, std::memory_order_release);
+    const std::int64_t until = clockNow(CLOCK_MONOTONIC) + timeout_ns;
+    while (pending_.load(std::memory_order_acquire) != nullptr) {
+        if (!running()) {
+            if (!join(timeout_ns)) break;
+            takeAdoption();
+            return true;
+        }
+        if (clockNow(CLOCK_MONOTONIC) > until) break;
+        const timespec pause{0, 100'000};
+        nanosleep(&pause, nullptr);
+    }
+    Adoption* expected = &adoption;
+    if (pending_.compare_exchange_strong(expected, nullptr, std::memory_order_acq_rel)) return false;
+    // The loop has got to it after all: it is done in a moment.
+    while (pending_.load(std::memory_order_acquire) != nullptr) sched_yield();
+    return true;
+}
+
+void Loop::adoptInjections() {
+    if (!joinable()) feed();
+}
+
+RealtimeProblems Loop::retune(const LoopSettings& settings) {
+    spin_ns_.store(settings.spin_ns, std::memory_order_relaxed);
+    overrun_policy_.store(settings.overrun, std::memory_order_relaxed);
+    max_overruns_.store(settings.max_overruns, std::memory_order_relaxed);
+    return joinable() ? applyToThread(thread_, settings.realtime) : RealtimeProblems{};
+}
+
+void Loop::refreshWallClock() noexcept {
+    stamp_offset_ns_.store(clockNow(CLOCK_REALTIME) - clockNow(CLOCK_MONOTONIC), std::memory_order_relaxed);
+}
+
+bool Loop::popRecord(CycleRecord& record) {
+    const CycleRecord* front = records_.front();
+    if (front == nullptr) return false;
+    record = *front;
+    records_.pop();
+    return true;
+}
+
+void* Loop::threadMain(void* self) {
+    static_cast<Loop*>(self)->run();
+    return nullptr;
+}
+
+void Loop::run() noexcept {
+    Log::setRealtimeThread(true);
+    pthread_setname_np(pthread_self(), "rtcf-loop");
+    thread_id_.store(static_cast<int>(syscall(SYS_gettid)), std::memory_order_relaxed);
+    prefaultStack(stack_bytes_);
+    std::int64_t deadline = clockNow(CLOCK_MONOTONIC) + clock_.period_ns;
+    while (!stop_requested_.load(std::memory_order_acquire) && fault_.kind == LoopFault::Kind::None) {
+        const std::int64_t wake = waitFor(deadline);
+        const std::int64_t begin = readCycleCounter();
+        cycle(deadline, wake);
+        deadline = nextDeadline(deadline, wake + counter_.toNs(readCycleCounter() - begin));
+    }
+    makeSafe();
+    running_.store(false, std::memory_order_release);
+}
+
+std::int64_t Loop::waitFor(std::int64_t deadline_ns) noexcept {
+    const std::int64_t spin = spin_ns_.load(std::memory_order_relaxed);
+    const timespec until = toTimespec(deadline_ns - spin);
+    // Absolute, so that a preemption before the call does not add up (clock_nanosleep(2)).
+    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
+    }
+    std::int64_t now = monotonicNow();
+    while (now < deadline_ns) now = monotonicNow();
+    return now;
+}
+
+void Loop::cycle(std::int64_t deadline_ns, std::int64_t wake_ns) noexcept RTCF_NONBLOCKING {
+    const std::int64_t begin = readCycleCounter();
+    takeProbe();
+    if (pending_.load(std::memory_order_relaxed) != nullptr) takeAdoption();
+    const Schedule& schedule = *schedule_;
+    clock_.time_ns = deadline_ns;
+    clock_.stamp_ns = deadline_ns + stamp_offset_ns_.load(std::memory_order_relaxed);
+    feed();
+    for (const Latch& latch : schedule.latches) latch.copy();
+    const std::int64_t limit = begin + counter_.toTicks(deadline_ns + clock_.period_ns - wake_ns);
+    const bool complete = update(schedule, begin, limit);
+    if (complete) {
+        for (Tap* tap : schedule.taps) tap->push();
+    }
+    const std::int64_t duration = readCycleCounter() - begin;
+    figures_.duration.add(duration);
+    figures_.latency.add(wake_ns - deadline_ns);
+    if (CycleRecord* record = records_.claim()) {
+        *record = {clock_.iteration, clock_.stamp_ns, wake_ns - deadline_ns, counter_.toNs(duration)};
+        records_.commit();
+    }
+    ++clock_.iteration;
+    figures_.iteration.store(clock_.iteration, std::memory_order_relaxed);
+}
+
+// The one frame that catches: a component may throw, the loop may not.
+bool Loop::update(const Schedule& schedule, std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept {
+    std::int64_t before = begin_ticks;
+    std::uint32_t index = 0;
+    try {
+        for (const Step& step : schedule.steps) {
+            step_.store(index++, std::memory_order_relaxed);
+            step.context->elapsed_ns = elapsed_ns_;
+            step.component->update();
+            const std::int64_t after = readCycleCounter();
+            step.figures->duration.add(after - before);
+            if (after > limit_ticks) {  // this one was running when the next cycle should have begun
+                bump(step.figures->overruns);
+                limit_ticks = INT64_MAX;
+            }
+            before = after;
+        }
+        return true;
+    } catch (const std::exception& error) {
+        noteFault(LoopFault::Kind::Exception, schedule.steps[index - 1].component, error.what());
+    } catch (...) {
+        noteFault(LoopFault::Kind::Exception, schedule.steps[index - 1].component, "an exception of unknown type");
+    }
+    return false;
+}
+
+void Loop::noteFault(LoopFault::Kind kind, const Component* component, const char* text) noexcept {
+    fault_.kind = kind;
+    fault_.component = component;
+    fault_.iteration = clock_.iteration;
+    std::strncpy(fault_.text.data(), text, fault_.text.size() - 1);
+}
+
+void Loop::takeAdoption() noexcept RTCF_NONBLOCKING {
+    Adoption* adoption = pending_.load(std::memory_order_acquire);
+    if (adoption == nullptr) return;
+    // Claimed before it is applied, so that the graph thread cannot take it back meanwhile.
+    if (!pending_.compare_exchange_strong(adoption, &claimed_, std::memory_order_acq_rel)) return;
+    adoption->apply();
+    if (adoption->schedule != nullptr) schedule_ = adoption->schedule;
+    if (adoption->period_ns != 0) {
+        clock_.period_ns = adoption->period_ns;
+        elapsed_ns_ = adoption->period_ns;
+    }
+    for (const Step& step : schedule_->steps) step.context->period_ns = clock_.period_ns;
+    pending_.store(nullptr, std::memory_order_release);
+}
+
+bool Loop::probe(Probe& probe, std::int64_t timeout_ns) {
+    if (!joinable()) {
+        probe.take(clock_);
+        return true;
+    }
+    probe_.store(&probe, std::memory_order_release);
+    const std::int64_t until = clockNow(CLOCK_MONOTONIC) + timeout_ns;
+    while (probe_.load(std::memory_order_acquire) != nullptr && running() && clockNow(CLOCK_MONOTONIC) < until) {
+        const timespec pause{0, 100'000};
+        nanosleep(&pause, nullptr);
+    }
+    Probe* expected = &probe;
+    if (probe_.compare_exchange_strong(expected, nullptr, std::memory_order_acq_rel)) return false;
+    while (probe_.load(std::memory_order_acquire) != nullptr) sched_yield();
+    return true;
+}
+
+void Loop::takeProbe() noexcept RTCF_NONBLOCKING {
+    Probe* probe = probe_.load(std::memory_order_relaxed);
+    if (probe == nullptr || probe == &claimed_probe_) return;
+    if (!probe_.compare_exchange_strong(probe, &claimed_probe_, std::memory_order_acq_rel)) return;
+    probe->take(clock_);
+    probe_.store(nullptr, std::memory_order_release);
+}
+
+void Loop::feed() noexcept RTCF_NONBLOCKING {
+    for (const Feed& feed : schedule_->feeds) {
+        if (!feed.injector->adopt(clock_)) continue;
+        for (InputBase* input : feed.readers) input->inject(feed.injector->front());
+    }
+}
+
+std::int64_t Loop::nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) noexcept RTCF_NONBLOCKING {
+    const std::int64_t period = clock_.period_ns;
+    const std::int64_t next = deadline_ns + period;
+    elapsed_ns_ = period;
+    if (end_ns < next) {
+        if (bucket_ > 0 && ++cycles_on_time_ % kBucketLeak == 0) --bucket_;
+        return next;
+    }
+    bump(figures_.overruns);
+    const std::uint32_t limit = max_overruns_.load(std::memory_order_relaxed);
+    if (limit != 0 && ++bucket_ > limit && fault_.kind == LoopFault::Kind::None) {
+        noteFault(LoopFault::Kind::Overruns, nullptr, "too many overruns");
+    }
+    switch (overrun_policy_.load(std::memory_order_relaxed)) {
+        case OverrunPolicy::CatchUp:
+            return next;
+        case OverrunPolicy::Relative:
+            return end_ns + period;
+        case OverrunPolicy::Skip:
+            break;
+    }
+    const std::int64_t dropped = (end_ns - next) / period + 1;
+    bump(figures_.missed, static_cast<std::uint64_t>(dropped));
+    elapsed_ns_ = (dropped + 1) * period;
+    return next + dropped * period;
+}
+
+void Loop::makeSafe() noexcept {
+    for (const Step& step : schedule_->steps) {
+        if (step.component != fault_.component) step.component->safe();
+    }
+}
+
+}  // namespace rtcf::executor

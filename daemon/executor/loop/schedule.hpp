@@ -1,0 +1,104 @@
+/// @file
+/// What the real-time thread executes, and what it takes over at a cycle
+/// boundary. Both are built by the graph thread; a schedule is never changed
+/// once the loop has it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "bridge/injector.hpp"
+#include "bridge/tap.hpp"
+#include "rtcf/component.hpp"
+#include "statistics/histogram.hpp"
+
+namespace rtcf::executor {
+
+/// What the loop measures of one component. Outlives the schedules it is in.
+struct ComponentFigures {
+    Histogram duration;                      ///< of update(), in ticks of the cycle counter
+    std::atomic<std::uint64_t> overruns{0};  ///< cycles that passed the next deadline during its update
+};
+
+/// One component's turn.
+struct Step {
+    Component* component;
+    ComponentContext* context;
+    ComponentFigures* figures;
+};
+
+/// A copy of an output's value, made before any component runs, for inputs that
+/// are to see the previous cycle although their writer runs earlier.
+struct Latch {
+    const TypeInfo* type;
+    SlotHeader* to;
+    const SlotHeader* from;
+
+    /// Real-time safe as TypeInfo::copy is.
+    void copy() const noexcept {
+        if (to->sequence != from->sequence) type->copy(*to, *from);
+    }
+};
+
+/// Values from outside the loop, and who reads them.
+struct Feed {
+    Injector* injector;
+    std::vector<InputBase*> readers;
+};
+
+/// The immutable list of a cycle's work. The raw pointers are kept alive by `owners`.
+struct Schedule {
+    std::uint64_t generation = 0;
+    std::vector<Feed> feeds;
+    std::vector<Latch> latches;
+    std::vector<Step> steps;
+    std::vector<Tap*> taps;
+    std::vector<std::shared_ptr<const void>> owners;
+};
+
+/// An input that reads from another place. Either `source` or `injector` is
+/// set; neither: the input keeps its value and has no writer any more.
+struct Rewire {
+    InputBase* input;
+    const SlotHeader* source;
+    const Injector* injector;
+    bool continued;                    ///< the same writer's values as before
+    const SlotHeader* kept = nullptr;  ///< filled at the boundary: where its present value stays
+
+    void apply() noexcept {
+        if (source == nullptr && injector == nullptr) {
+            input->disconnect();
+        } else {
+            input->rewire(injector != nullptr ? injector->front() : source, continued);
+        }
+        kept = input->current();
+    }
+};
+
+/// One component handing its state to its successor.
+struct HandOver {
+    Component* successor;
+    const Component* previous;
+};
+
+/// Everything that changes at one cycle boundary. Owned by the graph thread,
+/// which waits until it is applied.
+struct Adoption {
+    const Schedule* schedule = nullptr;        ///< the next one; null = stays
+    std::vector<Latch> new_latches;            ///< to be filled before inputs read them
+    std::vector<Rewire> rewires;
+    std::vector<HandOver> hand_overs;
+    std::vector<ParameterBase*> parameters;    ///< with a staged value
+    std::int64_t period_ns = 0;                ///< the loop's new period; 0 = stays
+
+    /// Makes the change. By whoever runs the cycle; real-time safe.
+    void apply() noexcept {
+        for (const Latch& latch : new_latches) latch.copy();
+        for (Rewire& rewire : rewires) rewire.apply();
+        for (ParameterBase* parameter : parameters) parameter->commit();
+        for (const HandOver& hand_over : hand_overs) hand_over.successor->takeOver(*hand_over.previous);
+    }
+};
+
+}  // namespace rtcf::executor

@@ -1,0 +1,135 @@
+// rtcf-executor: the process that runs one loop. Started by rtcfd; see
+// proto/rtcf/executor/v1/executor.proto for its socket. The only file that
+// knows the executor and ROS, and joins them.
+#include <fmt/format.h>
+#include <getopt.h>
+
+#include <atomic>
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "graph/names.hpp"
+#include "logging/log.hpp"
+#include "loop/realtime.hpp"
+#include "ros/ros_node.hpp"
+#include "rtcf/version.hpp"
+#include "runner/runner.hpp"
+#include "server/describe.hpp"
+#include "server/server.hpp"
+
+namespace {
+
+using namespace rtcf::executor;
+
+struct Options {
+    std::string runner;
+    std::string socket;
+    std::string describe;
+    std::string package;
+};
+
+constexpr const char* kUsage =
+    "usage: rtcf-executor --runner NAME --socket PATH\n"
+    "       rtcf-executor --describe LIBRARY --package PACKAGE\n"
+    "       rtcf-executor --version\n"
+    "It is started by rtcfd(8); see rtcf-executor(8).\n";
+
+constexpr int kUsageStatus = 2;
+
+// @return exit status, or -1 to go on
+int parse(int argc, char** argv, Options& options) {
+    enum Option { kRunner = 1, kSocket, kDescribe, kPackage, kVersion, kHelp };
+    const option known[] = {{"runner", required_argument, nullptr, kRunner},
+                            {"socket", required_argument, nullptr, kSocket},
+                            {"describe", required_argument, nullptr, kDescribe},
+                            {"package", required_argument, nullptr, kPackage},
+                            {"version", no_argument, nullptr, kVersion},
+                            {"help", no_argument, nullptr, kHelp},
+                            {nullptr, 0, nullptr, 0}};
+    for (int chosen = getopt_long(argc, argv, "", known, nullptr); chosen != -1;
+         chosen = getopt_long(argc, argv, "", known, nullptr)) {
+        switch (chosen) {
+            case kRunner:
+                options.runner = optarg;
+                break;
+            case kSocket:
+                options.socket = optarg;
+                break;
+            case kDescribe:
+                options.describe = optarg;
+                break;
+            case kPackage:
+                options.package = optarg;
+                break;
+            case kVersion:
+                std::puts("rtcf-executor " RTCF_VERSION);
+                return 0;
+            case kHelp:
+                std::fputs(kUsage, stdout);
+                return 0;
+            default:
+                std::fputs(kUsage, stderr);
+                return kUsageStatus;
+        }
+    }
+    const bool describes = !options.describe.empty() && !options.package.empty();
+    const bool runs = isBaseName(options.runner) && !options.socket.empty();
+    if (optind == argc && describes != runs) return -1;
+    std::fputs(kUsage, stderr);
+    return kUsageStatus;
+}
+
+// Makes texts of what components log, until the executor ends.
+class LogDrain {
+   public:
+    explicit LogDrain(Log& log) : thread_([this, &log] {
+        pthread_setname_np(pthread_self(), "rtcf-log");
+        while (!ending_.load(std::memory_order_acquire)) {
+            log.drain();
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        }
+    }) {}
+    ~LogDrain() {
+        ending_.store(true, std::memory_order_release);
+        thread_.join();
+    }
+
+   private:
+    std::atomic<bool> ending_{false};
+    std::thread thread_;
+};
+
+int run(const Options& options) {
+    prepareProcess();
+    // Takes the signals first, so that every thread made from here on has them blocked.
+    Server server(options.socket);
+    Log log([&server](LogEntry&& entry) { server.publish(entry); });
+    {
+        const LogDrain drain(log);
+        Runner runner(
+            options.runner, log, [&server](const RunnerEvent& event) { server.publish(event); },
+            std::make_unique<rtcf::ros1::RosNode>(options.runner, [&server](const std::string& message) {
+                server.publish(RunnerEvent{RunnerEvent::Kind::Ros, message, {}, 0});
+            }));
+        server.serve(runner, log);
+    }
+    log.drain();
+    server.deliver();
+    return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    Options options;
+    if (const int status = parse(argc, argv, options); status >= 0) return status;
+    try {
+        return options.describe.empty() ? run(options) : describeLibrary(options.describe, options.package);
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "rtcf-executor: %s\n", error.what());
+        return 1;
+    }
+}

@@ -1,0 +1,119 @@
+#include "plugins/library.hpp"
+
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/mman.h>
+#include <sys/sendfile.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "refusal.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+class FileDescriptor {
+   public:
+    explicit FileDescriptor(int fd) : fd_(fd) {}
+    ~FileDescriptor() {
+        if (fd_ >= 0) ::close(fd_);
+    }
+    FileDescriptor(const FileDescriptor&) = delete;
+    FileDescriptor& operator=(const FileDescriptor&) = delete;
+    int get() const noexcept { return fd_; }
+    int release() noexcept { return std::exchange(fd_, -1); }
+
+   private:
+    int fd_;
+};
+
+[[noreturn]] void refuse(const std::string& path, const std::string& why) {
+    throw Refusal(RefusalKind::FailedPrecondition, fmt::format("library {}: {}", path, why));
+}
+
+std::string systemError() { return std::strerror(errno); }
+
+// A copy of the file that nobody else can change; in memory, as /run is often mounted noexec.
+int privateCopy(const std::string& path) {
+    const FileDescriptor source(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+    if (source.get() < 0) refuse(path, systemError());
+    struct stat status {};
+    if (::fstat(source.get(), &status) != 0 || !S_ISREG(status.st_mode)) refuse(path, "not a regular file");
+    const std::string name = std::filesystem::path(path).filename();
+    FileDescriptor copy(::memfd_create(name.c_str(), MFD_CLOEXEC));
+    if (copy.get() < 0) refuse(path, "no memory for a copy: " + systemError());
+    for (off_t left = status.st_size; left > 0;) {
+        const ssize_t moved = ::sendfile(copy.get(), source.get(), nullptr, static_cast<std::size_t>(left));
+        if (moved <= 0) refuse(path, moved == 0 ? "it changed while it was read" : systemError());
+        left -= moved;
+    }
+    return copy.release();
+}
+
+void* openCopy(const std::string& path) {
+    // The descriptor stays open for the life of the process: debuggers and
+    // sanitizers find the symbols by this name, and it keeps the name unique.
+    const int copy = privateCopy(path);
+    const std::string copy_path = fmt::format("/proc/{}/fd/{}", ::getpid(), copy);
+    void* handle = ::dlopen(copy_path.c_str(), RTLD_NOW | RTLD_LOCAL);
+    if (handle == nullptr) {
+        std::string why = ::dlerror();
+        ::close(copy);
+        for (std::size_t at = why.find(copy_path); at != std::string::npos; at = why.find(copy_path)) {
+            why.replace(at, copy_path.size(), std::filesystem::path(path).filename());
+        }
+        refuse(path, "does not load: " + why + "; build it again, with what it needs linked in");
+    }
+    return handle;
+}
+
+}  // namespace
+
+Library::Library(const std::string& path) : path_(path) {
+    void* handle = openCopy(path);
+    using EntryPoint = const PluginDescriptor* (*)();
+    const auto entry = reinterpret_cast<EntryPoint>(::dlsym(handle, RTCF_ENTRY_POINT_NAME));
+    if (entry == nullptr) {
+        refuse(path, "has no components: it exports no " RTCF_ENTRY_POINT_NAME
+                     "; register them with RTCF_COMPONENT and build with rtcf_add_components()");
+    }
+    const PluginDescriptor* descriptor = entry();
+    if (descriptor->abi_version != RTCF_ABI_VERSION) {
+        refuse(path, fmt::format("was built for component ABI {}, this executor has {}: build it again with "
+                                 "librtcf-dev {}",
+                                 descriptor->abi_version, RTCF_ABI_VERSION, RTCF_VERSION));
+    }
+    for (const ComponentRecord* record = descriptor->components; record != nullptr; record = record->next) {
+        types_.push_back(record);
+    }
+    std::sort(types_.begin(), types_.end(),
+              [](const auto* a, const auto* b) { return std::strcmp(a->type, b->type) < 0; });
+}
+
+const ComponentRecord* Library::find(const std::string& type) const noexcept {
+    for (const ComponentRecord* record : types_) {
+        if (type == record->type) return record;
+    }
+    return nullptr;
+}
+
+std::shared_ptr<const Library> LibraryStore::open(const std::string& path) {
+    struct stat status {};
+    if (::stat(path.c_str(), &status) != 0) refuse(path, systemError());
+    const std::string identity = fmt::format("{} {} {} {}.{:09} {}", path, status.st_dev, status.st_ino,
+                                             status.st_mtim.tv_sec, status.st_mtim.tv_nsec, status.st_size);
+    for (const Entry& entry : entries_) {
+        if (entry.identity == identity) return entry.library;
+    }
+    entries_.push_back({identity, std::make_shared<const Library>(path)});
+    return entries_.back().library;
+}
+
+}  // namespace rtcf::executor

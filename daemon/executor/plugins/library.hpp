@@ -1,0 +1,46 @@
+/// @file
+/// A shared library of components, opened once and never closed: code that a
+/// log record, a slot or a thread may still refer to must not go away. Loaded
+/// from a private copy in memory, so that rebuilding the file cannot crash the
+/// loop and the rebuilt file loads beside the old code. Not real-time.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "rtcf/component.hpp"
+
+namespace rtcf::executor {
+
+class Library {
+   public:
+    /// Opens `path`. @throws Refusal naming the missing file or symbol, or both ABI versions
+    explicit Library(const std::string& path);
+
+    const std::string& path() const noexcept { return path_; }
+    /// The library's types, by name.
+    const std::vector<const ComponentRecord*>& types() const noexcept { return types_; }
+    /// @return null if the library has no such type
+    const ComponentRecord* find(const std::string& type) const noexcept;
+
+   private:
+    std::string path_;
+    std::vector<const ComponentRecord*> types_;
+};
+
+/// The libraries of one process: a file that has not changed is opened once.
+class LibraryStore {
+   public:
+    /// @throws Refusal as Library does
+    std::shared_ptr<const Library> open(const std::string& path);
+
+   private:
+    struct Entry {
+        std::string identity;  // path, inode, time and size
+        std::shared_ptr<const Library> library;
+    };
+    std::vector<Entry> entries_;
+};
+
+}  // namespace rtcf::executor

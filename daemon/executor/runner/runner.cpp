@@ -1,0 +1,438 @@
+#include "runner/runner.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "refusal.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+constexpr auto kTick = std::chrono::milliseconds(20);
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::int64_t kProbeTimeout = 100'000'000;
+
+template <typename T>
+bool contains(const std::vector<T>& items, const T& item) {
+    return std::find(items.begin(), items.end(), item) != items.end();
+}
+
+}  // namespace
+
+Runner::Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr<Bridge> bridge)
+    : name_(std::move(name)), log_(log), events_(std::move(events)), loop_(log), bridge_(std::move(bridge)) {
+    validate(settings_);
+    publishPicture();
+    thread_ = std::thread([this] { threadMain(); });
+}
+
+Runner::~Runner() {
+    loop_.requestStop();
+    {
+        const std::lock_guard<std::mutex> lock(jobs_mutex_);
+        ending_ = true;
+    }
+    jobs_changed_.notify_all();
+    thread_.join();
+}
+
+void Runner::post(std::function<void()> job) {
+    {
+        const std::lock_guard<std::mutex> lock(jobs_mutex_);
+        jobs_.push_back(std::move(job));
+    }
+    jobs_changed_.notify_all();
+}
+
+void Runner::threadMain() {
+    pthread_setname_np(pthread_self(), "rtcf-graph");
+    std::unique_lock<std::mutex> lock(jobs_mutex_);
+    while (!ending_ || !jobs_.empty()) {
+        jobs_changed_.wait_for(lock, kTick, [this] { return ending_ || !jobs_.empty(); });
+        std::function<void()> job;
+        if (!jobs_.empty()) {
+            job = std::move(jobs_.front());
+            jobs_.pop_front();
+        }
+        lock.unlock();
+        if (job) job();
+        note({});
+        tick();
+        lock.lock();
+    }
+    lock.unlock();
+    loop_.requestStop();
+    loop_.join(INT64_MAX);
+    if (state_ == RunnerState::Stepping) loop_.endStepping();
+    stopAll();
+    if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>());
+    bridge_.reset();
+    log_.drain();
+    plan_ = std::make_unique<Plan>();
+}
+
+// What has to be done now and then: a loop that ended by itself, clocks, counters.
+void Runner::tick() {
+    if (loop_.joinable()) {
+        if (!loop_.running()) loopEnded();
+        loop_.refreshWallClock();
+    }
+    CycleRecord record{};
+    while (loop_.popRecord(record)) {
+    }
+    publishPicture();
+}
+
+void Runner::loopEnded() {
+    loop_.join(INT64_MAX);
+    noteLoopFault();
+    stopAll();
+    publish(loop_.fault().component != nullptr ? loop_.fault().component->fullName() : "");
+}
+
+void Runner::noteLoopFault() {
+    const LoopFault& fault = loop_.fault();
+    state_ = fault.kind == LoopFault::Kind::None ? RunnerState::Stopped : RunnerState::Faulted;
+    if (state_ == RunnerState::Faulted) {
+        RunnerEvent event{RunnerEvent::Kind::LoopEnded, {}, {}, fault.iteration};
+        if (fault.kind == LoopFault::Kind::Overruns) {
+            event.message = fmt::format("loop stopped in iteration {}: more than {} overruns", fault.iteration,
+                                        settings_.loop.max_overruns);
+        }
+        for (const GraphNode& node : plan_->graph.nodes()) {
+            if (&node.instance->component() != fault.component) continue;
+            event.component = node.instance->fullName();
+            event.message = fmt::format("loop stopped in iteration {}: update() of {} threw: {}", fault.iteration,
+                                        event.component, fault.text.data());
+            node.instance->setFault(fmt::format("threw in iteration {}: {}", fault.iteration, fault.text.data()));
+        }
+        status_ = event.message;
+        events_(event);
+    }
+}
+
+MappingFilter Runner::filter() const {
+    return {NamePattern("whitelist", settings_.whitelist), NamePattern("blacklist", settings_.blacklist)};
+}
+
+std::int64_t Runner::adoptionTimeout() const noexcept { return kSecond + 10 * settings_.loop.period_ns; }
+
+void Runner::configure(RunnerSettings settings) {
+    validate(settings);
+    const RunnerSettings previous = std::exchange(settings_, std::move(settings));
+    try {
+        Change change;
+        change.graph = plan_->graph;
+        if (settings_.loop.period_ns != previous.loop.period_ns) change.period_ns = settings_.loop.period_ns;
+        adopt(std::move(change), [](const std::string&) {});
+    } catch (const Refusal&) {
+        settings_ = previous;
+        throw;
+    }
+    if (loop_.joinable()) {
+        for (const RealtimeProblem& problem : loop_.retune(settings_.loop)) {
+            if (!contains(degraded_, problem.text)) degraded_.push_back(problem.text);
+        }
+    }
+    if (bridge_) bridge_->configure(settings_.bridge);
+    publishPicture();
+}
+
+ChangeOutcome Runner::start(const Progress& progress) {
+    if (loop_.joinable() && !loop_.running()) loopEnded();
+    if (loop_.running()) return outcome();
+    if (state_ == RunnerState::Stepping) endStepping();
+    startAll(progress);
+    try {
+        progress("starting the loop");
+        degraded_.clear();
+        for (RealtimeProblem& problem : lockAndStart()) degraded_.push_back(std::move(problem.text));
+    } catch (const Refusal&) {
+        stopAll();
+        throw;
+    }
+    state_ = RunnerState::Running;
+    status_.clear();
+    publish();
+    for (const std::string& problem : degraded_) {
+        events_({RunnerEvent::Kind::Degraded, "degraded real time: " + problem, {}, 0});
+    }
+    ChangeOutcome result = outcome();
+    for (const std::string& problem : degraded_) result.notes.push_back("degraded real time: " + problem);
+    return result;
+}
+
+RealtimeProblems Runner::lockAndStart() {
+    RealtimeProblems problems = lockMemory(settings_.loop.realtime);
+    for (RealtimeProblem& problem : checkScheduling(settings_.loop.realtime)) problems.push_back(std::move(problem));
+    for (const RealtimeProblem& problem : problems) {
+        if (!settings_.realtime_required || !problem.essential) continue;
+        throw Refusal(RefusalKind::FailedPrecondition,
+                      fmt::format("no real time: {}; or let it run degraded: rtcfctl runner set {} --realtime preferred",
+                                  problem.text, name_));
+    }
+    for (RealtimeProblem& problem : loop_.start(settings_.loop)) problems.push_back(std::move(problem));
+    return problems;
+}
+
+ChangeOutcome Runner::stop(const Progress& progress) {
+    if (loop_.joinable()) {
+        progress("stopping the loop");
+        loop_.requestStop();
+        if (!loop_.join(adoptionTimeout())) {
+            throw Refusal(RefusalKind::Unavailable,
+                          fmt::format("the loop of {} does not reach the end of its cycle: a component does not "
+                                      "return from update()",
+                                      name_));
+        }
+        loopEnded();
+    } else if (state_ == RunnerState::Stepping) {
+        endStepping();
+    }
+    return outcome();
+}
+
+ChangeOutcome Runner::step(std::uint64_t cycles, const Progress& progress) {
+    constexpr std::uint64_t kChunk = 10000;  // cycles between reports
+    if (loop_.joinable()) {
+        throw Refusal(RefusalKind::FailedPrecondition,
+                      fmt::format("the loop of {0} runs in real time: stop it first: rtcfctl -r {0} stop", name_));
+    }
+    if (state_ != RunnerState::Stepping) {
+        startAll(progress);
+        loop_.beginStepping(settings_.loop);
+        state_ = RunnerState::Stepping;
+        status_.clear();
+        publish();
+    }
+    for (std::uint64_t left = cycles; left > 0;) {
+        const std::uint64_t wanted = std::min(left, kChunk);
+        const std::uint64_t done = loop_.step(wanted);
+        left -= done;
+        log_.drain();
+        note({});  // a long run is not a hook that hangs
+        if (done < wanted) break;
+        if (left > 0) progress(fmt::format("{} of {} cycles", cycles - left, cycles));
+    }
+    if (loop_.fault().kind != LoopFault::Kind::None || loop_.stopRequested()) endStepping();
+    return outcome();
+}
+
+void Runner::endStepping() {
+    loop_.endStepping();
+    noteLoopFault();
+    stopAll();
+    publish(loop_.fault().component != nullptr ? loop_.fault().component->fullName() : "");
+}
+
+void Runner::startAll(const Progress& progress) {
+    std::vector<Instance*> started;
+    try {
+        for (const std::size_t index : plan_->wiring.order) {
+            Instance& instance = *plan_->graph.nodes()[index].instance;
+            progress("starting " + instance.fullName());
+            note(instance.fullName() + ".start");
+            started.push_back(&instance);
+            instance.setFault({});
+            instance.start();
+        }
+    } catch (const Refusal&) {
+        for (Instance* instance : started) instance->stop();
+        throw;
+    }
+}
+
+void Runner::stopAll() noexcept {
+    // Against the order of execution: a component may rely on what it reads as long as it runs.
+    for (auto index = plan_->wiring.order.rbegin(); index != plan_->wiring.order.rend(); ++index) {
+        Instance& instance = *plan_->graph.nodes()[*index].instance;
+        note(instance.fullName() + ".stop");
+        instance.stop();
+    }
+}
+
+std::shared_ptr<Instance> Runner::makeInstance(ComponentDefinition definition, const std::string& library,
+                                               const Progress& progress) {
+    const std::string full_name = definition.fullName();
+    progress("loading " + full_name);
+    note(full_name + ".constructor");
+    const std::shared_ptr<const Library> code = libraries_.open(library);
+    auto instance = std::make_shared<Instance>(std::move(definition), code, name_, loop_.clock(), log_);
+    progress("configuring " + full_name);
+    note(full_name + ".configure");
+    instance->configure();
+    return instance;
+}
+
+void Runner::adopt(Change change, const Progress& progress) {
+    const Graph graph = change.graph;
+    Wiring wiring = wire(graph, filter(), change.loading);
+    Adoption adoption;
+    std::unique_ptr<Plan> plan = buildPlan(graph, std::move(wiring), *plan_, settings_.frequency_hz, adoption);
+    adoption.parameters = std::move(change.parameters);
+    adoption.hand_overs = std::move(change.hand_overs);
+    adoption.period_ns = change.period_ns;
+    if (loop_.running() || state_ == RunnerState::Stepping) {
+        for (const auto& instance : change.arriving) {
+            progress("starting " + instance->fullName());
+            note(instance->fullName() + ".start");
+            instance->start();
+        }
+    }
+    note({});
+    if (!loop_.adopt(adoption, adoptionTimeout())) {
+        throw Refusal(RefusalKind::Unavailable,
+                      fmt::format("the loop of {} reaches no cycle boundary: a component does not return from update(); "
+                                  "nothing has changed",
+                                  name_));
+    }
+    plan->noteKept(adoption, *plan_);
+    std::swap(plan_, plan);
+    if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>(plan_->bridgeTable()));
+    publish(change.changed);
+    // Out of the loop since its last boundary: what left may take its time.
+    for (const auto& instance : change.leaving) {
+        note(instance->fullName() + ".stop");
+        instance->stop();
+        note(instance->fullName() + ".cleanup");
+        instance->cleanup();
+    }
+    log_.drain();
+}
+
+ChangeOutcome Runner::load(ComponentDefinition definition, const std::string& library, const Progress& progress) {
+    plan_->graph.requireFree(definition.fullName());
+    const std::set<std::string> breaks = definition.breaks;
+    const std::shared_ptr<Instance> instance = makeInstance(std::move(definition), library, progress);
+    Change change;
+    change.graph = plan_->graph;
+    change.graph.add({instance, breaks});
+    change.loading = instance->fullName();
+    change.arriving = {instance};
+    adopt(std::move(change), progress);
+    ChangeOutcome result = outcome(instance->fullName());
+    for (const std::string& remap : instance->uselessRemaps()) {
+        result.notes.push_back(fmt::format("remap {} names no port of {}", remap, instance->fullName()));
+    }
+    return result;
+}
+
+ChangeOutcome Runner::unload(const std::vector<std::string>& names, const Progress& progress) {
+    if (names.empty()) throw Refusal(RefusalKind::InvalidArgument, "no component to unload is named");
+    Change change;
+    change.graph = plan_->graph;
+    for (const std::string& name : names) {
+        change.leaving.push_back(change.graph.get(name).instance);
+        change.graph.remove(name);
+    }
+    progress("unloading");
+    adopt(std::move(change), progress);
+    return outcome(names.size() == 1 ? names[0] : "");
+}
+
+ChangeOutcome Runner::replace(const std::string& name, ComponentDefinition definition, const std::string& library,
+                              const Progress& progress) {
+    const GraphNode old = plan_->graph.get(name);
+    if (definition.fullName() != name) plan_->graph.requireFree(definition.fullName());
+    const std::set<std::string> breaks = definition.breaks;
+    const std::shared_ptr<Instance> instance = makeInstance(std::move(definition), library, progress);
+    Change change;
+    change.graph = plan_->graph;
+    change.graph.replace(name, {instance, breaks});
+    change.loading = instance->fullName();
+    change.arriving = {instance};
+    change.leaving = {old.instance};
+    change.hand_overs = {{&instance->component(), &old.instance->component()}};
+    adopt(std::move(change), progress);
+    return outcome(instance->fullName());
+}
+
+ChangeOutcome Runner::setBreaks(const std::vector<std::pair<std::string, std::string>>& ports, bool broken) {
+    if (ports.empty()) throw Refusal(RefusalKind::InvalidArgument, "no input is named");
+    Change change;
+    change.graph = plan_->graph;
+    for (const auto& [component, port] : ports) change.graph.setBreak(component, port, broken);
+    adopt(std::move(change), [](const std::string&) {});
+    return outcome(ports[0].first);
+}
+
+ChangeOutcome Runner::setParameters(const std::string& name,
+                                    const std::vector<std::pair<std::string, ParameterValue>>& batch) {
+    Instance& instance = *plan_->graph.get(name).instance;
+    const std::vector<ParameterValue> previous = instance.parameterValues();
+    Change change;
+    change.graph = plan_->graph;
+    change.changed = name;
+    change.parameters = instance.stageParameters(batch);
+    try {
+        adopt(std::move(change), [](const std::string&) {});
+    } catch (const Refusal&) {
+        instance.restoreParameterValues(previous);
+        throw;
+    }
+    return outcome(name);
+}
+
+std::vector<Probe::Value> Runner::probe(const std::string& name) {
+    const Instance& instance = *plan_->graph.get(name).instance;
+    loop_.adoptInjections();
+    Probe probe;
+    std::size_t count = 0;
+    for (const InputBase* input : instance.component().inputs()) count = probe.add(*input) + 1;
+    for (const OutputBase* output : instance.component().outputs()) count = probe.add(*output) + 1;
+    std::vector<Probe::Value> values;
+    if (!loop_.probe(probe, kProbeTimeout + 2 * settings_.loop.period_ns)) return values;
+    for (std::size_t i = 0; i < count; ++i) values.push_back(probe.value(i));
+    return values;
+}
+
+ChangeOutcome Runner::outcome(std::string component) const {
+    ChangeOutcome result;
+    result.generation = plan_->schedule.generation;
+    for (const std::size_t index : plan_->wiring.order) {
+        result.order.push_back(plan_->graph.nodes()[index].instance->fullName());
+    }
+    result.component = std::move(component);
+    return result;
+}
+
+void Runner::publish(const std::string& changed) {
+    const std::shared_ptr<const GraphSnapshot> next = takeSnapshot(*plan_, *snapshot(), changed);
+    {
+        const std::lock_guard<std::mutex> lock(published_mutex_);
+        snapshot_ = next;
+    }
+    publishPicture();
+}
+
+void Runner::publishPicture() {
+    RunnerPicture next{state_, settings_, degraded_, status_, bridge_ ? bridge_->status() : BridgeStatus{}};
+    const std::lock_guard<std::mutex> lock(published_mutex_);
+    picture_ = std::move(next);
+}
+
+std::shared_ptr<const GraphSnapshot> Runner::snapshot() const {
+    const std::lock_guard<std::mutex> lock(published_mutex_);
+    return snapshot_;
+}
+
+RunnerPicture Runner::picture() const {
+    const std::lock_guard<std::mutex> lock(published_mutex_);
+    return picture_;
+}
+
+void Runner::note(std::string activity) {
+    const std::lock_guard<std::mutex> lock(published_mutex_);
+    activity_ = std::move(activity);
+    activity_since_ns_ = monotonicNow();
+}
+
+std::pair<std::string, std::int64_t> Runner::activity() const {
+    const std::lock_guard<std::mutex> lock(published_mutex_);
+    return {activity_, activity_since_ns_};
+}
+
+}  // namespace rtcf::executor

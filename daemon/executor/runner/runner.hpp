@@ -1,0 +1,169 @@
+/// @file
+/// A runner: the graph, its loop, and the one thread that changes them. Every
+/// change is a transaction: what is new is constructed and configured beside
+/// the running loop, wired and ordered, started, adopted at one cycle boundary;
+/// then what left is stopped and cleaned up. A failure at any point leaves all
+/// as it was.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "graph/definition.hpp"
+#include "graph/plan.hpp"
+#include "logging/log.hpp"
+#include "loop/loop.hpp"
+#include "plugins/library.hpp"
+#include "runner/settings.hpp"
+#include "runner/snapshot.hpp"
+
+namespace rtcf::executor {
+
+enum class RunnerState { Stopped, Running, Faulted, Stuck, Stepping };
+
+/// What came of a change.
+struct ChangeOutcome {
+    std::uint64_t generation = 0;
+    std::vector<std::string> order;  ///< full names
+    std::string component;           ///< full name of the one the change was about; may be empty
+    std::vector<std::string> notes;  ///< one line each
+};
+
+/// Something that happened without a request.
+struct RunnerEvent {
+    enum class Kind { LoopEnded, Degraded, Ros };
+    Kind kind;
+    std::string message;
+    std::string component;
+    std::uint64_t iteration = 0;
+};
+
+/// Counters and state for a status query; any thread.
+struct RunnerPicture {
+    RunnerState state = RunnerState::Stopped;
+    RunnerSettings settings;
+    std::vector<std::string> degraded;
+    std::string status;
+    BridgeStatus bridge;
+};
+
+class Runner {
+   public:
+    using Progress = std::function<void(const std::string&)>;
+    using EventConsumer = std::function<void(RunnerEvent)>;
+
+    /// @param name   of the runner
+    /// @param log    outlives the runner
+    /// @param events called from the graph thread
+    /// @param bridge the link to the outside; null = none
+    Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr<Bridge> bridge);
+    /// Stops the loop and lets all components go, in order.
+    ~Runner();
+    Runner(const Runner&) = delete;
+    Runner& operator=(const Runner&) = delete;
+
+    /// Queues work for the graph thread, which calls the functions below. Any thread.
+    void post(std::function<void()> job);
+    /// Ends the loop at the next boundary without waiting for the graph thread; the stop hooks
+    /// follow when it is free. Any thread.
+    void requestStop() noexcept { loop_.requestStop(); }
+
+    /// @name By jobs, on the graph thread. All throw Refusal and have then changed nothing.
+    /// @{
+    void configure(RunnerSettings settings);
+    ChangeOutcome start(const Progress& progress);
+    ChangeOutcome stop(const Progress& progress);
+    /// Runs cycles without real time on a simulated clock, as fast as they go; then pauses.
+    ChangeOutcome step(std::uint64_t cycles, const Progress& progress);
+    ChangeOutcome load(ComponentDefinition definition, const std::string& library, const Progress& progress);
+    ChangeOutcome unload(const std::vector<std::string>& names, const Progress& progress);
+    ChangeOutcome replace(const std::string& name, ComponentDefinition definition, const std::string& library,
+                          const Progress& progress);
+    ChangeOutcome setBreaks(const std::vector<std::pair<std::string, std::string>>& ports, bool broken);
+    ChangeOutcome setParameters(const std::string& name,
+                                const std::vector<std::pair<std::string, ParameterValue>>& batch);
+    /// Values of a component's ports, inputs first. Empty if the loop reaches no boundary in time.
+    std::vector<Probe::Value> probe(const std::string& name);
+    /// Settings to start from.
+    const RunnerSettings& settings() const noexcept { return settings_; }
+    /// @}
+
+    /// @name Any thread, at any time
+    /// @{
+    const std::string& name() const noexcept { return name_; }
+    std::shared_ptr<const GraphSnapshot> snapshot() const;
+    RunnerPicture picture() const;
+    const Loop& loop() const noexcept { return loop_; }
+    /// Name of the hook that the graph thread is in, and since when; empty = none.
+    std::pair<std::string, std::int64_t> activity() const;
+    /// @}
+
+   private:
+    struct Change {
+        Graph graph;
+        std::string loading;                        // new component, for advice on loops
+        std::string changed;                        // component to picture anew
+        std::vector<std::shared_ptr<Instance>> arriving;
+        std::vector<std::shared_ptr<Instance>> leaving;
+        std::vector<ParameterBase*> parameters;
+        std::vector<HandOver> hand_overs;
+        std::int64_t period_ns = 0;
+    };
+
+    void threadMain();
+    void tick();
+    void loopEnded();
+    void noteLoopFault();
+    void endStepping();
+    std::shared_ptr<Instance> makeInstance(ComponentDefinition definition, const std::string& library,
+                                           const Progress& progress);
+    /// Wires, starts, adopts; then stops and cleans up what left.
+    void adopt(Change change, const Progress& progress);
+    void startAll(const Progress& progress);
+    void stopAll() noexcept;
+    ChangeOutcome outcome(std::string component = {}) const;
+    RealtimeProblems lockAndStart();
+    MappingFilter filter() const;
+    void publish(const std::string& changed = {});
+    void publishPicture();
+    std::int64_t adoptionTimeout() const noexcept;
+    void note(std::string activity);
+
+    const std::string name_;
+    Log& log_;
+    EventConsumer events_;
+    LibraryStore libraries_;
+    Loop loop_;
+    std::unique_ptr<Bridge> bridge_;
+
+    // Graph thread only.
+    RunnerSettings settings_;
+    std::unique_ptr<Plan> plan_ = std::make_unique<Plan>();
+    RunnerState state_ = RunnerState::Stopped;
+    std::vector<std::string> degraded_;
+    std::string status_;
+
+    // Published for queries.
+    mutable std::mutex published_mutex_;
+    std::shared_ptr<const GraphSnapshot> snapshot_ = std::make_shared<GraphSnapshot>();
+    RunnerPicture picture_;
+    std::string activity_;
+    std::int64_t activity_since_ns_ = 0;
+
+    // Jobs.
+    std::mutex jobs_mutex_;
+    std::condition_variable jobs_changed_;
+    std::deque<std::function<void()>> jobs_;
+    bool ending_ = false;
+    std::thread thread_;
+};
+
+}  // namespace rtcf::executor

@@ -1,0 +1,55 @@
+#include "runner/settings.hpp"
+
+#include <fmt/format.h>
+#include <sched.h>
+
+#include <cmath>
+
+#include "graph/name_pattern.hpp"
+#include "refusal.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+[[noreturn]] void refuse(const std::string& message) { throw Refusal(RefusalKind::InvalidArgument, message); }
+
+template <typename T>
+void requireRange(const char* name, T value, T lowest, T highest, const char* unit) {
+    // Written so that NaN is out of range.
+    if (value >= lowest && value <= highest) return;
+    refuse(fmt::format("{} {} {} is out of range: {} to {} {}", name, value, unit, lowest, highest, unit));
+}
+
+void requireCpu(int cpu) {
+    if (cpu == -1) return;
+    cpu_set_t allowed;
+    CPU_ZERO(&allowed);
+    sched_getaffinity(0, sizeof allowed, &allowed);
+    if (cpu >= 0 && cpu < CPU_SETSIZE && CPU_ISSET(cpu, &allowed)) return;
+    std::string names;
+    for (int i = 0; i < CPU_SETSIZE; ++i) {
+        if (CPU_ISSET(i, &allowed)) names += (names.empty() ? "" : ", ") + std::to_string(i);
+    }
+    refuse(fmt::format("cpu {} is none that this daemon may use: {}, or -1 for the last of them", cpu, names));
+}
+
+}  // namespace
+
+void validate(RunnerSettings& settings) {
+    constexpr double kLowestHz = 0.1;
+    constexpr double kHighestHz = 20000.0;
+    constexpr std::size_t kKilo = 1024;
+    requireRange("frequency", settings.frequency_hz, kLowestHz, kHighestHz, "Hz");
+    settings.loop.period_ns = std::llround(1e9 / settings.frequency_hz);
+    requireCpu(settings.loop.realtime.cpu);
+    requireRange("priority", settings.loop.realtime.priority, 1U, 98U, "(SCHED_FIFO)");
+    requireRange("spin", settings.loop.spin_ns / 1000, std::int64_t{0}, settings.loop.period_ns / 2000, "µs");
+    requireRange("heap", settings.loop.realtime.heap_bytes / kKilo, std::size_t{0}, 1024 * kKilo, "KiB");
+    requireRange("stack", settings.loop.realtime.stack_bytes / kKilo, std::size_t{16}, 64 * kKilo, "KiB");
+    requireRange("queue", settings.bridge.queue, 1U, 1'000'000U, "messages");
+    (void)NamePattern("whitelist", settings.whitelist);
+    (void)NamePattern("blacklist", settings.blacklist);
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,75 @@
+/// @file
+/// What queries are answered from: an immutable picture of the graph that the
+/// graph thread publishes after every change. A query never waits for a hook or
+/// for the loop.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "graph/definition.hpp"
+#include "graph/plan.hpp"
+
+namespace rtcf::executor {
+
+struct PortSnapshot {
+    std::string name;
+    bool output;
+    std::string mapped_name;
+    const TypeInfo* type;
+    std::string unit;
+};
+
+struct ParameterSnapshot {
+    ParameterDeclaration declaration;
+    ParameterValue value;
+};
+
+/// One component. What its pointers point to is never unloaded (types) or is
+/// shared (figures), so a snapshot may outlive the component.
+struct ComponentSnapshot {
+    const Instance* instance;  ///< for comparison only
+    std::shared_ptr<const ComponentFigures> figures;
+    ComponentDefinition definition;  ///< with the breaks of now
+    std::string full_name;
+    std::string library;
+    std::string doc;
+    std::vector<PortSnapshot> ports;
+    std::vector<ParameterSnapshot> parameters;
+    std::string fault;
+};
+
+struct EndpointSnapshot {
+    std::string component;
+    std::string port;
+    bool broken;
+};
+
+struct ConnectionSnapshot {
+    std::string type;
+    std::optional<EndpointSnapshot> writer;
+    std::vector<EndpointSnapshot> readers;
+    bool published;
+    bool subscribed;
+};
+
+struct GraphSnapshot {
+    std::uint64_t generation = 0;
+    std::vector<std::shared_ptr<const ComponentSnapshot>> components;  ///< in order of execution
+    std::map<std::string, ConnectionSnapshot> connections;
+    std::vector<std::shared_ptr<Tap>> taps;
+
+    /// @throws Refusal if there is none of that name
+    const ComponentSnapshot& get(const std::string& full_name) const;
+};
+
+/// A picture of `plan`; components that have not changed are shared with `previous`.
+/// @param changed full name of a component to picture anew; empty = none
+std::shared_ptr<const GraphSnapshot> takeSnapshot(const Plan& plan, const GraphSnapshot& previous,
+                                                  const std::string& changed);
+
+}  // namespace rtcf::executor

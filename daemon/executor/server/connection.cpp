@@ -1,0 +1,67 @@
+#include "server/connection.hpp"
+
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+
+namespace rtcf::executor {
+
+namespace {
+
+constexpr std::size_t kHeader = 4;
+constexpr std::size_t kLargestBacklog = 64 * 1024 * 1024;  // bytes for a peer that does not read
+
+std::uint32_t lengthOf(const std::string& bytes, std::size_t at) {
+    std::uint32_t length = 0;
+    for (std::size_t i = 0; i < kHeader; ++i) {
+        length |= std::uint32_t{static_cast<unsigned char>(bytes[at + i])} << (8 * i);
+    }
+    return length;
+}
+
+}  // namespace
+
+Connection::~Connection() { ::close(fd_); }
+
+bool Connection::receive(std::vector<v1::Request>& requests) {
+    std::array<char, 65536> buffer{};
+    const ssize_t count = ::recv(fd_, buffer.data(), buffer.size(), 0);
+    if (count < 0) return errno == EAGAIN || errno == EINTR;
+    if (count == 0) return false;
+    in_.append(buffer.data(), static_cast<std::size_t>(count));
+    std::size_t at = 0;
+    while (in_.size() - at >= kHeader) {
+        const std::uint32_t length = lengthOf(in_, at);
+        if (length > kLargestFrame) return false;
+        if (in_.size() - at - kHeader < length) break;
+        v1::Request request;
+        if (!request.ParseFromArray(in_.data() + at + kHeader, static_cast<int>(length))) return false;
+        requests.push_back(std::move(request));
+        at += kHeader + length;
+    }
+    in_.erase(0, at);
+    return true;
+}
+
+bool Connection::send(const v1::Response& response) {
+    const std::string body = response.SerializeAsString();
+    if (out_.size() - written_ > kLargestBacklog) return false;
+    for (std::size_t i = 0; i < kHeader; ++i) out_ += static_cast<char>((body.size() >> (8 * i)) & 0xff);
+    out_ += body;
+    return flush();
+}
+
+bool Connection::flush() {
+    while (wantsWrite()) {
+        const ssize_t count = ::send(fd_, out_.data() + written_, out_.size() - written_, MSG_NOSIGNAL);
+        if (count < 0) return errno == EAGAIN || errno == EINTR;
+        written_ += static_cast<std::size_t>(count);
+    }
+    out_.clear();
+    written_ = 0;
+    return true;
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,351 @@
+#include "server/convert.hpp"
+
+#include <fmt/format.h>
+
+namespace rtcf::executor {
+
+namespace pb = ::rtcf::v1;
+
+namespace {
+
+constexpr std::uint32_t kKilo = 1024;
+
+ParameterValue valueFrom(const pb::ParameterValue& value, const std::string& name) {
+    switch (value.kind_case()) {
+        case pb::ParameterValue::kBoolValue:
+            return value.bool_value();
+        case pb::ParameterValue::kIntValue:
+            return static_cast<std::int64_t>(value.int_value());
+        case pb::ParameterValue::kDoubleValue:
+            return value.double_value();
+        case pb::ParameterValue::kStringValue:
+            return value.string_value();
+        case pb::ParameterValue::KIND_NOT_SET:
+            break;
+    }
+    throw Refusal(RefusalKind::InvalidArgument, fmt::format("parameter {} has no value", name));
+}
+
+pb::ParameterValue valueTo(const ParameterValue& value) {
+    pb::ParameterValue message;
+    std::visit(
+        [&](const auto& held) {
+            using T = std::decay_t<decltype(held)>;
+            if constexpr (std::is_same_v<T, bool>) {
+                message.set_bool_value(held);
+            } else if constexpr (std::is_same_v<T, std::int64_t>) {
+                message.set_int_value(held);
+            } else if constexpr (std::is_same_v<T, double>) {
+                message.set_double_value(held);
+            } else {
+                message.set_string_value(held);
+            }
+        },
+        value);
+    return message;
+}
+
+pb::ParameterInfo parameterTo(const ParameterDeclaration& declaration, const ParameterValue& value) {
+    pb::ParameterInfo info;
+    info.set_name(declaration.name);
+    *info.mutable_value() = valueTo(value);
+    *info.mutable_default_value() = valueTo(declaration.default_value);
+    if (declaration.minimum) info.set_minimum(*declaration.minimum);
+    if (declaration.maximum) info.set_maximum(*declaration.maximum);
+    info.set_unit(declaration.unit);
+    info.set_doc(declaration.doc);
+    for (const Choice& choice : declaration.choices) info.add_choices(choice.name);
+    info.set_type(declaration.type);
+    return info;
+}
+
+void setPortType(pb::PortInfo& info, const std::string& name, bool output, const TypeInfo& type) {
+    info.set_name(name);
+    info.set_direction(output ? pb::DIRECTION_OUTPUT : pb::DIRECTION_INPUT);
+    info.set_type(type.name);
+    info.set_md5(type.md5);
+}
+
+pb::ComponentSpec specTo(const ComponentDefinition& definition) {
+    pb::ComponentSpec spec;
+    spec.set_name(definition.name);
+    spec.set_ns(definition.ns);
+    spec.set_package(definition.package);
+    spec.set_type(definition.type);
+    for (const auto& [from, to] : definition.remaps) {
+        auto* remap = spec.add_remaps();
+        remap->set_from(from);
+        remap->set_to(to);
+    }
+    for (const auto& [name, value] : definition.parameters) {
+        auto* parameter = spec.add_parameters();
+        parameter->set_name(name);
+        *parameter->mutable_value() = valueTo(value);
+    }
+    spec.set_first(definition.first);
+    spec.set_ignore(definition.ignore);
+    for (const std::string& port : definition.breaks) spec.add_breaks(port);
+    spec.set_every(definition.every);
+    return spec;
+}
+
+OverrunPolicy overrunFrom(pb::OverrunPolicy policy) {
+    if (policy == pb::OVERRUN_POLICY_CATCH_UP) return OverrunPolicy::CatchUp;
+    if (policy == pb::OVERRUN_POLICY_RELATIVE) return OverrunPolicy::Relative;
+    return OverrunPolicy::Skip;
+}
+
+pb::OverrunPolicy overrunTo(OverrunPolicy policy) {
+    if (policy == OverrunPolicy::CatchUp) return pb::OVERRUN_POLICY_CATCH_UP;
+    if (policy == OverrunPolicy::Relative) return pb::OVERRUN_POLICY_RELATIVE;
+    return pb::OVERRUN_POLICY_SKIP;
+}
+
+}  // namespace
+
+ComponentDefinition definitionFrom(const pb::ComponentSpec& spec) {
+    ComponentDefinition definition;
+    definition.name = spec.name().empty() ? spec.type() : spec.name();
+    if (!isBaseName(definition.name)) {
+        throw Refusal(RefusalKind::InvalidArgument,
+                      fmt::format("'{}' is not a legal component name: a letter, then letters, digits and _; give the "
+                                  "namespace by --ns",
+                                  definition.name));
+    }
+    definition.ns = canonicalNamespace(spec.ns());
+    definition.package = spec.package();
+    definition.type = spec.type();
+    for (const auto& remap : spec.remaps()) {
+        for (const std::string& name : {remap.from(), remap.to()}) {
+            if (isGraphName(name)) continue;
+            throw Refusal(RefusalKind::InvalidArgument, fmt::format("remap {}:={}: '{}' is not a legal ROS name",
+                                                                    remap.from(), remap.to(), name));
+        }
+        definition.remaps.emplace_back(remap.from(), remap.to());
+    }
+    definition.parameters = parametersFrom(spec.parameters());
+    definition.first = spec.first();
+    definition.ignore = spec.ignore();
+    definition.breaks.insert(spec.breaks().begin(), spec.breaks().end());
+    definition.every = std::max(1U, spec.every());
+    if (definition.every != 1) {
+        throw Refusal(RefusalKind::InvalidArgument,
+                      fmt::format("{}: every {} cycles: this release runs all components every cycle",
+                                  definition.fullName(), definition.every));
+    }
+    return definition;
+}
+
+ComponentDefinition replacementFrom(const pb::ComponentSpec& spec, const ComponentDefinition& old) {
+    pb::ComponentSpec full = spec;
+    const pb::ComponentSpec before = specTo(old);
+    if (full.name().empty()) full.set_name(before.name());
+    if (full.ns().empty()) full.set_ns(before.ns());
+    if (full.remaps().empty()) *full.mutable_remaps() = before.remaps();
+    if (!full.first()) full.set_first(before.first());
+    if (full.ignore().empty()) full.set_ignore(before.ignore());
+    if (full.breaks().empty()) *full.mutable_breaks() = before.breaks();
+    return definitionFrom(full);
+}
+
+RunnerSettings settingsFrom(const pb::RunnerSettings& message, RunnerSettings base) {
+    if (message.has_frequency_hz()) base.frequency_hz = message.frequency_hz();
+    RealtimeSettings& realtime = base.loop.realtime;
+    if (message.has_cpu()) realtime.cpu = message.cpu();
+    if (message.has_priority()) realtime.priority = message.priority();
+    if (message.has_spin_us()) base.loop.spin_ns = std::int64_t{message.spin_us()} * 1000;
+    if (message.has_realtime() && message.realtime() != pb::REALTIME_UNSPECIFIED) {
+        base.realtime_required = message.realtime() == pb::REALTIME_REQUIRED;
+    }
+    if (message.has_overrun()) base.loop.overrun = overrunFrom(message.overrun());
+    if (message.has_max_overruns()) base.loop.max_overruns = message.max_overruns();
+    if (message.has_lock_memory()) realtime.lock_memory = message.lock_memory();
+    if (message.has_heap_kb()) realtime.heap_bytes = std::size_t{message.heap_kb()} * kKilo;
+    if (message.has_stack_kb()) realtime.stack_bytes = std::size_t{message.stack_kb()} * kKilo;
+    const pb::RosSettings& ros = message.ros();
+    if (ros.has_enabled()) base.bridge.enabled = ros.enabled();
+    if (ros.has_master_uri()) base.bridge.master_uri = ros.master_uri();
+    if (ros.has_queue()) base.bridge.queue = ros.queue();
+    if (ros.has_whitelist()) base.whitelist = ros.whitelist();
+    if (ros.has_blacklist()) base.blacklist = ros.blacklist();
+    return base;
+}
+
+pb::RunnerSettings settingsTo(const RunnerSettings& settings) {
+    pb::RunnerSettings message;
+    message.set_frequency_hz(settings.frequency_hz);
+    message.set_cpu(settings.loop.realtime.cpu);
+    message.set_priority(settings.loop.realtime.priority);
+    message.set_spin_us(static_cast<std::uint32_t>(settings.loop.spin_ns / 1000));
+    message.set_realtime(settings.realtime_required ? pb::REALTIME_REQUIRED : pb::REALTIME_PREFERRED);
+    message.set_overrun(overrunTo(settings.loop.overrun));
+    message.set_max_overruns(settings.loop.max_overruns);
+    message.set_lock_memory(settings.loop.realtime.lock_memory);
+    message.set_heap_kb(static_cast<std::uint32_t>(settings.loop.realtime.heap_bytes / kKilo));
+    message.set_stack_kb(static_cast<std::uint32_t>(settings.loop.realtime.stack_bytes / kKilo));
+    pb::RosSettings& ros = *message.mutable_ros();
+    ros.set_enabled(settings.bridge.enabled);
+    ros.set_master_uri(settings.bridge.master_uri);
+    ros.set_queue(settings.bridge.queue);
+    ros.set_whitelist(settings.whitelist);
+    ros.set_blacklist(settings.blacklist);
+    return message;
+}
+
+std::vector<std::pair<std::string, ParameterValue>> parametersFrom(
+    const google::protobuf::RepeatedPtrField<pb::ParameterSetting>& settings) {
+    std::vector<std::pair<std::string, ParameterValue>> parameters;
+    for (const auto& setting : settings) {
+        parameters.emplace_back(setting.name(), valueFrom(setting.value(), setting.name()));
+    }
+    return parameters;
+}
+
+v1::Error errorTo(RefusalKind kind, const std::string& message) {
+    v1::Error error;
+    switch (kind) {
+        case RefusalKind::InvalidArgument:
+            error.set_code(v1::Error::CODE_INVALID_ARGUMENT);
+            break;
+        case RefusalKind::NotFound:
+            error.set_code(v1::Error::CODE_NOT_FOUND);
+            break;
+        case RefusalKind::AlreadyExists:
+            error.set_code(v1::Error::CODE_ALREADY_EXISTS);
+            break;
+        case RefusalKind::FailedPrecondition:
+            error.set_code(v1::Error::CODE_FAILED_PRECONDITION);
+            break;
+        case RefusalKind::Unavailable:
+            error.set_code(v1::Error::CODE_UNAVAILABLE);
+            break;
+    }
+    error.set_message(message);
+    return error;
+}
+
+pb::ChangeResult outcomeTo(const ChangeOutcome& outcome) {
+    pb::ChangeResult result;
+    result.set_generation(outcome.generation);
+    for (const std::string& name : outcome.order) result.add_order(name);
+    result.set_component(outcome.component);
+    for (const std::string& line : outcome.notes) result.add_notes(line);
+    return result;
+}
+
+v1::LogRecord logTo(const LogEntry& entry) {
+    v1::LogRecord record;
+    record.set_level(static_cast<v1::LogRecord::Level>(entry.level));
+    record.set_time_ns(entry.time_ns);
+    record.set_iteration(entry.iteration);
+    record.set_component(entry.component);
+    record.set_message(entry.message);
+    record.set_file(entry.file);
+    record.set_line(entry.line);
+    record.set_function(entry.function);
+    record.set_realtime(entry.realtime);
+    return record;
+}
+
+v1::Event eventTo(const RunnerEvent& event) {
+    v1::Event message;
+    switch (event.kind) {
+        case RunnerEvent::Kind::LoopEnded:
+            message.set_kind(v1::Event::KIND_LOOP_ENDED);
+            break;
+        case RunnerEvent::Kind::Degraded:
+            message.set_kind(v1::Event::KIND_DEGRADED);
+            break;
+        case RunnerEvent::Kind::Ros:
+            message.set_kind(v1::Event::KIND_ROS);
+            break;
+    }
+    message.set_message(event.message);
+    message.set_component(event.component);
+    message.set_iteration(event.iteration);
+    return message;
+}
+
+pb::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t position, RunnerState state) {
+    const ComponentSnapshot& component = *snapshot.components[position];
+    pb::ComponentInfo info;
+    info.set_full_name(component.full_name);
+    *info.mutable_spec() = specTo(component.definition);
+    info.set_position(static_cast<std::uint32_t>(position));
+    info.set_library(component.library);
+    info.set_doc(component.doc);
+    info.set_fault(component.fault);
+    info.set_state(!component.fault.empty()            ? pb::COMPONENT_STATE_FAULTED
+                   : state == RunnerState::Running     ? pb::COMPONENT_STATE_RUNNING
+                                                       : pb::COMPONENT_STATE_CONFIGURED);
+    for (const PortSnapshot& port : component.ports) {
+        pb::PortInfo& message = *info.add_ports();
+        setPortType(message, port.name, port.output, *port.type);
+        message.set_mapped_name(port.mapped_name);
+        message.set_unit(port.unit);
+        const ConnectionSnapshot& connection = snapshot.connections.at(port.mapped_name);
+        message.set_connected(connection.writer.has_value() && !connection.readers.empty());
+        message.set_mapped(port.output ? connection.published : connection.subscribed);
+        for (const EndpointSnapshot& reader : connection.readers) {
+            if (!port.output && reader.component == component.full_name && reader.port == port.name) {
+                message.set_broken(reader.broken);
+            }
+        }
+    }
+    for (const ParameterSnapshot& parameter : component.parameters) {
+        *info.add_parameters() = parameterTo(parameter.declaration, parameter.value);
+    }
+    return info;
+}
+
+void addValues(pb::ComponentInfo& info, const std::vector<Probe::Value>& values) {
+    for (std::size_t i = 0; i < values.size() && i < static_cast<std::size_t>(info.ports_size()); ++i) {
+        pb::PortInfo& port = *info.mutable_ports(static_cast<int>(i));
+        port.set_count(port.direction() == pb::DIRECTION_OUTPUT ? values[i].sequence : values[i].seen);
+        if (values[i].sequence == 0) continue;
+        port.set_value(values[i].text.value_or("(too large to show)"));
+        port.set_age_ns(values[i].age_ns);
+    }
+}
+
+v1::ListConnectionsResult connectionsTo(const GraphSnapshot& snapshot) {
+    v1::ListConnectionsResult result;
+    const auto set = [](pb::Endpoint& message, const EndpointSnapshot& endpoint) {
+        message.set_component(endpoint.component);
+        message.set_port(endpoint.port);
+        message.set_broken(endpoint.broken);
+    };
+    for (const auto& [name, connection] : snapshot.connections) {
+        pb::Connection& message = *result.add_connections();
+        message.set_name(name);
+        message.set_type(connection.type);
+        if (connection.writer) set(*message.mutable_writer(), *connection.writer);
+        for (const EndpointSnapshot& reader : connection.readers) set(*message.add_readers(), reader);
+        message.set_published(connection.published);
+        message.set_subscribed(connection.subscribed);
+    }
+    return result;
+}
+
+pb::ComponentType typeTo(const std::string& package, const std::string& library, const ComponentRecord& record,
+                         const Component& component) {
+    pb::ComponentType type;
+    type.set_package(package);
+    type.set_type(record.type);
+    type.set_library(library);
+    type.set_doc(record.doc);
+    for (const InputBase* input : component.inputs()) {
+        setPortType(*type.add_ports(), input->name(), false, input->type());
+    }
+    for (const OutputBase* output : component.outputs()) {
+        pb::PortInfo& port = *type.add_ports();
+        setPortType(port, output->name(), true, output->type());
+        port.set_unit(output->unit());
+    }
+    for (const ParameterBase* parameter : component.parameters()) {
+        *type.add_parameters() = parameterTo(parameter->declaration(), parameter->declaration().default_value);
+    }
+    return type;
+}
+
+}  // namespace rtcf::executor

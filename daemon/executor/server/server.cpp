@@ -1,0 +1,519 @@
+#include "server/server.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/resource.h>
+#include <sys/signalfd.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <system_error>
+
+#include "rtcf/version.hpp"
+#include "server/convert.hpp"
+#include "statistics/thread_usage.hpp"
+
+namespace rtcf::executor {
+
+namespace pb = ::rtcf::v1;
+
+namespace {
+
+constexpr std::uint32_t kProtocol = 1;
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::int64_t kHookTimeout = 10 * kSecond;
+constexpr std::int64_t kProbeTimeout = kSecond / 2;
+constexpr std::size_t kLargestOutbox = 10000;  // messages kept while no daemon is connected
+constexpr std::size_t kLargestConnections = 8;
+
+[[noreturn]] void fail(const std::string& what) { throw std::system_error(errno, std::generic_category(), what); }
+
+int listenOn(const std::string& path) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    if (path.size() >= sizeof address.sun_path) {
+        errno = ENAMETOOLONG;
+        fail("socket " + path);
+    }
+    std::copy(path.begin(), path.end(), address.sun_path);
+    const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (fd < 0) fail("socket");
+    ::unlink(path.c_str());  // of an executor that was killed
+    if (::bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0) fail("socket " + path);
+    if (::listen(fd, 8) != 0) fail("socket " + path);
+    return fd;
+}
+
+int takeSignals() {
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGTERM);
+    sigaddset(&set, SIGINT);
+    pthread_sigmask(SIG_BLOCK, &set, nullptr);
+    const int fd = ::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
+    if (fd < 0) fail("signalfd");
+    return fd;
+}
+
+// The peer must be our own user, or root.
+bool trusted(int fd) {
+    ucred peer{};
+    socklen_t size = sizeof peer;
+    return ::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 && (peer.uid == ::geteuid() || peer.uid == 0);
+}
+
+v1::Response errorResponse(std::uint64_t id, RefusalKind kind, const std::string& message) {
+    v1::Response response;
+    response.set_id(id);
+    *response.mutable_error() = errorTo(kind, message);
+    return response;
+}
+
+void setDistribution(pb::Distribution& message, const DistributionSummary& summary) {
+    message.set_count(summary.count);
+    message.set_min_ns(summary.min);
+    message.set_mean_ns(summary.mean);
+    message.set_p50_ns(summary.p50);
+    message.set_p99_ns(summary.p99);
+    message.set_p999_ns(summary.p999);
+    message.set_max_ns(summary.max);
+}
+
+pb::RunnerState stateTo(RunnerState state) {
+    switch (state) {
+        case RunnerState::Running:
+            return pb::RUNNER_STATE_RUNNING;
+        case RunnerState::Faulted:
+            return pb::RUNNER_STATE_FAULTED;
+        case RunnerState::Stuck:
+            return pb::RUNNER_STATE_STUCK;
+        case RunnerState::Stepping:
+            return pb::RUNNER_STATE_STEPPING;
+        case RunnerState::Stopped:
+            break;
+    }
+    return pb::RUNNER_STATE_STOPPED;
+}
+
+}  // namespace
+
+Server::Server(const std::string& socket_path)
+    : path_(socket_path), listener_(listenOn(socket_path)), signals_(takeSignals()), wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+    if (wake_ < 0) fail("eventfd");
+}
+
+Server::~Server() {
+    connections_.clear();
+    ::close(wake_);
+    ::close(signals_);
+    ::close(listener_);
+    ::unlink(path_.c_str());
+}
+
+void Server::post(std::uint64_t connection, v1::Response response, bool last) {
+    {
+        const std::lock_guard<std::mutex> lock(outbox_mutex_);
+        if (outbox_.size() >= kLargestOutbox) outbox_.pop_front();
+        outbox_.push_back({connection, std::move(response), last});
+    }
+    const std::uint64_t one = 1;
+    // Full means that it is awake already.
+    [[maybe_unused]] const ssize_t count = ::write(wake_, &one, sizeof one);
+}
+
+void Server::publish(const LogEntry& entry) {
+    v1::Response response;
+    *response.mutable_log() = logTo(entry);
+    post(0, std::move(response), false);
+}
+
+void Server::publish(const RunnerEvent& event) {
+    v1::Response response;
+    *response.mutable_event() = eventTo(event);
+    post(0, std::move(response), false);
+}
+
+void Server::serve(Runner& runner, Log& log) {
+    runner_ = &runner;
+    log_ = &log;
+    while (!exiting_) {
+        std::vector<pollfd> polled{{listener_, POLLIN, 0}, {signals_, POLLIN, 0}, {wake_, POLLIN, 0}};
+        std::vector<std::uint64_t> ids;
+        for (const auto& [id, connection] : connections_) {
+            const short events = connection->wantsWrite() ? POLLIN | POLLOUT : POLLIN;
+            polled.push_back({connection->fd(), events, 0});
+            ids.push_back(id);
+        }
+        ::poll(polled.data(), polled.size(), waiting_.empty() ? 1000 : 20);
+        if ((polled[1].revents & POLLIN) != 0) exiting_ = true;
+        if ((polled[2].revents & POLLIN) != 0) {
+            std::uint64_t count = 0;
+            [[maybe_unused]] const ssize_t size = ::read(wake_, &count, sizeof count);
+        }
+        for (std::size_t i = 0; i < ids.size(); ++i) {
+            const auto found = connections_.find(ids[i]);
+            if (found == connections_.end()) continue;
+            const short events = polled[i + 3].revents;
+            if ((events & POLLOUT) != 0 && !found->second->flush()) {
+                drop(ids[i]);
+            } else if ((events & (POLLIN | POLLHUP | POLLERR)) != 0) {
+                receive(*found->second);
+            }
+        }
+        if ((polled[0].revents & POLLIN) != 0) accept();
+        deliver();
+        expire();
+    }
+    runner.requestStop();
+}
+
+void Server::accept() {
+    const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    if (fd < 0) return;
+    if (!trusted(fd) || connections_.size() >= kLargestConnections) {
+        ::close(fd);
+        return;
+    }
+    const std::uint64_t id = next_id_++;
+    connections_.emplace(id, std::make_unique<Connection>(fd, id));
+}
+
+void Server::receive(Connection& connection) {
+    const std::uint64_t id = connection.id();
+    std::vector<v1::Request> requests;
+    const bool alive = connection.receive(requests);
+    for (const v1::Request& request : requests) {
+        if (connections_.count(id) == 0) return;
+        handle(connection, request);
+    }
+    if (!alive) drop(id);
+}
+
+void Server::drop(std::uint64_t id) {
+    connections_.erase(id);
+    for (auto it = waiting_.begin(); it != waiting_.end();) it = it->first.first == id ? waiting_.erase(it) : std::next(it);
+}
+
+void Server::respond(std::uint64_t connection, v1::Response response) {
+    const auto found = connections_.find(connection);
+    if (found != connections_.end() && !found->second->send(response)) drop(connection);
+}
+
+// Sends what other threads have posted. Unasked messages wait for somebody to send them to.
+void Server::deliver() {
+    std::deque<Outgoing> outgoing;
+    const bool anybody = std::any_of(connections_.begin(), connections_.end(),
+                                     [](const auto& entry) { return entry.second->greeted(); });
+    {
+        const std::lock_guard<std::mutex> lock(outbox_mutex_);
+        if (anybody) {
+            outgoing.swap(outbox_);
+        } else {
+            while (!outbox_.empty() && outbox_.front().connection != 0) {
+                outgoing.push_back(std::move(outbox_.front()));
+                outbox_.pop_front();
+            }
+        }
+    }
+    for (Outgoing& message : outgoing) {
+        if (message.connection != 0) {
+            const auto request = std::make_pair(message.connection, message.response.id());
+            if (waiting_.count(request) == 0) continue;  // given up on, or its daemon has gone
+            if (message.last) waiting_.erase(request);
+            respond(message.connection, std::move(message.response));
+            continue;
+        }
+        std::vector<std::uint64_t> ids;
+        for (const auto& [id, connection] : connections_) {
+            if (connection->greeted()) ids.push_back(id);
+        }
+        for (const std::uint64_t id : ids) respond(id, message.response);
+    }
+}
+
+void Server::expire() {
+    const std::int64_t now = monotonicNow();
+    for (auto it = waiting_.begin(); it != waiting_.end();) {
+        if (now < it->second.until_ns) {
+            ++it;
+            continue;
+        }
+        const std::uint64_t connection = it->first.first;
+        v1::Response response = it->second.otherwise();
+        it = waiting_.erase(it);
+        respond(connection, std::move(response));
+        if (connections_.count(connection) == 0) return;  // drop() has changed waiting_
+    }
+}
+
+std::string Server::stuck() const {
+    const auto [activity, since_ns] = runner_->activity();
+    return !activity.empty() && monotonicNow() - since_ns > kHookTimeout ? activity : std::string();
+}
+
+void Server::handle(Connection& connection, const v1::Request& request) {
+    const std::uint64_t id = connection.id();
+    if (request.kind_case() == v1::Request::kHello) {
+        v1::Response response;
+        response.set_id(request.id());
+        v1::HelloResult& hello = *response.mutable_hello();
+        hello.set_protocol(kProtocol);
+        hello.set_version(RTCF_VERSION);
+        hello.set_runner(runner_->name());
+        hello.set_pid(::getpid());
+        connection.setGreeted();
+        respond(id, std::move(response));
+        return;
+    }
+    if (!connection.greeted()) {
+        respond(id, errorResponse(request.id(), RefusalKind::FailedPrecondition, "the first request must be hello"));
+        return;
+    }
+    try {
+        if (answerQuery(id, request)) return;
+        if (request.kind_case() == v1::Request::kGetComponent) {
+            submitProbe(id, request);
+        } else {
+            submitChange(id, request);
+        }
+    } catch (const Refusal& refusal) {
+        respond(id, errorResponse(request.id(), refusal.kind(), refusal.what()));
+    }
+}
+
+bool Server::answerQuery(std::uint64_t connection, const v1::Request& request) {
+    v1::Response response;
+    response.set_id(request.id());
+    const std::shared_ptr<const GraphSnapshot> graph = runner_->snapshot();
+    switch (request.kind_case()) {
+        case v1::Request::kListComponents: {
+            const RunnerState state = runner_->picture().state;
+            auto& result = *response.mutable_components();
+            for (std::size_t i = 0; i < graph->components.size(); ++i) {
+                *result.add_components() = componentTo(*graph, i, state);
+            }
+            break;
+        }
+        case v1::Request::kListConnections:
+            *response.mutable_connections() = connectionsTo(*graph);
+            break;
+        case v1::Request::kGetStatistics:
+            *response.mutable_statistics() = statistics();
+            break;
+        case v1::Request::kResetStatistics:
+            resetStatistics();
+            response.mutable_done();
+            break;
+        case v1::Request::kGetStatus:
+            *response.mutable_status() = status();
+            break;
+        case v1::Request::kExit:
+            response.mutable_done();
+            exiting_ = true;
+            break;
+        default:
+            return false;
+    }
+    respond(connection, std::move(response));
+    return true;
+}
+
+void Server::submitChange(std::uint64_t connection, const v1::Request& request) {
+    const std::uint64_t id = request.id();
+    // Stop never queues behind a hook.
+    if (request.kind_case() == v1::Request::kStop) runner_->requestStop();
+    if (const std::string where = stuck(); !where.empty() && request.kind_case() != v1::Request::kStop) {
+        throw Refusal(RefusalKind::Unavailable,
+                      fmt::format("runner {} is stuck in {}(): only stop and restart it", runner_->name(), where));
+    }
+    // Steps take as long as they take; they report progress.
+    const bool endless = request.kind_case() == v1::Request::kStep;
+    waiting_[{connection, id}] = {endless ? INT64_MAX : monotonicNow() + kHookTimeout, [this, id] {
+                                      return errorResponse(id, RefusalKind::Unavailable,
+                                                           fmt::format("runner {} is stuck in {}()", runner_->name(),
+                                                                       runner_->activity().first));
+                                  }};
+    runner_->post([this, connection, id, request] {
+        v1::Response response;
+        response.set_id(id);
+        try {
+            const auto progress = [this, connection, id](const std::string& line) {
+                v1::Response step;
+                step.set_id(id);
+                step.set_progress(line);
+                post(connection, std::move(step), false);
+            };
+            if (request.kind_case() == v1::Request::kConfigure) {
+                runner_->configure(settingsFrom(request.configure(), runner_->settings()));
+                *response.mutable_status() = status();
+            } else {
+                *response.mutable_change() = outcomeTo(change(request, progress));
+            }
+        } catch (const Refusal& refusal) {
+            response = errorResponse(id, refusal.kind(), refusal.what());
+        } catch (const std::exception& error) {
+            response = errorResponse(id, RefusalKind::FailedPrecondition, error.what());
+        }
+        log_->drain();  // what the hooks said comes before the answer
+        post(connection, std::move(response), true);
+    });
+}
+
+ChangeOutcome Server::change(const v1::Request& request, const Runner::Progress& progress) {
+    switch (request.kind_case()) {
+        case v1::Request::kStart:
+            return runner_->start(progress);
+        case v1::Request::kStop:
+            return runner_->stop(progress);
+        case v1::Request::kStep:
+            if (request.step().cycles() == 0) throw Refusal(RefusalKind::InvalidArgument, "0 cycles to step: name a number");
+            return runner_->step(request.step().cycles(), progress);
+        case v1::Request::kLoad:
+            return runner_->load(definitionFrom(request.load().component()), request.load().library(), progress);
+        case v1::Request::kUnload: {
+            std::vector<std::string> names;
+            for (const std::string& name : request.unload().components()) names.push_back(fullNameOf(name));
+            return runner_->unload(names, progress);
+        }
+        case v1::Request::kReplace: {
+            const std::string name = fullNameOf(request.replace().component());
+            for (const auto& component : runner_->snapshot()->components) {
+                if (component->full_name != name) continue;
+                return runner_->replace(name, replacementFrom(request.replace().replacement(), component->definition),
+                                        request.replace().library(), progress);
+            }
+            throw Refusal(RefusalKind::NotFound, fmt::format("no component {} to replace", name));
+        }
+        case v1::Request::kSetBreaks: {
+            std::vector<std::pair<std::string, std::string>> ports;
+            for (const pb::PortName& port : request.set_breaks().ports()) {
+                ports.emplace_back(fullNameOf(port.component()), port.port());
+            }
+            return runner_->setBreaks(ports, request.set_breaks().broken());
+        }
+        case v1::Request::kSetParameters:
+            return runner_->setParameters(fullNameOf(request.set_parameters().component()),
+                                          parametersFrom(request.set_parameters().parameters()));
+        default:
+            throw Refusal(RefusalKind::InvalidArgument, "a request of unknown kind: is rtcfd newer than its executor?");
+    }
+}
+
+// A component's picture is at hand; only its ports' values need the graph thread, and are left
+// out if that is busy.
+void Server::submitProbe(std::uint64_t connection, const v1::Request& request) {
+    const std::string name = fullNameOf(request.get_component().component());
+    const std::uint64_t id = request.id();
+    const std::shared_ptr<const GraphSnapshot> graph = runner_->snapshot();
+    const RunnerState state = runner_->picture().state;
+    const auto found = std::find_if(graph->components.begin(), graph->components.end(),
+                                    [&](const auto& component) { return component->full_name == name; });
+    if (found == graph->components.end()) {
+        (void)graph->get(name);  // refuses
+    }
+    v1::Response response;
+    response.set_id(id);
+    *response.mutable_component() = componentTo(*graph, static_cast<std::size_t>(found - graph->components.begin()), state);
+    waiting_[{connection, id}] = {monotonicNow() + kProbeTimeout, [response] { return response; }};
+    runner_->post([this, connection, name, response]() mutable {
+        try {
+            addValues(*response.mutable_component(), runner_->probe(name));
+        } catch (const Refusal&) {
+            // Unloaded since: the picture of a moment ago is still an answer.
+        }
+        post(connection, std::move(response), true);
+    });
+}
+
+pb::RunnerStatus Server::status() const {
+    const RunnerPicture picture = runner_->picture();
+    const std::shared_ptr<const GraphSnapshot> graph = runner_->snapshot();
+    const Loop& loop = runner_->loop();
+    pb::RunnerStatus status;
+    status.set_runner(runner_->name());
+    status.set_state(stateTo(picture.state));
+    status.set_status(picture.status);
+    if (const std::string where = stuck(); !where.empty()) {
+        status.set_state(pb::RUNNER_STATE_STUCK);
+        status.set_status(fmt::format("stuck in {}()", where));
+    }
+    *status.mutable_settings() = settingsTo(picture.settings);
+    status.set_pid(::getpid());
+    status.set_realtime_tid(loop.threadId());
+    status.set_iteration(loop.figures().iteration.load(std::memory_order_relaxed));
+    status.set_overruns(loop.figures().overruns.load(std::memory_order_relaxed));
+    status.set_missed(loop.figures().missed.load(std::memory_order_relaxed));
+    status.set_components(static_cast<std::uint32_t>(graph->components.size()));
+    status.set_generation(graph->generation);
+    for (const std::string& line : picture.degraded) status.add_degraded(line);
+    pb::RosStatus& ros = *status.mutable_ros();
+    ros.set_enabled(picture.bridge.enabled);
+    ros.set_connected(picture.bridge.connected);
+    ros.set_node(picture.bridge.node);
+    ros.set_master_uri(picture.bridge.master_uri);
+    ros.set_publications(picture.bridge.publications);
+    ros.set_subscriptions(picture.bridge.subscriptions);
+    ros.set_problem(picture.bridge.problem);
+    status.set_log_dropped(log_->dropped());
+    std::uint64_t dropped = 0;
+    for (const auto& tap : graph->taps) dropped += tap->dropped();
+    status.set_tap_dropped(dropped);
+    return status;
+}
+
+pb::RunnerStatistics Server::statistics() const {
+    const std::shared_ptr<const GraphSnapshot> graph = runner_->snapshot();
+    const Loop& loop = runner_->loop();
+    const double ns_per_tick = loop.counter().nsPerTick();
+    pb::RunnerStatistics message;
+    message.set_runner(runner_->name());
+    const HistogramSnapshot duration = difference(loop.figures().duration.snapshot(), baseline_.duration);
+    message.set_iterations(duration.count);
+    setDistribution(*message.mutable_duration(), summarize(duration, ns_per_tick));
+    setDistribution(*message.mutable_latency(),
+                    summarize(difference(loop.figures().latency.snapshot(), baseline_.latency), 1.0));
+    message.set_overruns(loop.figures().overruns.load(std::memory_order_relaxed) - baseline_.overruns);
+    message.set_missed(loop.figures().missed.load(std::memory_order_relaxed) - baseline_.missed);
+    for (const auto& component : graph->components) {
+        pb::ComponentStatistics& statistics = *message.add_components();
+        statistics.set_component(component->full_name);
+        HistogramSnapshot present = component->figures->duration.snapshot();
+        std::uint64_t overruns = component->figures->overruns.load(std::memory_order_relaxed);
+        if (const auto found = baseline_.components.find(component->figures.get()); found != baseline_.components.end()) {
+            present = difference(present, found->second.first);
+            overruns -= found->second.second;
+        }
+        setDistribution(*statistics.mutable_duration(), summarize(present, ns_per_tick));
+        statistics.set_overruns(overruns);
+    }
+    const ThreadUsage usage = readThreadUsage(loop.threadId());
+    message.set_minor_faults(usage.minor_faults);
+    message.set_major_faults(usage.major_faults);
+    message.set_involuntary_switches(usage.involuntary_switches);
+    message.set_log_dropped(log_->dropped());
+    std::uint64_t dropped = 0;
+    for (const auto& tap : graph->taps) dropped += tap->dropped();
+    message.set_tap_dropped(dropped);
+    return message;
+}
+
+void Server::resetStatistics() {
+    const Loop& loop = runner_->loop();
+    baseline_.components.clear();
+    for (const auto& component : runner_->snapshot()->components) {
+        baseline_.components[component->figures.get()] = {component->figures->duration.snapshot(),
+                                                          component->figures->overruns.load(std::memory_order_relaxed)};
+    }
+    baseline_.duration = loop.figures().duration.snapshot();
+    baseline_.latency = loop.figures().latency.snapshot();
+    baseline_.overruns = loop.figures().overruns.load(std::memory_order_relaxed);
+    baseline_.missed = loop.figures().missed.load(std::memory_order_relaxed);
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,94 @@
+/// @file
+/// The executor's socket. Runs on the main thread: answers queries at once from
+/// snapshots, hands changes to the graph thread and sends their answers when
+/// they come, forwards log records and events. A hook that takes long delays
+/// changes, never a query.
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "logging/log.hpp"
+#include "runner/runner.hpp"
+#include "server/connection.hpp"
+#include "statistics/histogram.hpp"
+
+namespace rtcf::executor {
+
+class Server {
+   public:
+    /// Listens on `socket_path` and takes SIGTERM and SIGINT. @throws std::system_error
+    explicit Server(const std::string& socket_path);
+    ~Server();
+    Server(const Server&) = delete;
+    Server& operator=(const Server&) = delete;
+
+    /// @name Any thread: messages to all connected daemons; kept for the next one if there is none
+    /// @{
+    void publish(const LogEntry& entry);
+    void publish(const RunnerEvent& event);
+    /// @}
+
+    /// Serves until an `exit` request or a signal. @param runner what to serve; outlives the call
+    void serve(Runner& runner, Log& log);
+    /// Sends what has been posted. After serve(), for what was logged on the way out.
+    void deliver();
+
+   private:
+    struct Outgoing {
+        std::uint64_t connection;  // 0 = all
+        v1::Response response;
+        bool last;                 // ends its request
+    };
+    struct Baseline {  // what statistics count from
+        std::map<const ComponentFigures*, std::pair<HistogramSnapshot, std::uint64_t>> components;
+        HistogramSnapshot duration;
+        HistogramSnapshot latency;
+        std::uint64_t overruns = 0;
+        std::uint64_t missed = 0;
+    };
+
+    void post(std::uint64_t connection, v1::Response response, bool last);
+    void accept();
+    void receive(Connection& connection);
+    void drop(std::uint64_t id);
+    void respond(std::uint64_t connection, v1::Response response);
+    void handle(Connection& connection, const v1::Request& request);
+    bool answerQuery(std::uint64_t connection, const v1::Request& request);
+    void submitChange(std::uint64_t connection, const v1::Request& request);
+    void submitProbe(std::uint64_t connection, const v1::Request& request);
+    void expire();
+    ChangeOutcome change(const v1::Request& request, const Runner::Progress& progress);
+    ::rtcf::v1::RunnerStatus status() const;
+    ::rtcf::v1::RunnerStatistics statistics() const;
+    void resetStatistics();
+    std::string stuck() const;
+
+    std::string path_;
+    int listener_ = -1;
+    int signals_ = -1;
+    int wake_ = -1;
+    bool exiting_ = false;
+    Runner* runner_ = nullptr;
+    Log* log_ = nullptr;
+    std::uint64_t next_id_ = 1;
+    std::map<std::uint64_t, std::unique_ptr<Connection>> connections_;
+    Baseline baseline_;
+
+    // Requests that the graph thread has, by connection and id: when to give up on them.
+    struct Waiting {
+        std::int64_t until_ns;
+        std::function<v1::Response()> otherwise;
+    };
+    std::map<std::pair<std::uint64_t, std::uint64_t>, Waiting> waiting_;
+
+    std::mutex outbox_mutex_;
+    std::deque<Outgoing> outbox_;
+};
+
+}  // namespace rtcf::executor

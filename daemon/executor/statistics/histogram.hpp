@@ -1,0 +1,82 @@
+/// @file
+/// A histogram of durations with logarithmic octaves of linear buckets (as in
+/// HdrHistogram, G. Tene): fixed memory, relative error below 1.6 %. One
+/// thread adds in constant time; any other reads snapshots, and resets by
+/// subtracting an earlier snapshot, so that the writer is never disturbed.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+#include "rtcf/realtime.hpp"
+
+namespace rtcf::executor {
+
+/// A histogram's counts at one time. Values are in the writer's unit.
+struct HistogramSnapshot {
+    std::vector<std::uint64_t> buckets;
+    std::uint64_t count = 0;
+    std::int64_t sum = 0;
+    std::int64_t maximum = 0;  ///< exact, since the beginning
+};
+
+/// Figures drawn from a snapshot, in the unit of its values times a scale.
+struct DistributionSummary {
+    std::uint64_t count = 0;
+    double min = 0.0;
+    double mean = 0.0;
+    double p50 = 0.0;
+    double p99 = 0.0;
+    double p999 = 0.0;
+    double max = 0.0;
+};
+
+/// What was added between two snapshots; `earlier` may be empty.
+HistogramSnapshot difference(const HistogramSnapshot& now, const HistogramSnapshot& earlier);
+
+/// Minimum, mean, quantiles, maximum. @param scale multiplies every value, e.g. ns per tick
+DistributionSummary summarize(const HistogramSnapshot& snapshot, double scale);
+
+class Histogram {
+   public:
+    static constexpr unsigned kSubBits = 5;                     // 32 buckets an octave
+    static constexpr unsigned kOctaves = 32;                    // up to 2^36 units: 23 s of a 3 GHz counter
+    static constexpr std::size_t kBuckets = (kOctaves + 1) << kSubBits;
+
+    /// Adds a value; below 0 counts as 0, above the range as the last bucket. Real-time safe.
+    void add(std::int64_t value) noexcept RTCF_NONBLOCKING {
+        bump(buckets_[bucketOf(value)], std::uint64_t{1});
+        bump(sum_, value);
+        if (value > maximum_.load(std::memory_order_relaxed)) maximum_.store(value, std::memory_order_relaxed);
+    }
+
+    /// Any thread; not real-time safe. Counts of a running writer may differ by the last few values.
+    HistogramSnapshot snapshot() const;
+
+    static std::size_t bucketOf(std::int64_t value) noexcept {
+        const auto v = static_cast<std::uint64_t>(value < 0 ? 0 : value);
+        constexpr std::uint64_t kSub = std::uint64_t{1} << kSubBits;
+        const unsigned magnitude = 63U - static_cast<unsigned>(__builtin_clzll(v | kSub));
+        const unsigned octave = magnitude - kSubBits;
+        const std::size_t index = (static_cast<std::size_t>(octave) << kSubBits) + (v >> octave);
+        return index < kBuckets ? index : kBuckets - 1;
+    }
+    /// Smallest value of a bucket, and the number of values it holds.
+    static std::int64_t lowerBound(std::size_t bucket) noexcept;
+    static std::int64_t width(std::size_t bucket) noexcept;
+
+   private:
+    // One writer: a load and a store suffice, without the bus lock of fetch_add.
+    template <typename T>
+    static void bump(std::atomic<T>& counter, T by) noexcept {
+        counter.store(counter.load(std::memory_order_relaxed) + by, std::memory_order_relaxed);
+    }
+
+    std::array<std::atomic<std::uint64_t>, kBuckets> buckets_{};
+    std::atomic<std::int64_t> sum_{0};
+    std::atomic<std::int64_t> maximum_{0};
+};
+
+}  // namespace rtcf::executor

@@ -1,0 +1,19 @@
+/// @file
+/// What the kernel counts of one of our threads: proc(5), /proc/self/task/TID.
+/// Not real-time.
+#pragma once
+
+#include <cstdint>
+
+namespace rtcf::executor {
+
+struct ThreadUsage {
+    std::uint64_t minor_faults = 0;
+    std::uint64_t major_faults = 0;
+    std::uint64_t involuntary_switches = 0;
+};
+
+/// @return all 0 if there is no such thread
+ThreadUsage readThreadUsage(int thread_id);
+
+}  // namespace rtcf::executor
