@@ -1,0 +1,324 @@
+#include "ros/master_watch.hpp"
+
+#include <ros/node_handle.h>
+
+#include <cstdlib>
+
+namespace rtcf::ros1 {
+
+namespace {
+
+constexpr auto kPeriod = std::chrono::milliseconds(500);
+constexpr auto kCallTimeout = std::chrono::milliseconds(1000);
+
+std::string masterUri(const executor::BridgeSettings& settings) {
+    if (!settings.master_uri.empty()) return settings.master_uri;
+    const char* environment = std::getenv("ROS_MASTER_URI");
+    return environment != nullptr && *environment != '\0' ? environment : "http://localhost:11311";
+}
+
+MasterClient clientOf(const std::string& uri, std::chrono::milliseconds timeout,
+                      const std::atomic<bool>& cancel) {
+    std::string host;
+    std::uint32_t port = 0;
+    splitMasterUri(uri, host, port);
+    return {host, port, timeout, cancel};
+}
+
+}  // namespace
+
+MasterWatch::MasterWatch(const std::string& runner, executor::BridgeReport report)
+    : name_(nodeName(runner)),
+      report_(std::move(report)),
+      node_(name_, [this](const std::string& reason) {
+          {
+              const std::lock_guard lock(mutex_);
+              shutdown_request_ = reason;
+              due_ = true;
+          }
+          changed_.notify_all();
+      }) {
+    status_.node = name_.full();
+}
+
+void MasterWatch::configure(const executor::BridgeSettings& settings) {
+    {
+        const std::lock_guard lock(mutex_);
+        settings_ = settings;
+        status_.enabled = settings.enabled;
+        status_.master_uri = masterUri(settings);
+        revived_ = true;
+        due_ = true;
+    }
+    changed_.notify_all();
+}
+
+void MasterWatch::setTable(const executor::BridgeTable& table) {
+    publishing_.setTaps(table.outputs);
+    subscribing_.setInjectors(table.inputs);
+    {
+        const std::lock_guard lock(mutex_);
+        due_ = true;
+    }
+    changed_.notify_all();
+}
+
+executor::BridgeStatus MasterWatch::status() const {
+    executor::BridgeStatus status;
+    {
+        const std::lock_guard lock(mutex_);
+        status = status_;
+    }
+    status.publications = publishing_.open();
+    status.subscriptions = subscribing_.open();
+    if (status.problem.empty()) status.problem = publishing_.problem();
+    if (status.problem.empty()) status.problem = subscribing_.problem();
+    return status;
+}
+
+void MasterWatch::stop() {
+    stop_ = true;
+    {
+        const std::lock_guard lock(mutex_);
+        due_ = true;
+    }
+    changed_.notify_all();
+}
+
+bool MasterWatch::waitForEnd(std::chrono::milliseconds timeout) {
+    {
+        std::unique_lock lock(mutex_);
+        if (changed_.wait_for(lock, timeout, [this] { return ended_; })) return true;
+    }
+    const std::lock_guard lock(report_mutex_);
+    report_ = nullptr;
+    return false;
+}
+
+void MasterWatch::run() {
+    while (true) {
+        {
+            std::unique_lock lock(mutex_);
+            changed_.wait_for(lock, kPeriod, [this] { return due_; });
+            due_ = false;
+            if (stop_) break;
+            if (!settings_) continue;
+        }
+        step();
+    }
+    end();
+    {
+        const std::lock_guard lock(mutex_);
+        ended_ = true;
+    }
+    changed_.notify_all();
+}
+
+void MasterWatch::step() {
+    executor::BridgeSettings settings;
+    {
+        const std::lock_guard lock(mutex_);
+        settings = *settings_;
+        if (std::exchange(revived_, false) && off_ == Off::Killed) off_ = Off::No;
+    }
+    if (failed_) return;
+    const std::string uri = masterUri(settings);
+    std::string host;
+    std::uint32_t port = 0;
+    if (settings.enabled && !splitMasterUri(uri, host, port)) {
+        return setProblem("the ROS master's URI '" + uri +
+                          "' is none; it has the form http://HOST:PORT");
+    }
+    if (!node_.started()) {
+        if (!settings.enabled) return setProblem("");
+        if (!startNode(uri)) return;
+    }
+    if (!node_.alive()) {
+        failed_ = true;
+        return setProblem(
+            "something in this process has shut down ROS: restart the executor to have it again");
+    }
+    if (!settings.enabled) {
+        MasterClient master = clientOf(master_uri_, kCallTimeout, stop_);
+        if (leaveTopics(master)) say("ROS node " + name_.full() + " is off");
+        return setProblem("");
+    }
+    if (uri != master_uri_) changeMaster(uri);
+    MasterClient master = clientOf(uri, kCallTimeout, stop_);
+    obeyShutdownRequest(master);
+    if (!watchMaster(master)) {
+        if (off_ == Off::No) subscribing_.reconcile(node_.handle(), false);
+        return;
+    }
+    openAndClose(master, settings.queue);
+}
+
+bool MasterWatch::startNode(const std::string& uri) {
+    MasterClient master = clientOf(uri, kCallTimeout, stop_);
+    XmlRpc::XmlRpcValue arguments;
+    arguments[0] = name_.full();
+    if (master.call("getPid", arguments).silent()) {
+        setProblem("no ROS master answers at " + uri);
+        say("no ROS master answers at " + uri + ": waiting for one");
+        return false;
+    }
+    try {
+        node_.start(uri);
+    } catch (const std::exception& error) {
+        failed_ = true;
+        setProblem(std::string("the ROS node could not be started: ") + error.what());
+        say(std::string("the ROS node could not be started: ") + error.what());
+        return false;
+    }
+    refusals_ = std::make_unique<Refusals>();
+    master_uri_ = uri;
+    registered_ = true;  // roscpp has done so
+    say("ROS node " + name_.full() + " is up at " + uri);
+    return true;
+}
+
+void MasterWatch::changeMaster(const std::string& uri) {
+    MasterClient old = clientOf(master_uri_, kCallTimeout, stop_);
+    MasterClient node = self();
+    withdrawAll(old, node, node_, std::chrono::steady_clock::now() + std::chrono::seconds(1));
+    node_.useMaster(uri);
+    master_uri_ = uri;
+    registered_ = false;
+    was_silent_ = false;
+    if (off_ == Off::NameTaken) off_ = Off::No;
+}
+
+// The node itself stays, so that it can come back; roscpp cannot be started twice.
+void MasterWatch::obeyShutdownRequest(MasterClient& master) {
+    std::optional<std::string> reason;
+    {
+        const std::lock_guard lock(mutex_);
+        reason.swap(shutdown_request_);
+    }
+    if (reason) {
+        off_ = reason->find("same name") != std::string::npos ? Off::NameTaken : Off::Killed;
+    }
+    if (off_ == Off::No) return;
+    leaveTopics(master);
+    say(whyOff());
+    setProblem(whyOff());
+}
+
+std::string MasterWatch::whyOff() const {
+    if (off_ == Off::Killed) {
+        return "ROS node " + name_.full() +
+               " was asked to shut down: it is off until ROS is configured again";
+    }
+    return "another node named " + name_.full() +
+           " runs at this ROS master: give its host or runner another name";
+}
+
+// Closes all topics and withdraws what is left. roscpp asks the master while it
+// closes, so that one must answer. @return true if there was anything, and it is done
+bool MasterWatch::leaveTopics(MasterClient& master) {
+    if (!registered_ && publishing_.open() == 0 && subscribing_.open() == 0) return false;
+    if (lookUp(master, node_).kind == Lookup::Kind::Silent) return false;
+    publishing_.closeAll();
+    subscribing_.closeAll();
+    MasterClient node = self();
+    withdrawAll(master, node, node_, std::chrono::steady_clock::now() + kCallTimeout);
+    registered_ = false;
+    return true;
+}
+
+// True if another node has our name and we are not to fight for it: until the
+// master has told us to go, or, afterwards, until that node does not answer.
+bool MasterWatch::nameIsTaken(const Lookup& found) {
+    constexpr int kPatience = 3;  // steps
+    if (found.kind != Lookup::Kind::Other) {
+        taken_ = 0;
+        off_ = Off::No;
+        return false;
+    }
+    XmlRpc::XmlRpcValue arguments;
+    arguments[0] = name_.full();
+    const bool answers =
+        !clientOf(found.uri, kCallTimeout, stop_).call("getPid", arguments).silent();
+    taken_ = off_ == Off::NameTaken && answers ? 0 : taken_ + 1;
+    if (taken_ < kPatience) return true;
+    taken_ = 0;
+    off_ = Off::No;
+    return false;
+}
+
+// @return true if the master answers, knows of the node, and topics can be opened
+bool MasterWatch::watchMaster(MasterClient& master) {
+    if (off_ == Off::Killed) return false;
+    const Lookup found = lookUp(master, node_);
+    if (found.kind == Lookup::Kind::Silent) {
+        setProblem("no ROS master answers at " + master_uri_ + "; open connections go on");
+        say("the ROS master at " + master_uri_ +
+            " does not answer any more: open connections go on");
+        was_silent_ = true;
+        return false;
+    }
+    if (nameIsTaken(found)) return false;
+    const bool returned = std::exchange(was_silent_, false);
+    if (found.kind != Lookup::Kind::Ours || !registered_) {
+        MasterClient node = self();
+        registered_ = registerAll(master, node, node_);
+        if (!registered_) {
+            setProblem("the ROS master at " + master_uri_ + " did not take all registrations");
+            return false;
+        }
+        say("ROS node " + name_.full() + " is registered again at " + master_uri_);
+    } else if (returned) {
+        say("the ROS master at " + master_uri_ + " answers again");
+    }
+    return true;
+}
+
+void MasterWatch::openAndClose(MasterClient& master, std::uint32_t queue) {
+    const bool published = publishing_.reconcile(node_.handle(), queue);
+    const bool subscribed = subscribing_.reconcile(node_.handle(), true);
+    // roscpp does not say if the master took them; if it has gone meanwhile, do it again later.
+    if ((published || subscribed) && lookUp(master, node_).kind != Lookup::Kind::Ours) {
+        registered_ = false;
+    }
+    setConnected();
+    for (const std::string& refusal : refusals_->take()) say(refusal);
+}
+
+MasterClient MasterWatch::self() const { return {"127.0.0.1", node_.port(), kCallTimeout, stop_}; }
+
+void MasterWatch::end() {
+    if (node_.started() && node_.alive()) {
+        const std::atomic<bool> never{false};
+        constexpr auto kShort = std::chrono::milliseconds(300);
+        MasterClient master = clientOf(master_uri_, kShort, never);
+        MasterClient node("127.0.0.1", node_.port(), kShort, never);
+        withdrawAll(master, node, node_, std::chrono::steady_clock::now() + 2 * kShort);
+        node_.leaveMaster();
+    }
+    publishing_.setTaps({});
+    publishing_.closeAll();
+    subscribing_.closeAll();
+    refusals_.reset();
+    node_.stop();
+}
+
+void MasterWatch::setProblem(const std::string& problem) {
+    const std::lock_guard lock(mutex_);
+    status_.connected = false;
+    status_.problem = problem;
+}
+
+void MasterWatch::setConnected() {
+    const std::lock_guard lock(mutex_);
+    status_.connected = true;
+    status_.problem = refusals_->recent();
+}
+
+void MasterWatch::say(const std::string& message) {
+    if (message == said_) return;
+    said_ = message;
+    const std::lock_guard lock(report_mutex_);
+    if (report_) report_(message);
+}
+
+}  // namespace rtcf::ros1

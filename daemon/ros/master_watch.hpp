@@ -1,0 +1,92 @@
+/// @file
+/// The life of the node: waits for a master, starts the node, opens and closes
+/// its topics, notices when the master goes and comes, and ends it all in
+/// order. The ROS node owns it; run() has a thread of its own.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "bridge/bridge.hpp"
+#include "ros/master_client.hpp"
+#include "ros/publishing.hpp"
+#include "ros/refusals.hpp"
+#include "ros/registration.hpp"
+#include "ros/roscpp_node.hpp"
+#include "ros/subscribing.hpp"
+
+namespace rtcf::ros1 {
+
+class MasterWatch {
+   public:
+    MasterWatch(const std::string& runner, executor::BridgeReport report);
+
+    /// @name Any thread; return at once
+    /// @{
+    void configure(const executor::BridgeSettings& settings);
+    void setTable(const executor::BridgeTable& table);
+    executor::BridgeStatus status() const;
+    /// Lets run() end.
+    void stop();
+    /// Waits until run() has ended. @return false if it has not in time; it reports nothing more
+    /// then
+    bool waitForEnd(std::chrono::milliseconds timeout);
+    /// @}
+
+    /// Serves until stop(). Called once.
+    void run();
+
+   private:
+    // Why the node is off although it is enabled.
+    enum class Off { No, NameTaken, Killed };
+
+    void step();
+    bool startNode(const std::string& uri);
+    void changeMaster(const std::string& uri);
+    void obeyShutdownRequest(MasterClient& master);
+    bool watchMaster(MasterClient& master);
+    void openAndClose(MasterClient& master, std::uint32_t queue);
+    bool leaveTopics(MasterClient& master);
+    bool nameIsTaken(const Lookup& found);
+    std::string whyOff() const;
+    void end();
+    MasterClient self() const;
+
+    void setProblem(const std::string& problem);
+    void setConnected();
+    void say(const std::string& message);
+
+    const NodeName name_;
+    std::atomic<bool> stop_{false};
+
+    mutable std::mutex mutex_;  // down to ended_
+    std::condition_variable changed_;
+    std::optional<executor::BridgeSettings> settings_;
+    std::optional<std::string> shutdown_request_;
+    bool revived_ = false;  // configured anew since it was killed
+    bool due_ = false;      // something changed since the last step
+    executor::BridgeStatus status_;
+    bool ended_ = false;
+
+    std::mutex report_mutex_;  // report_
+    executor::BridgeReport report_;
+
+    // The watch thread's alone, but for what is thread-safe in itself.
+    RoscppNode node_;
+    Publishing publishing_;
+    Subscribing subscribing_;
+    std::unique_ptr<Refusals> refusals_;
+    std::string master_uri_;   // of the running node
+    bool registered_ = false;  // everything that is open, as far as we know
+    bool was_silent_ = false;  // the master, at the last step
+    int taken_ = 0;            // steps since another node got our name, or does not answer
+    bool failed_ = false;      // the node cannot be started in this process
+    Off off_ = Off::No;
+    std::string said_;
+};
+
+}  // namespace rtcf::ros1

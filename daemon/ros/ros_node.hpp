@@ -1,0 +1,39 @@
+/// @file
+/// The executor's ROS 1 node, by which taps and injectors become topics.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "bridge/bridge.hpp"
+
+namespace rtcf::ros1 {
+
+class MasterWatch;
+
+/// One per process, and one in its life: roscpp cannot be started again. All
+/// work is done in threads of its own; none is real-time. With no master it
+/// waits for one; it outlives masters that go and come.
+class RosNode final : public executor::Bridge {
+   public:
+    /// @param runner names the node, `/rtcfd/<host>/<runner>`
+    /// @param report hears of what changes; not called after the destructor
+    RosNode(std::string runner, executor::BridgeReport report);
+
+    /// Withdraws from the master and closes all topics, in less than two seconds whatever the
+    /// master does. Taps and injectors are not used any more afterwards.
+    ~RosNode() override;
+    RosNode(const RosNode&) = delete;
+    RosNode& operator=(const RosNode&) = delete;
+
+    void configure(const executor::BridgeSettings& settings) override;
+    void setTable(std::shared_ptr<const executor::BridgeTable> table) override;
+    executor::BridgeStatus status() const override;
+
+   private:
+    std::shared_ptr<MasterWatch> watch_;  // shared with its thread
+    std::thread thread_;
+};
+
+}  // namespace rtcf::ros1

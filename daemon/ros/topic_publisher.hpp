@@ -1,0 +1,49 @@
+/// @file
+/// One topic that the node publishes: any type, given as bytes.
+#pragma once
+
+#include <ros/publisher.h>
+
+#include <cstdint>
+#include <mutex>
+#include <string>
+
+#include "rtcf/port_type.hpp"
+
+namespace ros {
+class NodeHandle;
+}
+
+namespace rtcf::ros1 {
+
+/// Owned by Publishing. open() and close() speak to the master; publish()
+/// comes from another thread and never waits for them.
+class TopicPublisher {
+   public:
+    TopicPublisher(std::string topic, const TypeInfo& type, std::uint32_t queue);
+
+    /// True if it takes messages of such a type.
+    bool serves(const TypeInfo& type) const;
+    std::uint32_t queue() const { return queue_; }
+    bool isOpen() const;
+    /// Why it could not be opened, one line; empty if it could.
+    std::string problem() const;
+
+    void open(ros::NodeHandle& handle);
+    void close();
+
+    /// Sends one message, or nothing while closed. The bytes are copied only for a subscriber.
+    void publish(const std::uint8_t* bytes, std::uint32_t size);
+
+   private:
+    std::string topic_;
+    std::string type_;
+    std::string md5_;
+    std::string definition_;
+    std::uint32_t queue_;
+    mutable std::mutex mutex_;  // all below
+    std::string problem_;
+    ros::Publisher publisher_;
+};
+
+}  // namespace rtcf::ros1

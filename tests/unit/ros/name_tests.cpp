@@ -1,0 +1,18 @@
+#include <gtest/gtest.h>
+
+#include "ros/node_name.hpp"
+
+using rtcf::ros1::nodeName;
+
+TEST(NodeName, IsOfHostAndRunner) {
+    EXPECT_EQ(nodeName("robot", "arm").full(), "/rtcfd/robot/arm");
+}
+
+TEST(NodeName, ReplacesWhatRosDoesNotAllow) {
+    EXPECT_EQ(nodeName("pi-4.lab.example", "left arm/2").full(),
+              "/rtcfd/pi_4_lab_example/left_arm_2");
+}
+
+TEST(NodeName, StandsInForWhatIsEmpty) {
+    EXPECT_EQ(nodeName("", "").full(), "/rtcfd/localhost/rt_runner");
+}

@@ -1,0 +1,58 @@
+#!/usr/bin/python3
+"""A ROS node on the other side of a test's topics; the test starts and ends it.
+
+peer.py listen TOPIC TYPE   prints the value of each message
+peer.py send TOPIC VALUE    publishes one latched std_msgs/Float64 and stays
+peer.py node NAME           only has that name; ends when its master says so
+peer.py loggers NODE        does what rqt_logger_level does to a node, prints `done` and ends
+"""
+
+import os
+import sys
+from typing import Any
+
+import roscpp.srv  # type: ignore[import]
+import rospy  # type: ignore[import]
+import std_msgs.msg  # type: ignore[import]
+
+
+def show(message: Any) -> None:
+    """Prints a message's value on a line of its own."""
+    print(message.data, flush=True)
+
+
+def look_at_loggers(node: str) -> None:
+    """Asks for the loggers of a node and sets the level of one."""
+    try:
+        rospy.ServiceProxy(f"{node}/get_loggers", roscpp.srv.GetLoggers)()
+    except rospy.ServiceException:
+        pass  # it may refuse
+    rospy.ServiceProxy(f"{node}/set_logger_level", roscpp.srv.SetLoggerLevel)("ros", "debug")
+    print("done", flush=True)
+
+
+def main() -> None:
+    """Does what the command line says until it is killed."""
+    action, argument = sys.argv[1:3]
+    if action == "node":
+        namespace, _, name = argument.rpartition("/")
+        os.environ["ROS_NAMESPACE"] = namespace
+        # rospy reads it when it is imported.
+        rospy.names._set_caller_id(argument)
+        rospy.init_node(name, disable_signals=True)
+    else:
+        rospy.init_node("peer", anonymous=True, disable_signals=True)
+    if action == "listen":
+        rospy.Subscriber(argument, getattr(std_msgs.msg, sys.argv[3]), show, tcp_nodelay=True)
+    if action == "send":
+        publisher = rospy.Publisher(argument, std_msgs.msg.Float64, latch=True, queue_size=1)
+        publisher.publish(float(sys.argv[3]))
+    if action == "loggers":
+        look_at_loggers(argument)
+        return
+    if action == "node":
+        print("ready", flush=True)
+    rospy.spin()
+
+
+main()

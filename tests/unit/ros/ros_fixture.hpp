@@ -1,0 +1,109 @@
+/// @file
+/// A ROS of its own for each test: a master on a free port, files in a
+/// temporary folder, peers in processes of their own; and what the executor
+/// gives to the node: taps and injectors of std_msgs/Float64.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <std_msgs/Float64.h>
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "bridge/injector.hpp"
+#include "bridge/tap.hpp"
+#include "child_process.hpp"
+#include "ros/ros_node.hpp"
+
+using namespace std::chrono_literals;
+
+/// An output of the loop: write() is what a cycle does.
+class Source {
+   public:
+    explicit Source(const std::string& topic)
+        : slot_(std::make_shared<rtcf::Slot<std_msgs::Float64>>()),
+          tap_(std::make_shared<rtcf::executor::Tap>(topic, rtcf::typeInfo<std_msgs::Float64>(),
+                                                     slot_, 1 << 16)) {}
+
+    const std::shared_ptr<rtcf::executor::Tap>& tap() const { return tap_; }
+    void write(double value) {
+        slot_->value.data = value;
+        ++slot_->sequence;
+        tap_->push();
+    }
+
+   private:
+    std::shared_ptr<rtcf::Slot<std_msgs::Float64>> slot_;
+    std::shared_ptr<rtcf::executor::Tap> tap_;
+};
+
+/// An input of the loop: value() is what a cycle reads.
+class Sink {
+   public:
+    explicit Sink(const std::string& topic)
+        : injector_(std::make_shared<rtcf::executor::Injector>(
+              topic, rtcf::typeInfo<std_msgs::Float64>())) {}
+
+    const std::shared_ptr<rtcf::executor::Injector>& injector() const { return injector_; }
+    double value() {
+        injector_->adopt({});
+        return static_cast<const rtcf::Slot<std_msgs::Float64>*>(injector_->front())->value.data;
+    }
+
+   private:
+    std::shared_ptr<rtcf::executor::Injector> injector_;
+};
+
+class RosFixture : public ::testing::Test {
+   protected:
+    RosFixture();
+    ~RosFixture() override;
+
+    /// Starts a master, the same port each time, and waits until it answers.
+    void startMaster();
+    void stopMaster() { master_.reset(); }
+    ChildProcess& master() { return *master_; }
+    std::string masterUri() const { return "http://127.0.0.1:" + std::to_string(port_); }
+
+    /// A rospy node that prints the values of a topic, one a line.
+    std::unique_ptr<ChildProcess> listen(const std::string& topic,
+                                         const std::string& type = "Float64");
+    /// A rospy node that publishes one latched value and stays.
+    std::unique_ptr<ChildProcess> send(const std::string& topic, double value);
+    /// A rospy node of that name.
+    std::unique_ptr<ChildProcess> node(const std::string& name);
+    /// What a command such as `rosnode` prints.
+    std::string run(const std::vector<std::string>& command);
+    /// Has a peer do what rqt_logger_level does to the node. @return "done\n"
+    std::string lookAtLoggers();
+
+    /// Starts the node with this master.
+    void startNode();
+    void stopNode() { node_.reset(); }
+    rtcf::ros1::RosNode& rosNode() { return *node_; }
+    void serve(const std::vector<Source*>& outputs, const std::vector<Sink*>& inputs);
+
+    /// True as soon as `condition` is; false if it is not in time.
+    static bool eventually(const std::function<bool()>& condition,
+                           std::chrono::milliseconds timeout = 10s);
+    /// Writes rising values, 1 ms apart, until the listener prints one. @return its line, "" if
+    /// none
+    static std::string flow(Source& source, ChildProcess& listener,
+                            std::chrono::milliseconds timeout = 10s);
+    bool reported(const std::string& part) const;
+
+   private:
+    std::map<std::string, std::string> environment() const;
+
+    std::filesystem::path folder_;
+    int port_ = 0;
+    std::unique_ptr<ChildProcess> master_;
+    mutable std::mutex mutex_;  // reports_
+    std::vector<std::string> reports_;
+    std::unique_ptr<rtcf::ros1::RosNode> node_;
+};

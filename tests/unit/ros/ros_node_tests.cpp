@@ -1,0 +1,310 @@
+#include <csignal>
+#include <thread>
+
+#include "ros_fixture.hpp"
+
+class RosNodeTest : public RosFixture {};
+
+TEST_F(RosNodeTest, ValuesFlowBothWays) {
+    startMaster();
+    Source source("/out");
+    Sink sink("/in");
+    startNode();
+    serve({&source}, {&sink});
+    const auto listener = listen("/out");
+    const auto sender = send("/in", 2.5);
+    EXPECT_NE(flow(source, *listener), "");
+    EXPECT_TRUE(eventually([&] { return sink.value() == 2.5; }));
+    const auto status = rosNode().status();
+    EXPECT_TRUE(status.enabled && status.connected);
+    EXPECT_EQ(status.publications, 1U);
+    EXPECT_EQ(status.subscriptions, 1U);
+    EXPECT_EQ(status.problem, "");
+    EXPECT_EQ(status.master_uri, masterUri());
+}
+
+TEST_F(RosNodeTest, NoValueIsLostOrReordered) {
+    startMaster();
+    Source source("/out");
+    startNode();
+    serve({&source}, {});
+    const auto listener = listen("/out");
+    double last = std::stod(flow(source, *listener));
+    while (const auto line = listener->line(300ms)) last = std::stod(*line);
+    for (int i = 1; i <= 2000; ++i) {
+        source.write(last + i);
+        if (i % 20 == 0) std::this_thread::sleep_for(10ms);
+    }
+    for (int i = 1; i <= 2000; ++i) {
+        const auto line = listener->line(5s);
+        ASSERT_TRUE(line) << "after " << i - 1;
+        ASSERT_EQ(std::stod(*line), last + i);
+    }
+}
+
+TEST_F(RosNodeTest, WaitsForAMaster) {
+    Source source("/out");
+    startNode();
+    serve({&source}, {});
+    ASSERT_TRUE(eventually([&] { return reported("no ROS master"); }));
+    EXPECT_FALSE(rosNode().status().connected);
+    EXPECT_NE(rosNode().status().problem.find(masterUri()), std::string::npos);
+    // Nobody takes the values, and yet the tap does not fill up.
+    for (int i = 0; i < 10000; ++i) {
+        source.write(i);
+        if (i % 100 == 0) std::this_thread::sleep_for(2ms);
+    }
+    EXPECT_EQ(source.tap()->dropped(), 0U);
+    startMaster();
+    EXPECT_TRUE(eventually([&] { return rosNode().status().publications == 1; }, 2s));
+    EXPECT_TRUE(eventually([&] { return rosNode().status().connected; }, 1s));
+    const auto listener = listen("/out");
+    EXPECT_NE(flow(source, *listener), "");
+}
+
+TEST_F(RosNodeTest, RegistersAgainWithARestartedMaster) {
+    startMaster();
+    Source source("/out");
+    Sink sink("/in");
+    startNode();
+    serve({&source}, {&sink});
+    const auto old_listener = listen("/out");
+    ASSERT_NE(flow(source, *old_listener), "");
+    stopMaster();
+    ASSERT_TRUE(eventually([&] { return !rosNode().status().connected; }));
+    // Connections do not need the master.
+    while (old_listener->line(100ms)) {
+    }
+    EXPECT_NE(flow(source, *old_listener), "");
+    startMaster();
+    EXPECT_TRUE(eventually([&] { return rosNode().status().connected; }, 2s));
+    EXPECT_TRUE(reported("registered again"));
+    const auto listener = listen("/out");
+    const auto sender = send("/in", 7.0);
+    EXPECT_NE(flow(source, *listener), "");
+    EXPECT_TRUE(eventually([&] { return sink.value() == 7.0; }));
+    EXPECT_NE(run({"rosnode", "info", rosNode().status().node}).find("/set_logger_level"),
+              std::string::npos);
+}
+
+TEST_F(RosNodeTest, FindsPublishersThatAMasterKnewBeforeIt) {
+    startMaster();
+    Sink sink("/in");
+    startNode();
+    serve({}, {&sink});
+    ASSERT_TRUE(eventually([&] { return rosNode().status().subscriptions == 1; }));
+    // While ours does not look, a sender registers with the new master first.
+    stopMaster();
+    ASSERT_TRUE(eventually([&] { return !rosNode().status().connected; }));
+    startMaster();
+    const auto sender = send("/in", 3.0);
+    EXPECT_TRUE(eventually([&] { return sink.value() == 3.0; }));
+}
+
+TEST_F(RosNodeTest, OpensAndClosesWithTheTable) {
+    startMaster();
+    Source first("/first");
+    Source second("/second");
+    Sink sink("/in");
+    startNode();
+    serve({&first}, {});
+    ASSERT_TRUE(eventually([&] { return rosNode().status().publications == 1; }));
+    const auto listener = listen("/first");
+    ASSERT_NE(flow(first, *listener), "");
+    serve({&first, &second}, {&sink});
+    ASSERT_TRUE(eventually([&] {
+        return rosNode().status().publications == 2 && rosNode().status().subscriptions == 1;
+    }));
+    const auto other = listen("/second");
+    EXPECT_NE(flow(second, *other), "");
+    while (listener->line(100ms)) {
+    }
+    EXPECT_NE(flow(first, *listener), "");
+    serve({&second}, {});
+    ASSERT_TRUE(eventually([&] {
+        return rosNode().status().publications == 1 && rosNode().status().subscriptions == 0;
+    }));
+    std::string text;
+    EXPECT_TRUE(eventually([&] {
+        text = run({"rosnode", "info", rosNode().status().node});
+        return text.find("/first") == std::string::npos && text.find("/in") == std::string::npos;
+    })) << text;
+    EXPECT_NE(text.find("/second"), std::string::npos) << text;
+}
+
+TEST_F(RosNodeTest, ANewTapOfATopicKeepsItsSubscribers) {
+    startMaster();
+    Source before("/out");
+    startNode();
+    serve({&before}, {});
+    const auto listener = listen("/out");
+    ASSERT_NE(flow(before, *listener), "");
+    while (listener->line(200ms)) {
+    }
+    Source after("/out");
+    serve({&after}, {});
+    // The connection stays, so that not even the first value is lost.
+    after.write(77.0);
+    EXPECT_EQ(listener->line(5s).value_or("none"), "77.0");
+}
+
+TEST_F(RosNodeTest, ANewInjectorOfATopicGetsTheLatchedValue) {
+    startMaster();
+    Sink before("/in");
+    startNode();
+    serve({}, {&before});
+    const auto sender = send("/in", 4.0);
+    ASSERT_TRUE(eventually([&] { return before.value() == 4.0; }));
+    Sink after("/in");
+    serve({}, {&after});
+    EXPECT_TRUE(eventually([&] { return after.value() == 4.0; }, 2s));
+    // Nor does it take a master.
+    stopMaster();
+    ASSERT_TRUE(eventually([&] { return !rosNode().status().connected; }));
+    Sink late("/in");
+    serve({}, {&late});
+    EXPECT_TRUE(eventually([&] { return late.value() == 4.0; }, 2s));
+}
+
+TEST_F(RosNodeTest, ARefusedConnectionShowsInTheStatus) {
+    startMaster();
+    Source source("/out");
+    startNode();
+    serve({&source}, {});
+    ASSERT_TRUE(eventually([&] { return rosNode().status().publications == 1; }));
+    const auto listener = listen("/out", "Int32");
+    EXPECT_TRUE(eventually([&] {
+        return rosNode().status().problem.find("std_msgs/Int32") != std::string::npos;
+    })) << rosNode().status().problem;
+    EXPECT_TRUE(reported("/out"));
+}
+
+TEST_F(RosNodeTest, GivesWayToANodeOfItsNameAndComesBack) {
+    startMaster();
+    Source source("/out");
+    startNode();
+    serve({&source}, {});
+    ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    auto twin = node(rosNode().status().node);
+    ASSERT_EQ(twin->line(10s).value_or(""), "ready");
+    EXPECT_TRUE(eventually([&] {
+        return rosNode().status().problem.find("another node named") != std::string::npos;
+    }));
+    EXPECT_TRUE(eventually([&] { return rosNode().status().publications == 0; }));
+    EXPECT_TRUE(reported("another node named"));
+    // It ends without a word to the master, which still knows it.
+    twin.reset();
+    EXPECT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    const auto listener = listen("/out");
+    EXPECT_NE(flow(source, *listener), "");
+}
+
+TEST_F(RosNodeTest, StaysOffOnceKilledUntilConfiguredAgain) {
+    startMaster();
+    Source source("/out");
+    startNode();
+    serve({&source}, {});
+    ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    run({"rosnode", "kill", rosNode().status().node});
+    EXPECT_TRUE(eventually([&] { return reported("asked to shut down"); }));
+    EXPECT_EQ(rosNode().status().publications, 0U);
+    rtcf::executor::BridgeSettings settings;
+    settings.master_uri = masterUri();
+    rosNode().configure(settings);
+    EXPECT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    const auto listener = listen("/out");
+    EXPECT_NE(flow(source, *listener), "");
+}
+
+TEST_F(RosNodeTest, FollowsItsSettings) {
+    startMaster();
+    Source source("/out");
+    startNode();
+    serve({&source}, {});
+    ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    rtcf::executor::BridgeSettings settings;
+    settings.enabled = false;
+    rosNode().configure(settings);
+    EXPECT_TRUE(eventually([&] { return rosNode().status().publications == 0; }));
+    EXPECT_FALSE(rosNode().status().enabled);
+    settings.enabled = true;
+    settings.master_uri = "nonsense";
+    rosNode().configure(settings);
+    EXPECT_TRUE(eventually(
+        [&] { return rosNode().status().problem.find("http://HOST:PORT") != std::string::npos; }));
+    settings.master_uri = "http://127.0.0.1:1";
+    rosNode().configure(settings);
+    EXPECT_TRUE(eventually([&] {
+        return rosNode().status().problem.find("no ROS master answers") != std::string::npos;
+    }));
+    settings.master_uri = masterUri();
+    settings.queue = 10;
+    rosNode().configure(settings);
+    EXPECT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    const auto listener = listen("/out");
+    EXPECT_NE(flow(source, *listener), "");
+}
+
+TEST_F(RosNodeTest, LookingAtItsLoggersDoesNotCrashIt) {
+    startMaster();
+    Source source("/out");
+    startNode();
+    serve({&source}, {});
+    ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    EXPECT_EQ(lookAtLoggers(), "done\n");
+    // These make roscpp log.
+    const auto wrong = listen("/out", "Int32");
+    EXPECT_TRUE(eventually([&] { return !rosNode().status().problem.empty(); }));
+    const auto listener = listen("/out");
+    EXPECT_NE(flow(source, *listener), "");
+}
+
+TEST_F(RosNodeTest, EndsSoonWithoutAMaster) {
+    Source source("/out");
+    startNode();
+    serve({&source}, {});
+    ASSERT_TRUE(eventually([&] { return reported("no ROS master"); }));
+    const auto begin = std::chrono::steady_clock::now();
+    stopNode();
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
+}
+
+TEST_F(RosNodeTest, EndsSoonAfterItsMasterHasGone) {
+    startMaster();
+    Source source("/out");
+    Sink sink("/in");
+    startNode();
+    serve({&source}, {&sink});
+    ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    stopMaster();
+    const auto begin = std::chrono::steady_clock::now();
+    stopNode();
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
+}
+
+TEST_F(RosNodeTest, EndsSoonWithAMasterThatHangs) {
+    startMaster();
+    Source source("/out");
+    Sink sink("/in");
+    startNode();
+    serve({&source}, {&sink});
+    ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    master().signal(SIGSTOP);
+    Source other("/other");
+    serve({&other}, {});
+    const auto begin = std::chrono::steady_clock::now();
+    stopNode();
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
+}
+
+TEST_F(RosNodeTest, LeavesNothingAtTheMaster) {
+    startMaster();
+    Source source("/out");
+    Sink sink("/in");
+    startNode();
+    serve({&source}, {&sink});
+    ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    const std::string name = rosNode().status().node;
+    stopNode();
+    EXPECT_EQ(run({"rosnode", "list"}).find(name), std::string::npos);
+}
