@@ -1,0 +1,40 @@
+// The component of the paper's evaluation (section 3): a sum, so that what is
+// measured is the framework.
+#include <std_msgs/Float64.h>
+
+#include <rtcf/component.hpp>
+
+namespace {
+
+class Mimo final : public rtcf::Component {
+    using Number = std_msgs::Float64;
+
+    rtcf::Input<Number> in1{this, "in1"};
+    rtcf::Input<Number> in2{this, "in2"};
+    rtcf::Input<Number> in3{this, "in3"};
+    rtcf::Input<Number> in4{this, "in4"};
+    rtcf::Output<Number> out1{this, "out1"};
+    rtcf::Output<Number> out2{this, "out2"};
+
+    // What an input adds: its new value, or `otherwise`.
+    static double term(rtcf::Input<Number>& input, double otherwise) noexcept RTCF_NONBLOCKING {
+        return input.read() == rtcf::DataStatus::New ? input.value().data : otherwise;
+    }
+
+    void update() override {
+        // in1 counts 1 without new data, so that a loop of sums does not stay at 0.
+        double sum = term(in1, 1.0) + term(in2, 0.0) + term(in3, 0.0) + term(in4, 0.0);
+        if (sum > kLimit) sum = 1.0;
+        out1.value().data = sum;
+        out1.publish();
+        out2.value().data = sum;
+        out2.publish();
+    }
+
+    // Sums in a loop grow without end; they begin anew before they lose precision.
+    static constexpr double kLimit = 1e20;
+};
+
+}  // namespace
+
+RTCF_COMPONENT(Mimo, "Sums its inputs that have new data; the paper's benchmark")
