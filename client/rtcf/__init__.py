@@ -1,0 +1,29 @@
+"""Client library of rtcf.
+
+    import rtcf
+
+    with rtcf.Client() as client:
+        client.load(rtcf.component("rtcf_examples", "Mimo", name="H1", remaps=["in1:=/a"]))
+        client.start()
+
+Requests and answers are the protobuf messages of rtcf.v1.
+"""
+
+from rtcf.client import Client, default_socket
+from rtcf.errors import DaemonUnreachableError, RefusedError, RtcfError
+from rtcf.spec import component, parse_parameter, parse_port, parse_remap, parse_value
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Client",
+    "DaemonUnreachableError",
+    "RefusedError",
+    "RtcfError",
+    "component",
+    "default_socket",
+    "parse_parameter",
+    "parse_port",
+    "parse_remap",
+    "parse_value",
+]

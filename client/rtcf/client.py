@@ -1,0 +1,210 @@
+"""The client of rtcfd: one method per call of `rtcf.v1.Control`."""
+
+import os
+from collections.abc import Callable, Iterable
+from types import TracebackType
+from typing import Any
+
+import grpc
+
+from rtcf import errors
+from rtcf.v1 import control_pb2, control_pb2_grpc, graph_pb2, runner_pb2
+
+DEFAULT_SOCKET = "/run/rtcfd/control.sock"
+QUERY_TIMEOUT_S = 20.0
+# Above rtcfd's own limits, so that its better word arrives.
+CHANGE_TIMEOUT_S = 120.0
+
+_OPTIONS = (
+    ("grpc.max_receive_message_length", 64 * 1024 * 1024),
+    # A connection of its own: a shared one may belong to a rtcfd that has ended.
+    ("grpc.use_local_subchannel_pool", 1),
+    # After a restart of rtcfd a client is to be back soon, not in gRPC's 1 to 120 s.
+    ("grpc.initial_reconnect_backoff_ms", 100),
+    ("grpc.min_reconnect_backoff_ms", 100),
+    ("grpc.max_reconnect_backoff_ms", 1000),
+)
+
+OnProgress = Callable[[str], None]
+
+
+def default_socket() -> str:
+    """Return $RTCF_SOCKET, or the system daemon's socket."""
+    return os.environ.get("RTCF_SOCKET") or DEFAULT_SOCKET
+
+
+class Client:
+    """A connection to rtcfd; opened with the first call, thread-safe.
+
+    `runner` in the methods names one; empty is rt_runner.  All methods raise
+    RefusedError, DaemonUnreachableError or RtcfError.  `on_progress` is called
+    with a line for each step of a long call.
+    """
+
+    def __init__(self, socket: str | os.PathLike[str] | None = None) -> None:
+        self.socket = os.path.abspath(socket if socket is not None else default_socket())
+        self._channel = grpc.insecure_channel(f"unix:{self.socket}", options=_OPTIONS)
+        self._stub: Any = control_pb2_grpc.ControlStub(self._channel)  # type: ignore[no-untyped-call]
+
+    def __enter__(self) -> "Client":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the connection."""
+        self._channel.close()
+
+    def get_status(self, runner: str = "") -> control_pb2.GetStatusResponse:
+        """Return the status of rtcfd and of all runners, or of the one named."""
+        request = control_pb2.GetStatusRequest(runner=runner)
+        return self._ask(self._stub.GetStatus, request)  # type: ignore[no-any-return]
+
+    def add_runner(
+        self, runner: str, settings: runner_pb2.RunnerSettings | None = None
+    ) -> runner_pb2.RunnerStatus:
+        """Add a runner and start its executor; what `settings` leave open takes its default."""
+        request = control_pb2.AddRunnerRequest(runner=runner, settings=settings)
+        return self._ask(self._stub.AddRunner, request, CHANGE_TIMEOUT_S).status  # type: ignore[no-any-return]
+
+    def set_runner(
+        self, settings: runner_pb2.RunnerSettings, runner: str = ""
+    ) -> runner_pb2.RunnerStatus:
+        """Change settings; what `settings` leave open stays."""
+        request = control_pb2.SetRunnerRequest(runner=runner, settings=settings)
+        return self._ask(self._stub.SetRunner, request, CHANGE_TIMEOUT_S).status  # type: ignore[no-any-return]
+
+    def remove_runner(self, runner: str) -> None:
+        """Stop a runner's loop, end its executor and forget it."""
+        request = control_pb2.RemoveRunnerRequest(runner=runner)
+        self._ask(self._stub.RemoveRunner, request, CHANGE_TIMEOUT_S)
+
+    def start(
+        self, runner: str = "", on_progress: OnProgress | None = None
+    ) -> control_pb2.ChangeResult:
+        """Start the loop; one that runs is left alone."""
+        return self._change(self._stub.Start, control_pb2.StartRequest(runner=runner), on_progress)
+
+    def stop(
+        self, runner: str = "", on_progress: OnProgress | None = None
+    ) -> control_pb2.ChangeResult:
+        """End the loop at the next cycle boundary."""
+        return self._change(self._stub.Stop, control_pb2.StopRequest(runner=runner), on_progress)
+
+    def load(
+        self,
+        component: graph_pb2.ComponentSpec,
+        runner: str = "",
+        on_progress: OnProgress | None = None,
+    ) -> control_pb2.ChangeResult:
+        """Load a component (see rtcf.component); the loop misses no cycle."""
+        request = control_pb2.LoadRequest(runner=runner, component=component)
+        return self._change(self._stub.Load, request, on_progress)
+
+    def unload(
+        self,
+        components: Iterable[str],
+        runner: str = "",
+        on_progress: OnProgress | None = None,
+    ) -> control_pb2.ChangeResult:
+        """Unload components, all at one cycle boundary."""
+        request = control_pb2.UnloadRequest(runner=runner, components=components)
+        return self._change(self._stub.Unload, request, on_progress)
+
+    def replace(
+        self,
+        component: str,
+        replacement: graph_pb2.ComponentSpec,
+        runner: str = "",
+        on_progress: OnProgress | None = None,
+    ) -> control_pb2.ChangeResult:
+        """Put a new component in the place of an old one; what is empty in it is the old one's."""
+        request = control_pb2.ReplaceRequest(
+            runner=runner, component=component, replacement=replacement
+        )
+        return self._change(self._stub.Replace, request, on_progress)
+
+    def set_breaks(
+        self,
+        ports: Iterable[control_pb2.PortName],
+        broken: bool,
+        runner: str = "",
+        on_progress: OnProgress | None = None,
+    ) -> control_pb2.ChangeResult:
+        """Set (or remove) loop breaks on inputs, all at one cycle boundary."""
+        request = control_pb2.SetBreaksRequest(runner=runner, ports=ports, broken=broken)
+        return self._change(self._stub.SetBreaks, request, on_progress)
+
+    def set_parameters(
+        self,
+        component: str,
+        parameters: Iterable[graph_pb2.ParameterSetting],
+        runner: str = "",
+        on_progress: OnProgress | None = None,
+    ) -> control_pb2.ChangeResult:
+        """Change parameters of a component, all at one cycle boundary."""
+        request = control_pb2.SetParametersRequest(
+            runner=runner, component=component, parameters=parameters
+        )
+        return self._change(self._stub.SetParameters, request, on_progress)
+
+    def list_components(self, runner: str = "") -> list[graph_pb2.ComponentInfo]:
+        """Return all components in order of the schedule, without values."""
+        request = control_pb2.ListComponentsRequest(runner=runner)
+        return list(self._ask(self._stub.ListComponents, request).components)
+
+    def get_component(self, component: str, runner: str = "") -> graph_pb2.ComponentInfo:
+        """Return one component with the values of its ports and parameters."""
+        request = control_pb2.GetComponentRequest(runner=runner, component=component)
+        return self._ask(self._stub.GetComponent, request)  # type: ignore[no-any-return]
+
+    def get_order(self, runner: str = "") -> list[str]:
+        """Return the full names of the components in order of the schedule."""
+        request = control_pb2.GetOrderRequest(runner=runner)
+        return list(self._ask(self._stub.GetOrder, request).components)
+
+    def list_connections(self, runner: str = "") -> list[graph_pb2.Connection]:
+        """Return all connections by name."""
+        request = control_pb2.ListConnectionsRequest(runner=runner)
+        return list(self._ask(self._stub.ListConnections, request).connections)
+
+    def list_types(self, package: str = "") -> control_pb2.ListTypesResponse:
+        """Return the component types of a package, or of all, and what does not load."""
+        request = control_pb2.ListTypesRequest(package=package)
+        # Each library that rtcfd does not know yet is described in a process of its own.
+        return self._ask(self._stub.ListTypes, request, CHANGE_TIMEOUT_S)  # type: ignore[no-any-return]
+
+    def get_statistics(self, runner: str = "") -> runner_pb2.RunnerStatistics:
+        """Return the figures of a runner's loop and of its components."""
+        request = control_pb2.GetStatisticsRequest(runner=runner)
+        return self._ask(self._stub.GetStatistics, request)  # type: ignore[no-any-return]
+
+    def reset_statistics(self, runner: str = "") -> None:
+        """Begin the figures anew."""
+        self._ask(self._stub.ResetStatistics, control_pb2.ResetStatisticsRequest(runner=runner))
+
+    def _ask(self, method: Any, request: Any, timeout_s: float = QUERY_TIMEOUT_S) -> Any:
+        try:
+            return method(request, timeout=timeout_s)
+        except grpc.RpcError as error:
+            raise errors.from_grpc(error, self.socket) from None
+
+    def _change(
+        self, method: Any, request: Any, on_progress: OnProgress | None
+    ) -> control_pb2.ChangeResult:
+        result = control_pb2.ChangeResult()
+        try:
+            for response in method(request, timeout=CHANGE_TIMEOUT_S):
+                if response.WhichOneof("kind") == "result":
+                    result = response.result
+                elif on_progress is not None:
+                    on_progress(response.progress)
+        except grpc.RpcError as error:
+            raise errors.from_grpc(error, self.socket) from None
+        return result

@@ -1,0 +1,83 @@
+"""What can go wrong for a client, and the one place where gRPC's errors become that."""
+
+import os
+import socket as sockets
+from typing import Any
+
+# Set by rtcfd on its own refusals; gRPC's word on a lost connection lacks it.
+_REFUSAL_KEY = "rtcf-refusal"
+_PROBE_TIMEOUT_S = 1.0
+
+
+class RtcfError(Exception):
+    """A call failed; the text is one line for people."""
+
+
+class RefusedError(RtcfError):
+    """rtcfd refused the request; nothing has changed.
+
+    `code` is the name of the gRPC status: INVALID_ARGUMENT, NOT_FOUND,
+    ALREADY_EXISTS, FAILED_PRECONDITION or UNAVAILABLE.
+    """
+
+    def __init__(self, message: str, code: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+class DaemonUnreachableError(RtcfError):
+    """rtcfd does not run, does not answer, or may not be asked."""
+
+
+def from_grpc(error: Any, socket: str) -> RtcfError:
+    """Return what a grpc.RpcError of a call through `socket` means."""
+    code = error.code().name
+    text = error.details() or code
+    if any(key == _REFUSAL_KEY for key, _ in error.trailing_metadata() or ()):
+        return RefusedError(text, code) if code != "INTERNAL" else RtcfError(text)
+    if code == "UNAVAILABLE":
+        return DaemonUnreachableError(_why_unreachable(socket, text))
+    if code == "DEADLINE_EXCEEDED":
+        return DaemonUnreachableError(f"rtcfd at {socket} does not answer in time")
+    if code == "UNIMPLEMENTED":
+        return RtcfError(f"rtcfd at {socket} is older than this client: {text}")
+    return RtcfError(f"{text} ({code})")
+
+
+def _why_unreachable(socket: str, text: str) -> str:
+    """Say why, by trying once more by hand: gRPC's own words do not help people."""
+    try:
+        with sockets.socket(sockets.AF_UNIX, sockets.SOCK_STREAM) as probe:
+            probe.settimeout(_PROBE_TIMEOUT_S)
+            probe.connect(socket)
+    except PermissionError:
+        return (
+            f"permission denied on {socket}: join its group "
+            f"(`sudo adduser {_user()} {_group(socket)}`) and log in again"
+        )
+    except (FileNotFoundError, ConnectionRefusedError):
+        return (
+            f"rtcfd is not running at {socket}: start it with `sudo systemctl start rtcfd`, "
+            "or name another socket with --socket or RTCF_SOCKET"
+        )
+    except OSError as error:
+        return f"cannot reach rtcfd at {socket}: {error.strerror or error}"
+    return f"the connection to rtcfd at {socket} was lost: {text}"
+
+
+def _user() -> str:
+    import getpass
+
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):
+        return f"#{os.getuid()}"
+
+
+def _group(socket: str) -> str:
+    import grp
+
+    try:
+        return grp.getgrgid(os.stat(socket).st_gid).gr_name
+    except (KeyError, OSError):
+        return "rtcf"

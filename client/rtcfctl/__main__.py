@@ -1,0 +1,7 @@
+"""`python3 -m rtcfctl`."""
+
+import sys
+
+from rtcfctl.main import main
+
+sys.exit(main())

@@ -1,0 +1,205 @@
+"""`rtcfctl load|unload|replace|list|info`."""
+
+import argparse
+from typing import Any
+
+import rtcf
+from rtcf.v1 import graph_pb2
+
+from rtcfctl import words
+from rtcfctl.output import Output
+from rtcfctl.plain import enumerator
+
+
+def register(verbs: Any, common: argparse.ArgumentParser) -> None:
+    """Add the verbs."""
+    loading = verbs.add_parser("load", parents=[common], help="load a component")
+    _component_options(loading)
+    loading.set_defaults(run=load)
+
+    unloading = verbs.add_parser("unload", parents=[common], help="unload components")
+    unloading.add_argument("names", metavar="NAME", nargs="+")
+    unloading.set_defaults(run=unload)
+
+    replacing = verbs.add_parser(
+        "replace", parents=[common], help="put a new component in the place of an old one"
+    )
+    replacing.add_argument("old", metavar="NAME")
+    _component_options(replacing)
+    replacing.set_defaults(run=replace)
+
+    listing = verbs.add_parser("list", parents=[common], help="all components")
+    listing.set_defaults(run=show_all)
+
+    info = verbs.add_parser("info", parents=[common], help="one component, with values")
+    info.add_argument("component", metavar="NAME")
+    info.set_defaults(run=show)
+
+
+def load(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Load a component."""
+    result = client.load(_spec(args), args.runner, output.progress)
+    output.changed(f"loaded {result.component}", result)
+
+
+def unload(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Unload components."""
+    result = client.unload(args.names, args.runner, output.progress)
+    output.changed(f"unloaded {', '.join(args.names)}", result)
+
+
+def replace(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Replace a component."""
+    result = client.replace(args.old, _spec(args), args.runner, output.progress)
+    output.changed(f"replaced {args.old} by {result.component}", result)
+
+
+def show_all(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Print all components in order of the schedule."""
+    components = client.list_components(args.runner)
+    if not output.for_people:
+        output.data(components)
+        return
+    output.table(
+        ("#", "component", "type", "state", "notes"),
+        (
+            (
+                each.position,
+                each.full_name,
+                f"{each.spec.package}/{each.spec.type}",
+                enumerator(each, "state"),
+                _notes(each),
+            )
+            for each in components
+        ),
+        right=("#",),
+    )
+
+
+def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Print one component."""
+    found = client.get_component(args.component, args.runner)
+    if not output.for_people:
+        output.data(found)
+        return
+    output.line(f"{found.full_name}: {found.spec.package}/{found.spec.type}", "bold")
+    if found.doc:
+        output.line(f"  {found.doc}")
+    output.line(f"  {enumerator(found, 'state')}, {found.position} in the schedule")
+    output.line(f"  from {found.library}")
+    if found.fault:
+        output.line(f"  fault: {found.fault}", "bold red")
+    if notes := _notes(found):
+        output.line(f"  {notes}")
+    if found.ports:
+        print_ports(list(found.ports), output)
+    if found.parameters:
+        print_parameters(list(found.parameters), output)
+
+
+def print_ports(ports: list[graph_pb2.PortInfo], output: Output) -> None:
+    """Print ports with mapped names, types and newest values."""
+    output.table(
+        ("port", "", "mapped name", "type", "value", "unit", "age", "count", ""),
+        (
+            (
+                port.name,
+                enumerator(port, "direction").removesuffix("put"),
+                port.mapped_name,
+                port.type,
+                port.value if port.HasField("value") else "-",
+                port.unit,
+                words.age(port.age_ns) if port.HasField("age_ns") else "-",
+                port.count,
+                _flags(port),
+            )
+            for port in ports
+        ),
+        right=("age", "count"),
+    )
+
+
+def print_parameters(parameters: list[graph_pb2.ParameterInfo], output: Output) -> None:
+    """Print parameters with values and bounds."""
+    output.table(
+        ("parameter", "type", "value", "unit", "range", "default", "meaning"),
+        (
+            (
+                each.name,
+                each.type,
+                words.value(each.value),
+                each.unit,
+                _range(each),
+                words.value(each.default_value),
+                each.doc,
+            )
+            for each in parameters
+        ),
+    )
+
+
+def _component_options(to: argparse.ArgumentParser) -> None:
+    to.add_argument("package", metavar="PKG")
+    to.add_argument("type", metavar="COMPONENT", help="a component type of the package")
+    to.add_argument("--name", default="", help="its name (default: the type's)")
+    to.add_argument("--ns", default="", help="its namespace (default: /)")
+    to.add_argument("--remap", action="append", default=[], metavar="FROM:=TO")
+    to.add_argument("--param", action="append", default=[], metavar="NAME:=VALUE")
+    to.add_argument("--first", action="store_true", help="all connections into it are loop breaks")
+    to.add_argument(
+        "--ignore",
+        default="",
+        metavar="REGEX",
+        help="connections of these mapped names are loop breaks for it",
+    )
+    to.add_argument(
+        "--break",
+        dest="breaks",
+        action="append",
+        default=[],
+        metavar="PORT",
+        help="the connection into this input is a loop break",
+    )
+    to.add_argument("--every", type=int, default=0, metavar="N", help="run in each N-th cycle")
+
+
+def _spec(args: argparse.Namespace) -> graph_pb2.ComponentSpec:
+    return rtcf.component(
+        args.package,
+        args.type,
+        name=args.name,
+        ns=args.ns,
+        remaps=args.remap,
+        parameters=args.param,
+        first=args.first,
+        ignore=args.ignore,
+        breaks=args.breaks,
+        every=args.every,
+    )
+
+
+def _notes(found: graph_pb2.ComponentInfo) -> str:
+    spec = found.spec
+    notes = ["first"] if spec.first else []
+    if spec.ignore:
+        notes.append(f"ignores {spec.ignore}")
+    if spec.breaks:
+        notes.append(f"loop break at {', '.join(spec.breaks)}")
+    if spec.every > 1:
+        notes.append(f"every {spec.every} cycles")
+    if found.fault:
+        notes.append(found.fault)
+    return ", ".join(notes)
+
+
+def _flags(port: graph_pb2.PortInfo) -> str:
+    flags = ((port.connected, "connected"), (port.broken, "broken"), (port.mapped, "ROS"))
+    return " ".join(word for condition, word in flags if condition)
+
+
+def _range(found: graph_pb2.ParameterInfo) -> str:
+    if found.choices:
+        return "|".join(found.choices)
+    low = f"{found.minimum:g}" if found.HasField("minimum") else ""
+    high = f"{found.maximum:g}" if found.HasField("maximum") else ""
+    return f"{low}..{high}" if low or high else ""

@@ -1,0 +1,60 @@
+"""Protobuf messages as plain dicts, lists, numbers and strings, for JSON and YAML.
+
+Other than in protobuf's own JSON, integers are numbers, all fields are there,
+an enumerator is its short name ("running"), a parameter's value is the value
+itself, and what has no value is null.
+"""
+
+import math
+import re
+from typing import Any
+
+from google.protobuf.descriptor import FieldDescriptor
+
+_VALUE_MESSAGE = "rtcf.v1.ParameterValue"
+
+
+def plain(message: Any) -> Any:
+    """Return a message as a dict, or the value if it is a parameter's value."""
+    if message.DESCRIPTOR.full_name == _VALUE_MESSAGE:
+        kind = message.WhichOneof("kind")
+        return None if kind is None else _number(getattr(message, kind))
+    return {field.name: _field(message, field) for field in message.DESCRIPTOR.fields}
+
+
+def enumerator(message: Any, name: str) -> str:
+    """Return the short name of an enum field's value, e.g. "catch_up"."""
+    field = message.DESCRIPTOR.fields_by_name[name]
+    return _short(field.enum_type, getattr(message, name))
+
+
+def _field(message: Any, field: FieldDescriptor) -> Any:
+    value = getattr(message, field.name)
+    if field.label == FieldDescriptor.LABEL_REPEATED:
+        return [_single(field, each) for each in value]
+    if field.has_presence and not message.HasField(field.name):
+        return None
+    return _single(field, value)
+
+
+def _single(field: FieldDescriptor, value: Any) -> Any:
+    if field.message_type is not None:
+        return plain(value)
+    if field.enum_type is not None:
+        return _short(field.enum_type, value)
+    return _number(value)
+
+
+def _number(value: Any) -> Any:
+    # JSON has no words for these.
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value
+
+
+def _short(enum_type: Any, value: int) -> str:
+    found = enum_type.values_by_number.get(value)
+    if found is None:
+        return str(value)
+    prefix = re.sub(r"(?<!^)(?=[A-Z])", "_", enum_type.name).upper() + "_"
+    return str(found.name.removeprefix(prefix).lower())

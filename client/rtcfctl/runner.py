@@ -1,0 +1,147 @@
+"""`rtcfctl runner list|add|set|remove`."""
+
+import argparse
+from typing import Any
+
+import rtcf
+from rtcf.v1 import runner_pb2
+
+from rtcfctl.output import Output
+from rtcfctl.status import print_runners
+
+_REALTIME = {
+    "required": runner_pb2.REALTIME_REQUIRED,
+    "preferred": runner_pb2.REALTIME_PREFERRED,
+}
+_OVERRUN = {
+    "skip": runner_pb2.OVERRUN_POLICY_SKIP,
+    "catch_up": runner_pb2.OVERRUN_POLICY_CATCH_UP,
+    "relative": runner_pb2.OVERRUN_POLICY_RELATIVE,
+}
+# Options that are fields of RunnerSettings and of RosSettings.
+_FIELDS = ("frequency_hz", "cpu", "priority", "spin_us", "max_overruns", "lock_memory", "heap_kb",
+           "stack_kb")  # fmt: skip
+_ROS_FIELDS = ("enabled", "master_uri", "whitelist", "blacklist", "queue")
+
+
+def register(verbs: Any, common: argparse.ArgumentParser) -> None:
+    """Add the noun and its verbs."""
+    noun = verbs.add_parser("runner", help="list, add, set or remove runners")
+    actions = noun.add_subparsers(metavar="ACTION", required=True)
+
+    listing = actions.add_parser("list", parents=[common], help="all runners")
+    listing.set_defaults(run=show)
+
+    add = actions.add_parser("add", parents=[common], help="add a runner, start its executor")
+    add.add_argument("name", metavar="NAME")
+    _settings_options(add)
+    add.set_defaults(run=add_runner)
+
+    change = actions.add_parser("set", parents=[common], help="change settings of a runner")
+    change.add_argument("name", metavar="NAME", nargs="?", default="")
+    _settings_options(change)
+    change.set_defaults(run=set_runner)
+
+    remove = actions.add_parser("remove", parents=[common], help="stop a runner and forget it")
+    remove.add_argument("name", metavar="NAME")
+    remove.set_defaults(run=remove_runner)
+
+
+def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Print the runners."""
+    runners = list(client.get_status(args.runner).runners)
+    if output.for_people:
+        print_runners(runners, output)
+    else:
+        output.data(runners)
+
+
+def add_runner(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Add a runner."""
+    status = client.add_runner(args.name, settings_of(args))
+    _changed(output, f"runner {status.runner} added", status)
+
+
+def set_runner(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Change settings."""
+    settings = settings_of(args)
+    if not settings.ListFields():
+        raise ValueError("runner set: no setting named; see `rtcfctl runner set --help`")
+    status = client.set_runner(settings, args.name or args.runner)
+    _changed(output, f"runner {status.runner} set", status)
+
+
+def remove_runner(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Remove a runner."""
+    client.remove_runner(args.name)
+    if output.for_people:
+        print(f"runner {args.name} removed")
+
+
+def settings_of(args: argparse.Namespace) -> runner_pb2.RunnerSettings:
+    """Return the settings that were given as options."""
+    settings = runner_pb2.RunnerSettings()
+    for field in _FIELDS:
+        _take(settings, field, getattr(args, field))
+    _take(settings, "realtime", _REALTIME.get(args.realtime))
+    _take(settings, "overrun", _OVERRUN.get(args.overrun))
+    ros = runner_pb2.RosSettings()
+    for field in _ROS_FIELDS:
+        _take(ros, field, getattr(args, f"ros_{field}"))
+    if ros.ListFields():
+        settings.ros.CopyFrom(ros)
+    return settings
+
+
+def _take(message: Any, field: str, value: Any) -> None:
+    if value is None:
+        return
+    try:
+        setattr(message, field, value)
+    except ValueError:
+        raise ValueError(f"{field} of {value} is out of range") from None
+
+
+def _settings_options(to: argparse.ArgumentParser) -> None:
+    switch = argparse.BooleanOptionalAction
+    to.add_argument(
+        "--frequency", dest="frequency_hz", type=float, metavar="HZ", help="0.1 to 20000"
+    )
+    to.add_argument("--cpu", type=int, metavar="N", help="CPU of the loop; -1: the last allowed")
+    to.add_argument("--priority", type=int, metavar="N", help="SCHED_FIFO, 1 to 98")
+    to.add_argument(
+        "--spin", dest="spin_us", type=int, metavar="µS", help="busy wait before each deadline"
+    )
+    to.add_argument("--realtime", choices=sorted(_REALTIME), help="may the loop run without it?")
+    to.add_argument("--overrun", choices=list(_OVERRUN), help="what follows a late cycle")
+    to.add_argument("--max-overruns", type=int, metavar="N", help="stop the loop above; 0: never")
+    to.add_argument("--lock-memory", action=switch, help="lock the executor's memory")
+    to.add_argument("--heap-kb", type=int, metavar="KIB", help="heap touched at start")
+    to.add_argument("--stack-kb", type=int, metavar="KIB", help="stack of the real-time thread")
+    to.add_argument("--ros", dest="ros_enabled", action=switch, help="have a ROS node")
+    to.add_argument("--master-uri", dest="ros_master_uri", metavar="URI", help="the ROS master")
+    to.add_argument(
+        "--whitelist",
+        dest="ros_whitelist",
+        metavar="REGEX",
+        help="connections that become ROS topics (whole mapped names)",
+    )
+    to.add_argument(
+        "--blacklist", dest="ros_blacklist", metavar="REGEX", help="exceptions from --whitelist"
+    )
+    to.add_argument(
+        "--queue",
+        dest="ros_queue",
+        type=int,
+        metavar="N",
+        help="messages kept for a slow subscriber",
+    )
+
+
+def _changed(output: Output, sentence: str, status: runner_pb2.RunnerStatus) -> None:
+    if not output.for_people:
+        output.data(status)
+        return
+    print(sentence)
+    if status.status:
+        output.line(f"{status.runner}: {status.status}", "yellow")

@@ -1,0 +1,57 @@
+"""`rtcfctl stats`."""
+
+import argparse
+from typing import Any
+
+import rtcf
+from rtcf.v1 import runner_pb2
+
+from rtcfctl.output import Output
+from rtcfctl.words import microseconds
+
+_FIGURES = ("min_ns", "mean_ns", "p50_ns", "p99_ns", "p999_ns", "max_ns")
+_COLUMNS = ("count", "min", "mean", "p50", "p99", "p99.9", "max")
+
+
+def register(verbs: Any, common: argparse.ArgumentParser) -> None:
+    """Add the verb."""
+    stats = verbs.add_parser("stats", parents=[common], help="durations, latencies, overruns")
+    stats.add_argument("--reset", action="store_true", help="begin the figures anew afterwards")
+    stats.set_defaults(run=show)
+
+
+def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Print the figures of a loop and of its components."""
+    found = client.get_statistics(args.runner)
+    if args.reset:
+        client.reset_statistics(args.runner)
+    if not output.for_people:
+        output.data(found)
+        return
+    output.table(
+        (f"{found.runner} (µs)", *_COLUMNS),
+        (
+            _row("calculation duration", found.duration),
+            _row("wake-up latency", found.latency),
+        ),
+        right=_COLUMNS,
+    )
+    output.line(
+        f"{found.iterations} cycles, {found.overruns} overruns, {found.missed} missed; "
+        f"{found.minor_faults} minor and {found.major_faults} major page faults, "
+        f"{found.involuntary_switches} involuntary context switches",
+        "bold red" if found.overruns or found.missed or found.major_faults else "",
+    )
+    for count, what in ((found.log_dropped, "log records"), (found.tap_dropped, "mapped values")):
+        if count:
+            output.line(f"{count} {what} lost in full rings", "yellow")
+    output.table(
+        ("component (µs)", *_COLUMNS, "overruns"),
+        ((*_row(each.component, each.duration), each.overruns) for each in found.components),
+        right=(*_COLUMNS, "overruns"),
+    )
+
+
+def _row(name: str, figures: runner_pb2.Distribution) -> tuple[Any, ...]:
+    values = (microseconds(getattr(figures, figure)) for figure in _FIGURES)
+    return (name, figures.count, *(values if figures.count else ("-" for _ in _FIGURES)))

@@ -1,0 +1,99 @@
+"""`rtcfctl status`."""
+
+import argparse
+from typing import Any
+
+import rtcf
+from rtcf.v1 import runner_pb2
+
+from rtcfctl.output import Output
+from rtcfctl.plain import enumerator
+
+STYLES = {
+    runner_pb2.RUNNER_STATE_RUNNING: "green",
+    runner_pb2.RUNNER_STATE_DOWN: "bold red",
+    runner_pb2.RUNNER_STATE_FAULTED: "bold red",
+    runner_pb2.RUNNER_STATE_STUCK: "bold red",
+}
+
+
+def register(verbs: Any, common: argparse.ArgumentParser) -> None:
+    """Add the verb."""
+    status = verbs.add_parser(
+        "status", parents=[common], help="what rtcfd and its runners are doing"
+    )
+    status.set_defaults(run=show)
+
+
+def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Print the status of rtcfd and of all runners, or of the one named."""
+    response = client.get_status(args.runner)
+    if not output.for_people:
+        output.data(response)
+        return
+    up_s = response.uptime_ns // 1_000_000_000
+    hours, minutes, seconds = up_s // 3600, up_s // 60 % 60, up_s % 60
+    output.line(
+        f"rtcfd {response.version} (pid {response.pid}), up {hours}:{minutes:02}:{seconds:02}"
+    )
+    for runner in response.runners:
+        _alarms(runner, output)
+    print_runners(list(response.runners), output)
+    for runner in response.runners:
+        _details(runner, output)
+
+
+def print_runners(runners: list[runner_pb2.RunnerStatus], output: Output) -> None:
+    """Print a table of runners."""
+    numbers = ("Hz", "CPU", "prio", "components", "iteration", "overruns", "missed", "pid")
+    output.table(
+        ("runner", "state", *numbers),
+        (
+            (
+                runner.runner,
+                (enumerator(runner, "state"), STYLES.get(runner.state, "")),
+                f"{runner.settings.frequency_hz:g}",
+                _cpu(runner.settings),
+                runner.settings.priority,
+                runner.components,
+                runner.iteration,
+                runner.overruns,
+                runner.missed,
+                runner.pid or "-",
+            )
+            for runner in runners
+        ),
+        right=numbers,
+    )
+
+
+def _alarms(runner: runner_pb2.RunnerStatus, output: Output) -> None:
+    """Say loudly what is missing for real time."""
+    if runner.degraded:
+        output.line(f"!! {runner.runner} IS NOT REAL TIME:", "bold red")
+        for reason in runner.degraded:
+            output.line(f"!!   {reason}", "red")
+
+
+def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
+    """Print what a table has no room for."""
+    if runner.status:
+        output.line(f"{runner.runner}: {runner.status}", "yellow")
+    ros = runner.ros
+    if ros.enabled:
+        state = (
+            f"registered at {ros.master_uri}, "
+            f"{ros.publications} topics published, {ros.subscriptions} subscribed"
+            if ros.connected
+            else f"no master at {ros.master_uri}"
+        )
+        output.line(f"{runner.runner}: ROS node {ros.node}: {state}")
+    if ros.problem:
+        output.line(f"{runner.runner}: ROS: {ros.problem}", "yellow")
+    for count, what in ((runner.log_dropped, "log records"), (runner.tap_dropped, "mapped values")):
+        if count:
+            output.line(f"{runner.runner}: {count} {what} lost in full rings", "yellow")
+
+
+def _cpu(settings: runner_pb2.RunnerSettings) -> str:
+    return "last" if settings.cpu < 0 else str(settings.cpu)

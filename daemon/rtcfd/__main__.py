@@ -1,0 +1,7 @@
+"""`python3 -m rtcfd`."""
+
+import sys
+
+from rtcfd.main import main
+
+sys.exit(main())

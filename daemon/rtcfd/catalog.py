@@ -1,0 +1,113 @@
+"""The catalog: which library offers a component type.
+
+A package is a folder of libraries, `<folder>/<package>/*.so`, in one of the
+folders of the search path; of two types with one name the first found wins.
+"""
+
+import asyncio
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rtcf.v1 import graph_pb2
+
+from rtcfd.describe import Describer
+from rtcfd.errors import FailedPrecondition, NotFound
+from rtcfd.names import check_base_name, listing, suggestion
+
+
+@dataclass
+class _Contents:
+    """What the libraries of a package offer."""
+
+    types: dict[str, graph_pb2.ComponentType] = field(default_factory=dict)
+    problems: list[str] = field(default_factory=list)
+
+
+class Catalog:
+    """Finds component types along the search path."""
+
+    def __init__(self, folders: Sequence[Path], describer: Describer) -> None:
+        self._folders = list(folders)
+        self._describer = describer
+
+    async def find(self, package: str, type_name: str) -> str:
+        """Return the path of the library that offers a type, or refuse and say why."""
+        check_base_name("package", package)
+        check_base_name("type", type_name)
+        libraries = self._packages().get(package)
+        if libraries is None:
+            raise NotFound(self._no_package(package))
+        contents = await self._contents(package, libraries)
+        found = contents.types.get(type_name)
+        if found is not None:
+            return str(found.library)
+        if contents.problems:
+            raise FailedPrecondition(
+                f'no type "{type_name}" in package "{package}" (types: '
+                f"{listing(contents.types)}), and not all of it loads: "
+                + "; ".join(contents.problems)
+            )
+        raise NotFound(
+            f'no type "{type_name}" in package "{package}"'
+            f"{suggestion(type_name, contents.types)} (types: {listing(contents.types)})"
+        )
+
+    async def types(self, package: str = "") -> tuple[list[graph_pb2.ComponentType], list[str]]:
+        """Return the types of one package or of all, by name, and what does not load."""
+        packages = self._packages()
+        if package:
+            check_base_name("package", package)
+            if package not in packages:
+                raise NotFound(self._no_package(package))
+            packages = {package: packages[package]}
+        names = sorted(packages)
+        every = await asyncio.gather(*(self._contents(name, packages[name]) for name in names))
+        types = [contents.types[name] for contents in every for name in sorted(contents.types)]
+        return types, [problem for contents in every for problem in contents.problems]
+
+    def _packages(self) -> dict[str, list[Path]]:
+        """Return the libraries of each package, in the order in which they count."""
+        packages: dict[str, list[Path]] = {}
+        for folder in self._folders:
+            for package in _sub_folders(folder):
+                libraries = sorted(package.glob("*.so"))
+                if libraries:
+                    packages.setdefault(package.name, []).extend(libraries)
+        return packages
+
+    async def _contents(self, package: str, libraries: list[Path]) -> _Contents:
+        contents = _Contents()
+        descriptions = await asyncio.gather(
+            *(self._describer.describe(library, package) for library in libraries)
+        )
+        for library, description in zip(libraries, descriptions, strict=True):
+            if description.problem:
+                contents.problems.append(_one_problem(library, description.problem))
+            for described in description.types:
+                offered = graph_pb2.ComponentType()
+                offered.CopyFrom(described)
+                offered.package = package
+                offered.library = str(library)
+                contents.types.setdefault(offered.type, offered)
+        return contents
+
+    def _no_package(self, package: str) -> str:
+        folders = ", ".join(str(folder) for folder in self._folders)
+        return (
+            f'no package "{package}" with component libraries in {folders}'
+            f"{suggestion(package, self._packages())}"
+        )
+
+
+def _one_problem(library: Path, problem: str) -> str:
+    """Name the library, unless the dynamic loader's text begins with it already."""
+    text = " ".join(problem.split())
+    return text if str(library) in text else f"{library}: {text}"
+
+
+def _sub_folders(folder: Path) -> Iterator[Path]:
+    try:
+        yield from sorted(entry for entry in folder.iterdir() if entry.is_dir())
+    except OSError:
+        return  # a folder of the search path need not exist

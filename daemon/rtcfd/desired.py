@@ -1,0 +1,101 @@
+"""The desired state of one runner: what was accepted, and nothing else.
+
+Owned by its Runner; store.py keeps it on disk.
+"""
+
+from collections.abc import Iterable
+
+from google.protobuf import json_format
+from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+
+from rtcfd import settings
+from rtcfd.names import absolute
+
+
+class Desired:
+    """Settings that were chosen (what is unset follows the defaults) and components."""
+
+    def __init__(self, runner: str) -> None:
+        self.runner = runner
+        self.chosen = runner_pb2.RunnerSettings()
+        self._components: dict[str, graph_pb2.ComponentSpec] = {}
+        # The text of each component as it is saved: a change of one among
+        # a thousand costs the text of one.
+        self._texts: dict[str, str] = {}
+
+    @property
+    def components(self) -> dict[str, graph_pb2.ComponentSpec]:
+        """All components by full name, in the order of loading.  Not to be changed."""
+        return self._components
+
+    def complete(self, defaults: runner_pb2.RunnerSettings) -> runner_pb2.RunnerSettings:
+        """Return all settings."""
+        return settings.merged(defaults, self.chosen)
+
+    def choose(self, change: runner_pb2.RunnerSettings) -> None:
+        """Note settings that were accepted."""
+        self.chosen = settings.merged(self.chosen, change)
+
+    def put(self, full_name: str, spec: graph_pb2.ComponentSpec) -> None:
+        """Note a component, new or changed, with the name and namespace it got."""
+        kept = graph_pb2.ComponentSpec()
+        kept.CopyFrom(spec)
+        namespace, _, kept.name = full_name.rpartition("/")
+        kept.ns = namespace or "/"
+        self._components[full_name] = kept
+        self._texts.pop(full_name, None)
+
+    def drop(self, full_names: Iterable[str]) -> None:
+        """Forget components."""
+        for name in full_names:
+            self._components.pop(name, None)
+            self._texts.pop(name, None)
+
+    def set_breaks(self, ports: Iterable[control_pb2.PortName], broken: bool) -> None:
+        """Note loop breaks that were set or removed."""
+        for port in ports:
+            name = absolute(port.component)
+            spec = self._components.get(name)
+            if spec is None:
+                continue
+            breaks = [each for each in spec.breaks if each != port.port]
+            spec.breaks[:] = [*breaks, port.port] if broken else breaks
+            self._texts.pop(name, None)
+
+    def set_parameters(self, component: str, changes: Iterable[graph_pb2.ParameterSetting]) -> None:
+        """Note parameters that were changed."""
+        name = absolute(component)
+        spec = self._components.get(name)
+        if spec is None:
+            return
+        values = {setting.name: setting for setting in spec.parameters}
+        values.update({setting.name: setting for setting in changes})
+        parameters = list(values.values())
+        del spec.parameters[:]
+        spec.parameters.extend(parameters)
+        self._texts.pop(name, None)
+
+    def component_texts(self) -> list[str]:
+        """Return each component as a line of JSON."""
+        for name, spec in self._components.items():
+            if name not in self._texts:
+                self._texts[name] = json_format.MessageToJson(
+                    spec, preserving_proto_field_name=True, indent=None
+                )
+        return [self._texts[name] for name in self._components]
+
+
+def replacement(
+    old: graph_pb2.ComponentSpec | None, given: graph_pb2.ComponentSpec
+) -> graph_pb2.ComponentSpec:
+    """Return the spec of a replacement: name, namespace, remaps, flags and breaks that
+    are empty in `given` are those of the old component."""
+    result = graph_pb2.ComponentSpec()
+    if old is not None:
+        result.CopyFrom(old)
+        del result.parameters[:]  # they belong to the old type
+    for field in ("remaps", "breaks"):
+        if getattr(given, field):
+            result.ClearField(field)
+    result.MergeFrom(given)
+    return result

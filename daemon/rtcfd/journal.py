@@ -1,0 +1,98 @@
+"""Where rtcfd's log goes: the journal with its fields, or lines on stderr."""
+
+import logging
+import os
+import sys
+import time
+
+_JOURNAL_PRIORITIES = (
+    (logging.CRITICAL, 2),
+    (logging.ERROR, 3),
+    (logging.WARNING, 4),
+    (logging.INFO, 6),
+)
+_DEBUG_PRIORITY = 7
+
+
+class JournalHandler(logging.Handler):
+    """Sends records to systemd's journal.
+
+    Fields: RTCF_RUNNER, RTCF_COMPONENT, RTCF_ITERATION, CODE_FILE, CODE_LINE,
+    CODE_FUNC; the journal drops names that are not in capitals.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        import systemd.journal
+
+        self._send = systemd.journal.send
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Send one record."""
+        try:
+            self._send(self.format(record), **fields(record))
+        except Exception:  # logging must not end the daemon
+            self.handleError(record)
+
+
+class LineFormatter(logging.Formatter):
+    """One readable line per record: time, level, runner, component, message, source."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the line."""
+        clock = time.strftime("%H:%M:%S", time.localtime(record.created))
+        words = [f"{clock}.{int(record.msecs):03d}", f"{record.levelname:<7}"]
+        runner = getattr(record, "runner", "")
+        component = getattr(record, "component", "")
+        if runner:
+            words.append(f"{runner}{' ' if component else ''}{component}:")
+        words.append(" ".join(record.getMessage().splitlines()))
+        if component and record.pathname:
+            iteration = getattr(record, "iteration", 0)
+            words.append(f"({os.path.basename(record.pathname)}:{record.lineno}, #{iteration})")
+        line = " ".join(words)
+        if record.exc_info:
+            line += "\n" + self.formatException(record.exc_info)
+        return line
+
+
+def fields(record: logging.LogRecord) -> dict[str, str]:
+    """Return the journal's fields of a record, besides its message."""
+    priority = next(
+        (value for level, value in _JOURNAL_PRIORITIES if record.levelno >= level), _DEBUG_PRIORITY
+    )
+    result = {"PRIORITY": str(priority), "SYSLOG_IDENTIFIER": "rtcfd"}
+    if record.pathname:
+        result["CODE_FILE"] = record.pathname
+        result["CODE_LINE"] = str(record.lineno)
+    if record.funcName:
+        result["CODE_FUNC"] = record.funcName
+    if runner := getattr(record, "runner", ""):
+        result["RTCF_RUNNER"] = runner
+    if component := getattr(record, "component", ""):
+        result["RTCF_COMPONENT"] = component
+        result["RTCF_ITERATION"] = str(getattr(record, "iteration", 0))
+    return result
+
+
+def stderr_is_journal() -> bool:
+    """Tell whether stderr is connected to the journal (systemd.exec(5), $JOURNAL_STREAM)."""
+    device, _, inode = os.environ.get("JOURNAL_STREAM", "").partition(":")
+    if not (device.isdigit() and inode.isdigit()):
+        return False
+    found = os.fstat(2)
+    return (found.st_dev, found.st_ino) == (int(device), int(inode))
+
+
+def set_up(verbose: bool) -> None:
+    """Send everything that is logged to where it belongs."""
+    handler: logging.Handler
+    if stderr_is_journal():
+        handler = JournalHandler()
+    else:
+        handler = logging.StreamHandler(sys.stderr)
+        handler.setFormatter(LineFormatter())
+    root = logging.getLogger()
+    root.handlers[:] = [handler]
+    root.setLevel(logging.DEBUG if verbose else logging.INFO)
+    logging.getLogger("asyncio").setLevel(logging.WARNING)

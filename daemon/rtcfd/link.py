@@ -1,0 +1,145 @@
+"""The connection to one executor: requests out, responses and unasked frames in.
+
+Owned by the Executor.  Requests may overlap; each response finds its request
+by id.  A link that ends fails all requests that wait for it.
+"""
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+
+from google.protobuf.message import DecodeError
+from rtcf.executor.v1 import executor_pb2 as wire
+
+from rtcfd import errors, frames
+
+PROTOCOL = 1
+
+Progress = Callable[[str], None]
+Unasked = Callable[[wire.Response], None]
+
+_REFUSALS: dict[int, type[errors.Refusal]] = {
+    wire.Error.CODE_INVALID_ARGUMENT: errors.InvalidArgument,
+    wire.Error.CODE_NOT_FOUND: errors.NotFound,
+    wire.Error.CODE_ALREADY_EXISTS: errors.AlreadyExists,
+    wire.Error.CODE_FAILED_PRECONDITION: errors.FailedPrecondition,
+    wire.Error.CODE_UNAVAILABLE: errors.Unavailable,
+}
+
+
+class _Pending:
+    """A request on its way."""
+
+    def __init__(self, on_progress: Progress | None) -> None:
+        self.on_progress = on_progress
+        self.result: asyncio.Future[wire.Response] = asyncio.get_running_loop().create_future()
+
+
+class Link:
+    """One connection.  `peer` names the executor in messages."""
+
+    def __init__(
+        self,
+        peer: str,
+        reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+        on_unasked: Unasked,
+    ) -> None:
+        self._peer = peer
+        self._writer = writer
+        self._on_unasked = on_unasked
+        self._next_id = 1
+        self._pending: dict[int, _Pending] = {}
+        self.problem = ""  # why the peer was cut off; empty = it closed
+        self.ended = asyncio.Event()
+        self._reading = asyncio.create_task(self._read(reader))
+
+    @classmethod
+    async def connect(cls, peer: str, path: Path, on_unasked: Unasked) -> "Link":
+        """Connect to the executor's socket; raises OSError."""
+        reader, writer = await asyncio.open_unix_connection(path)
+        return cls(peer, reader, writer, on_unasked)
+
+    async def hello(self, timeout_s: float) -> wire.HelloResult:
+        """Open the conversation and check that both speak the same protocol."""
+        request = wire.Request(hello=wire.Hello(protocol=PROTOCOL))
+        result = (await self.request(request, timeout_s)).hello
+        if result.protocol != PROTOCOL:
+            raise errors.FailedPrecondition(
+                f"{self._peer} speaks protocol {result.protocol}, rtcfd {PROTOCOL}: "
+                "install rtcfd and its executor of the same version"
+            )
+        return result
+
+    async def request(
+        self, request: wire.Request, timeout_s: float | None, on_progress: Progress | None = None
+    ) -> wire.Response:
+        """Send a request (its id is set here) and return the response that ends it.
+
+        Raises the executor's refusal, or Unavailable when the link ends or
+        `timeout_s` of wall-clock time passes (None: for callers with an own limit).
+        """
+        if self.ended.is_set():
+            raise errors.Unavailable(self._lost())
+        request.id = self._next_id
+        self._next_id += 1
+        pending = self._pending[request.id] = _Pending(on_progress)
+        try:
+            self._writer.write(frames.pack(request.SerializeToString()))
+            async with asyncio.timeout(timeout_s):
+                await self._writer.drain()
+                response = await pending.result
+        except TimeoutError:
+            raise errors.Unavailable(
+                f"{self._peer} did not answer {request.WhichOneof('kind')} within {timeout_s:g} s"
+            ) from None
+        except frames.FrameError as error:
+            raise errors.InvalidArgument(f"request too large: {error}") from None
+        except ConnectionError:
+            raise errors.Unavailable(self._lost()) from None
+        finally:
+            del self._pending[request.id]
+            pending.result.cancel()
+        if response.WhichOneof("kind") == "error":
+            refusal = _REFUSALS.get(response.error.code, errors.FailedPrecondition)
+            raise refusal(response.error.message)
+        return response
+
+    async def close(self) -> None:
+        """End the connection; requests that wait fail."""
+        self._writer.close()
+        self._reading.cancel()
+        await asyncio.gather(self._reading, return_exceptions=True)
+        self._fail_pending()
+
+    async def _read(self, reader: asyncio.StreamReader) -> None:
+        try:
+            while (message := await frames.read(reader)) is not None:
+                self._dispatch(wire.Response.FromString(message))
+        except (frames.FrameError, DecodeError) as error:
+            self.problem = f"{self._peer} does not keep to the protocol: {error}"
+        finally:
+            self._writer.close()
+            self._fail_pending()
+
+    def _dispatch(self, response: wire.Response) -> None:
+        if response.id == 0:
+            self._on_unasked(response)
+            return
+        pending = self._pending.get(response.id)
+        if pending is None:
+            return  # its caller gave up
+        if response.WhichOneof("kind") == "progress":
+            if pending.on_progress is not None:
+                pending.on_progress(response.progress)
+        elif not pending.result.done():
+            pending.result.set_result(response)
+
+    def _fail_pending(self) -> None:
+        self.ended.set()
+        for pending in self._pending.values():
+            if not pending.result.done():
+                pending.result.set_exception(errors.Unavailable(self._lost()))
+
+    def _lost(self) -> str:
+        return self.problem or f"{self._peer} closed its connection"

@@ -1,0 +1,42 @@
+"""Names of runners, packages, types and components: checking and resolving."""
+
+import difflib
+import re
+from collections.abc import Iterable
+
+from rtcfd.errors import InvalidArgument
+
+DEFAULT_RUNNER = "rt_runner"
+
+# A runner's name becomes a file name and, with a suffix, a unix socket's path.
+_MAX_LENGTH = 64
+_BASE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
+
+
+def check_base_name(kind: str, name: str) -> str:
+    """Return `name` if it is a ROS base name; `kind` ("runner", …) is for the message."""
+    if not _BASE_NAME.fullmatch(name):
+        raise InvalidArgument(
+            f'{kind} name "{name}" is not valid: use letters, digits and _, and begin with a letter'
+        )
+    if len(name) > _MAX_LENGTH:
+        raise InvalidArgument(f"{kind} name of {len(name)} characters: at most {_MAX_LENGTH}")
+    return name
+
+
+def absolute(name: str) -> str:
+    """Resolve a component's name as requests give it: relative ones are taken in "/"."""
+    return name if name.startswith("/") else "/" + name
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Return '; did you mean "x"?', or nothing where no known name is close."""
+    close = difflib.get_close_matches(name, list(known), n=2, cutoff=0.6)
+    if not close:
+        return ""
+    return "; did you mean " + " or ".join(f'"{name}"' for name in close) + "?"
+
+
+def listing(names: Iterable[str]) -> str:
+    """Return names in order, separated by commas, or "none"."""
+    return ", ".join(sorted(names)) or "none"
