@@ -1,0 +1,50 @@
+# The tasks of this tree. Each starts on a plain Debian 12 that has make and
+# git: what more it needs is installed with apt first.
+BUILD := build
+# Compilers are called by way of ccache where it is installed.
+export CMAKE_CXX_COMPILER_LAUNCHER = $(wildcard /usr/bin/ccache)
+export CMAKE_BUILD_PARALLEL_LEVEL ?= $(shell nproc)
+
+.PHONY: all dependencies build demo test test-long bench bench-rt deb lint clean help
+.NOTPARALLEL:
+
+all: dependencies build ## build everything into build/ (default)
+
+dependencies:
+	@tools/install-dependencies build run
+
+build:
+	@cmake -S . -B $(BUILD) -G Ninja
+	@cmake --build $(BUILD)
+
+demo: all ## run Fig. 1 of the paper at 2 kHz for 10 s, with ROS nodes talking to it
+	@tests/demo/run
+
+test: all ## all checks: lint, unit, sanitizers, integration, packages
+	@tools/install-dependencies test
+	@tests/run
+
+test-long: all ## the same with the tests that take hours
+	@tools/install-dependencies test
+	@tests/run --long
+
+bench: all ## measure cost per component, latency and load times
+	@tools/install-dependencies bench
+	@tests/bench/run
+
+bench-rt: all ## measure in a PREEMPT_RT machine with instruction-counted time
+	@tools/install-dependencies bench
+	@tests/bench/run-rt
+
+deb: dependencies ## build the Debian packages into build/deb/
+	@tools/build-packages $(BUILD)/deb
+
+lint: all ## format, static checks and types; LINT_ALL=1: clang-tidy on every file
+	@tools/install-dependencies test
+	@tools/lint
+
+clean: ## remove everything that was built
+	rm -rf $(BUILD) build-tsan build-asan build-rtsan
+
+help: ## show this list
+	@sed -nE 's/^([a-z-]+):[^#]*## (.*)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 18

@@ -1,0 +1,98 @@
+"""A rtcfd of the build tree in a folder of its own, with the peer executor."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import rtcf
+
+BUILD_TREE = Path(str(rtcf.__file__)).parents[2]
+DEADLINE_S = 20.0
+_POLL_S = 0.01
+
+
+def wait_for(condition: Callable[[], Any], what: str) -> Any:
+    """Return the condition's result when it is true; fail after the deadline."""
+    deadline = time.monotonic() + DEADLINE_S
+    while not (result := condition()):
+        assert time.monotonic() < deadline, f"waited {DEADLINE_S:g} s for {what}"
+        time.sleep(_POLL_S)
+    return result
+
+
+class DaemonUnderTest:
+    """rtcfd as a process, its folders and its log."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.socket = folder / "control.sock"
+        self.state = folder / "state"
+        self.packages = folder / "lib"
+        self.log_file = folder / "log"
+        self.executor = folder / "executor"
+        self.process: subprocess.Popen[bytes] | None = None
+        self.environment: dict[str, str] = {}
+        peer = Path(__file__).with_name("peer_executor.py")
+        self.executor.write_text(
+            f'#!/bin/sh\nPYTHONPATH={BUILD_TREE}/python exec {sys.executable} {peer} "$@"\n'
+        )
+        self.executor.chmod(0o755)
+
+    def package(self, name: str, library: str = "main", **contents: Any) -> Path:
+        """Write a library of a package; returns its path."""
+        file = self.packages / name / f"{library}.so"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(contents))
+        return file
+
+    def start(self, *options: str) -> "DaemonUnderTest":
+        """Start rtcfd and wait until it is ready."""
+        with self.log_file.open("ab") as log:
+            begin = log.tell()
+            self.process = subprocess.Popen(
+                [
+                    *(str(BUILD_TREE / "bin" / "rtcfd"), "--foreground"),
+                    *("--socket", str(self.socket), "--state-dir", str(self.state)),
+                    *("--path", str(self.packages), "--executor", str(self.executor)),
+                    *options,
+                ],
+                stderr=log,
+                env=os.environ | self.environment,
+            )
+        wait_for(lambda: "ready;" in self.log()[begin:] or self.process_ended(), "rtcfd")
+        return self
+
+    def process_ended(self) -> bool:
+        return self.process is not None and self.process.poll() is not None
+
+    def log(self) -> str:
+        return self.log_file.read_text()
+
+    def client(self) -> rtcf.Client:
+        return rtcf.Client(self.socket)
+
+    def ctl(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Run rtcfctl."""
+        return subprocess.run(
+            [str(BUILD_TREE / "bin" / "rtcfctl"), *arguments],
+            env={**os.environ, "RTCF_SOCKET": str(self.socket)},
+            capture_output=True,
+            text=True,
+            timeout=DEADLINE_S,
+        )
+
+    def executor_pid(self, runner: str = "") -> int:
+        with self.client() as client:
+            return int(client.get_status(runner or "rt_runner").runners[0].pid)
+
+    def end(self, number: signal.Signals = signal.SIGTERM) -> int:
+        """Send a signal and return the exit status."""
+        assert self.process is not None
+        self.process.send_signal(number)
+        return self.process.wait(DEADLINE_S)

@@ -1,0 +1,245 @@
+"""The other side of the executor protocol, for tests of rtcfd without real-time parts.
+
+Speaks the real frames over a real unix socket and keeps a list of components.
+A "library" here is a JSON file: {"types": {"Name": "behaviour"}, "problem":
+"...", "crash": "SIGSEGV"}; behaviours of a type at its load: "fine",
+"refused", "crashes", "slow" (until the file named by its parameter `until`
+exists), "logs".
+"""
+
+import argparse
+import asyncio
+import json
+import os
+import signal
+import sys
+from pathlib import Path
+
+from google.protobuf import json_format
+from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+from rtcfd import frames
+
+POLL_S = 0.005
+
+
+def describe(library: Path, package: str) -> int:
+    contents = json.loads(library.read_text())
+    if "crash" in contents:
+        os.kill(os.getpid(), signal.Signals[contents["crash"]])
+    description = wire.LibraryDescription(
+        problem=contents.get("problem", ""),
+        types=[
+            graph_pb2.ComponentType(package=package, type=name)
+            for name in contents.get("types", {})
+        ],
+    )
+    sys.stdout.buffer.write(description.SerializeToString())
+    return 1 if description.problem else 0
+
+
+class Refused(Exception):
+    """Carries an Error code."""
+
+
+class Peer:
+    def __init__(self, runner: str) -> None:
+        self.runner = runner
+        self.settings = runner_pb2.RunnerSettings()
+        self.running = False
+        self.generation = 0
+        self.components: dict[str, graph_pb2.ComponentSpec] = {}
+        self.end = asyncio.Event()
+        self.tasks: set[asyncio.Task[None]] = set()
+
+    async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.writer = writer
+        while (message := await frames.read(reader)) is not None:
+            task = asyncio.create_task(self.answer(wire.Request.FromString(message)))
+            self.tasks.add(task)
+            task.add_done_callback(self.tasks.discard)
+
+    def send(self, response: wire.Response) -> None:
+        self.writer.write(frames.pack(response.SerializeToString()))
+
+    async def answer(self, request: wire.Request) -> None:
+        kind = request.WhichOneof("kind")
+        try:
+            response = await getattr(self, kind)(getattr(request, kind), request.id)
+        except Refused as refused:
+            code, text = refused.args
+            response = wire.Response(error=wire.Error(code=code, message=text))
+        response.id = request.id
+        self.send(response)
+        if kind == "exit":
+            await self.writer.drain()
+            self.end.set()
+
+    async def hello(self, _: wire.Hello, __: int) -> wire.Response:
+        return wire.Response(
+            hello=wire.HelloResult(protocol=1, runner=self.runner, pid=os.getpid())
+        )
+
+    async def configure(self, change: runner_pb2.RunnerSettings, _: int) -> wire.Response:
+        if change.ros.whitelist == "(":
+            raise Refused(wire.Error.CODE_INVALID_ARGUMENT, 'whitelist "(": unmatched (')
+        self.settings.MergeFrom(change)
+        return await self.get_status(wire.GetStatus(), 0)
+
+    async def get_status(self, _: wire.GetStatus, __: int) -> wire.Response:
+        state = runner_pb2.RUNNER_STATE_RUNNING if self.running else runner_pb2.RUNNER_STATE_STOPPED
+        return wire.Response(
+            status=runner_pb2.RunnerStatus(
+                runner=self.runner,
+                state=state,
+                settings=self.settings,
+                components=len(self.components),
+                degraded=["no permission for SCHED_FIFO"],
+            )
+        )
+
+    async def start(self, _: wire.Start, __: int) -> wire.Response:
+        self.running = True
+        return self.changed()
+
+    async def stop(self, _: wire.Stop, __: int) -> wire.Response:
+        self.running = False
+        return self.changed()
+
+    async def load(self, load: wire.Load, id_: int) -> wire.Response:
+        spec = load.component
+        name = f"{spec.ns.rstrip('/')}/{spec.name or spec.type}"
+        if name in self.components:
+            raise Refused(wire.Error.CODE_ALREADY_EXISTS, f"component {name} is there already")
+        await self.behave(load.library, spec, id_)
+        self.components[name] = spec
+        return self.changed(name)
+
+    async def behave(self, library: str, spec: graph_pb2.ComponentSpec, id_: int) -> None:
+        behaviour = json.loads(Path(library).read_text())["types"][spec.type]
+        if behaviour == "refused":
+            raise Refused(wire.Error.CODE_FAILED_PRECONDITION, f"{spec.type}.configure failed")
+        if behaviour == "crashes":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if behaviour == "slow":
+            self.send(wire.Response(id=id_, progress=f"configuring {spec.type}"))
+            until = Path(spec.parameters[0].value.string_value)
+            while not until.exists():
+                await asyncio.sleep(POLL_S)
+        if behaviour == "logs":
+            record = wire.LogRecord(
+                level=wire.LogRecord.LEVEL_WARN,
+                time_ns=1_700_000_000_500_000_000,
+                iteration=7,
+                component="/Logs",
+                message="from the loop",
+                file="/src/logs.cpp",
+                line=12,
+                function="update",
+            )
+            self.send(wire.Response(log=record))
+
+    async def unload(self, request: control_pb2.UnloadRequest, _: int) -> wire.Response:
+        for name in request.components:
+            if name not in self.components:
+                raise Refused(wire.Error.CODE_NOT_FOUND, f"no component {name}")
+        for name in request.components:
+            del self.components[name]
+        return self.changed()
+
+    async def replace(self, request: wire.Replace, id_: int) -> wire.Response:
+        if request.component not in self.components:
+            raise Refused(wire.Error.CODE_NOT_FOUND, f"no component {request.component}")
+        spec = request.replacement
+        await self.behave(request.library, spec, id_)
+        del self.components[request.component]
+        name = f"{spec.ns.rstrip('/')}/{spec.name}"
+        self.components[name] = spec
+        return self.changed(name)
+
+    async def set_breaks(self, _: control_pb2.SetBreaksRequest, __: int) -> wire.Response:
+        return self.changed()
+
+    async def set_parameters(self, _: control_pb2.SetParametersRequest, __: int) -> wire.Response:
+        return self.changed()
+
+    async def list_components(self, _: wire.ListComponents, __: int) -> wire.Response:
+        infos = [self.info(name, at) for at, name in enumerate(sorted(self.components))]
+        infos.reverse()  # rtcfd is to sort by position
+        return wire.Response(components=wire.ListComponentsResult(components=infos))
+
+    async def get_component(
+        self, request: control_pb2.GetComponentRequest, _: int
+    ) -> wire.Response:
+        if request.component not in self.components:
+            raise Refused(wire.Error.CODE_NOT_FOUND, f"no component {request.component}")
+        return wire.Response(component=self.info(request.component, 0))
+
+    def info(self, name: str, position: int) -> graph_pb2.ComponentInfo:
+        text = """{"state": "COMPONENT_STATE_CONFIGURED", "ports": [
+            {"name": "in1", "direction": "DIRECTION_INPUT", "mapped_name": "/a[1]",
+             "type": "std_msgs/Float64", "value": "1.5", "age_ns": "2500000"},
+            {"name": "out1", "direction": "DIRECTION_OUTPUT", "mapped_name": "/b",
+             "type": "double"}],
+            "parameters": [{"name": "kp", "type": "double", "value": {"double_value": 1.5},
+             "default_value": {"double_value": 1.0}, "minimum": 0.0, "doc": "gain"}]}"""
+        info = graph_pb2.ComponentInfo()
+        json_format.Parse(text, info)
+        info.full_name = name
+        info.position = position
+        info.spec.CopyFrom(self.components[name])
+        return info
+
+    async def list_connections(self, _: wire.ListConnections, __: int) -> wire.Response:
+        names = sorted(self.components, reverse=True)
+        return wire.Response(
+            connections=wire.ListConnectionsResult(
+                connections=[graph_pb2.Connection(name=f"{name}_out") for name in names]
+            )
+        )
+
+    async def get_statistics(self, _: wire.GetStatistics, __: int) -> wire.Response:
+        figures = runner_pb2.Distribution(count=10, min_ns=1000.0, mean_ns=1500.0, max_ns=2e3)
+        return wire.Response(
+            statistics=runner_pb2.RunnerStatistics(
+                iterations=10, duration=figures, latency=figures, overruns=1
+            )
+        )
+
+    async def reset_statistics(self, _: wire.ResetStatistics, __: int) -> wire.Response:
+        return wire.Response(done=wire.Done())
+
+    async def exit(self, _: wire.Exit, __: int) -> wire.Response:
+        return wire.Response(done=wire.Done())
+
+    def changed(self, component: str = "") -> wire.Response:
+        self.generation += 1
+        return wire.Response(
+            change=control_pb2.ChangeResult(
+                generation=self.generation, component=component, order=sorted(self.components)
+            )
+        )
+
+
+async def run(runner: str, socket: str) -> None:
+    peer = Peer(runner)
+    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, peer.end.set)
+    server = await asyncio.start_unix_server(peer.serve, socket)
+    await peer.end.wait()
+    server.close()
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser()
+    for option in ("--runner", "--socket", "--package"):
+        parser.add_argument(option)
+    parser.add_argument("--describe", type=Path)
+    args = parser.parse_args()
+    if args.describe:
+        return describe(args.describe, args.package)
+    asyncio.run(run(args.runner, args.socket))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,122 @@
+"""Settings: defaults, the configuration file, what is allowed."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rtcf.v1 import runner_pb2
+from rtcfd import config, options, settings
+from rtcfd.errors import Refusal
+
+
+def written(tmp_path: Path, text: str) -> Path:
+    file = tmp_path / "rtcfd.toml"
+    file.write_text(text)
+    return file
+
+
+def test_every_setting_has_a_default() -> None:
+    complete = settings.defaults(runner_pb2.REALTIME_REQUIRED)
+    messages: list[Any] = [complete, complete.ros]
+    for message in messages:
+        for field in message.DESCRIPTOR.fields:
+            assert message.HasField(field.name), field.name
+    settings.check(complete)
+
+
+def test_a_file_is_read(tmp_path: Path) -> None:
+    file = written(
+        tmp_path,
+        """
+        [daemon]
+        socket = "/run/x.sock"
+        path = ["/opt/a/lib/rtcf"]
+        realtime = "preferred"
+        [runner]
+        frequency_hz = 2000
+        overrun = "catch_up"
+        [runner.ros]
+        whitelist = "/a.*"
+        """,
+    )
+    found = config.read(file)
+    assert (found.socket, found.realtime) == (Path("/run/x.sock"), "preferred")
+    assert found.path == [Path("/opt/a/lib/rtcf")]
+    assert found.runner == runner_pb2.RunnerSettings(
+        frequency_hz=2000.0,
+        overrun=runner_pb2.OVERRUN_POLICY_CATCH_UP,
+        ros=runner_pb2.RosSettings(whitelist="/a.*"),
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[deamon]", 'unknown key "deamon"; did you mean "daemon"'),
+        ("[daemon]\nsockte = 1", 'unknown key "daemon.sockte"; did you mean "socket"'),
+        ("[runner.ros]\nfoo = 1", 'unknown key "runner.ros.foo"'),
+        ("[daemon]\nsocket = 1", "daemon.socket must be an absolute path"),
+        ('[daemon]\nsocket = "x"', "daemon.socket must be an absolute path"),
+        ('[daemon]\nrealtime = "no"', "daemon.realtime must be one of required, preferred"),
+        ("daemon = 1", "daemon must be a table"),
+        ("[runner]\npriority = true", "runner.priority must be an integer"),
+        ("[runner]\npriority = -1", "runner.priority is out of range"),
+        ("[runner]\npriority = 99", "priority 99 is out of range: 1 to 98"),
+        ('[runner]\nlock_memory = "yes"', "runner.lock_memory must be true or false"),
+        ("[runner]\nros = 1", "runner.ros must be a table"),
+        ("[runner]\n!", "line 2"),
+    ],
+)
+def test_a_bad_file_is_refused_by_name(tmp_path: Path, text: str, said: str) -> None:
+    file = written(tmp_path, text)
+    with pytest.raises(Refusal) as refused:
+        config.read(file)
+    assert said in str(refused.value)
+    assert str(file) in str(refused.value)
+
+
+def test_a_cpu_that_is_not_there_is_refused() -> None:
+    with pytest.raises(Refusal, match="CPU 4096"):
+        settings.check(runner_pb2.RunnerSettings(cpu=4096))
+    settings.check(runner_pb2.RunnerSettings(cpu=max(os.sched_getaffinity(0))))
+
+
+def test_the_unspecified_leaves_a_setting_as_it_is() -> None:
+    base = settings.defaults(runner_pb2.REALTIME_REQUIRED)
+    change = runner_pb2.RunnerSettings(realtime=runner_pb2.REALTIME_UNSPECIFIED, spin_us=3)
+    result = settings.merged(base, change)
+    assert (result.realtime, result.spin_us) == (runner_pb2.REALTIME_REQUIRED, 3)
+
+
+def test_the_command_line_goes_before_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = written(tmp_path, '[daemon]\nsocket = "/f"\npath = ["/f/lib"]\nrealtime = "required"')
+    monkeypatch.setenv("RTCF_SOCKET", "/e")
+    monkeypatch.setenv("CMAKE_PREFIX_PATH", "/ws/devel:/opt/ros")
+    line = ["--foreground", "--config", str(file)]
+    assert options.parse(line, None).socket == Path("/f")
+    given = options.parse([*line, "--socket", "/o", "--path", "/o/lib"], Path("/build"))
+    assert given.socket == Path("/o")
+    assert given.runtime_dir == Path("/o.d")
+    assert given.state_dir is None
+    assert given.executor == Path("/build/bin/rtcf-executor")
+    assert given.defaults.realtime == runner_pb2.REALTIME_REQUIRED
+    assert [str(folder) for folder in given.folders[:5]] == [
+        "/o/lib",
+        "/f/lib",
+        "/build/lib/rtcf",
+        "/ws/devel/lib/rtcf",
+        "/opt/ros/lib/rtcf",
+    ]
+    assert options.parse(["--foreground"], None).socket == Path("/e")
+
+
+def test_the_service_takes_systemds_folders(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RUNTIME_DIRECTORY", "/run/here")
+    monkeypatch.delenv("STATE_DIRECTORY", raising=False)
+    given = options.parse([], None)
+    assert given.runtime_dir == Path("/run/here")
+    assert given.state_dir == Path("/var/lib/rtcfd")
+    assert given.defaults.realtime == runner_pb2.REALTIME_REQUIRED

@@ -1,0 +1,221 @@
+"""rtcfd from outside: its socket, its life, its runners."""
+
+import os
+import signal
+import socket
+import stat
+from pathlib import Path
+
+import pytest
+import rtcf
+from daemon_under_test import DaemonUnderTest, wait_for
+from rtcf.v1 import runner_pb2
+
+
+def is_alive(pid: int) -> bool:
+    return Path(f"/proc/{pid}").exists()
+
+
+def test_serves_the_default_runner_stopped(client: rtcf.Client) -> None:
+    status = client.get_status()
+    assert [runner.runner for runner in status.runners] == ["rt_runner"]
+    assert status.runners[0].state == runner_pb2.RUNNER_STATE_STOPPED
+    assert status.runners[0].settings.frequency_hz == 1000.0
+    assert is_alive(status.runners[0].pid)
+
+
+def test_socket_is_for_owner_and_group(daemon: DaemonUnderTest) -> None:
+    assert stat.S_IMODE(daemon.socket.stat().st_mode) == 0o660
+    assert stat.S_IMODE(Path(f"{daemon.socket}.d/executors").stat().st_mode) == 0o700
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_a_signal_ends_it_with_its_executors(
+    daemon: DaemonUnderTest, number: signal.Signals
+) -> None:
+    executor = daemon.executor_pid()
+    assert daemon.end(number) == 0
+    assert not is_alive(executor)
+    assert not daemon.socket.exists()
+    assert not Path(f"{daemon.socket}.d").exists()
+
+
+def test_a_stale_socket_is_taken(stopped_daemon: DaemonUnderTest) -> None:
+    with socket.socket(socket.AF_UNIX) as stale:
+        stale.bind(str(stopped_daemon.socket))
+    stopped_daemon.start()
+    assert stopped_daemon.executor_pid()
+
+
+def test_a_live_socket_is_refused(daemon: DaemonUnderTest, tmp_path: Path) -> None:
+    folder = tmp_path / "second"
+    folder.mkdir()
+    second = DaemonUnderTest(folder)
+    second.socket = daemon.socket
+    second.start("--runtime-dir", str(tmp_path / "other"))
+    assert second.process is not None
+    assert second.process.wait() == 1
+    assert "answers at" in second.log()
+    assert daemon.executor_pid()
+
+
+def test_a_left_over_executor_is_ended(daemon: DaemonUnderTest) -> None:
+    orphan = daemon.executor_pid()
+    daemon.end(signal.SIGKILL)
+    assert is_alive(orphan)
+    daemon.start()
+    wait_for(lambda: not is_alive(orphan), "the orphan to end")
+    assert daemon.executor_pid() != orphan
+
+
+def test_no_executor_binary_is_one_line(stopped_daemon: DaemonUnderTest) -> None:
+    stopped_daemon.executor.unlink()
+    stopped_daemon.start()
+    assert stopped_daemon.process is not None
+    assert stopped_daemon.process.wait() == 1
+    assert stopped_daemon.log() == (
+        f"rtcfd: no executor at {stopped_daemon.executor}: install it, "
+        "or name one with --executor\n"
+    )
+
+
+def test_an_executor_that_ends_at_once_shows_in_the_status(
+    stopped_daemon: DaemonUnderTest,
+) -> None:
+    stopped_daemon.executor.write_text("#!/bin/sh\nexit 7\n")
+    stopped_daemon.start()
+    with stopped_daemon.client() as client:
+        status = client.get_status().runners[0]
+        assert status.state == runner_pb2.RUNNER_STATE_DOWN
+        assert "exit status 7" in status.status
+        with pytest.raises(rtcf.RefusedError, match="exit status 7"):
+            client.get_order()
+
+
+def test_death_of_an_executor_is_told_and_mended_by_start(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
+    client.load(rtcf.component("demo", "Fine", name="kept"))
+    client.start()
+    pid = daemon.executor_pid()
+    os.kill(pid, signal.SIGABRT)
+    wait_for(
+        lambda: client.get_status().runners[0].state == runner_pb2.RUNNER_STATE_DOWN, "its death"
+    )
+    status = client.get_status().runners[0]
+    assert f"pid {pid}) was killed by SIGABRT" in status.status
+    assert "rtcfctl -r rt_runner start" in status.status
+    assert status.pid == 0
+    with pytest.raises(rtcf.RefusedError) as refused:
+        client.load(rtcf.component("demo", "Fine"))
+    assert refused.value.code == "UNAVAILABLE"
+    assert "was killed by SIGABRT" in daemon.log()
+    assert "no loop to stop" in client.stop().notes[0]
+
+    assert client.start().order == ["/kept"]
+    status = client.get_status().runners[0]
+    assert (status.state, status.status) == (runner_pb2.RUNNER_STATE_RUNNING, "")
+
+
+def test_an_executor_that_does_not_answer_is_stuck(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
+    pid = daemon.executor_pid()
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        status = client.get_status().runners[0]
+        assert status.state == runner_pb2.RUNNER_STATE_STUCK
+        assert "did not answer get_status" in status.status
+    finally:
+        os.kill(pid, signal.SIGCONT)
+
+
+def test_runners_come_and_go(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
+    added = client.add_runner("arm", runner_pb2.RunnerSettings(frequency_hz=2000.0))
+    assert added.settings.frequency_hz == 2000.0
+    assert added.settings.priority == 80
+    client.load(rtcf.component("demo", "Fine"), "arm")
+    assert client.get_order("arm") == ["/Fine"]
+    assert client.get_order() == []
+    client.remove_runner("arm")
+    assert not is_alive(added.pid)
+    assert [runner.runner for runner in client.get_status().runners] == ["rt_runner"]
+    assert not (daemon.state / "arm.json").exists()
+
+
+def test_a_change_of_settings_keeps_the_rest(client: rtcf.Client) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(ros=runner_pb2.RosSettings(whitelist="/a.*")))
+    status = client.set_runner(runner_pb2.RunnerSettings(frequency_hz=500.0))
+    assert status.settings.frequency_hz == 500.0
+    assert status.settings.ros.whitelist == "/a.*"
+    assert status.settings.ros.queue == 1000
+
+
+@pytest.mark.parametrize(
+    ("runner", "code", "text"),
+    [
+        ("nobody", "NOT_FOUND", r'no runner "nobody" \(runners: rt_runner\)'),
+        ("rt_runer", "NOT_FOUND", r'did you mean "rt_runner"\?'),
+    ],
+)
+def test_unknown_runner_is_refused(client: rtcf.Client, runner: str, code: str, text: str) -> None:
+    with pytest.raises(rtcf.RefusedError, match=text) as refused:
+        client.start(runner)
+    assert refused.value.code == code
+
+
+@pytest.mark.parametrize("name", ["1st", "a/b", "../x", "a b", "ä"])
+def test_bad_runner_name_is_refused(client: rtcf.Client, name: str) -> None:
+    with pytest.raises(rtcf.RefusedError, match="is not valid") as refused:
+        client.add_runner(name)
+    assert refused.value.code == "INVALID_ARGUMENT"
+
+
+def test_a_runner_that_is_there_is_refused(client: rtcf.Client) -> None:
+    with pytest.raises(rtcf.RefusedError, match="runner rt_runner is there already") as refused:
+        client.add_runner("rt_runner")
+    assert refused.value.code == "ALREADY_EXISTS"
+
+
+@pytest.mark.parametrize("frequency", [0.0, -1.0, 20001.0, float("nan"), float("inf")])
+def test_bad_frequency_is_refused_and_nothing_changed(
+    client: rtcf.Client, frequency: float
+) -> None:
+    with pytest.raises(rtcf.RefusedError, match=r"0\.1 to 20000 Hz"):
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=frequency))
+    assert client.get_status().runners[0].settings.frequency_hz == 1000.0
+
+
+def test_a_refusal_of_the_executor_changes_no_settings(client: rtcf.Client) -> None:
+    bad = runner_pb2.RunnerSettings(frequency_hz=10.0, ros=runner_pb2.RosSettings(whitelist="("))
+    with pytest.raises(rtcf.RefusedError, match="unmatched"):
+        client.set_runner(bad)
+    with pytest.raises(rtcf.RefusedError, match="unmatched"):
+        client.add_runner("other", bad)
+    status = client.get_status()
+    assert len(status.runners) == 1
+    assert status.runners[0].settings.frequency_hz == 1000.0
+
+
+def test_environment_reaches_the_executor(stopped_daemon: DaemonUnderTest) -> None:
+    stopped_daemon.environment = {
+        "ROS_MASTER_URI": "http://elsewhere:1",
+        "ROS_IP": "10.0.0.1",
+        "WATCHDOG_USEC": "",
+    }
+    stopped_daemon.start()
+    environment = Path(f"/proc/{stopped_daemon.executor_pid()}/environ").read_bytes().split(b"\0")
+    assert b"ROS_IP=10.0.0.1" in environment
+    assert b"ROS_MASTER_URI=http://elsewhere:1" in environment
+    with stopped_daemon.client() as client:
+        assert client.get_status().runners[0].settings.ros.master_uri == "http://elsewhere:1"
+
+
+def test_log_records_arrive_with_their_source(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
+    client.load(rtcf.component("demo", "Logs"))
+    line = wait_for(
+        lambda: next((x for x in daemon.log().splitlines() if "from the loop" in x), ""),
+        "the record",
+    )
+    assert line.split(maxsplit=1)[0].endswith(".500")
+    assert "WARNING rt_runner /Logs: from the loop (logs.cpp:12, #7)" in line

@@ -1,0 +1,249 @@
+"""Changes of a graph: refusals, what is kept, what comes back."""
+
+import json
+import os
+import signal
+import threading
+from pathlib import Path
+
+import pytest
+import rtcf
+from daemon_under_test import DaemonUnderTest, wait_for
+from rtcf.v1 import control_pb2, runner_pb2
+
+
+def saved(daemon: DaemonUnderTest, runner: str = "rt_runner") -> dict[str, object]:
+    document = json.loads((daemon.state / f"{runner}.json").read_text())
+    return {f"{c['ns'].rstrip('/')}/{c['name']}": c for c in document["components"]}
+
+
+def test_a_loaded_component_is_listed_in_order(client: rtcf.Client) -> None:
+    client.load(rtcf.component("demo", "Fine", name="b"))
+    result = client.load(rtcf.component("demo", "Fine", name="a", ns="/arm"))
+    assert result.component == "/arm/a"
+    assert client.get_order() == ["/arm/a", "/b"]
+    assert [each.full_name for each in client.list_components()] == ["/arm/a", "/b"]
+    assert [each.name for each in client.list_connections()] == ["/arm/a_out", "/b_out"]
+
+
+def test_relative_names_are_taken_in_the_root(client: rtcf.Client) -> None:
+    client.load(rtcf.component("demo", "Fine", name="a"))
+    assert client.get_component("a").full_name == "/a"
+    client.unload(["a"])
+    assert client.get_order() == []
+
+
+@pytest.mark.parametrize(
+    ("package", "type_name", "code", "text"),
+    [
+        ("demmo", "Fine", "NOT_FOUND", r'no package "demmo" .*did you mean "demo"\?'),
+        ("demo", "Fin", "NOT_FOUND", r'no type "Fin" .*did you mean "Fine"\?.*Crashes, Fine'),
+        ("../demo", "Fine", "INVALID_ARGUMENT", "package name"),
+        ("demo", "a/b", "INVALID_ARGUMENT", "type name"),
+        ("demo", "Refused", "FAILED_PRECONDITION", r"Refused\.configure failed"),
+    ],
+)
+def test_refused_load_changes_nothing(
+    daemon: DaemonUnderTest,
+    client: rtcf.Client,
+    package: str,
+    type_name: str,
+    code: str,
+    text: str,
+) -> None:
+    with pytest.raises(rtcf.RefusedError, match=text) as refused:
+        client.load(rtcf.component(package, type_name))
+    assert refused.value.code == code
+    assert client.get_order() == []
+    assert not (daemon.state / "rt_runner.json").exists()
+
+
+def test_unknown_package_lists_the_folders(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
+    with pytest.raises(rtcf.RefusedError) as refused:
+        client.load(rtcf.component("nothing_like_it", "Fine"))
+    assert str(daemon.packages) in str(refused.value)
+    assert "/usr/lib/rtcf" in str(refused.value)
+
+
+def test_duplicate_name_is_refused(client: rtcf.Client) -> None:
+    client.load(rtcf.component("demo", "Fine"))
+    with pytest.raises(rtcf.RefusedError, match="/Fine is there already") as refused:
+        client.load(rtcf.component("demo", "Fine"))
+    assert refused.value.code == "ALREADY_EXISTS"
+
+
+def test_a_library_that_does_not_load_gives_the_loaders_text(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
+    library = daemon.package("bad", problem="undefined symbol: _ZN3FooE")
+    with pytest.raises(rtcf.RefusedError, match="undefined symbol: _ZN3FooE") as refused:
+        client.load(rtcf.component("bad", "Foo"))
+    assert refused.value.code == "FAILED_PRECONDITION"
+    assert str(library) in str(refused.value)
+    assert client.list_types("bad").problems == [f"{library}: undefined symbol: _ZN3FooE"]
+
+
+def test_a_library_that_crashes_is_refused_by_signal(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
+    daemon.package("bad", crash="SIGSEGV")
+    with pytest.raises(rtcf.RefusedError, match="was killed by SIGSEGV"):
+        client.load(rtcf.component("bad", "Foo"))
+
+
+def test_a_library_that_was_mended_is_seen(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
+    daemon.package("late", types={"Old": "fine"})
+    assert [each.type for each in client.list_types("late").types] == ["Old"]
+    daemon.package("late", types={"Newer": "fine"})
+    assert [each.type for each in client.list_types("late").types] == ["Newer"]
+
+
+def test_a_crash_at_load_is_told_and_not_kept(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
+    client.load(rtcf.component("demo", "Fine"))
+    with pytest.raises(rtcf.RefusedError, match="closed its connection"):
+        client.load(rtcf.component("demo", "Crashes"))
+    wait_for(lambda: "was killed by SIGSEGV" in client.get_status().runners[0].status, "its death")
+    assert list(saved(daemon)) == ["/Fine"]
+
+
+def test_progress_is_streamed_and_stop_and_queries_do_not_wait(
+    daemon: DaemonUnderTest, client: rtcf.Client, tmp_path: Path
+) -> None:
+    go = tmp_path / "go"
+    lines: list[str] = []
+    results: list[control_pb2.ChangeResult] = []
+    slow = rtcf.component("demo", "Slow", parameters=[f"until:='{go}'"])
+    loading = threading.Thread(
+        target=lambda: results.append(client.load(slow, on_progress=lines.append))
+    )
+    loading.start()
+    wait_for(lambda: lines == ["configuring Slow"], "progress")
+    assert client.get_order() == []
+    client.stop()
+    assert client.get_status().runners[0].state == runner_pb2.RUNNER_STATE_STOPPED
+    go.touch()
+    loading.join()
+    assert results[0].component == "/Slow"
+
+
+def test_a_change_outlives_its_caller(
+    daemon: DaemonUnderTest, client: rtcf.Client, tmp_path: Path
+) -> None:
+    go = tmp_path / "go"
+    slow = rtcf.component("demo", "Slow", parameters=[f"until:='{go}'"])
+
+    class Enough(Exception):
+        pass
+
+    def leave(_: str) -> None:
+        raise Enough
+
+    with daemon.client() as hasty, pytest.raises(Enough):
+        hasty.load(slow, on_progress=leave)
+    wait_for(lambda: daemon.executor_pid(), "an answer")
+    go.touch()
+    wait_for(lambda: client.get_order() == ["/Slow"], "the load")
+    wait_for(lambda: "its caller had left" in daemon.log(), "the log")
+    assert list(saved(daemon)) == ["/Slow"]
+
+
+def test_replacement_inherits_what_is_empty(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
+    old = rtcf.component(
+        "demo", "Fine", name="x", ns="/arm", remaps=["in1:=/a"], first=True, breaks=["in2"],
+        parameters=["k:=1"],
+    )  # fmt: skip
+    client.load(old)
+    result = client.replace("/arm/x", rtcf.component("demo", "Logs"))
+    assert result.component == "/arm/x"
+    spec = client.get_component("/arm/x").spec
+    assert (spec.type, spec.first, list(spec.breaks)) == ("Logs", True, ["in2"])
+    assert [(each.to) for each in spec.remaps] == ["/a"]
+    assert not spec.parameters
+    assert list(saved(daemon)) == ["/arm/x"]
+
+
+def test_the_graph_comes_back_held_after_a_restart(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=250.0))
+    client.load(rtcf.component("demo", "Fine", name="a", parameters=["k:=1"]))
+    client.load(rtcf.component("demo", "Fine", name="b"))
+    client.load(rtcf.component("demo", "Fine", name="c"))
+    client.unload(["b"])
+    client.set_parameters("a", [rtcf.parse_parameter("k:=2.5")])
+    client.set_breaks([rtcf.parse_port("a.in1"), rtcf.parse_port("c.in1")], True)
+    client.set_breaks([rtcf.parse_port("c.in1")], False)
+    client.add_runner("arm")
+    client.start()
+    daemon.end()
+
+    daemon.start()
+    with daemon.client() as again:
+        arm, default = again.get_status().runners
+        assert (arm.runner, default.runner) == ("arm", "rt_runner")
+        assert default.state == runner_pb2.RUNNER_STATE_STOPPED
+        assert default.settings.frequency_hz == 250.0
+        assert again.get_order() == ["/a", "/c"]
+        spec = again.get_component("a").spec
+        assert [each.value.double_value for each in spec.parameters] == [2.5]
+        assert list(spec.breaks) == ["in1"]
+        assert not again.get_component("c").spec.breaks
+
+
+def test_what_does_not_load_again_is_left_out_and_reported(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
+    daemon.package("gone", types={"Gone": "fine"})
+    client.load(rtcf.component("gone", "Gone"))
+    client.load(rtcf.component("demo", "Fine"))
+    daemon.end()
+    (daemon.packages / "gone" / "main.so").unlink()
+
+    daemon.start()
+    with daemon.client() as again:
+        assert again.get_order() == ["/Fine"]
+        assert '/Gone is left out: no package "gone"' in again.get_status().runners[0].status
+        assert set(saved(daemon)) == {"/Fine", "/Gone"}
+        again.unload(["Gone"])
+        assert again.get_status().runners[0].status == ""
+        assert set(saved(daemon)) == {"/Fine"}
+
+
+def test_a_component_can_be_taken_out_while_the_executor_is_down(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
+    client.load(rtcf.component("demo", "Fine", name="a"))
+    client.load(rtcf.component("demo", "Fine", name="b"))
+    os.kill(daemon.executor_pid(), signal.SIGKILL)
+    wait_for(
+        lambda: client.get_status().runners[0].state == runner_pb2.RUNNER_STATE_DOWN, "its death"
+    )
+    with pytest.raises(rtcf.RefusedError, match="no component /c"):
+        client.unload(["c"])
+    assert client.unload(["a"]).notes == ["taken out of the saved graph only"]
+    assert client.start().order == ["/b"]
+
+
+@pytest.mark.parametrize("content", ["{", "[]", '{"version": 9}', '{"version": 1}', "\xff"])
+def test_a_corrupt_state_is_set_aside(stopped_daemon: DaemonUnderTest, content: str) -> None:
+    stopped_daemon.state.mkdir()
+    (stopped_daemon.state / "rt_runner.json").write_text(content, encoding="latin-1")
+    stopped_daemon.start()
+    assert "is corrupt" in stopped_daemon.log()
+    (aside,) = stopped_daemon.state.iterdir()
+    assert aside.name.startswith("rt_runner.corrupt-")
+    assert aside.read_text(encoding="latin-1") == content
+    assert stopped_daemon.executor_pid()
+
+
+def test_a_change_that_cannot_be_saved_stands_and_says_so(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
+    daemon.state.rmdir()
+    result = client.load(rtcf.component("demo", "Fine"))
+    assert result.notes == ["not saved: No such file or directory"]
+    assert client.get_order() == ["/Fine"]
+    assert "not saved" in client.get_status().runners[0].status
+    daemon.state.mkdir()
+    assert not client.unload(["Fine"]).notes
+    assert client.get_status().runners[0].status == ""

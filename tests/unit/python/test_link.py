@@ -1,0 +1,108 @@
+"""The link to an executor: overlapping requests, limits, a peer that misbehaves."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import pytest
+from rtcf.executor.v1 import executor_pb2 as wire
+from rtcfd import errors, frames
+from rtcfd.link import Link
+
+Peer = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
+
+STATUS = wire.GetStatus()
+
+
+def against(tmp_path: Path, peer: Peer, test: Callable[[Link], Awaitable[None]]) -> None:
+    """Run a test with a link to a peer."""
+
+    async def run() -> None:
+        path = tmp_path / "s"
+        server = await asyncio.start_unix_server(peer, path)
+        link = await Link.connect("the peer", path, lambda _: None)
+        try:
+            await test(link)
+        finally:
+            await link.close()
+            server.close()
+
+    asyncio.run(run())
+
+
+async def received(reader: asyncio.StreamReader) -> wire.Request:
+    message = await frames.read(reader)
+    assert message is not None
+    request = wire.Request()
+    request.ParseFromString(message)
+    return request
+
+
+def test_answers_find_their_requests_in_any_order(tmp_path: Path) -> None:
+    async def peer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        requests = [await received(reader) for _ in range(3)]
+        for request in reversed(requests):
+            response = wire.Response(id=request.id)
+            response.component.full_name = request.get_component.component
+            writer.write(frames.pack(response.SerializeToString()))
+
+    async def test(link: Link) -> None:
+        async def ask(name: str) -> str:
+            request = wire.Request()
+            request.get_component.component = name
+            return str((await link.request(request, 5.0)).component.full_name)
+
+        answers = await asyncio.gather(ask("a"), ask("b"), ask("c"))
+        assert list(answers) == ["a", "b", "c"]
+
+    against(tmp_path, peer, test)
+
+
+def test_no_answer_in_time_is_unavailable(tmp_path: Path) -> None:
+    async def peer(reader: asyncio.StreamReader, _: asyncio.StreamWriter) -> None:
+        await reader.read()
+
+    async def test(link: Link) -> None:
+        with pytest.raises(errors.Unavailable, match=r"did not answer get_status within 0\.01 s"):
+            await link.request(wire.Request(get_status=STATUS), 0.01)
+
+    against(tmp_path, peer, test)
+
+
+@pytest.mark.parametrize(
+    "reply",
+    [
+        b"",
+        b"\x01\x00",
+        (frames.MAX_FRAME + 1).to_bytes(4, "little"),
+        frames.pack(b"\xff\xff\xff"),
+    ],
+    ids=["end of stream", "half a length", "too long", "no message"],
+)
+def test_a_peer_that_breaks_off_fails_what_waits(tmp_path: Path, reply: bytes) -> None:
+    async def peer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await received(reader)
+        writer.write(reply)
+        writer.close()
+
+    async def test(link: Link) -> None:
+        with pytest.raises(errors.Unavailable, match="the peer"):
+            await link.request(wire.Request(get_status=STATUS), 5.0)
+        assert link.ended.is_set()
+        with pytest.raises(errors.Unavailable, match="the peer"):
+            await link.request(wire.Request(get_status=STATUS), 5.0)
+
+    against(tmp_path, peer, test)
+
+
+def test_another_protocol_is_refused(tmp_path: Path) -> None:
+    async def peer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        request = await received(reader)
+        response = wire.Response(id=request.id, hello=wire.HelloResult(protocol=2))
+        writer.write(frames.pack(response.SerializeToString()))
+
+    async def test(link: Link) -> None:
+        with pytest.raises(errors.FailedPrecondition, match="protocol 2"):
+            await link.hello(5.0)
+
+    against(tmp_path, peer, test)

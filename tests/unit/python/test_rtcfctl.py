@@ -1,0 +1,141 @@
+"""rtcfctl: its words, its formats, its exit codes."""
+
+import json
+import os
+import socket
+from pathlib import Path
+
+import pytest
+import rtcf
+import yaml
+from daemon_under_test import DaemonUnderTest
+from rtcf.v1 import runner_pb2
+from rtcfctl.main import parser
+from rtcfctl.plain import plain
+from rtcfctl.runner import settings_of
+
+
+def test_a_session_in_words(daemon: DaemonUnderTest) -> None:
+    steps = [
+        ("runner set --frequency 2000 --no-ros", "runner rt_runner set\n"),
+        ("load demo Fine --name a --remap in1:=/x", "loaded /a\n"),
+        ("load demo Fine --name b --first", "loaded /b\n"),
+        ("order", "/a\n/b\n"),
+        ("break a.in1", "broken: a.in1\n"),
+        ("set a k:=2", "set k:=2 of a\n"),
+        ("start", "started\n"),
+        ("stop", "stopped\n"),
+        ("replace a demo Logs", "replaced a by /a\n"),
+        ("unload a b", "unloaded a, b\n"),
+        ("runner add arm", "runner arm added\n"),
+        ("runner remove arm", "runner arm removed\n"),
+    ]
+    for command, answer in steps:
+        done = daemon.ctl(*command.split())
+        assert (done.stdout, done.stderr, done.returncode) == (answer, "", 0), command
+
+
+def test_status_says_loudly_what_is_not_real_time(daemon: DaemonUnderTest) -> None:
+    lines = daemon.ctl("status").stdout.splitlines()
+    assert "!! rt_runner IS NOT REAL TIME:" in lines
+    assert "!!   no permission for SCHED_FIFO" in lines
+
+
+def test_tables_are_not_folded_where_there_is_no_terminal(daemon: DaemonUnderTest) -> None:
+    name = "a" * 60
+    daemon.ctl("load", "demo", "Fine", "--name", name, "--ignore", "[a-z]" * 30)
+    table = daemon.ctl("list").stdout
+    assert f"/{name}" in table
+    assert "[a-z]" * 30 in table
+    info = daemon.ctl("info", name).stdout
+    assert "/a[1]" in info
+    assert "2.5 ms" in info
+
+
+@pytest.mark.parametrize(
+    "command", ["status", "runner list", "list", "info a", "order", "connections", "types", "stats"]
+)
+def test_every_query_speaks_json_and_yaml(daemon: DaemonUnderTest, command: str) -> None:
+    daemon.ctl("load", "demo", "Fine", "--name", "a")
+    as_json = json.loads(daemon.ctl(*command.split(), "-o", "json").stdout)
+    as_yaml = yaml.safe_load(daemon.ctl("-o", "yaml", *command.split()).stdout)
+    assert type(as_json) is type(as_yaml)
+    assert daemon.ctl(*command.split()).stdout
+
+
+def test_refusal_is_one_line_and_exit_code_1(daemon: DaemonUnderTest) -> None:
+    done = daemon.ctl("load", "demo", "Refused")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == "rtcfctl: Refused.configure failed\n"
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["load demo", "nonsense", "break a", "set a k", "runner set", "load demo Fine --remap a"],
+)
+def test_bad_usage_is_exit_code_2(stopped_daemon: DaemonUnderTest, command: str) -> None:
+    assert stopped_daemon.ctl(*command.split()).returncode == 2
+
+
+def test_no_daemon_is_exit_code_3(stopped_daemon: DaemonUnderTest) -> None:
+    done = stopped_daemon.ctl("status")
+    assert done.returncode == 3
+    assert str(stopped_daemon.socket) in done.stderr
+    assert "systemctl start rtcfd" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="takes root to become somebody else")
+def test_no_permission_is_exit_code_3_and_names_the_group(
+    stopped_daemon: DaemonUnderTest, tmp_path: Path
+) -> None:
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(str(stopped_daemon.socket))
+        listening.listen()
+        stopped_daemon.socket.chmod(0o600)
+        for folder in (tmp_path, *tmp_path.parents[:-2]):
+            folder.chmod(0o755)
+        child = os.fork()
+        if child == 0:
+            code = 99
+            try:
+                os.setuid(65534)
+                done = stopped_daemon.ctl("status")
+                denied = "permission denied" in done.stderr and "adduser nobody" in done.stderr
+                code = done.returncode if denied else 98
+            finally:
+                os._exit(code)
+        _, status = os.waitpid(child, 0)
+        assert os.waitstatus_to_exitcode(status) == 3
+
+
+def test_options_become_settings_and_nothing_else() -> None:
+    line = "runner set --cpu -1 --spin 5 --overrun catch_up --no-lock-memory --whitelist a"
+    args = parser().parse_args(line.split())
+    expected = runner_pb2.RunnerSettings(
+        cpu=-1,
+        spin_us=5,
+        overrun=runner_pb2.OVERRUN_POLICY_CATCH_UP,
+        lock_memory=False,
+        ros=runner_pb2.RosSettings(whitelist="a"),
+    )
+    assert settings_of(args) == expected
+
+
+def test_global_options_stand_before_or_after_the_verb() -> None:
+    before = parser().parse_args(["-r", "arm", "-o", "json", "order"])
+    after = parser().parse_args(["order", "-r", "arm", "-o", "json"])
+    assert (before.runner, before.output) == (after.runner, after.output) == ("arm", "json")
+
+
+def test_plain_has_numbers_short_words_and_nulls() -> None:
+    status = runner_pb2.RunnerStatus(
+        state=runner_pb2.RUNNER_STATE_RUNNING,
+        iteration=2**60,
+        settings=runner_pb2.RunnerSettings(overrun=runner_pb2.OVERRUN_POLICY_CATCH_UP),
+    )
+    result = plain(status)
+    assert (result["state"], result["iteration"]) == ("running", 2**60)
+    assert result["settings"]["overrun"] == "catch_up"
+    assert result["settings"]["cpu"] is None
+    assert plain(rtcf.parse_value(".nan")) == "nan"

@@ -1,0 +1,58 @@
+"""What systemd and its journal are told."""
+
+import logging
+import os
+import socket
+from pathlib import Path
+
+import pytest
+from daemon_under_test import DEADLINE_S, DaemonUnderTest
+from rtcfd import journal
+
+
+def test_ready_status_and_watchdog_are_told(
+    stopped_daemon: DaemonUnderTest, tmp_path: Path
+) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(tmp_path / "notify"))
+        manager.settimeout(DEADLINE_S)
+        stopped_daemon.environment = {
+            "NOTIFY_SOCKET": str(tmp_path / "notify"),
+            "WATCHDOG_USEC": "100000",
+        }
+        stopped_daemon.start()
+        told = b""
+        while b"WATCHDOG=1" not in told:
+            told += manager.recv(4096) + b"\n"
+        assert b"READY=1" in told
+        assert b"STATUS=rt_runner stopped" in told
+        stopped_daemon.end()
+        while b"STOPPING=1" not in told:
+            told += manager.recv(4096) + b"\n"
+
+
+def test_journal_fields_are_in_capitals() -> None:
+    record = logging.getLogger("x").makeRecord(
+        "x", logging.WARNING, "/src/a.cpp", 12, "%s", ("m",), None, "update",
+        {"runner": "rt_runner", "component": "/H1", "iteration": 7},
+    )  # fmt: skip
+    assert journal.fields(record) == {
+        "PRIORITY": "4",
+        "SYSLOG_IDENTIFIER": "rtcfd",
+        "CODE_FILE": "/src/a.cpp",
+        "CODE_LINE": "12",
+        "CODE_FUNC": "update",
+        "RTCF_RUNNER": "rt_runner",
+        "RTCF_COMPONENT": "/H1",
+        "RTCF_ITERATION": "7",
+    }
+
+
+def test_the_journal_is_known_by_its_stream(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = os.fstat(2)
+    monkeypatch.setenv("JOURNAL_STREAM", f"{found.st_dev}:{found.st_ino}")
+    assert journal.stderr_is_journal()
+    monkeypatch.setenv("JOURNAL_STREAM", f"{found.st_dev}:{found.st_ino + 1}")
+    assert not journal.stderr_is_journal()
+    monkeypatch.delenv("JOURNAL_STREAM")
+    assert not journal.stderr_is_journal()

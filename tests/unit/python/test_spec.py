@@ -1,0 +1,71 @@
+"""Parameters, remaps and ports from the words of a command line."""
+
+import math
+
+import pytest
+import rtcf
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "value"),
+    [
+        ("true", "bool_value", True),
+        ("False", "bool_value", False),
+        ("1", "int_value", 1),
+        ("-12", "int_value", -12),
+        ("007", "int_value", 7),
+        ("0x10", "int_value", 16),
+        ("0o17", "int_value", 15),
+        ("1.", "double_value", 1.0),
+        ("1e-3", "double_value", 1e-3),
+        ("-.5", "double_value", -0.5),
+        (".inf", "double_value", math.inf),
+        ("-.inf", "double_value", -math.inf),
+        ("yes", "string_value", "yes"),
+        ("'1'", "string_value", "1"),
+        ("'it''s'", "string_value", "it's"),
+        ('"a\\tb"', "string_value", "a\tb"),
+        ("", "string_value", ""),
+        ("1.2.3", "string_value", "1.2.3"),
+        ("e5", "string_value", "e5"),
+        (".", "string_value", "."),
+    ],
+)
+def test_values_are_typed_as_yaml_scalars(text: str, kind: str, value: object) -> None:
+    found = rtcf.parse_value(text)
+    assert found.WhichOneof("kind") == kind
+    assert getattr(found, kind) == value
+
+
+def test_nan_is_a_number() -> None:
+    assert math.isnan(rtcf.parse_value(".nan").double_value)
+
+
+def test_an_integer_of_more_than_64_bits_is_refused() -> None:
+    assert rtcf.parse_value(str(2**63 - 1)).int_value == 2**63 - 1
+    with pytest.raises(ValueError, match="64 bits"):
+        rtcf.parse_value(str(2**63))
+
+
+def test_a_parameter_keeps_signs_in_its_value() -> None:
+    setting = rtcf.parse_parameter("map := a:=b")
+    assert (setting.name, setting.value.string_value) == ("map", "a:=b")
+
+
+@pytest.mark.parametrize("text", ["a", "a=b", ":=b"])
+def test_a_parameter_without_a_sign_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="a parameter is name:=value"):
+        rtcf.parse_parameter(text)
+
+
+@pytest.mark.parametrize("text", ["a", "a:=", ":=b"])
+def test_half_a_remap_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="a remap is from:=to"):
+        rtcf.parse_remap(text)
+
+
+def test_a_port_is_what_follows_the_last_dot() -> None:
+    port = rtcf.parse_port("/arm/H1.in1")
+    assert (port.component, port.port) == ("/arm/H1", "in1")
+    with pytest.raises(ValueError, match=r"COMPONENT\.PORT"):
+        rtcf.parse_port("in1")
