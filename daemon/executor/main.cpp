@@ -6,11 +6,15 @@
 
 #include <atomic>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <memory>
 #include <string>
 #include <thread>
 
+#include "check/check.hpp"
+#include "faults/crash_handler.hpp"
+#include "faults/flight_recorder.hpp"
 #include "graph/names.hpp"
 #include "logging/log.hpp"
 #include "loop/realtime.hpp"
@@ -29,11 +33,13 @@ struct Options {
     std::string socket;
     std::string describe;
     std::string package;
+    CheckRequest check;
 };
 
 constexpr const char* kUsage =
     "usage: rtcf-executor --runner NAME --socket PATH\n"
     "       rtcf-executor --describe LIBRARY --package PACKAGE\n"
+    "       rtcf-executor --check LIBRARY --package PACKAGE --type TYPE [--cycles N] [--param NAME:=VALUE]...\n"
     "       rtcf-executor --version\n"
     "It is started by rtcfd(8); see rtcf-executor(8).\n";
 
@@ -41,11 +47,15 @@ constexpr int kUsageStatus = 2;
 
 // @return exit status, or -1 to go on
 int parse(int argc, char** argv, Options& options) {
-    enum Option { kRunner = 1, kSocket, kDescribe, kPackage, kVersion, kHelp };
+    enum Option { kRunner = 1, kSocket, kDescribe, kPackage, kCheck, kType, kCycles, kParam, kVersion, kHelp };
     const option known[] = {{"runner", required_argument, nullptr, kRunner},
                             {"socket", required_argument, nullptr, kSocket},
                             {"describe", required_argument, nullptr, kDescribe},
                             {"package", required_argument, nullptr, kPackage},
+                            {"check", required_argument, nullptr, kCheck},
+                            {"type", required_argument, nullptr, kType},
+                            {"cycles", required_argument, nullptr, kCycles},
+                            {"param", required_argument, nullptr, kParam},
                             {"version", no_argument, nullptr, kVersion},
                             {"help", no_argument, nullptr, kHelp},
                             {nullptr, 0, nullptr, 0}};
@@ -64,6 +74,18 @@ int parse(int argc, char** argv, Options& options) {
             case kPackage:
                 options.package = optarg;
                 break;
+            case kCheck:
+                options.check.library = optarg;
+                break;
+            case kType:
+                options.check.type = optarg;
+                break;
+            case kCycles:
+                options.check.cycles = std::strtoull(optarg, nullptr, 10);
+                break;
+            case kParam:
+                options.check.parameters.emplace_back(optarg);
+                break;
             case kVersion:
                 std::puts("rtcf-executor " RTCF_VERSION);
                 return 0;
@@ -75,9 +97,11 @@ int parse(int argc, char** argv, Options& options) {
                 return kUsageStatus;
         }
     }
+    options.check.package = options.package;
     const bool describes = !options.describe.empty() && !options.package.empty();
+    const bool checks = !options.check.library.empty() && !options.package.empty() && !options.check.type.empty();
     const bool runs = isBaseName(options.runner) && !options.socket.empty();
-    if (optind == argc && describes != runs) return -1;
+    if (optind == argc && int{describes} + int{checks} + int{runs} == 1) return -1;
     std::fputs(kUsage, stderr);
     return kUsageStatus;
 }
@@ -108,12 +132,16 @@ int run(const Options& options) {
     Server server(options.socket);
     Log log([&server](LogEntry&& entry) { server.publish(entry); });
     {
+        FlightRecorder recorder;
+        installCrashHandler(recorder);
+        const CrashContext crash_context(ThreadRole::Other);
         const LogDrain drain(log);
         Runner runner(
             options.runner, log, [&server](const RunnerEvent& event) { server.publish(event); },
             std::make_unique<rtcf::ros1::RosNode>(options.runner, [&server](const std::string& message) {
                 server.publish(RunnerEvent{RunnerEvent::Kind::Ros, message, {}, 0});
-            }));
+            }),
+            recorder);
         server.serve(runner, log);
     }
     log.drain();
@@ -127,7 +155,9 @@ int main(int argc, char** argv) {
     Options options;
     if (const int status = parse(argc, argv, options); status >= 0) return status;
     try {
-        return options.describe.empty() ? run(options) : describeLibrary(options.describe, options.package);
+        if (!options.describe.empty()) return describeLibrary(options.describe, options.package);
+        if (!options.check.library.empty()) return checkComponent(options.check);
+        return run(options);
     } catch (const std::exception& error) {
         std::fprintf(stderr, "rtcf-executor: %s\n", error.what());
         return 1;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -24,6 +25,8 @@ struct ComponentDefinition {
     std::string ignore;     ///< regular expression of connections that are loop breaks for it
     std::set<std::string> breaks;  ///< inputs whose connection is a loop break
     std::uint32_t every = 1;       ///< runs each n-th cycle
+    std::optional<std::uint32_t> phase;  ///< the cycle of those n it runs in; unset = chosen to spread load
+    bool optional = false;         ///< a fault takes it out, and the loop goes on
 
     std::string fullName() const { return joinName(ns, name); }
 };

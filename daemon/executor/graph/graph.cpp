@@ -53,6 +53,11 @@ void Graph::replace(const std::string& full_name, GraphNode node) {
     nodes_[index] = std::move(node);
 }
 
+void Graph::setBreaks(const std::string& full_name, const std::set<std::string>& ports) {
+    for (const std::string& port : ports) setBreak(full_name, port, true);
+    nodes_[indexOf(full_name)].breaks = ports;
+}
+
 void Graph::setBreak(const std::string& full_name, const std::string& port, bool broken) {
     GraphNode& node = nodes_[indexOf(full_name)];
     if (node.instance->findInput(port) == nullptr) {

@@ -33,6 +33,7 @@ class Graph {
     void remove(const std::string& full_name);
     void replace(const std::string& full_name, GraphNode node);
     void setBreak(const std::string& full_name, const std::string& port, bool broken);
+    void setBreaks(const std::string& full_name, const std::set<std::string>& ports);  ///< and no others
     /// @}
 
     /// Refuses a name that is taken. For before a component is constructed.

@@ -27,41 +27,67 @@ std::string parameterNames(const Component& component) {
     return names.empty() ? "none" : names;
 }
 
+// The flight recorder's note of a hook, as long as it runs.
+class HookNote {
+   public:
+    HookNote(FlightRecorder& recorder, std::uint32_t slot, Hook hook) : recorder_(recorder) {
+        recorder_.enterHook(slot, hook);
+    }
+    ~HookNote() { recorder_.leaveHook(); }
+    HookNote(const HookNote&) = delete;
+    HookNote& operator=(const HookNote&) = delete;
+
+   private:
+    FlightRecorder& recorder_;
+};
+
 }  // namespace
 
 Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library> library, const std::string& runner,
-                   const LoopClock& clock, LogSink& log)
+                   const LoopClock& clock, Log& log, FlightRecorder& recorder)
     : definition_(std::move(definition)),
       library_(std::move(library)),
       record_(&findRecord(*library_, definition_)),
       ignore_("ignore of " + definition_.fullName(), definition_.ignore),
-      log_(log) {
+      log_(log),
+      recorder_(recorder),
+      slot_(recorder.addSlot(definition_.fullName())) {
+    phase_ = definition_.phase;
     context_.full_name = definition_.fullName();
     context_.name = definition_.name;
     context_.ns = definition_.ns;
     context_.runner = runner;
     context_.clock = &clock;
-    context_.period_ns = clock.period_ns;
-    context_.elapsed_ns = clock.period_ns;
+    context_.period_ns = clock.period_ns * definition_.every;
+    context_.elapsed_ns = context_.period_ns;
     context_.log = &log;
-    callHook("constructor", [this] {
-        component_.reset(record_->create());
-        return true;
-    });
-    component_->attach(context_);
-    for (const ParameterBase* parameter : component_->parameters()) {
-        parameter_values_.push_back(parameter->declaration().default_value);
+    try {
+        callHook(Hook::Constructor, [this] {
+            component_.reset(record_->create());
+            return true;
+        });
+        component_->attach(context_);
+        for (const ParameterBase* parameter : component_->parameters()) {
+            parameter_values_.push_back(parameter->declaration().default_value);
+        }
+        for (ParameterBase* parameter : stageParameters(definition_.parameters)) parameter->commit();
+    } catch (const Refusal&) {
+        recorder_.removeSlot(slot_);
+        throw;
     }
-    for (ParameterBase* parameter : stageParameters(definition_.parameters)) parameter->commit();
 }
 
 Instance::~Instance() {
     stop();
     cleanup();
+    component_.reset();
+    log_.drain();  // pending records refer to its name
+    recorder_.removeSlot(slot_);
 }
 
 // A failing hook's own words, or its exception's, in one line.
-void Instance::callHook(const char* hook, const std::function<bool()>& call) {
+void Instance::callHook(Hook hook, const std::function<bool()>& call) {
+    const HookNote note(recorder_, slot_, hook);
     std::string why;
     try {
         if (call()) return;
@@ -75,7 +101,7 @@ void Instance::callHook(const char* hook, const std::function<bool()>& call) {
     }
     throw Refusal(RefusalKind::FailedPrecondition,
                   fmt::format("{} ({}/{}): {} failed: {}", context_.full_name, definition_.package, definition_.type,
-                              hook, why));
+                              hookName(hook), why));
 }
 
 void Instance::configure() {
@@ -83,11 +109,15 @@ void Instance::configure() {
     // cleanup() undoes what a configure() that fails has begun.
     configured_ = true;
     try {
-        callHook("configure", [this] { return component_->configure(); });
+        callHook(Hook::Configure, [this] { return component_->configure(); });
     } catch (const Refusal&) {
         cleanup();
         throw;
     }
+    freezePorts();
+}
+
+void Instance::freezePorts() {
     component_->freeze();
     const auto mapped = [this](const std::string& port) {
         return mappedName(port, definition_.ns, context_.full_name, definition_.remaps);
@@ -105,13 +135,14 @@ void Instance::configure() {
 
 void Instance::start() {
     if (started_) return;
-    callHook("start", [this] { return component_->start(); });
+    callHook(Hook::Start, [this] { return component_->start(); });
     started_ = true;
 }
 
 void Instance::stop() noexcept {
     if (!started_) return;
     started_ = false;
+    const HookNote note(recorder_, slot_, Hook::Stop);
     try {
         component_->stop();
     } catch (...) {
@@ -123,6 +154,7 @@ void Instance::stop() noexcept {
 void Instance::cleanup() noexcept {
     if (!configured_) return;
     configured_ = false;
+    const HookNote note(recorder_, slot_, Hook::Cleanup);
     try {
         component_->cleanup();
     } catch (...) {

@@ -9,8 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "faults/flight_recorder.hpp"
 #include "graph/definition.hpp"
 #include "graph/name_pattern.hpp"
+#include "logging/log.hpp"
 #include "loop/schedule.hpp"
 #include "plugins/library.hpp"
 #include "rtcf/component.hpp"
@@ -22,8 +24,8 @@ class Instance {
     /// Constructs the component and checks and sets its load-time parameters.
     /// @throws Refusal and leaves nothing behind
     Instance(ComponentDefinition definition, std::shared_ptr<const Library> library, const std::string& runner,
-             const LoopClock& clock, LogSink& log);
-    /// Stops and cleans up what still is started and configured.
+             const LoopClock& clock, Log& log, FlightRecorder& recorder);
+    /// Stops and cleans up what still is started and configured, and drains the log of what it said.
     ~Instance();
     Instance(const Instance&) = delete;
     Instance& operator=(const Instance&) = delete;
@@ -31,6 +33,8 @@ class Instance {
     /// @name Lifecycle; idempotent
     /// @{
     void configure();  ///< then freezes the ports. @throws Refusal, after cleanup()
+    /// Freezes and resolves the ports without configure(), for a look at how it would be wired.
+    void freezePorts();
     void start();      ///< @throws Refusal
     void stop() noexcept;
     void cleanup() noexcept;
@@ -52,6 +56,14 @@ class Instance {
     const SlotHeader* sample(std::size_t output) const noexcept { return samples_[output].get(); }
     /// Remaps that name no port of it; after configure().
     std::vector<std::string> uselessRemaps() const;
+    /// Its place in the flight recorder.
+    std::uint32_t slot() const noexcept { return slot_; }
+    /// The cycle of its every() in which it runs; chosen once, so that a change of others does not move it.
+    std::uint32_t phase() const noexcept { return phase_.value_or(0); }
+    bool hasPhase() const noexcept { return phase_.has_value(); }
+    void setPhase(std::uint32_t phase) noexcept { phase_ = phase; }
+    /// Not null if it paces the loop.
+    Source* source() const noexcept { return dynamic_cast<Source*>(component_.get()); }
     InputBase* findInput(const std::string& port) const noexcept;
 
     /// The parameters' values as last staged, in the order of declaration.
@@ -67,13 +79,16 @@ class Instance {
     void setFault(std::string text) { fault_ = std::move(text); }
 
    private:
-    void callHook(const char* hook, const std::function<bool()>& call);
+    void callHook(Hook hook, const std::function<bool()>& call);
 
     ComponentDefinition definition_;
     std::shared_ptr<const Library> library_;
     const ComponentRecord* record_;
     NamePattern ignore_;
-    LogSink& log_;
+    Log& log_;
+    FlightRecorder& recorder_;
+    std::uint32_t slot_;
+    std::optional<std::uint32_t> phase_;
     ComponentContext context_;
     std::unique_ptr<Component> component_;
     std::vector<ParameterValue> parameter_values_;

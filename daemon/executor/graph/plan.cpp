@@ -125,7 +125,11 @@ class Builder {
     void addSteps() {
         for (const std::size_t index : plan_.wiring.order) {
             Instance& instance = *plan_.graph.nodes()[index].instance;
-            plan_.schedule.steps.push_back({&instance.component(), &instance.context(), instance.figures().get()});
+            const ComponentDefinition& definition = instance.definition();
+            plan_.schedule.steps.push_back({&instance.component(), &instance.context(), instance.figures().get(),
+                                            instance.slot(), definition.every, instance.phase(), definition.optional});
+            if (Source* source = instance.source(); source != nullptr) plan_.schedule.source = source;
+            if (definition.every != 1 || !instance.component().finiteOutputs().empty()) plan_.schedule.plain = false;
         }
     }
 
@@ -144,7 +148,7 @@ void Plan::noteKept(const Adoption& adoption, const Plan& previous) {
         if (found == bindings.end()) continue;
         Binding& binding = found->second;
         const auto before = previous.bindings.find(rewire.input);
-        const bool nothing_kept = rewire.continued || before == previous.bindings.end() || rewire.kept == binding.source;
+        const bool nothing_kept = before == previous.bindings.end() || rewire.kept == binding.source;
         if (nothing_kept) {
             binding.kept = nullptr;
             binding.kept_owner = nullptr;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "graph/order.hpp"
+#include "graph/rates.hpp"
 #include "refusal.hpp"
 
 namespace rtcf::executor {
@@ -132,10 +133,26 @@ OrderProblem orderProblem(const Graph& graph, const Wiring& wiring) {
     return problem;
 }
 
+// Two devices cannot both say when a cycle begins.
+void requireOneSource(const Graph& graph) {
+    const Instance* present = nullptr;
+    for (const GraphNode& node : graph.nodes()) {
+        if (node.instance->source() == nullptr) continue;
+        if (present != nullptr) {
+            throw Refusal(RefusalKind::FailedPrecondition,
+                          fmt::format("{} and {} both pace the loop: put one of them into another runner",
+                                      present->fullName(), node.instance->fullName()));
+        }
+        present = node.instance.get();
+    }
+}
+
 }  // namespace
 
 Wiring wire(const Graph& graph, const MappingFilter& filter, const std::string& loading) {
     Wiring wiring;
+    requireOneSource(graph);
+    assignPhases(graph);
     Collector collector(graph, wiring.connections);
     for (std::size_t index = 0; index < graph.nodes().size(); ++index) collector.addNode(index);
     for (auto& [name, plan] : wiring.connections) {

@@ -5,9 +5,11 @@
 #include <time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstring>
 #include <exception>
 
+#include "faults/crash_handler.hpp"
 #include "logging/log.hpp"
 #include "refusal.hpp"
 
@@ -32,7 +34,8 @@ void bump(std::atomic<std::uint64_t>& counter, std::uint64_t by = 1) {
 
 }  // namespace
 
-Loop::Loop(Log& log) : log_(log), counter_(CycleCounter::calibrate()), schedule_(&empty_) {
+Loop::Loop(Log& log, FlightRecorder& recorder)
+    : log_(log), recorder_(recorder), counter_(CycleCounter::calibrate()), schedule_(&empty_) {
     log_.setIteration(&figures_.iteration);
 }
 
@@ -43,10 +46,19 @@ Loop::~Loop() {
 }
 
 void Loop::reset(const LoopSettings& settings) {
-    clock_ = {};
+    clock_.iteration = 0;
+    clock_.time_ns = 0;
+    clock_.stamp_ns = 0;
     clock_.period_ns = settings.period_ns;
     elapsed_ns_ = settings.period_ns;
-    for (const Step& step : schedule_->steps) step.context->period_ns = settings.period_ns;
+    total_elapsed_ns_ = 0;
+    warmup_cycles_ = settings.warmup_cycles;
+    any_disabled_ = false;
+    for (const Step& step : schedule_->steps) {
+        step.context->period_ns = settings.period_ns * step.every;
+        step.context->updated_ns = -1;
+        step.context->disabled = false;
+    }
     figures_.iteration.store(0, std::memory_order_relaxed);
     bucket_ = 0;
     cycles_on_time_ = 0;
@@ -63,7 +75,8 @@ void Loop::beginStepping(const LoopSettings& settings) {
 std::uint64_t Loop::step(std::uint64_t cycles) noexcept {
     for (std::uint64_t done = 0; done < cycles; ++done) {
         if (stop_requested_.load(std::memory_order_acquire) || fault_.kind != LoopFault::Kind::None) return done;
-        const std::int64_t now = clock_.time_ns + (clock_.iteration == 0 ? 0 : clock_.period_ns);
+        const std::int64_t period = clock_.period_ns;
+        const std::int64_t now = clock_.time_ns + (clock_.iteration == 0 ? 0 : period);
         cycle(now, now);
     }
     return cycles;
@@ -152,6 +165,14 @@ bool Loop::popRecord(CycleRecord& record) {
     return true;
 }
 
+bool Loop::popFault(ComponentFault& fault) {
+    const ComponentFault* front = faults_.front();
+    if (front == nullptr) return false;
+    fault = *front;
+    faults_.pop();
+    return true;
+}
+
 void* Loop::threadMain(void* self) {
     static_cast<Loop*>(self)->run();
     return nullptr;
@@ -159,18 +180,43 @@ void* Loop::threadMain(void* self) {
 
 void Loop::run() noexcept {
     Log::setRealtimeThread(true);
+    const CrashContext crash_context(ThreadRole::Realtime);
     pthread_setname_np(pthread_self(), "rtcf-loop");
     thread_id_.store(static_cast<int>(syscall(SYS_gettid)), std::memory_order_relaxed);
     prefaultStack(stack_bytes_);
+    recorder_.setRunning(true);
     std::int64_t deadline = clockNow(CLOCK_MONOTONIC) + clock_.period_ns;
     while (!stop_requested_.load(std::memory_order_acquire) && fault_.kind == LoopFault::Kind::None) {
-        const std::int64_t wake = waitFor(deadline);
+        std::int64_t wake = 0;
+        if (Source* source = schedule_->source; source != nullptr) {
+            wake = waitForSource(*source);
+            deadline = wake;
+            if (stop_requested_.load(std::memory_order_acquire)) break;
+        } else {
+            wake = waitFor(deadline);
+        }
         const std::int64_t begin = readCycleCounter();
         cycle(deadline, wake);
         deadline = nextDeadline(deadline, wake + counter_.toNs(readCycleCounter() - begin));
     }
     makeSafe();
+    recorder_.setRunning(false);
     running_.store(false, std::memory_order_release);
+}
+
+// The device says when a cycle begins. Changes are taken over and a request to stop is seen
+// between its deadlines, which are never far away.
+std::int64_t Loop::waitForSource(Source& source) noexcept {
+    constexpr std::int64_t kPatience = 10'000'000;
+    while (!stop_requested_.load(std::memory_order_acquire)) {
+        if (source.wait(monotonicNow() + kPatience)) break;
+        takeProbe();
+        if (pending_.load(std::memory_order_relaxed) != nullptr) {
+            takeAdoption();
+            if (schedule_->source != &source) break;
+        }
+    }
+    return monotonicNow();
 }
 
 std::int64_t Loop::waitFor(std::int64_t deadline_ns) noexcept {
@@ -180,6 +226,7 @@ std::int64_t Loop::waitFor(std::int64_t deadline_ns) noexcept {
     while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
     }
     std::int64_t now = monotonicNow();
+    figures_.wake_up.add(now - deadline_ns + spin);
     while (now < deadline_ns) now = monotonicNow();
     return now;
 }
@@ -194,32 +241,44 @@ void Loop::cycle(std::int64_t deadline_ns, std::int64_t wake_ns) noexcept RTCF_N
     feed();
     for (const Latch& latch : schedule.latches) latch.copy();
     const std::int64_t limit = begin + counter_.toTicks(deadline_ns + clock_.period_ns - wake_ns);
-    const bool complete = update(schedule, begin, limit);
+    const bool plain = schedule.plain && !any_disabled_ && clock_.iteration >= warmup_cycles_;
+    recorder_.setIteration(clock_.iteration);
+    total_elapsed_ns_ += elapsed_ns_;
+    const bool complete =
+        plain ? update<true>(schedule, begin, limit) : update<false>(schedule, begin, limit);
+    recorder_.leaveComponents();
     if (complete) {
         for (Tap* tap : schedule.taps) tap->push();
     }
     const std::int64_t duration = readCycleCounter() - begin;
-    figures_.duration.add(duration);
-    figures_.latency.add(wake_ns - deadline_ns);
+    if (clock_.iteration >= warmup_cycles_) {
+        figures_.duration.add(duration);
+        figures_.latency.add(wake_ns - deadline_ns);
+    }
     if (CycleRecord* record = records_.claim()) {
         *record = {clock_.iteration, clock_.stamp_ns, wake_ns - deadline_ns, counter_.toNs(duration)};
         records_.commit();
     }
-    ++clock_.iteration;
+    clock_.iteration = clock_.iteration + 1;
     figures_.iteration.store(clock_.iteration, std::memory_order_relaxed);
 }
 
-// The one frame that catches: a component may throw, the loop may not.
+// The one frame that catches: a component may throw, the loop may not. `Plain` leaves out what
+// most graphs do not have, so that it costs them nothing.
+template <bool Plain>
 bool Loop::update(const Schedule& schedule, std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept {
     std::int64_t before = begin_ticks;
-    std::uint32_t index = 0;
+    const Step* running = nullptr;
     try {
         for (const Step& step : schedule.steps) {
-            step_.store(index++, std::memory_order_relaxed);
-            step.context->elapsed_ns = elapsed_ns_;
+            if (!Plain && !due(step)) continue;
+            if (Plain) step.context->elapsed_ns = elapsed_ns_;
+            running = &step;
+            recorder_.enterComponent(step.slot);
             step.component->update();
+            if (!Plain) commitFinite(step);
             const std::int64_t after = readCycleCounter();
-            step.figures->duration.add(after - before);
+            if (Plain || clock_.iteration >= warmup_cycles_) step.figures->duration.add(after - before);
             if (after > limit_ticks) {  // this one was running when the next cycle should have begun
                 bump(step.figures->overruns);
                 limit_ticks = INT64_MAX;
@@ -228,16 +287,61 @@ bool Loop::update(const Schedule& schedule, std::int64_t begin_ticks, std::int64
         }
         return true;
     } catch (const std::exception& error) {
-        noteFault(LoopFault::Kind::Exception, schedule.steps[index - 1].component, error.what());
+        componentFailed(LoopFault::Kind::Exception, *running, error.what());
     } catch (...) {
-        noteFault(LoopFault::Kind::Exception, schedule.steps[index - 1].component, "an exception of unknown type");
+        componentFailed(LoopFault::Kind::Exception, *running, "an exception of unknown type");
     }
     return false;
+}
+
+// Whether a component runs in this cycle; then its clock is set.
+bool Loop::due(const Step& step) noexcept RTCF_NONBLOCKING {
+    ComponentContext& context = *step.context;
+    if (context.disabled || clock_.iteration % step.every != step.phase) return false;
+    const bool again = context.updated_ns >= 0 && step.every != 1;
+    context.elapsed_ns = again ? total_elapsed_ns_ - context.updated_ns : std::max(elapsed_ns_, context.period_ns);
+    context.updated_ns = total_elapsed_ns_;
+    return true;
+}
+
+void Loop::commitFinite(const Step& step) noexcept RTCF_NONBLOCKING {
+    for (OutputBase* output : step.component->finiteOutputs()) {
+        if (output->commitFinite()) continue;
+        if (output->nonFinitePolicy() == OnNonFinite::Stop) {
+            noteFault(LoopFault::Kind::NotFinite, step.component, output->name().c_str());
+        } else {
+            reportFault(LoopFault::Kind::NotFinite, step.component, output->name().c_str());
+        }
+    }
+}
+
+void Loop::componentFailed(LoopFault::Kind kind, const Step& step, const char* text) noexcept {
+    if (!step.optional) {
+        noteFault(kind, step.component, text);
+        return;
+    }
+    step.context->disabled = true;
+    any_disabled_ = true;
+    reportFault(kind, step.component, text);
+}
+
+void Loop::reportFault(LoopFault::Kind kind, const Component* component, const char* text) noexcept {
+    ComponentFault* fault = faults_.claim();
+    if (fault == nullptr) return;  // there are many of them already
+    *fault = {};
+    fault->kind = kind;
+    fault->component = component;
+    fault->iteration = clock_.iteration;
+    std::strncpy(fault->text.data(), text, fault->text.size() - 1);
+    faults_.commit();
 }
 
 void Loop::noteFault(LoopFault::Kind kind, const Component* component, const char* text) noexcept {
     fault_.kind = kind;
     fault_.component = component;
+    if (component != nullptr) {
+        std::strncpy(fault_.component_name.data(), component->fullName().c_str(), fault_.component_name.size() - 1);
+    }
     fault_.iteration = clock_.iteration;
     std::strncpy(fault_.text.data(), text, fault_.text.size() - 1);
 }
@@ -253,7 +357,7 @@ void Loop::takeAdoption() noexcept RTCF_NONBLOCKING {
         clock_.period_ns = adoption->period_ns;
         elapsed_ns_ = adoption->period_ns;
     }
-    for (const Step& step : schedule_->steps) step.context->period_ns = clock_.period_ns;
+    for (const Step& step : schedule_->steps) step.context->period_ns = clock_.period_ns * step.every;
     pending_.store(nullptr, std::memory_order_release);
 }
 
@@ -306,6 +410,7 @@ std::int64_t Loop::nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) n
         case OverrunPolicy::CatchUp:
             return next;
         case OverrunPolicy::Relative:
+            elapsed_ns_ = (end_ns + period - deadline_ns) / period * period;
             return end_ns + period;
         case OverrunPolicy::Skip:
             break;
@@ -318,7 +423,7 @@ std::int64_t Loop::nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) n
 
 void Loop::makeSafe() noexcept {
     for (const Step& step : schedule_->steps) {
-        if (step.component != fault_.component) step.component->safe();
+        if (step.component != fault_.component && !step.context->disabled) step.component->safe();
     }
 }
 

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "faults/flight_recorder.hpp"
 #include "loop/cycle_counter.hpp"
 #include "loop/probe.hpp"
 #include "loop/realtime.hpp"
@@ -32,6 +33,7 @@ struct LoopSettings {
     std::int64_t spin_ns = 0;             ///< busy wait before each deadline
     OverrunPolicy overrun = OverrunPolicy::Skip;
     std::uint32_t max_overruns = 0;       ///< leaky bucket; 0 = never stop for overruns
+    std::uint64_t warmup_cycles = 10;     ///< first cycles, kept out of the figures
     RealtimeSettings realtime;
 };
 
@@ -45,17 +47,27 @@ struct CycleRecord {
 
 /// Why a loop ended by itself.
 struct LoopFault {
-    enum class Kind { None, Exception, Overruns };
+    enum class Kind { None, Exception, NotFinite, Overruns };
     Kind kind = Kind::None;
-    const Component* component = nullptr;  ///< the culprit, if it is one component
+    const Component* component = nullptr;  ///< the culprit, if it is one component; for comparison only
+    std::array<char, 240> component_name{};  ///< its full name, as it may be gone when this is read
     std::uint64_t iteration = 0;
     std::array<char, 240> text{};          ///< what the exception said
+};
+
+/// A component that failed while the loop goes on.
+struct ComponentFault {
+    LoopFault::Kind kind = LoopFault::Kind::None;
+    const Component* component = nullptr;
+    std::uint64_t iteration = 0;
+    std::array<char, 160> text{};
 };
 
 /// What the loop counts. Written by the real-time thread alone.
 struct LoopFigures {
     Histogram duration;  ///< ticks
     Histogram latency;   ///< ns
+    Histogram wake_up;   ///< ns after the end of the sleep, which is `spin` before the deadline
     std::atomic<std::uint64_t> iteration{0};  ///< cycles completed since the loop started
     std::atomic<std::uint64_t> overruns{0};
     std::atomic<std::uint64_t> missed{0};
@@ -64,7 +76,8 @@ struct LoopFigures {
 class Loop {
    public:
     /// @param log the thread marks itself there; outlives the loop
-    explicit Loop(Log& log);
+    /// @param recorder what runs is noted there; outlives the loop
+    Loop(Log& log, FlightRecorder& recorder);
     /// Ends the loop in order.
     ~Loop();
     Loop(const Loop&) = delete;
@@ -95,12 +108,15 @@ class Loop {
     bool probe(Probe& probe, std::int64_t timeout_ns);
     /// Follows the wall clock for stamp(); to be called now and then.
     void refreshWallClock() noexcept;
+    void setSpin(std::int64_t spin_ns) noexcept { spin_ns_.store(spin_ns, std::memory_order_relaxed); }
     /// New settings for a running loop (CPU, priority, spin, overrun policy); the period goes by adopt().
     RealtimeProblems retune(const LoopSettings& settings);
     /// After join().
     const LoopFault& fault() const noexcept { return fault_; }
     /// Takes the oldest cycle record. @return false if there is none
     bool popRecord(CycleRecord& record);
+    /// Takes the oldest report of a component that failed without ending the loop. @return false if there is none
+    bool popFault(ComponentFault& fault);
     /// @}
 
     /// @name By any thread
@@ -111,6 +127,8 @@ class Loop {
     bool running() const noexcept { return running_.load(std::memory_order_acquire); }
     /// The thread has been started and not been joined yet.
     bool joinable() const noexcept { return joinable_.load(std::memory_order_acquire); }
+    /// A component is running just now.
+    bool inCycle() const noexcept { return recorder_.runningSlot() != 0; }
     int threadId() const noexcept { return thread_id_.load(std::memory_order_relaxed); }
     const LoopFigures& figures() const noexcept { return figures_; }
     const CycleCounter& counter() const noexcept { return counter_; }
@@ -126,16 +144,23 @@ class Loop {
     static void* threadMain(void* self);
     void run() noexcept;
     void cycle(std::int64_t deadline_ns, std::int64_t wake_ns) noexcept RTCF_NONBLOCKING;
+    template <bool Plain>
     bool update(const Schedule& schedule, std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept;
+    bool due(const Step& step) noexcept RTCF_NONBLOCKING;
+    void commitFinite(const Step& step) noexcept RTCF_NONBLOCKING;
+    void componentFailed(LoopFault::Kind kind, const Step& step, const char* text) noexcept;
+    void reportFault(LoopFault::Kind kind, const Component* component, const char* text) noexcept;
     void noteFault(LoopFault::Kind kind, const Component* component, const char* text) noexcept;
     void takeAdoption() noexcept RTCF_NONBLOCKING;
     void takeProbe() noexcept RTCF_NONBLOCKING;
     void feed() noexcept RTCF_NONBLOCKING;
     std::int64_t nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) noexcept RTCF_NONBLOCKING;
     std::int64_t waitFor(std::int64_t deadline_ns) noexcept;
+    std::int64_t waitForSource(Source& source) noexcept;
     void makeSafe() noexcept;
 
     Log& log_;
+    FlightRecorder& recorder_;
     CycleCounter counter_;
     pthread_t thread_{};
     std::unique_ptr<IdleStateGuard> idle_guard_;
@@ -144,6 +169,9 @@ class Loop {
     const Schedule* schedule_;
     LoopClock clock_;
     std::int64_t elapsed_ns_ = 0;        // whole periods since the last cycle
+    std::int64_t total_elapsed_ns_ = 0;  // loop time in whole periods
+    std::uint64_t warmup_cycles_ = 0;
+    bool any_disabled_ = false;
     std::uint32_t bucket_ = 0;
     std::uint64_t cycles_on_time_ = 0;
     LoopFault fault_;
@@ -158,13 +186,13 @@ class Loop {
     std::atomic<bool> running_{false};
     std::atomic<bool> joinable_{false};
     std::atomic<int> thread_id_{0};
-    std::atomic<std::uint32_t> step_{0};  // of the component that runs
     std::atomic<std::int64_t> spin_ns_{0};
     std::atomic<OverrunPolicy> overrun_policy_{OverrunPolicy::Skip};
     std::atomic<std::uint32_t> max_overruns_{0};
     std::size_t stack_bytes_ = 0;
     LoopFigures figures_;
     SpscRing<CycleRecord, 16384> records_;
+    SpscRing<ComponentFault, 64> faults_;
     const Schedule empty_{};
 };
 

@@ -26,6 +26,10 @@ struct Step {
     Component* component;
     ComponentContext* context;
     ComponentFigures* figures;
+    std::uint32_t slot;         ///< in the flight recorder
+    std::uint32_t every = 1;    ///< runs in each n-th cycle,
+    std::uint32_t phase = 0;    ///< in which the iteration modulo n is this
+    bool optional = false;      ///< a fault takes it out, and the loop goes on
 };
 
 /// A copy of an output's value, made before any component runs, for inputs that
@@ -47,14 +51,15 @@ struct Feed {
     std::vector<InputBase*> readers;
 };
 
-/// The immutable list of a cycle's work. The raw pointers are kept alive by `owners`.
+/// The immutable list of a cycle's work. What it points to lives in the Plan that it is part of.
 struct Schedule {
     std::uint64_t generation = 0;
     std::vector<Feed> feeds;
     std::vector<Latch> latches;
     std::vector<Step> steps;
     std::vector<Tap*> taps;
-    std::vector<std::shared_ptr<const void>> owners;
+    Source* source = nullptr;  ///< paces the loop instead of the clock
+    bool plain = true;         ///< all components run every cycle and no output is checked
 };
 
 /// An input that reads from another place. Either `source` or `injector` is

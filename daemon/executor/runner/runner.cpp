@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "faults/crash_handler.hpp"
 #include "refusal.hpp"
 
 namespace rtcf::executor {
@@ -22,19 +23,27 @@ bool contains(const std::vector<T>& items, const T& item) {
 
 }  // namespace
 
-Runner::Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr<Bridge> bridge)
-    : name_(std::move(name)), log_(log), events_(std::move(events)), loop_(log), bridge_(std::move(bridge)) {
+Runner::Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr<Bridge> bridge,
+               FlightRecorder& recorder)
+    : name_(std::move(name)),
+      log_(log),
+      events_(std::move(events)),
+      recorder_(recorder),
+      loop_(log, recorder),
+      stall_monitor_(loop_),
+      bridge_(std::move(bridge)) {
     validate(settings_);
+    stall_monitor_.setTimeout(settings_.stall_timeout_ns);
     publishPicture();
     thread_ = std::thread([this] { threadMain(); });
 }
 
 Runner::~Runner() {
-    loop_.requestStop();
     {
         const std::lock_guard<std::mutex> lock(jobs_mutex_);
         ending_ = true;
     }
+    loop_.requestStop();
     jobs_changed_.notify_all();
     thread_.join();
 }
@@ -48,9 +57,10 @@ void Runner::post(std::function<void()> job) {
 }
 
 void Runner::threadMain() {
+    const CrashContext crash_context(ThreadRole::Graph);
     pthread_setname_np(pthread_self(), "rtcf-graph");
     std::unique_lock<std::mutex> lock(jobs_mutex_);
-    while (!ending_ || !jobs_.empty()) {
+    while (!ending_) {  // what still waits then is not begun any more
         jobs_changed_.wait_for(lock, kTick, [this] { return ending_ || !jobs_.empty(); });
         std::function<void()> job;
         if (!jobs_.empty()) {
@@ -76,21 +86,28 @@ void Runner::threadMain() {
 
 // What has to be done now and then: a loop that ended by itself, clocks, counters.
 void Runner::tick() {
+    noticeEnd();
     if (loop_.joinable()) {
-        if (!loop_.running()) loopEnded();
         loop_.refreshWallClock();
+        tuneSpin();
     }
+    noteComponentFaults();
     CycleRecord record{};
     while (loop_.popRecord(record)) {
     }
     publishPicture();
 }
 
+// A loop may end by itself at any time, also while a change waits for its next boundary.
+void Runner::noticeEnd() {
+    if (state_ == RunnerState::Running && !loop_.running()) loopEnded();
+}
+
 void Runner::loopEnded() {
     loop_.join(INT64_MAX);
     noteLoopFault();
     stopAll();
-    publish(loop_.fault().component != nullptr ? loop_.fault().component->fullName() : "");
+    publish({loop_.fault().component_name.data()});
 }
 
 void Runner::noteLoopFault() {
@@ -102,16 +119,57 @@ void Runner::noteLoopFault() {
             event.message = fmt::format("loop stopped in iteration {}: more than {} overruns", fault.iteration,
                                         settings_.loop.max_overruns);
         }
-        for (const GraphNode& node : plan_->graph.nodes()) {
-            if (&node.instance->component() != fault.component) continue;
-            event.component = node.instance->fullName();
-            event.message = fmt::format("loop stopped in iteration {}: update() of {} threw: {}", fault.iteration,
-                                        event.component, fault.text.data());
-            node.instance->setFault(fmt::format("threw in iteration {}: {}", fault.iteration, fault.text.data()));
+        if (fault.component != nullptr) {
+            event.component = fault.component_name.data();
+            const std::string what = fault.kind == LoopFault::Kind::NotFinite
+                                         ? fmt::format("output {} is not finite", fault.text.data())
+                                         : fmt::format("update() threw: {}", fault.text.data());
+            event.message = fmt::format("loop stopped in iteration {}: {}: {}", fault.iteration, event.component, what);
+            // It may have been unloaded at the boundary at which the loop ended.
+            if (const GraphNode* node = nodeOf(fault.component); node != nullptr) {
+                node->instance->setFault(fmt::format("iteration {}: {}", fault.iteration, what));
+            }
         }
         status_ = event.message;
         events_(event);
     }
+}
+
+const GraphNode* Runner::nodeOf(const Component* component) const noexcept {
+    for (const GraphNode& node : plan_->graph.nodes()) {
+        if (&node.instance->component() == component) return &node;
+    }
+    return nullptr;
+}
+
+// Components that failed while the loop went on: said once each, until the next start.
+void Runner::noteComponentFaults() {
+    ComponentFault fault;
+    while (loop_.popFault(fault)) {
+        const GraphNode* node = nodeOf(fault.component);
+        if (node == nullptr || !node->instance->faultText().empty()) continue;
+        const std::string& name = node->instance->fullName();
+        const std::string what =
+            fault.kind == LoopFault::Kind::NotFinite
+                ? fmt::format("output {} is not finite: readers keep its last value", fault.text.data())
+                : fmt::format("update() threw: {}; taken out, the loop goes on", fault.text.data());
+        node->instance->setFault(fmt::format("iteration {}: {}", fault.iteration, what));
+        events_({RunnerEvent::Kind::ComponentFailed, fmt::format("{}: iteration {}: {}", name, fault.iteration, what),
+                 name, fault.iteration});
+        publish({name});
+    }
+}
+
+// spin = auto: as long as 99 of 100 wake-ups of the last second were late, at most a tenth of the period.
+void Runner::tuneSpin() {
+    if (!settings_.spin_auto || monotonicNow() - tuned_at_ns_ < kSecond) return;
+    const HistogramSnapshot now = loop_.figures().wake_up.snapshot();
+    const DistributionSummary late = summarize(difference(now, tuned_from_), 1.0);
+    tuned_from_ = now;
+    tuned_at_ns_ = monotonicNow();
+    if (late.count == 0) return;
+    settings_.loop.spin_ns = std::min(static_cast<std::int64_t>(late.p99), settings_.loop.period_ns / 10);
+    loop_.setSpin(settings_.loop.spin_ns);
 }
 
 MappingFilter Runner::filter() const {
@@ -137,12 +195,13 @@ void Runner::configure(RunnerSettings settings) {
             if (!contains(degraded_, problem.text)) degraded_.push_back(problem.text);
         }
     }
+    stall_monitor_.setTimeout(settings_.stall_timeout_ns);
     if (bridge_) bridge_->configure(settings_.bridge);
     publishPicture();
 }
 
 ChangeOutcome Runner::start(const Progress& progress) {
-    if (loop_.joinable() && !loop_.running()) loopEnded();
+    noticeEnd();
     if (loop_.running()) return outcome();
     if (state_ == RunnerState::Stepping) endStepping();
     startAll(progress);
@@ -197,6 +256,7 @@ ChangeOutcome Runner::stop(const Progress& progress) {
 
 ChangeOutcome Runner::step(std::uint64_t cycles, const Progress& progress) {
     constexpr std::uint64_t kChunk = 10000;  // cycles between reports
+    noticeEnd();
     if (loop_.joinable()) {
         throw Refusal(RefusalKind::FailedPrecondition,
                       fmt::format("the loop of {0} runs in real time: stop it first: rtcfctl -r {0} stop", name_));
@@ -214,7 +274,7 @@ ChangeOutcome Runner::step(std::uint64_t cycles, const Progress& progress) {
         left -= done;
         log_.drain();
         note({});  // a long run is not a hook that hangs
-        if (done < wanted) break;
+        if (done < wanted || ending_) break;
         if (left > 0) progress(fmt::format("{} of {} cycles", cycles - left, cycles));
     }
     if (loop_.fault().kind != LoopFault::Kind::None || loop_.stopRequested()) endStepping();
@@ -225,7 +285,7 @@ void Runner::endStepping() {
     loop_.endStepping();
     noteLoopFault();
     stopAll();
-    publish(loop_.fault().component != nullptr ? loop_.fault().component->fullName() : "");
+    publish({loop_.fault().component_name.data()});
 }
 
 void Runner::startAll(const Progress& progress) {
@@ -240,7 +300,7 @@ void Runner::startAll(const Progress& progress) {
             instance.start();
         }
     } catch (const Refusal&) {
-        for (Instance* instance : started) instance->stop();
+        for (auto instance = started.rbegin(); instance != started.rend(); ++instance) (*instance)->stop();
         throw;
     }
 }
@@ -255,12 +315,16 @@ void Runner::stopAll() noexcept {
 }
 
 std::shared_ptr<Instance> Runner::makeInstance(ComponentDefinition definition, const std::string& library,
-                                               const Progress& progress) {
+                                               const Progress& progress, bool configure) {
     const std::string full_name = definition.fullName();
     progress("loading " + full_name);
     note(full_name + ".constructor");
     const std::shared_ptr<const Library> code = libraries_.open(library);
-    auto instance = std::make_shared<Instance>(std::move(definition), code, name_, loop_.clock(), log_);
+    auto instance = std::make_shared<Instance>(std::move(definition), code, name_, loop_.clock(), log_, recorder_);
+    if (!configure) {
+        instance->freezePorts();
+        return instance;
+    }
     progress("configuring " + full_name);
     note(full_name + ".configure");
     instance->configure();
@@ -268,6 +332,7 @@ std::shared_ptr<Instance> Runner::makeInstance(ComponentDefinition definition, c
 }
 
 void Runner::adopt(Change change, const Progress& progress) {
+    noticeEnd();
     const Graph graph = change.graph;
     Wiring wiring = wire(graph, filter(), change.loading);
     Adoption adoption;
@@ -300,7 +365,7 @@ void Runner::adopt(Change change, const Progress& progress) {
         note(instance->fullName() + ".cleanup");
         instance->cleanup();
     }
-    log_.drain();
+    noticeEnd();
 }
 
 ChangeOutcome Runner::load(ComponentDefinition definition, const std::string& library, const Progress& progress) {
@@ -350,6 +415,68 @@ ChangeOutcome Runner::replace(const std::string& name, ComponentDefinition defin
     return outcome(instance->fullName());
 }
 
+ChangeOutcome Runner::apply(const std::vector<WantedComponent>& wanted, bool dry_run, const Progress& progress) {
+    std::vector<Difference> differences = compare(plan_->graph, wanted);
+    std::vector<std::pair<std::shared_ptr<Instance>, std::vector<ParameterValue>>> previous;
+    for (const GraphNode& node : plan_->graph.nodes()) {
+        previous.emplace_back(node.instance, node.instance->parameterValues());
+    }
+    const auto restoreParameters = [&] {
+        for (auto& [instance, values] : previous) instance->restoreParameterValues(values);
+    };
+    try {
+        Change change;
+        change.graph = plan_->graph;
+        for (const Difference& difference : differences) addDifference(change, difference, progress, dry_run);
+        if (dry_run) {
+            (void)wire(change.graph, filter(), {});
+            restoreParameters();
+        } else if (!differences.empty()) {
+            adopt(std::move(change), progress);
+        }
+    } catch (const Refusal&) {
+        restoreParameters();
+        throw;
+    }
+    ChangeOutcome result = outcome();
+    result.differences = std::move(differences);
+    for (Difference& difference : result.differences) difference.wanted = nullptr;
+    return result;
+}
+
+void Runner::addDifference(Change& change, const Difference& difference, const Progress& progress, bool look) {
+    const std::string& name = difference.component;
+    switch (difference.kind) {
+        case Difference::Kind::Unload:
+            change.leaving.push_back(change.graph.get(name).instance);
+            change.graph.remove(name);
+            return;
+        case Difference::Kind::Breaks:
+            change.graph.setBreaks(name, difference.wanted->definition.breaks);
+            return;
+        case Difference::Kind::Parameters: {
+            const auto staged = change.graph.get(name).instance->stageParameters(difference.parameters);
+            change.parameters.insert(change.parameters.end(), staged.begin(), staged.end());
+            change.changed.insert(name);
+            return;
+        }
+        case Difference::Kind::Load:
+        case Difference::Kind::Replace:
+            break;
+    }
+    const ComponentDefinition& definition = difference.wanted->definition;
+    const std::shared_ptr<Instance> instance = makeInstance(definition, difference.wanted->library, progress, !look);
+    change.arriving.push_back(instance);
+    if (difference.kind == Difference::Kind::Load) {
+        change.graph.add({instance, definition.breaks});
+        return;
+    }
+    const std::shared_ptr<Instance> old = change.graph.get(name).instance;
+    change.graph.replace(name, {instance, definition.breaks});
+    change.leaving.push_back(old);
+    change.hand_overs.push_back({&instance->component(), &old->component()});
+}
+
 ChangeOutcome Runner::setBreaks(const std::vector<std::pair<std::string, std::string>>& ports, bool broken) {
     if (ports.empty()) throw Refusal(RefusalKind::InvalidArgument, "no input is named");
     Change change;
@@ -365,7 +492,7 @@ ChangeOutcome Runner::setParameters(const std::string& name,
     const std::vector<ParameterValue> previous = instance.parameterValues();
     Change change;
     change.graph = plan_->graph;
-    change.changed = name;
+    change.changed = {name};
     change.parameters = instance.stageParameters(batch);
     try {
         adopt(std::move(change), [](const std::string&) {});
@@ -399,7 +526,7 @@ ChangeOutcome Runner::outcome(std::string component) const {
     return result;
 }
 
-void Runner::publish(const std::string& changed) {
+void Runner::publish(const std::set<std::string>& changed) {
     const std::shared_ptr<const GraphSnapshot> next = takeSnapshot(*plan_, *snapshot(), changed);
     {
         const std::lock_guard<std::mutex> lock(published_mutex_);

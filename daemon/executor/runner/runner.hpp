@@ -12,12 +12,16 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "faults/flight_recorder.hpp"
+#include "faults/stall_monitor.hpp"
 #include "graph/definition.hpp"
+#include "graph/difference.hpp"
 #include "graph/plan.hpp"
 #include "logging/log.hpp"
 #include "loop/loop.hpp"
@@ -35,11 +39,12 @@ struct ChangeOutcome {
     std::vector<std::string> order;  ///< full names
     std::string component;           ///< full name of the one the change was about; may be empty
     std::vector<std::string> notes;  ///< one line each
+    std::vector<Difference> differences;  ///< of apply()
 };
 
 /// Something that happened without a request.
 struct RunnerEvent {
-    enum class Kind { LoopEnded, Degraded, Ros };
+    enum class Kind { LoopEnded, Degraded, Ros, ComponentFailed };
     Kind kind;
     std::string message;
     std::string component;
@@ -64,7 +69,8 @@ class Runner {
     /// @param log    outlives the runner
     /// @param events called from the graph thread
     /// @param bridge the link to the outside; null = none
-    Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr<Bridge> bridge);
+    /// @param recorder outlives the runner
+    Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr<Bridge> bridge, FlightRecorder& recorder);
     /// Stops the loop and lets all components go, in order.
     ~Runner();
     Runner(const Runner&) = delete;
@@ -87,6 +93,8 @@ class Runner {
     ChangeOutcome unload(const std::vector<std::string>& names, const Progress& progress);
     ChangeOutcome replace(const std::string& name, ComponentDefinition definition, const std::string& library,
                           const Progress& progress);
+    /// Makes the graph what is wanted, in one transaction; or only tells what it would take.
+    ChangeOutcome apply(const std::vector<WantedComponent>& wanted, bool dry_run, const Progress& progress);
     ChangeOutcome setBreaks(const std::vector<std::pair<std::string, std::string>>& ports, bool broken);
     ChangeOutcome setParameters(const std::string& name,
                                 const std::vector<std::pair<std::string, ParameterValue>>& batch);
@@ -102,6 +110,7 @@ class Runner {
     std::shared_ptr<const GraphSnapshot> snapshot() const;
     RunnerPicture picture() const;
     const Loop& loop() const noexcept { return loop_; }
+    const FlightRecorder& recorder() const noexcept { return recorder_; }
     /// Name of the hook that the graph thread is in, and since when; empty = none.
     std::pair<std::string, std::int64_t> activity() const;
     /// @}
@@ -110,7 +119,7 @@ class Runner {
     struct Change {
         Graph graph;
         std::string loading;                        // new component, for advice on loops
-        std::string changed;                        // component to picture anew
+        std::set<std::string> changed;              // components to picture anew
         std::vector<std::shared_ptr<Instance>> arriving;
         std::vector<std::shared_ptr<Instance>> leaving;
         std::vector<ParameterBase*> parameters;
@@ -120,11 +129,17 @@ class Runner {
 
     void threadMain();
     void tick();
+    void noticeEnd();
     void loopEnded();
     void noteLoopFault();
+    void noteComponentFaults();
+    void tuneSpin();
+    const GraphNode* nodeOf(const Component* component) const noexcept;
     void endStepping();
     std::shared_ptr<Instance> makeInstance(ComponentDefinition definition, const std::string& library,
-                                           const Progress& progress);
+                                           const Progress& progress, bool configure = true);
+    /// Works a difference into a change. @param look without configuring what is new
+    void addDifference(Change& change, const Difference& difference, const Progress& progress, bool look);
     /// Wires, starts, adopts; then stops and cleans up what left.
     void adopt(Change change, const Progress& progress);
     void startAll(const Progress& progress);
@@ -132,7 +147,7 @@ class Runner {
     ChangeOutcome outcome(std::string component = {}) const;
     RealtimeProblems lockAndStart();
     MappingFilter filter() const;
-    void publish(const std::string& changed = {});
+    void publish(const std::set<std::string>& changed = {});
     void publishPicture();
     std::int64_t adoptionTimeout() const noexcept;
     void note(std::string activity);
@@ -140,8 +155,10 @@ class Runner {
     const std::string name_;
     Log& log_;
     EventConsumer events_;
+    FlightRecorder& recorder_;
     LibraryStore libraries_;
     Loop loop_;
+    StallMonitor stall_monitor_;
     std::unique_ptr<Bridge> bridge_;
 
     // Graph thread only.
@@ -150,6 +167,8 @@ class Runner {
     RunnerState state_ = RunnerState::Stopped;
     std::vector<std::string> degraded_;
     std::string status_;
+    HistogramSnapshot tuned_from_;      // wake-up latency at the last tuneSpin()
+    std::int64_t tuned_at_ns_ = 0;
 
     // Published for queries.
     mutable std::mutex published_mutex_;
@@ -162,7 +181,7 @@ class Runner {
     std::mutex jobs_mutex_;
     std::condition_variable jobs_changed_;
     std::deque<std::function<void()>> jobs_;
-    bool ending_ = false;
+    std::atomic<bool> ending_{false};
     std::thread thread_;
 };
 

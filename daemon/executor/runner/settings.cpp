@@ -47,6 +47,8 @@ void validate(RunnerSettings& settings) {
     requireRange("spin", settings.loop.spin_ns / 1000, std::int64_t{0}, settings.loop.period_ns / 2000, "µs");
     requireRange("heap", settings.loop.realtime.heap_bytes / kKilo, std::size_t{0}, 1024 * kKilo, "KiB");
     requireRange("stack", settings.loop.realtime.stack_bytes / kKilo, std::size_t{16}, 64 * kKilo, "KiB");
+    requireRange("stall timeout", settings.stall_timeout_ns / 1'000'000, std::int64_t{0}, std::int64_t{3'600'000}, "ms");
+    requireRange("orphan timeout", static_cast<double>(settings.orphan_timeout_ns) / 1e9, 0.0, 1e6, "s");
     requireRange("queue", settings.bridge.queue, 1U, 1'000'000U, "messages");
     (void)NamePattern("whitelist", settings.whitelist);
     (void)NamePattern("blacklist", settings.blacklist);

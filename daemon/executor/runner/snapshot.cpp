@@ -55,7 +55,7 @@ const ComponentSnapshot& GraphSnapshot::get(const std::string& full_name) const 
 }
 
 std::shared_ptr<const GraphSnapshot> takeSnapshot(const Plan& plan, const GraphSnapshot& previous,
-                                                  const std::string& changed) {
+                                                  const std::set<std::string>& changed) {
     auto result = std::make_shared<GraphSnapshot>();
     result->generation = plan.schedule.generation;
     std::map<const Instance*, std::shared_ptr<const ComponentSnapshot>> known;
@@ -65,7 +65,7 @@ std::shared_ptr<const GraphSnapshot> takeSnapshot(const Plan& plan, const GraphS
         const auto found = known.find(node.instance.get());
         const bool same = found != known.end() && found->second->full_name == node.instance->fullName() &&
                           found->second->figures == node.instance->figures() &&
-                          found->second->definition.breaks == node.breaks && node.instance->fullName() != changed;
+                          found->second->definition.breaks == node.breaks && changed.count(node.instance->fullName()) == 0;
         result->components.push_back(same ? found->second : picture(node));
     }
     for (const auto& [name, connection] : plan.wiring.connections) {

@@ -68,8 +68,8 @@ struct GraphSnapshot {
 };
 
 /// A picture of `plan`; components that have not changed are shared with `previous`.
-/// @param changed full name of a component to picture anew; empty = none
+/// @param changed full names of components to picture anew
 std::shared_ptr<const GraphSnapshot> takeSnapshot(const Plan& plan, const GraphSnapshot& previous,
-                                                  const std::string& changed);
+                                                  const std::set<std::string>& changed);
 
 }  // namespace rtcf::executor

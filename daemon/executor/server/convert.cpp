@@ -86,6 +86,8 @@ pb::ComponentSpec specTo(const ComponentDefinition& definition) {
     spec.set_ignore(definition.ignore);
     for (const std::string& port : definition.breaks) spec.add_breaks(port);
     spec.set_every(definition.every);
+    if (definition.phase) spec.set_phase(*definition.phase);
+    spec.set_optional(definition.optional);
     return spec;
 }
 
@@ -93,6 +95,22 @@ OverrunPolicy overrunFrom(pb::OverrunPolicy policy) {
     if (policy == pb::OVERRUN_POLICY_CATCH_UP) return OverrunPolicy::CatchUp;
     if (policy == pb::OVERRUN_POLICY_RELATIVE) return OverrunPolicy::Relative;
     return OverrunPolicy::Skip;
+}
+
+pb::Difference::Kind differenceKindTo(Difference::Kind kind) {
+    switch (kind) {
+        case Difference::Kind::Load:
+            return pb::Difference::KIND_LOAD;
+        case Difference::Kind::Unload:
+            return pb::Difference::KIND_UNLOAD;
+        case Difference::Kind::Replace:
+            return pb::Difference::KIND_REPLACE;
+        case Difference::Kind::Breaks:
+            return pb::Difference::KIND_BREAKS;
+        case Difference::Kind::Parameters:
+            break;
+    }
+    return pb::Difference::KIND_PARAMETERS;
 }
 
 pb::OverrunPolicy overrunTo(OverrunPolicy policy) {
@@ -128,10 +146,20 @@ ComponentDefinition definitionFrom(const pb::ComponentSpec& spec) {
     definition.ignore = spec.ignore();
     definition.breaks.insert(spec.breaks().begin(), spec.breaks().end());
     definition.every = std::max(1U, spec.every());
-    if (definition.every != 1) {
+    definition.optional = spec.optional();
+    constexpr std::uint32_t kSlowest = 100000;
+    if (definition.every > kSlowest) {
         throw Refusal(RefusalKind::InvalidArgument,
-                      fmt::format("{}: every {} cycles: this release runs all components every cycle",
-                                  definition.fullName(), definition.every));
+                      fmt::format("{}: every {} cycles is out of range: 1 to {}", definition.fullName(),
+                                  definition.every, kSlowest));
+    }
+    if (spec.has_phase()) {
+        if (spec.phase() >= definition.every) {
+            throw Refusal(RefusalKind::InvalidArgument,
+                          fmt::format("{}: phase {} is out of range: 0 to {} with --every {}", definition.fullName(),
+                                      spec.phase(), definition.every - 1, definition.every));
+        }
+        definition.phase = spec.phase();
     }
     return definition;
 }
@@ -145,6 +173,11 @@ ComponentDefinition replacementFrom(const pb::ComponentSpec& spec, const Compone
     if (!full.first()) full.set_first(before.first());
     if (full.ignore().empty()) full.set_ignore(before.ignore());
     if (full.breaks().empty()) *full.mutable_breaks() = before.breaks();
+    if (full.every() == 0) {
+        full.set_every(before.every());
+        if (!full.has_phase() && before.has_phase()) full.set_phase(before.phase());
+    }
+    if (!full.optional()) full.set_optional(before.optional());
     return definitionFrom(full);
 }
 
@@ -162,6 +195,14 @@ RunnerSettings settingsFrom(const pb::RunnerSettings& message, RunnerSettings ba
     if (message.has_lock_memory()) realtime.lock_memory = message.lock_memory();
     if (message.has_heap_kb()) realtime.heap_bytes = std::size_t{message.heap_kb()} * kKilo;
     if (message.has_stack_kb()) realtime.stack_bytes = std::size_t{message.stack_kb()} * kKilo;
+    if (message.has_warmup_cycles()) base.loop.warmup_cycles = message.warmup_cycles();
+    if (message.has_stall_timeout_ms()) base.stall_timeout_ns = std::int64_t{message.stall_timeout_ms()} * 1'000'000;
+    if (message.has_orphan_timeout_s()) {
+        base.orphan_timeout_ns = static_cast<std::int64_t>(message.orphan_timeout_s() * 1e9);
+    }
+    if (message.has_spin_auto()) base.spin_auto = message.spin_auto();
+    if (message.has_on_boot()) base.on_boot = message.on_boot();
+    if (message.has_on_crash()) base.on_crash = message.on_crash();
     const pb::RosSettings& ros = message.ros();
     if (ros.has_enabled()) base.bridge.enabled = ros.enabled();
     if (ros.has_master_uri()) base.bridge.master_uri = ros.master_uri();
@@ -183,6 +224,12 @@ pb::RunnerSettings settingsTo(const RunnerSettings& settings) {
     message.set_lock_memory(settings.loop.realtime.lock_memory);
     message.set_heap_kb(static_cast<std::uint32_t>(settings.loop.realtime.heap_bytes / kKilo));
     message.set_stack_kb(static_cast<std::uint32_t>(settings.loop.realtime.stack_bytes / kKilo));
+    message.set_warmup_cycles(static_cast<std::uint32_t>(settings.loop.warmup_cycles));
+    message.set_stall_timeout_ms(static_cast<std::uint32_t>(settings.stall_timeout_ns / 1'000'000));
+    message.set_orphan_timeout_s(static_cast<double>(settings.orphan_timeout_ns) / 1e9);
+    message.set_spin_auto(settings.spin_auto);
+    message.set_on_boot(static_cast<pb::OnBoot>(settings.on_boot));
+    message.set_on_crash(static_cast<pb::OnCrash>(settings.on_crash));
     pb::RosSettings& ros = *message.mutable_ros();
     ros.set_enabled(settings.bridge.enabled);
     ros.set_master_uri(settings.bridge.master_uri);
@@ -230,6 +277,12 @@ pb::ChangeResult outcomeTo(const ChangeOutcome& outcome) {
     for (const std::string& name : outcome.order) result.add_order(name);
     result.set_component(outcome.component);
     for (const std::string& line : outcome.notes) result.add_notes(line);
+    for (const Difference& difference : outcome.differences) {
+        pb::Difference& message = *result.add_differences();
+        message.set_kind(differenceKindTo(difference.kind));
+        message.set_component(difference.component);
+        message.set_detail(difference.detail);
+    }
     return result;
 }
 
@@ -255,6 +308,9 @@ v1::Event eventTo(const RunnerEvent& event) {
             break;
         case RunnerEvent::Kind::Degraded:
             message.set_kind(v1::Event::KIND_DEGRADED);
+            break;
+        case RunnerEvent::Kind::ComponentFailed:
+            message.set_kind(v1::Event::KIND_COMPONENT_FAILED);
             break;
         case RunnerEvent::Kind::Ros:
             message.set_kind(v1::Event::KIND_ROS);

@@ -169,8 +169,21 @@ void Server::serve(Runner& runner, Log& log) {
         if ((polled[0].revents & POLLIN) != 0) accept();
         deliver();
         expire();
+        if (orphaned()) exiting_ = true;
     }
     runner.requestStop();
+}
+
+// No daemon for too long: nobody is left who could stop this loop.
+bool Server::orphaned() {
+    const bool anybody = std::any_of(connections_.begin(), connections_.end(),
+                                     [](const auto& entry) { return entry.second->greeted(); });
+    if (anybody || !had_daemon_) {
+        alone_since_ns_ = monotonicNow();
+        had_daemon_ = had_daemon_ || anybody;
+        return false;
+    }
+    return monotonicNow() - alone_since_ns_ >= runner_->picture().settings.orphan_timeout_ns;
 }
 
 void Server::accept() {
@@ -267,6 +280,7 @@ void Server::handle(Connection& connection, const v1::Request& request) {
         hello.set_version(RTCF_VERSION);
         hello.set_runner(runner_->name());
         hello.set_pid(::getpid());
+        hello.set_flight_recorder_fd(runner_->recorder().fd());
         connection.setGreeted();
         respond(id, std::move(response));
         return;
@@ -390,6 +404,13 @@ ChangeOutcome Server::change(const v1::Request& request, const Runner::Progress&
             }
             throw Refusal(RefusalKind::NotFound, fmt::format("no component {} to replace", name));
         }
+        case v1::Request::kApply: {
+            std::vector<WantedComponent> wanted;
+            for (const v1::Load& load : request.apply().components()) {
+                wanted.push_back({definitionFrom(load.component()), load.library()});
+            }
+            return runner_->apply(wanted, request.apply().dry_run(), progress);
+        }
         case v1::Request::kSetBreaks: {
             std::vector<std::pair<std::string, std::string>> ports;
             for (const pb::PortName& port : request.set_breaks().ports()) {
@@ -485,7 +506,7 @@ pb::RunnerStatistics Server::statistics() const {
         statistics.set_component(component->full_name);
         HistogramSnapshot present = component->figures->duration.snapshot();
         std::uint64_t overruns = component->figures->overruns.load(std::memory_order_relaxed);
-        if (const auto found = baseline_.components.find(component->figures.get()); found != baseline_.components.end()) {
+        if (const auto found = baseline_.components.find(component->figures); found != baseline_.components.end()) {
             present = difference(present, found->second.first);
             overruns -= found->second.second;
         }
@@ -507,7 +528,7 @@ void Server::resetStatistics() {
     const Loop& loop = runner_->loop();
     baseline_.components.clear();
     for (const auto& component : runner_->snapshot()->components) {
-        baseline_.components[component->figures.get()] = {component->figures->duration.snapshot(),
+        baseline_.components[component->figures] = {component->figures->duration.snapshot(),
                                                           component->figures->overruns.load(std::memory_order_relaxed)};
     }
     baseline_.duration = loop.figures().duration.snapshot();

@@ -46,7 +46,8 @@ class Server {
         bool last;                 // ends its request
     };
     struct Baseline {  // what statistics count from
-        std::map<const ComponentFigures*, std::pair<HistogramSnapshot, std::uint64_t>> components;
+        // Held, as another component's figures could come to the same address.
+        std::map<std::shared_ptr<const ComponentFigures>, std::pair<HistogramSnapshot, std::uint64_t>> components;
         HistogramSnapshot duration;
         HistogramSnapshot latency;
         std::uint64_t overruns = 0;
@@ -63,6 +64,7 @@ class Server {
     void submitChange(std::uint64_t connection, const v1::Request& request);
     void submitProbe(std::uint64_t connection, const v1::Request& request);
     void expire();
+    bool orphaned();
     ChangeOutcome change(const v1::Request& request, const Runner::Progress& progress);
     ::rtcf::v1::RunnerStatus status() const;
     ::rtcf::v1::RunnerStatistics statistics() const;
@@ -74,6 +76,8 @@ class Server {
     int signals_ = -1;
     int wake_ = -1;
     bool exiting_ = false;
+    bool had_daemon_ = false;
+    std::int64_t alone_since_ns_ = 0;
     Runner* runner_ = nullptr;
     Log* log_ = nullptr;
     std::uint64_t next_id_ = 1;

@@ -65,7 +65,7 @@ DistributionSummary summarize(const HistogramSnapshot& snapshot, double scale) {
         }
         return maximum;
     };
-    result.min = static_cast<double>(Histogram::lowerBound(bottom)) * scale;
+    result.min = std::min(middle(bottom), maximum) * scale;
     result.mean = static_cast<double>(snapshot.sum) / static_cast<double>(snapshot.count) * scale;
     result.p50 = quantile(0.5) * scale;
     result.p99 = quantile(0.99) * scale;

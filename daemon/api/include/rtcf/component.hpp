@@ -32,6 +32,10 @@ struct ComponentContext {
     const LoopClock* clock = nullptr;  ///< the loop's clock
     std::int64_t period_ns = 0;        ///< of this component, ns
     std::int64_t elapsed_ns = 0;       ///< whole periods since its last update, ns
+    std::int64_t updated_ns = -1;      ///< loop time in whole periods at its last update, ns; -1 = not yet
+    bool disabled = false;             ///< taken out after a fault; written by the loop
+    std::atomic<std::uint64_t> device_calls{0};    ///< scopes of RTCF_DEVICE_IO so far
+    std::atomic<std::int64_t> device_time_ns{0};   ///< time spent in them, ns
     LogSink* log = nullptr;            ///< never null once attached
     std::atomic<LogLevel> log_level{LogLevel::Info};  ///< calls below it are not logged
 };
@@ -97,6 +101,9 @@ class Component {
     const std::vector<InputBase*>& inputs() const noexcept { return inputs_; }
     const std::vector<OutputBase*>& outputs() const noexcept { return outputs_; }
     const std::vector<ParameterBase*>& parameters() const noexcept { return parameters_; }
+    /// Outputs whose values are checked before anybody reads them.
+    const std::vector<OutputBase*>& finiteOutputs() const noexcept { return finite_outputs_; }
+    ComponentContext& context() const noexcept { return *context_; }
     const std::string& failure() const noexcept { return failure_; }
     const LoopClock& clock() const noexcept RTCF_NONBLOCKING { return *context_->clock; }
     /// @}
@@ -106,6 +113,7 @@ class Component {
     /// @{
     void declare(InputBase* input) { declareIn(inputs_, input, input->name(), "port"); }
     void declare(OutputBase* output) { declareIn(outputs_, output, output->name(), "port"); }
+    void declareFinite(OutputBase* output) { finite_outputs_.push_back(output); }
     void declare(ParameterBase* parameter) {
         declareIn(parameters_, parameter, parameter->declaration().name, "parameter");
     }
@@ -134,6 +142,7 @@ class Component {
     std::vector<InputBase*> inputs_;
     std::vector<OutputBase*> outputs_;
     std::vector<ParameterBase*> parameters_;
+    std::vector<OutputBase*> finite_outputs_;
     std::string failure_;
 };
 
@@ -170,13 +179,20 @@ inline InputBase::InputBase(Component* owner, std::string name, const TypeInfo& 
 }
 
 inline std::int64_t InputBase::age() const noexcept RTCF_NONBLOCKING {
-    return current_->sequence == 0 ? -1 : owner_->time() - current_->time_ns;
+    // The loop's time goes back when a simulated clock begins anew.
+    return current_->sequence == 0 ? -1 : std::max<std::int64_t>(0, owner_->time() - current_->time_ns);
 }
 
-inline OutputBase::OutputBase(Component* owner, std::string name, std::string unit, const TypeInfo& type)
+inline OutputBase::OutputBase(Component* owner, std::string name, std::string unit, const TypeInfo& type,
+                              const Finite* finite)
     : owner_(owner), slot_(type.make_slot(nullptr)), name_(std::move(name)), unit_(std::move(unit)), type_(type) {
     raw_ = slot_.get();
     owner_->declare(this);
+    if (finite == nullptr) return;
+    policy_ = finite->policy;
+    staged_ = type.make_slot(nullptr);
+    raw_ = staged_.get();
+    owner_->declareFinite(this);
 }
 
 inline void OutputBase::stampWrite() noexcept RTCF_NONBLOCKING {
@@ -188,6 +204,12 @@ inline void OutputBase::stampWrite() noexcept RTCF_NONBLOCKING {
 
 inline ParameterBase::ParameterBase(Component* owner, ParameterDeclaration declaration)
     : declaration_(std::move(declaration)) {
+    // NaN and infinity are no values to set, but some use them as default: "no limit".
+    ParameterValue initial = declaration_.default_value;
+    const double* number = std::get_if<double>(&initial);
+    if (number == nullptr || std::isfinite(*number)) {
+        if (const std::string why = check(initial); !why.empty()) throw std::logic_error("default value: " + why);
+    }
     owner->declare(this);
 }
 
@@ -225,6 +247,16 @@ inline std::string ParameterBase::check(ParameterValue& value) const {
     return {};
 }
 
+/// A component that waits for its device and so paces the loop: at most one in
+/// a runner. The runner's frequency is then nominal.
+class Source : public Component {
+   public:
+    /// Called in the real-time thread instead of its sleep. @param deadline_ns CLOCK_MONOTONIC, ns; it must
+    /// return by then. @return true if the device is ready: a cycle begins
+    virtual bool wait(std::int64_t deadline_ns) noexcept = 0;
+};
+
 }  // namespace rtcf
 
+#include "rtcf/device_io.hpp"
 #include "rtcf/registration.hpp"

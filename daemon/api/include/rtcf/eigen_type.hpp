@@ -146,6 +146,7 @@ struct PortType<Eigen::Matrix<Scalar, Rows, Cols, Options, MaxRows, MaxCols>,
     }
     static std::string print(const T& value) {
         std::ostringstream text;
+        detail::makeExact(text);
         text << value.format(Eigen::IOFormat(Eigen::StreamPrecision, Eigen::DontAlignCols, ", ", "; ", "", "", "[", "]"));
         return text.str();
     }

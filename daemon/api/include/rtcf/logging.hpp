@@ -104,6 +104,12 @@ const T& logLoad(const T& value) noexcept {
     return value;
 }
 
+/// Checks a call's format at compile time, with the arguments as they are stored; never called.
+template <typename Format, typename... Arguments>
+void logCheck(const Format& format, const Arguments&... arguments) {
+    (void)fmt::formatted_size(format, logLoad(logStore(arguments))...);
+}
+
 template <typename Stored>
 void renderLog(const LogRecord& record, std::string& text) {
     const auto& stored = *std::launder(reinterpret_cast<const Stored*>(record.payload.data()));
@@ -140,7 +146,9 @@ void logCall(LogSink& sink, const char* component, const LogSite& site,
 inline bool logThrottle(std::atomic<std::int64_t>& next_ns, std::int64_t now_ns,
                         std::int64_t period_ns) noexcept {
     std::int64_t due = next_ns.load(std::memory_order_relaxed);
-    return now_ns >= due && next_ns.compare_exchange_strong(due, now_ns + period_ns, std::memory_order_relaxed);
+    // Further away than a period: a simulated clock has begun anew since.
+    const bool passes = now_ns >= due || due - now_ns > period_ns;
+    return passes && next_ns.compare_exchange_strong(due, now_ns + period_ns, std::memory_order_relaxed);
 }
 
 }  // namespace detail
@@ -155,7 +163,7 @@ inline bool logThrottle(std::atomic<std::int64_t>& next_ns, std::int64_t now_ns,
         if (rtcf_log_self.logs(log_level) && (condition)) {                                       \
             static constexpr ::rtcf::LogSite rtcf_log_site{                                       \
                 log_level, __FILE__, __LINE__, RTCF_LOG_FUNCTION_, text};                         \
-            if (false) (void)fmt::formatted_size(FMT_STRING(text), ##__VA_ARGS__);                \
+            if (false) ::rtcf::detail::logCheck(FMT_STRING(text), ##__VA_ARGS__);                 \
             ::rtcf::detail::logCall(rtcf_log_self.logSink(), rtcf_log_self.fullName().c_str(),    \
                                     rtcf_log_site, ##__VA_ARGS__);                                \
         }                                                                                         \

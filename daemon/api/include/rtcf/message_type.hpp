@@ -7,7 +7,9 @@
 #include <ros/serialization.h>
 
 #include <sstream>
+#include <stdexcept>
 
+#include "rtcf/exact_text.hpp"
 #include "rtcf/port_type.hpp"
 
 namespace rtcf {
@@ -47,9 +49,11 @@ struct PortType<T, std::enable_if_t<ros::message_traits::IsMessage<T>::value>> {
         // roscpp's stream takes a mutable pointer although it only reads.
         ros::serialization::IStream stream(const_cast<std::uint8_t*>(from), size);
         ros::serialization::deserialize(stream, value);
+        if (stream.getLength() != 0) throw std::length_error("bytes after the end of the message");
     }
     static std::string print(const T& value) {
         std::ostringstream text;
+        detail::makeExact(text);
         ros::message_operations::Printer<T>::stream(text, "", value);
         return detail::joinLines(text.str());
     }

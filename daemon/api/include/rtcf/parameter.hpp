@@ -3,6 +3,8 @@
 /// loaded and changed while the loop runs, with bounds checked beforehand.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -151,12 +153,18 @@ class Parameter final : public ParameterBase {
         } else {
             declaration.type = "double";
             declaration.default_value = static_cast<double>(initial);
+            narrow(declaration, static_cast<double>(std::numeric_limits<T>::lowest()),
+                   static_cast<double>(std::numeric_limits<T>::max()));
         }
         return declaration;
     }
+    // Bounds of T, where it is smaller than what values travel as.
     static void narrow(ParameterDeclaration& declaration, double lowest, double highest) {
-        if constexpr (sizeof(T) < sizeof(std::int64_t)) {
+        constexpr bool kSmaller = sizeof(T) < sizeof(std::int64_t);
+        if constexpr (kSmaller || std::is_unsigned_v<T>) {
             declaration.minimum = std::max(lowest, declaration.minimum.value_or(lowest));
+        }
+        if constexpr (kSmaller) {
             declaration.maximum = std::min(highest, declaration.maximum.value_or(highest));
         }
     }

@@ -47,7 +47,10 @@ class InputBase {
     /// Reads from `source` on. A new writer's value counts once it writes; until then the present
     /// value stays as old data. `continued`: the same writer's values by another slot.
     void rewire(const SlotHeader* source, bool continued) noexcept RTCF_NONBLOCKING {
-        if (continued || (current_->sequence == 0 && seen_ == 0)) {
+        if (continued) {
+            // A value kept of an earlier writer stays, as before.
+            if (current_ == source_) current_ = source;
+        } else if (current_->sequence == 0 && seen_ == 0) {
             current_ = source;
         } else {
             seen_ = source->sequence;
@@ -79,6 +82,7 @@ class InputBase {
         }
         return current_->sequence != 0 ? DataStatus::Old : DataStatus::None;
     }
+
    private:
     const SlotHeader* source_;    // where the writer writes
     const SlotHeader* current_;   // where the component's value is
@@ -123,7 +127,7 @@ class Input final : public InputBase {
 /// What the executor handles of any output.
 class OutputBase {
    public:
-    OutputBase(Component* owner, std::string name, std::string unit, const TypeInfo& type);
+    OutputBase(Component* owner, std::string name, std::string unit, const TypeInfo& type, const Finite* finite);
     OutputBase(const OutputBase&) = delete;
     OutputBase& operator=(const OutputBase&) = delete;
 
@@ -133,16 +137,32 @@ class OutputBase {
     /// The slot that this output writes; inputs may keep it alive beyond the component.
     const std::shared_ptr<SlotHeader>& slot() const noexcept { return slot_; }
 
+    /// @name Of an output declared Finite; for the executor, after update(); real-time safe
+    /// @{
+    /// Lets readers see what was written, if it is finite. @return false if it is not
+    bool commitFinite() noexcept RTCF_NONBLOCKING {
+        if (staged_->sequence == examined_) return true;
+        examined_ = staged_->sequence;
+        if (!type_.finite(*staged_)) return false;
+        type_.copy(*slot_, *staged_);
+        return true;
+    }
+    OnNonFinite nonFinitePolicy() const noexcept RTCF_NONBLOCKING { return policy_; }
+    /// @}
+
    protected:
     ~OutputBase() = default;
 
     void stampWrite() noexcept RTCF_NONBLOCKING;
 
-    SlotHeader* raw_;  // slot_'s object, one load less in the cycle
+    SlotHeader* raw_;  // what is written: slot_'s object, or staged_'s
 
    private:
     Component* owner_;
     std::shared_ptr<SlotHeader> slot_;
+    std::shared_ptr<SlotHeader> staged_;  // of an output declared Finite
+    std::uint64_t examined_ = 0;          // staged_'s sequence at the last check
+    OnNonFinite policy_ = OnNonFinite::Hold;
     std::string name_;
     std::string unit_;
     const TypeInfo& type_;
@@ -156,7 +176,10 @@ class Output final : public OutputBase {
     /// @param name  ROS base name, unique among the component's ports
     /// @param unit  what a value means, for people
     Output(Component* owner, std::string name, std::string unit = {})
-        : OutputBase(owner, std::move(name), std::move(unit), typeInfo<T>()) {}
+        : OutputBase(owner, std::move(name), std::move(unit), typeInfo<T>(), nullptr) {}
+    /// An output whose values are checked for NaN and infinity before anybody reads them.
+    Output(Component* owner, std::string name, std::string unit, Finite finite)
+        : OutputBase(owner, std::move(name), std::move(unit), typeInfo<T>(), &finite) {}
 
     /// Writes a value. Real-time safe for types whose assignment is; for messages
     /// of variable size once reserve() has been given the largest one.
@@ -172,7 +195,10 @@ class Output final : public OutputBase {
 
     /// Takes the capacity of `sample`, so that later values up to its size are
     /// written without allocation. For constructor and configure(); not real-time safe.
-    void reserve(const T& sample) { static_cast<Slot<T>*>(raw_)->value = sample; }
+    void reserve(const T& sample) {
+        static_cast<Slot<T>*>(raw_)->value = sample;
+        static_cast<Slot<T>*>(slot().get())->value = sample;
+    }
 };
 
 }  // namespace rtcf

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+#include "rtcf/finite.hpp"
 #include "rtcf/slot.hpp"
 
 namespace rtcf {
@@ -46,6 +47,8 @@ struct TypeInfo {
     bool (*deserialize)(SlotHeader& slot, const std::uint8_t* from, std::uint32_t size);
     /// The value as text of one line. Not real-time safe.
     std::string (*print)(const SlotHeader& slot);
+    /// True if the value holds no NaN and no infinity. Real-time safe.
+    bool (*finite)(const SlotHeader& slot);
 };
 
 /// True if values of the two types may share a connection.
@@ -98,6 +101,11 @@ bool deserializeSlot(SlotHeader& slot, const std::uint8_t* from, std::uint32_t s
 }
 
 template <typename T>
+bool finiteSlot(const SlotHeader& slot) {
+    return isFinite(static_cast<const Slot<T>&>(slot).value);
+}
+
+template <typename T>
 std::string printSlot(const SlotHeader& slot) {
     return PortType<T>::print(static_cast<const Slot<T>&>(slot).value);
 }
@@ -120,7 +128,8 @@ const TypeInfo& typeInfo() {
                                &detail::slotLength<T>,
                                &detail::serializeSlot<T>,
                                &detail::deserializeSlot<T>,
-                               &detail::printSlot<T>};
+                               &detail::printSlot<T>,
+                               &detail::finiteSlot<T>};
     return info;
 }
 

@@ -1,0 +1,53 @@
+/// @file
+/// A component's talk with its device, in the cycle: system calls that are meant.
+///
+///     void update() override {
+///         RTCF_DEVICE_IO(this);
+///         ::write(bus_, &frame_, sizeof frame_);
+///     }
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <ctime>
+
+#include "rtcf/component.hpp"
+
+// Of the RealtimeSanitizer's run time; only the checking executor has them.
+extern "C" {
+__attribute__((weak)) void __rtsan_disable();  // NOLINT: the name is clang's
+__attribute__((weak)) void __rtsan_enable();   // NOLINT
+}
+
+namespace rtcf {
+
+/// A scope that `rtcfctl check` does not complain about, timed and counted. Real-time safe.
+class DeviceIo {
+   public:
+    explicit DeviceIo(Component* component) noexcept : context_(component->context()), begin_ns_(now()) {
+        if (__rtsan_disable != nullptr) __rtsan_disable();
+    }
+    ~DeviceIo() {
+        if (__rtsan_enable != nullptr) __rtsan_enable();
+        const auto relaxed = std::memory_order_relaxed;
+        context_.device_calls.store(context_.device_calls.load(relaxed) + 1, relaxed);
+        context_.device_time_ns.store(context_.device_time_ns.load(relaxed) + now() - begin_ns_, relaxed);
+    }
+    DeviceIo(const DeviceIo&) = delete;
+    DeviceIo& operator=(const DeviceIo&) = delete;
+
+   private:
+    static std::int64_t now() noexcept {
+        timespec time{};
+        clock_gettime(CLOCK_MONOTONIC, &time);
+        return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
+    }
+
+    ComponentContext& context_;
+    std::int64_t begin_ns_;
+};
+
+}  // namespace rtcf
+
+/// Marks the rest of the scope as device input and output of the component `self`.
+#define RTCF_DEVICE_IO(self) const ::rtcf::DeviceIo rtcf_device_io(self)

@@ -1,0 +1,122 @@
+#include "check/check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <future>
+#include <memory>
+
+#include "bridge/bridge.hpp"
+#include "faults/crash_handler.hpp"
+#include "faults/flight_recorder.hpp"
+#include "graph/definition.hpp"
+#include "logging/log.hpp"
+#include "refusal.hpp"
+#include "runner/runner.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+constexpr std::uint64_t kCyclesPerValue = 10;
+
+// Stands where the ROS node would: a value comes on every input, every output is read.
+class ValueSource final : public Bridge {
+   public:
+    void configure(const BridgeSettings& /*settings*/) override {}
+    void setTable(std::shared_ptr<const BridgeTable> table) override { table_ = std::move(table); }
+    BridgeStatus status() const override { return {}; }
+
+    // Graph thread, as all calls.
+    void exchange() {
+        for (const auto& injector : table_->inputs) {
+            const std::shared_ptr<SlotHeader> value = injector->type().make_slot(nullptr);
+            std::vector<std::uint8_t> bytes(injector->type().length(*value));
+            injector->type().serialize(*value, bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+            injector->deliver(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+        }
+        for (const auto& tap : table_->outputs) {
+            while (tap->pop([](const std::uint8_t*, std::uint32_t) {})) {
+            }
+        }
+    }
+
+   private:
+    std::shared_ptr<const BridgeTable> table_ = std::make_shared<BridgeTable>();
+};
+
+ParameterValue parseValue(const std::string& text) {
+    if (text == "true" || text == "false") return text == "true";
+    try {
+        std::size_t used = 0;
+        if (const long long number = std::stoll(text, &used); used == text.size()) return std::int64_t{number};
+        if (const double number = std::stod(text, &used); used == text.size()) return number;
+    } catch (const std::logic_error&) {
+        // no number: a string
+    }
+    return text;
+}
+
+ComponentDefinition definitionOf(const CheckRequest& request) {
+    ComponentDefinition definition;
+    definition.name = "checked";
+    definition.package = request.package;
+    definition.type = request.type;
+    for (const std::string& parameter : request.parameters) {
+        const std::size_t at = parameter.find(":=");
+        if (at == std::string::npos) {
+            throw Refusal(RefusalKind::InvalidArgument, fmt::format("'{}' is not name:=value", parameter));
+        }
+        definition.parameters.emplace_back(parameter.substr(0, at), parseValue(parameter.substr(at + 2)));
+    }
+    return definition;
+}
+
+void run(const CheckRequest& request, Runner& runner, ValueSource& values) {
+    const Runner::Progress silent = [](const std::string&) {};
+    RunnerSettings settings = runner.settings();
+    settings.whitelist = ".*";
+    settings.loop.warmup_cycles = 0;
+    runner.configure(settings);
+    runner.load(definitionOf(request), request.library, silent);
+    for (std::uint64_t done = 0; done < request.cycles; done += kCyclesPerValue) {
+        values.exchange();
+        runner.step(std::min(kCyclesPerValue, request.cycles - done), silent);
+        if (runner.loop().fault().kind != LoopFault::Kind::None) {
+            throw Refusal(RefusalKind::FailedPrecondition, runner.picture().status);
+        }
+    }
+    runner.stop(silent);
+}
+
+}  // namespace
+
+int checkComponent(const CheckRequest& request) {
+    FlightRecorder recorder;
+    installCrashHandler(recorder);
+    Log log([](LogEntry&& entry) { fmt::print(stderr, "{}: {}\n", entry.component, entry.message); });
+    auto bridge = std::make_unique<ValueSource>();
+    ValueSource& values = *bridge;
+    Runner runner("check", log, [](const RunnerEvent&) {}, std::move(bridge), recorder);
+    std::promise<std::string> refusal;
+    runner.post([&] {
+        try {
+            run(request, runner, values);
+            refusal.set_value({});
+        } catch (const std::exception& error) {
+            refusal.set_value(error.what());
+        }
+    });
+    const std::string why = refusal.get_future().get();
+    log.drain();
+    if (why.empty()) {
+        fmt::print(stderr, "{}/{}: {} cycles\n", request.package, request.type, request.cycles);
+        return 0;
+    }
+    fmt::print(stderr, "rtcf-executor: {}\n", why);
+    return 1;
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,96 @@
+/// @file
+/// The flight recorder: a shared memory that tells, after any death of the
+/// process, what its threads were doing. rtcfd holds it open. Writing is one
+/// store; layout and meaning are fixed in executor.proto.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "rtcf/realtime.hpp"
+
+namespace rtcf::executor {
+
+/// Which thread, in the recorder's numbers.
+enum class ThreadRole : std::uint32_t { None = 0, Realtime = 1, Graph = 2, Other = 3 };
+
+/// Which hook the graph thread is in, in the recorder's numbers.
+enum class Hook : std::uint32_t { None = 0, Constructor = 1, Configure = 2, Start = 3, Stop = 4, Cleanup = 5 };
+
+const char* hookName(Hook hook) noexcept;
+
+/// Why the process dies, in the recorder's numbers.
+enum class CrashReason : std::uint32_t { Signal = 0, Stall = 1 };
+
+class FlightRecorder {
+   public:
+    static constexpr std::uint32_t kSlots = 4096;  ///< one per component; slot 0 means none
+
+    /// @throws std::system_error if there is no memory for it
+    FlightRecorder();
+    ~FlightRecorder();
+    FlightRecorder(const FlightRecorder&) = delete;
+    FlightRecorder& operator=(const FlightRecorder&) = delete;
+
+    /// The descriptor that rtcfd opens by /proc.
+    int fd() const noexcept { return fd_; }
+
+    /// @name Slots: names of components; graph thread
+    /// @{
+    std::uint32_t addSlot(const std::string& name);  ///< @throws Refusal if there are too many components
+    void removeSlot(std::uint32_t slot) noexcept;
+    /// @}
+
+    /// @name Notes; real-time safe
+    /// @{
+    void setIteration(std::uint64_t iteration) noexcept RTCF_NONBLOCKING {
+        page_->iteration.store(iteration, std::memory_order_relaxed);
+    }
+    void enterComponent(std::uint32_t slot) noexcept RTCF_NONBLOCKING {
+        page_->realtime_slot.store(slot, std::memory_order_relaxed);
+    }
+    void leaveComponents() noexcept RTCF_NONBLOCKING { enterComponent(0); }
+    void setRunning(bool running) noexcept RTCF_NONBLOCKING {
+        page_->running.store(running ? 1 : 0, std::memory_order_relaxed);
+    }
+    void enterHook(std::uint32_t slot, Hook hook) noexcept {
+        page_->graph_slot.store(slot, std::memory_order_relaxed);
+        page_->graph_hook.store(static_cast<std::uint32_t>(hook), std::memory_order_relaxed);
+    }
+    void leaveHook() noexcept { enterHook(0, Hook::None); }
+    /// Async-signal-safe; the first note stays.
+    void noteCrash(int signal, ThreadRole thread, CrashReason reason, const void* address) noexcept;
+    /// @}
+
+    /// Slot of the component that the real-time thread runs; 0 = none.
+    std::uint32_t runningSlot() const noexcept { return page_->realtime_slot.load(std::memory_order_relaxed); }
+
+   private:
+    struct Page {
+        std::uint32_t magic;
+        std::uint32_t version;
+        std::atomic<std::uint64_t> iteration;
+        std::atomic<std::uint32_t> realtime_slot;
+        std::atomic<std::uint32_t> graph_slot;
+        std::atomic<std::uint32_t> graph_hook;
+        std::atomic<std::uint32_t> crash_signal;
+        std::atomic<std::uint32_t> crash_thread;
+        std::atomic<std::uint32_t> crash_reason;
+        std::atomic<std::uint64_t> crash_address;
+        std::atomic<std::uint32_t> running;
+        std::uint32_t slots;
+        std::uint64_t reserved;
+        char names[kSlots][128];  // NOLINT(modernize-avoid-c-arrays): a layout in memory
+    };
+    static_assert(offsetof(Page, crash_address) == 40 && offsetof(Page, names) == 64, "the layout is in executor.proto");
+
+    int fd_ = -1;
+    Page* page_ = nullptr;
+    std::vector<std::uint32_t> free_;
+    std::uint32_t next_ = 1;
+};
+
+}  // namespace rtcf::executor
