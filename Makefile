@@ -18,7 +18,7 @@ build:
 	@cmake --build $(BUILD)
 
 demo: all ## run Fig. 1 of the paper at 2 kHz for 10 s, with ROS nodes talking to it
-	@tests/demo/run
+	@components/rtcf_examples/demo/demo
 
 test: all ## all checks: lint, unit, sanitizers, integration, packages
 	@tools/install-dependencies test
