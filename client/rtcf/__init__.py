@@ -11,6 +11,8 @@ Requests and answers are the protobuf messages of rtcf.v1.
 
 from rtcf.client import Client, default_socket
 from rtcf.errors import DaemonUnreachableError, RefusedError, RtcfError
+from rtcf.graph_reader import Graph, GraphFileError, read_graphs
+from rtcf.graph_writer import live_spec, write_graphs
 from rtcf.spec import component, parse_parameter, parse_port, parse_remap, parse_value
 
 __version__ = "0.1.0"
@@ -18,12 +20,17 @@ __version__ = "0.1.0"
 __all__ = [
     "Client",
     "DaemonUnreachableError",
+    "Graph",
+    "GraphFileError",
     "RefusedError",
     "RtcfError",
     "component",
     "default_socket",
+    "live_spec",
     "parse_parameter",
     "parse_port",
     "parse_remap",
     "parse_value",
+    "read_graphs",
+    "write_graphs",
 ]

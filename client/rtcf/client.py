@@ -97,6 +97,17 @@ class Client:
         """End the loop at the next cycle boundary."""
         return self._change(self._stub.Stop, control_pb2.StopRequest(runner=runner), on_progress)
 
+    def step(
+        self, cycles: int, runner: str = "", on_progress: OnProgress | None = None
+    ) -> control_pb2.ChangeResult:
+        """Run cycles of a stopped loop on a simulated clock, as fast as they go.
+
+        Goes on where the last call paused, until the next stop or start; takes
+        as long as the cycles take.
+        """
+        request = control_pb2.StepRequest(runner=runner, cycles=cycles)
+        return self._change(self._stub.Step, request, on_progress, timeout_s=None)
+
     def load(
         self,
         component: graph_pb2.ComponentSpec,
@@ -130,6 +141,33 @@ class Client:
         )
         return self._change(self._stub.Replace, request, on_progress)
 
+    def apply(
+        self,
+        components: Iterable[graph_pb2.ComponentSpec],
+        runner: str = "",
+        settings: runner_pb2.RunnerSettings | None = None,
+        dry_run: bool = False,
+        on_progress: OnProgress | None = None,
+    ) -> control_pb2.ChangeResult:
+        """Make the graph what `components` say, all at one cycle boundary.
+
+        The result's `differences` tell what was changed, or would be.
+        """
+        request = control_pb2.ApplyRequest(
+            runner=runner, components=components, settings=settings, dry_run=dry_run
+        )
+        return self._change(self._stub.Apply, request, on_progress)
+
+    def release(
+        self,
+        components: Iterable[str],
+        runner: str = "",
+        on_progress: OnProgress | None = None,
+    ) -> control_pb2.ChangeResult:
+        """Load components again that were left out of the loop after a fault."""
+        request = control_pb2.ReleaseRequest(runner=runner, components=components)
+        return self._change(self._stub.Release, request, on_progress)
+
     def set_breaks(
         self,
         ports: Iterable[control_pb2.PortName],
@@ -155,7 +193,7 @@ class Client:
         return self._change(self._stub.SetParameters, request, on_progress)
 
     def list_components(self, runner: str = "") -> list[graph_pb2.ComponentInfo]:
-        """Return all components in order of the schedule, without values."""
+        """Return all components in order of the schedule, without values; then those left out."""
         request = control_pb2.ListComponentsRequest(runner=runner)
         return list(self._ask(self._stub.ListComponents, request).components)
 
@@ -196,11 +234,15 @@ class Client:
             raise errors.from_grpc(error, self.socket) from None
 
     def _change(
-        self, method: Any, request: Any, on_progress: OnProgress | None
+        self,
+        method: Any,
+        request: Any,
+        on_progress: OnProgress | None,
+        timeout_s: float | None = CHANGE_TIMEOUT_S,
     ) -> control_pb2.ChangeResult:
         result = control_pb2.ChangeResult()
         try:
-            for response in method(request, timeout=CHANGE_TIMEOUT_S):
+            for response in method(request, timeout=timeout_s):
                 if response.WhichOneof("kind") == "result":
                     result = response.result
                 elif on_progress is not None:

@@ -33,6 +33,8 @@ def component(
     ignore: str = "",
     breaks: Iterable[str] = (),
     every: int = 0,
+    phase: int | None = None,
+    optional: bool = False,
 ) -> graph_pb2.ComponentSpec:
     """Return a component to load.
 
@@ -50,6 +52,8 @@ def component(
         ignore=ignore,
         breaks=breaks,
         every=every,
+        phase=phase,
+        optional=optional,
     )
 
 

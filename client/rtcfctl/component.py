@@ -1,4 +1,4 @@
-"""`rtcfctl load|unload|replace|list|info`."""
+"""`rtcfctl load|unload|replace|release|list|info`."""
 
 import argparse
 from typing import Any
@@ -9,6 +9,11 @@ from rtcf.v1 import graph_pb2
 from rtcfctl import words
 from rtcfctl.output import Output
 from rtcfctl.plain import enumerator
+
+_STYLES = {
+    graph_pb2.COMPONENT_STATE_FAULTED: "bold red",
+    graph_pb2.COMPONENT_STATE_LEFT_OUT: "bold red",
+}
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
@@ -27,6 +32,12 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     replacing.add_argument("old", metavar="NAME")
     _component_options(replacing)
     replacing.set_defaults(run=replace)
+
+    releasing = verbs.add_parser(
+        "release", parents=[common], help="load components again that were left out after a fault"
+    )
+    releasing.add_argument("names", metavar="NAME", nargs="+")
+    releasing.set_defaults(run=release)
 
     listing = verbs.add_parser("list", parents=[common], help="all components")
     listing.set_defaults(run=show_all)
@@ -54,6 +65,12 @@ def replace(client: rtcf.Client, args: argparse.Namespace, output: Output) -> No
     output.changed(f"replaced {args.old} by {result.component}", result)
 
 
+def release(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Load components again."""
+    result = client.release(args.names, args.runner, output.progress)
+    output.changed(f"released {', '.join(args.names)}", result)
+
+
 def show_all(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Print all components in order of the schedule."""
     components = client.list_components(args.runner)
@@ -64,10 +81,10 @@ def show_all(client: rtcf.Client, args: argparse.Namespace, output: Output) -> N
         ("#", "component", "type", "state", "notes"),
         (
             (
-                each.position,
+                "-" if left_out(each) else each.position,
                 each.full_name,
                 f"{each.spec.package}/{each.spec.type}",
-                enumerator(each, "state"),
+                (enumerator(each, "state").replace("_", " "), _STYLES.get(each.state, "")),
                 _notes(each),
             )
             for each in components
@@ -85,6 +102,9 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     output.line(f"{found.full_name}: {found.spec.package}/{found.spec.type}", "bold")
     if found.doc:
         output.line(f"  {found.doc}")
+    if left_out(found):
+        output.line(f"  left out of the loop: {found.fault}", "bold red")
+        return
     output.line(f"  {enumerator(found, 'state')}, {found.position} in the schedule")
     output.line(f"  from {found.library}")
     if found.fault:
@@ -138,6 +158,11 @@ def print_parameters(parameters: list[graph_pb2.ParameterInfo], output: Output) 
     )
 
 
+def left_out(found: graph_pb2.ComponentInfo) -> bool:
+    """Tell whether a component belongs to the graph but is not loaded."""
+    return bool(found.state == graph_pb2.COMPONENT_STATE_LEFT_OUT)
+
+
 def _component_options(to: argparse.ArgumentParser) -> None:
     to.add_argument("package", metavar="PKG")
     to.add_argument("type", metavar="COMPONENT", help="a component type of the package")
@@ -161,6 +186,15 @@ def _component_options(to: argparse.ArgumentParser) -> None:
         help="the connection into this input is a loop break",
     )
     to.add_argument("--every", type=int, default=0, metavar="N", help="run in each N-th cycle")
+    to.add_argument(
+        "--phase",
+        type=int,
+        metavar="N",
+        help="with --every: in which of them, from 0 (default: chosen to spread load)",
+    )
+    to.add_argument(
+        "--optional", action="store_true", help="after a fault the loop goes on without it"
+    )
 
 
 def _spec(args: argparse.Namespace) -> graph_pb2.ComponentSpec:
@@ -175,6 +209,8 @@ def _spec(args: argparse.Namespace) -> graph_pb2.ComponentSpec:
         ignore=args.ignore,
         breaks=args.breaks,
         every=args.every,
+        phase=args.phase,
+        optional=args.optional,
     )
 
 
@@ -186,7 +222,10 @@ def _notes(found: graph_pb2.ComponentInfo) -> str:
     if spec.breaks:
         notes.append(f"loop break at {', '.join(spec.breaks)}")
     if spec.every > 1:
-        notes.append(f"every {spec.every} cycles")
+        phase = f" from cycle {spec.phase}" if spec.HasField("phase") else ""
+        notes.append(f"every {spec.every} cycles{phase}")
+    if spec.optional:
+        notes.append("optional")
     if found.fault:
         notes.append(found.fault)
     return ", ".join(notes)

@@ -1,4 +1,4 @@
-"""`rtcfctl start` and `rtcfctl stop`."""
+"""`rtcfctl start|stop|step`."""
 
 import argparse
 from typing import Any
@@ -14,6 +14,11 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     begin.set_defaults(run=start)
     end = verbs.add_parser("stop", parents=[common], help="end the loop at the next cycle")
     end.set_defaults(run=stop)
+    stepping = verbs.add_parser(
+        "step", parents=[common], help="run cycles of a stopped loop on a simulated clock"
+    )
+    stepping.add_argument("cycles", metavar="N", type=int, help="how many, as fast as they go")
+    stepping.set_defaults(run=step)
 
 
 def start(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
@@ -26,3 +31,11 @@ def stop(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Stop the loop."""
     result = client.stop(args.runner, output.progress)
     output.changed("stopped", result)
+
+
+def step(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Run cycles of a stopped loop."""
+    if args.cycles < 1:
+        raise ValueError(f"step {args.cycles}: name at least 1 cycle")
+    result = client.step(args.cycles, args.runner, output.progress)
+    output.changed(f"stepped {args.cycles} cycles", result)

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 import rtcf
 
-from rtcfctl import component, graph, loop, parameter, runner, stats, status, types
+from rtcfctl import component, files, graph, loop, parameter, runner, stats, status, types
 from rtcfctl.output import Output
 
 DONE, REFUSED, USAGE, UNREACHABLE = range(4)
 
-_NOUNS = (status, runner, loop, component, graph, parameter, types, stats)
+_NOUNS = (status, runner, loop, component, graph, files, parameter, types, stats)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

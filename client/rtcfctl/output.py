@@ -84,6 +84,10 @@ class Output:
             self.data(result)
             return
         print(sentence)
+        self.notes(result)
+
+    def notes(self, result: control_pb2.ChangeResult) -> None:
+        """Print what else the caller of a change should know."""
         for note in result.notes:
             print(f"rtcfctl: note: {note}", file=sys.stderr)
 

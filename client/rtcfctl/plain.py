@@ -6,10 +6,10 @@ itself, and what has no value is null.
 """
 
 import math
-import re
 from typing import Any
 
 from google.protobuf.descriptor import FieldDescriptor
+from rtcf.enums import word
 
 _VALUE_MESSAGE = "rtcf.v1.ParameterValue"
 
@@ -25,7 +25,7 @@ def plain(message: Any) -> Any:
 def enumerator(message: Any, name: str) -> str:
     """Return the short name of an enum field's value, e.g. "catch_up"."""
     field = message.DESCRIPTOR.fields_by_name[name]
-    return _short(field.enum_type, getattr(message, name))
+    return word(field.enum_type, getattr(message, name))
 
 
 def _field(message: Any, field: FieldDescriptor) -> Any:
@@ -41,7 +41,7 @@ def _single(field: FieldDescriptor, value: Any) -> Any:
     if field.message_type is not None:
         return plain(value)
     if field.enum_type is not None:
-        return _short(field.enum_type, value)
+        return word(field.enum_type, value)
     return _number(value)
 
 
@@ -50,11 +50,3 @@ def _number(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     return value
-
-
-def _short(enum_type: Any, value: int) -> str:
-    found = enum_type.values_by_number.get(value)
-    if found is None:
-        return str(value)
-    prefix = re.sub(r"(?<!^)(?=[A-Z])", "_", enum_type.name).upper() + "_"
-    return str(found.name.removeprefix(prefix).lower())

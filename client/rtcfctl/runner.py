@@ -4,22 +4,22 @@ import argparse
 from typing import Any
 
 import rtcf
+from rtcf.enums import choices
 from rtcf.v1 import runner_pb2
 
 from rtcfctl.output import Output
 from rtcfctl.status import print_runners
 
-_REALTIME = {
-    "required": runner_pb2.REALTIME_REQUIRED,
-    "preferred": runner_pb2.REALTIME_PREFERRED,
-}
-_OVERRUN = {
-    "skip": runner_pb2.OVERRUN_POLICY_SKIP,
-    "catch_up": runner_pb2.OVERRUN_POLICY_CATCH_UP,
-    "relative": runner_pb2.OVERRUN_POLICY_RELATIVE,
+# Fields of RunnerSettings whose values are words.
+_CHOICES = {
+    "realtime": choices(runner_pb2.Realtime.DESCRIPTOR),
+    "overrun": choices(runner_pb2.OverrunPolicy.DESCRIPTOR),
+    "on_boot": choices(runner_pb2.OnBoot.DESCRIPTOR),
+    "on_crash": choices(runner_pb2.OnCrash.DESCRIPTOR),
 }
 # Options that are fields of RunnerSettings and of RosSettings.
-_FIELDS = ("frequency_hz", "cpu", "priority", "spin_us", "max_overruns", "lock_memory", "heap_kb",
+_FIELDS = ("frequency_hz", "cpu", "priority", "spin_us", "spin_auto", "max_overruns",
+           "warmup_cycles", "stall_timeout_ms", "orphan_timeout_s", "lock_memory", "heap_kb",
            "stack_kb")  # fmt: skip
 _ROS_FIELDS = ("enabled", "master_uri", "whitelist", "blacklist", "queue")
 
@@ -83,8 +83,8 @@ def settings_of(args: argparse.Namespace) -> runner_pb2.RunnerSettings:
     settings = runner_pb2.RunnerSettings()
     for field in _FIELDS:
         _take(settings, field, getattr(args, field))
-    _take(settings, "realtime", _REALTIME.get(args.realtime))
-    _take(settings, "overrun", _OVERRUN.get(args.overrun))
+    for field, known in _CHOICES.items():
+        _take(settings, field, known.get(getattr(args, field)))
     ros = runner_pb2.RosSettings()
     for field in _ROS_FIELDS:
         _take(ros, field, getattr(args, f"ros_{field}"))
@@ -112,9 +112,35 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
     to.add_argument(
         "--spin", dest="spin_us", type=int, metavar="µS", help="busy wait before each deadline"
     )
-    to.add_argument("--realtime", choices=sorted(_REALTIME), help="may the loop run without it?")
-    to.add_argument("--overrun", choices=list(_OVERRUN), help="what follows a late cycle")
+    to.add_argument(
+        "--spin-auto", action=switch, help="choose --spin from the observed wake-up latency"
+    )
+    to.add_argument("--realtime", choices=_CHOICES["realtime"], help="may the loop run without it?")
+    to.add_argument("--overrun", choices=_CHOICES["overrun"], help="what follows a late cycle")
     to.add_argument("--max-overruns", type=int, metavar="N", help="stop the loop above; 0: never")
+    to.add_argument(
+        "--warmup-cycles", type=int, metavar="N", help="first cycles, kept out of the statistics"
+    )
+    to.add_argument(
+        "--stall-timeout",
+        dest="stall_timeout_ms",
+        type=int,
+        metavar="MS",
+        help="end the executor when a cycle makes no progress for so long; 0: never",
+    )
+    to.add_argument(
+        "--orphan-timeout",
+        dest="orphan_timeout_s",
+        type=float,
+        metavar="S",
+        help="stop the loop when rtcfd has been gone for so long",
+    )
+    to.add_argument(
+        "--on-boot", choices=_CHOICES["on_boot"], help="of a loop that ran when rtcfd ended"
+    )
+    to.add_argument(
+        "--on-crash", choices=_CHOICES["on_crash"], help="of a loop whose executor crashed"
+    )
     to.add_argument("--lock-memory", action=switch, help="lock the executor's memory")
     to.add_argument("--heap-kb", type=int, metavar="KIB", help="heap touched at start")
     to.add_argument("--stack-kb", type=int, metavar="KIB", help="stack of the real-time thread")

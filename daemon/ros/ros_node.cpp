@@ -1,5 +1,10 @@
 #include "ros/ros_node.hpp"
 
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+
 #include "ros/master_watch.hpp"
 #include "ros/quiet_thread.hpp"
 
@@ -15,8 +20,15 @@ RosNode::~RosNode() {
         thread_.join();
     } else {
         // A master that went silent in the middle of one of roscpp's own calls,
-        // which have no bound. The thread keeps what it uses alive.
+        // which have no bound. The thread keeps what it uses alive. roscpp's exit
+        // handler would wait for that master too; this one runs before it.
         thread_.detach();
+        on_exit(
+            [](int status, void* /*unused*/) {
+                std::fflush(nullptr);
+                _exit(status);
+            },
+            nullptr);
     }
 }
 

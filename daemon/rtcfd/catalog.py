@@ -5,10 +5,11 @@ folders of the search path; of two types with one name the first found wins.
 """
 
 import asyncio
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import graph_pb2
 
 from rtcfd.describe import Describer
@@ -98,6 +99,18 @@ class Catalog:
             f'no package "{package}" with component libraries in {folders}'
             f"{suggestion(package, self._packages())}"
         )
+
+
+async def loads(catalog: Catalog, specs: Iterable[graph_pb2.ComponentSpec]) -> list[wire.Load]:
+    """Return components with their libraries; each type is looked for once."""
+    libraries: dict[tuple[str, str], str] = {}
+    result = []
+    for spec in specs:
+        key = (spec.package, spec.type)
+        if key not in libraries:
+            libraries[key] = await catalog.find(*key)
+        result.append(wire.Load(component=spec, library=libraries[key]))
+    return result
 
 
 def _one_problem(library: Path, problem: str) -> str:

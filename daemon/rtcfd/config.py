@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from rtcf.enums import choices
 from rtcf.v1 import runner_pb2
 
 from rtcfd import settings
@@ -19,18 +20,6 @@ from rtcfd.errors import InvalidArgument, Refusal
 from rtcfd.names import listing, suggestion
 
 DEFAULT_FILE = Path("/etc/rtcfd/rtcfd.toml")
-
-_ENUMERATORS: dict[str, dict[str, int]] = {
-    "realtime": {
-        "required": runner_pb2.REALTIME_REQUIRED,
-        "preferred": runner_pb2.REALTIME_PREFERRED,
-    },
-    "overrun": {
-        "skip": runner_pb2.OVERRUN_POLICY_SKIP,
-        "catch_up": runner_pb2.OVERRUN_POLICY_CATCH_UP,
-        "relative": runner_pb2.OVERRUN_POLICY_RELATIVE,
-    },
-}
 
 
 @dataclass
@@ -76,7 +65,7 @@ def _read_daemon(table: dict[str, Any], config: Config) -> None:
         raise InvalidArgument("daemon.path must be a list of folders")
     config.path = [_absolute_path("daemon.path", folder) for folder in folders]
     if "realtime" in table:
-        _enumerator("daemon.realtime", "realtime", table["realtime"])
+        _enumerator("daemon.realtime", runner_pb2.Realtime.DESCRIPTOR, table["realtime"])
         config.realtime = table["realtime"]
 
 
@@ -92,7 +81,7 @@ def _read_message(table: dict[str, Any], where: str, message: Any) -> None:
                 raise InvalidArgument(f"{name} must be a table")
             _read_message(value, name, getattr(message, key))
         elif descriptor.enum_type is not None:
-            setattr(message, key, _enumerator(name, key, value))
+            setattr(message, key, _enumerator(name, descriptor.enum_type, value))
         else:
             _set_scalar(message, key, name, value, type(descriptor.default_value))
 
@@ -109,11 +98,11 @@ def _set_scalar(message: Any, key: str, name: str, value: Any, expected: type) -
         raise InvalidArgument(f"{name} is out of range: {value}") from None
 
 
-def _enumerator(name: str, kind: str, value: Any) -> int:
-    choices = _ENUMERATORS[kind]
-    if not isinstance(value, str) or value not in choices:
-        raise InvalidArgument(f"{name} must be one of {', '.join(choices)}, not {value!r}")
-    return choices[value]
+def _enumerator(name: str, enum_type: Any, value: Any) -> int:
+    known = choices(enum_type)
+    if not isinstance(value, str) or value not in known:
+        raise InvalidArgument(f"{name} must be one of {', '.join(known)}, not {value!r}")
+    return known[value]
 
 
 def _absolute_path(name: str, value: Any) -> Path:

@@ -13,7 +13,7 @@ from google.protobuf.message import DecodeError
 from rtcf.executor.v1 import executor_pb2 as wire
 
 from rtcfd.command import ExecutorCommand
-from rtcfd.executor import describe_exit
+from rtcfd.process import describe_exit
 
 TIMEOUT_S = 10.0
 _AT_ONCE = 2

@@ -1,4 +1,4 @@
-"""The desired state of one runner: what was accepted, and nothing else.
+"""The desired state of one runner: what was accepted, and what came of it.
 
 Owned by its Runner; store.py keeps it on disk.
 """
@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from google.protobuf import json_format
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 
-from rtcfd import settings
+from rtcfd import names, settings
 from rtcfd.names import absolute
 
 
@@ -18,6 +18,8 @@ class Desired:
     def __init__(self, runner: str) -> None:
         self.runner = runner
         self.chosen = runner_pb2.RunnerSettings()
+        self.running = False  # the loop was started, and neither stopped nor ended by a fault
+        self.quarantined: dict[str, str] = {}  # components that a fault took out, and why
         self._components: dict[str, graph_pb2.ComponentSpec] = {}
         # The text of each component as it is saved: a change of one among
         # a thousand costs the text of one.
@@ -44,12 +46,25 @@ class Desired:
         kept.ns = namespace or "/"
         self._components[full_name] = kept
         self._texts.pop(full_name, None)
+        self.quarantined.pop(full_name, None)
 
     def drop(self, full_names: Iterable[str]) -> None:
         """Forget components."""
         for name in full_names:
             self._components.pop(name, None)
             self._texts.pop(name, None)
+            self.quarantined.pop(name, None)
+
+    def quarantine(self, full_name: str, reason: str) -> None:
+        """Note that a component is not to be loaded until it is released."""
+        if full_name in self._components:
+            self.quarantined[full_name] = reason
+
+    def become(self, specs: Iterable[graph_pb2.ComponentSpec]) -> None:
+        """Take a whole graph in the place of what was there."""
+        self.drop(list(self._components))
+        for spec in specs:
+            self.put(names.full_name(spec), spec)
 
     def set_breaks(self, ports: Iterable[control_pb2.PortName], broken: bool) -> None:
         """Note loop breaks that were set or removed."""

@@ -1,7 +1,7 @@
 """One executor process and the link to it.
 
-Owned by its Runner from launch to end.  It never restarts: a new start is a
-new object.
+Owned by its Runner from launch, or from its adoption, to its end.  It never
+restarts: a new start is a new object.
 """
 
 import asyncio
@@ -14,7 +14,9 @@ from rtcf.executor.v1 import executor_pb2 as wire
 
 from rtcfd.command import ExecutorCommand
 from rtcfd.errors import FailedPrecondition, Refusal, Unavailable
+from rtcfd.flight_recorder import FlightRecorder, Note
 from rtcfd.link import Link, Progress, Unasked
+from rtcfd.process import Child, End, Process, Stranger
 
 log = logging.getLogger(__name__)
 
@@ -24,63 +26,47 @@ STOP_TIMEOUT_S = 10.0  # for the loop to end and the stop hooks to return
 EXIT_TIMEOUT_S = 5.0  # from the exit frame, and then from SIGTERM, to the end
 _RETRY_S = 0.01
 
-
-def describe_exit(status: int) -> str:
-    """Return how a process ended, from its `returncode`."""
-    if status >= 0:
-        return f"ended with exit status {status}"
-    try:
-        number = signal.Signals(-status)
-    except ValueError:
-        return f"was killed by signal {-status}"
-    return f"was killed by {number.name} ({signal.strsignal(number)})"
+OnEnd = Callable[["Executor", End], None]
 
 
 class Executor:
     """A running executor.  `on_end` is called once, with how it ended."""
 
     def __init__(
-        self,
-        runner: str,
-        process: asyncio.subprocess.Process,
-        socket: Path,
-        on_unasked: Unasked,
-        on_end: Callable[["Executor", str], None],
+        self, runner: str, process: Process, socket: Path, on_unasked: Unasked, on_end: OnEnd
     ) -> None:
         self.pid = process.pid
         self.expected = False  # its end was asked for
+        self.ended = asyncio.Event()  # set after on_end
         self._peer = f"executor of {runner} (pid {process.pid})"
         self._process = process
         self._socket = socket
         self._on_unasked = on_unasked
         self._on_end = on_end
         self._link: Link | None = None
+        self._recorder: FlightRecorder | None = None
         self._watching: asyncio.Task[None] | None = None
 
     @classmethod
     async def launch(
-        cls,
-        runner: str,
-        command: ExecutorCommand,
-        on_unasked: Unasked,
-        on_end: Callable[["Executor", str], None],
+        cls, runner: str, command: ExecutorCommand, on_unasked: Unasked, on_end: OnEnd
     ) -> "Executor":
         """Start the process and connect; a failure leaves no process behind."""
-        socket = command.socket(runner)
-        await retire_orphan(runner, socket)
         try:
             # An own session: Ctrl-C at rtcfd's terminal reaches rtcfd alone, which
-            # then stops the loops in order.
+            # then stops the loops in order.  Signals as rtcfd has them: without
+            # SIGPIPE, so that a loop does not die of the reader of our stderr.
             process = await asyncio.create_subprocess_exec(
                 *command.arguments(runner),
                 stdin=asyncio.subprocess.DEVNULL,
                 stdout=2,
                 env=command.environment(),
                 start_new_session=True,
+                restore_signals=False,
             )
         except OSError as error:
             raise FailedPrecondition(f"cannot run {command.binary}: {error.strerror}") from None
-        executor = cls(runner, process, socket, on_unasked, on_end)
+        executor = cls(runner, Child(process), command.socket(runner), on_unasked, on_end)
         try:
             await executor._attach()
         except BaseException:
@@ -90,6 +76,58 @@ class Executor:
             raise
         executor._watching = asyncio.create_task(executor._watch())
         return executor
+
+    @classmethod
+    async def adopt(
+        cls, runner: str, socket: Path, on_unasked: Unasked, on_end: OnEnd
+    ) -> "Executor | None":
+        """Take over an executor that an earlier rtcfd left at its socket.
+
+        None if there is none: a dead socket is removed, and an executor that
+        speaks another protocol is ended in order.
+        """
+        try:
+            link = await Link.connect(f"left-over executor of {runner}", socket, on_unasked)
+        except FileNotFoundError:
+            return None
+        except ConnectionRefusedError:
+            socket.unlink(missing_ok=True)
+            return None
+        try:
+            process = Stranger(link.peer_pid)
+        except OSError:
+            await link.close()  # it has just ended
+            socket.unlink(missing_ok=True)
+            return None
+        executor = cls(runner, process, socket, on_unasked, on_end)
+        try:
+            link.peer = executor._peer
+            await executor._greet(link, QUERY_TIMEOUT_S)
+        except FailedPrecondition as refusal:
+            log.warning("%s: ending it", refusal)
+            await _retire(process, link)
+            socket.unlink(missing_ok=True)
+            return None
+        except BaseException as problem:
+            await link.close()
+            process.release()
+            if isinstance(problem, Unavailable):
+                raise Unavailable(
+                    f"{problem}; its loop may be running: `rtcfctl -r {runner} start` tries again, "
+                    f"`kill {executor.pid}` ends it"
+                ) from None
+            raise
+        executor._watching = asyncio.create_task(executor._watch())
+        return executor
+
+    @property
+    def connected(self) -> bool:
+        """Tell whether the link stands."""
+        return self._link is not None and not self._link.ended.is_set()
+
+    def note(self) -> Note | None:
+        """Return what the flight recorder says; None if there is none."""
+        return None if self._recorder is None else self._recorder.read()
 
     async def request(
         self,
@@ -110,29 +148,19 @@ class Executor:
             await self.request(wire.Request(exit=wire.Exit()), EXIT_TIMEOUT_S)
         except Refusal as refusal:
             log.warning("%s: no orderly end: %s", self._peer, refusal)
-            self._signal(signal.SIGTERM)
-        for harder in (signal.SIGTERM, signal.SIGKILL):
-            try:
-                await asyncio.wait_for(self._process.wait(), EXIT_TIMEOUT_S)
-                break
-            except TimeoutError:
-                log.warning("%s does not end: sending %s", self._peer, harder.name)
-                self._signal(harder)
+            self._process.signal(signal.SIGTERM)
+        await _end(self._process, self._peer)
         if self._watching is not None:
             await self._watching
-
-    def _signal(self, number: signal.Signals) -> None:
-        if self._process.returncode is None:
-            self._process.send_signal(number)
 
     async def _attach(self) -> None:
         """Connect and say hello, within the deadline."""
         loop = asyncio.get_running_loop()
         deadline = loop.time() + CONNECT_TIMEOUT_S
         while True:
-            if self._process.returncode is not None:
+            if self._process.end is not None:
                 raise FailedPrecondition(
-                    f"{self._peer} {describe_exit(self._process.returncode)} before it served; "
+                    f"{self._peer} {self._process.end} before it served; "
                     "its reason is in rtcfd's log"
                 )
             try:
@@ -146,10 +174,19 @@ class Executor:
                     ) from None
                 await asyncio.sleep(_RETRY_S)
         try:
-            await link.hello(max(deadline - loop.time(), 1.0))
+            await self._greet(link, max(deadline - loop.time(), 1.0))
         except BaseException:
             await link.close()
             raise
+
+    async def _greet(self, link: Link, timeout_s: float) -> None:
+        """Say hello, and open what the answer names."""
+        hello = await link.hello(timeout_s)
+        if self._recorder is None and hello.flight_recorder_fd > 0:
+            try:
+                self._recorder = FlightRecorder(link.peer_pid, hello.flight_recorder_fd)
+            except (OSError, ValueError) as error:
+                log.warning("%s: no flight recorder: %s", self._peer, error)
         self._link = link
 
     async def _watch(self) -> None:
@@ -169,33 +206,44 @@ class Executor:
                 await self._attach()
             except Refusal as refusal:
                 log.error("%s: ending it", refusal)
-                self._signal(signal.SIGTERM)
+                self._process.signal(signal.SIGTERM)
                 break
-        status = await ending
+        end = await ending
         if self._link is not None:
             await self._link.close()
         self._socket.unlink(missing_ok=True)
-        self._on_end(self, describe_exit(status))
+        self._on_end(self, end)
+        if self._recorder is not None:
+            self._recorder.close()
+            self._recorder = None
+        self.ended.set()
 
 
-async def retire_orphan(runner: str, socket: Path) -> None:
-    """End an executor that an earlier rtcfd left at this socket; remove a stale socket."""
+async def _retire(process: Stranger, link: Link) -> None:
+    """End an executor that cannot be adopted, in order if it understands that."""
     try:
-        link = await Link.connect(f"left-over executor of {runner}", socket, lambda _: None)
-    except FileNotFoundError:
-        return
-    except ConnectionRefusedError:
-        socket.unlink(missing_ok=True)
-        return
-    log.warning("runner %s: ending the executor that an earlier rtcfd left running", runner)
-    try:
-        await link.hello(QUERY_TIMEOUT_S)
         await link.request(wire.Request(exit=wire.Exit()), STOP_TIMEOUT_S)
-        await asyncio.wait_for(link.ended.wait(), EXIT_TIMEOUT_S)
-    except (Refusal, TimeoutError) as problem:
-        raise FailedPrecondition(
-            f"an executor that an earlier rtcfd left at {socket} does not end: {problem}"
-        ) from None
-    finally:
-        await link.close()
-    socket.unlink(missing_ok=True)
+    except Refusal:
+        process.signal(signal.SIGTERM)
+    await link.close()
+    await _end(process, f"left-over executor (pid {process.pid})")
+
+
+async def _end(process: Process, peer: str) -> None:
+    """Wait until a process that was asked to end has done so; insist."""
+    for harder in (signal.SIGTERM, signal.SIGKILL):
+        try:
+            await asyncio.wait_for(process.wait(), EXIT_TIMEOUT_S)
+            return
+        except TimeoutError:
+            log.warning("%s does not end: sending %s", peer, harder.name)
+            process.signal(harder)
+    await process.wait()
+
+
+def left_overs(folder: Path) -> list[str]:
+    """Return the runners that have a socket in the folder of the executors."""
+    try:
+        return sorted(each.stem for each in folder.glob("*.sock") if each.is_socket())
+    except OSError:
+        return []

@@ -3,13 +3,17 @@
 Functions on a Runner; each is one transaction of its executor.
 """
 
+from collections.abc import Sequence
+
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, graph_pb2
 
+from rtcfd import settings
+from rtcfd.catalog import loads
 from rtcfd.desired import replacement
-from rtcfd.errors import InvalidArgument, NotFound
+from rtcfd.errors import InvalidArgument, NotFound, Refusal
 from rtcfd.link import Progress
-from rtcfd.names import absolute, listing, suggestion
+from rtcfd.names import absolute, full_name, listing, suggestion
 from rtcfd.runner import Runner
 
 
@@ -17,7 +21,7 @@ async def load(
     runner: Runner, spec: graph_pb2.ComponentSpec, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Load a component."""
-    library = await runner.library(spec.package, spec.type)
+    library = await runner.catalog.find(spec.package, spec.type)
 
     async def work() -> control_pb2.ChangeResult:
         request = wire.Request(load=wire.Load(component=spec, library=library))
@@ -66,12 +70,17 @@ async def replace(
 ) -> control_pb2.ChangeResult:
     """Put a new component in the place of an old one."""
     old = absolute(name)
-    library = await runner.library(given.package, given.type)
+    library = await runner.catalog.find(given.package, given.type)
 
     async def work() -> control_pb2.ChangeResult:
         spec = replacement(runner.desired.components.get(old), given)
-        change = wire.Replace(component=old, replacement=spec, library=library)
-        result = (await runner.ask(wire.Request(replace=change), progress)).change
+        if old in runner.left_out:  # the executor does not have it
+            request = wire.Request(load=wire.Load(component=spec, library=library))
+        else:
+            change = wire.Replace(component=old, replacement=spec, library=library)
+            request = wire.Request(replace=change)
+        result = (await runner.ask(request, progress)).change
+        runner.left_out.pop(old, None)
         runner.desired.drop([old])
         runner.desired.put(result.component, spec)
         return await _saved(runner, result)
@@ -80,6 +89,99 @@ async def replace(
     result = await runner.change(f"the replacement of {old} by {what}", work)
     runner.log.info("%s replaced by %s (%s)", old, result.component, what)
     return result
+
+
+async def release(runner: Runner, names: list[str], progress: Progress) -> control_pb2.ChangeResult:
+    """Load components again that were left out of the loop."""
+    if not names:
+        raise InvalidArgument("no component named to release")
+    full_names = [absolute(name) for name in names]
+    what = ", ".join(full_names)
+
+    async def work() -> control_pb2.ChangeResult:
+        _check_known(runner, full_names)
+        for name in full_names:
+            if name not in runner.left_out:
+                raise NotFound(f"{name} is not left out of runner {runner.name}: it is in the loop")
+        specs = [runner.desired.components[name] for name in full_names]
+        if len(specs) == 1:
+            (load,) = await loads(runner.catalog, specs)
+            request = wire.Request(load=load)
+        else:
+            every = [spec for name, spec in runner.desired.components.items()
+                     if name not in runner.left_out or name in full_names]  # fmt: skip
+            request = wire.Request(apply=wire.Apply(components=await loads(runner.catalog, every)))
+        result = (await runner.ask(request, progress)).change
+        for name in full_names:
+            runner.left_out.pop(name, None)
+            runner.desired.quarantined.pop(name, None)
+        return await _saved(runner, result)
+
+    result = await runner.change(f"the release of {what}", work)
+    runner.log.info("%s released", what)
+    return result
+
+
+async def apply(
+    runner: Runner, request: control_pb2.ApplyRequest, progress: Progress
+) -> control_pb2.ChangeResult:
+    """Make the graph, and the settings that are given, what a request says."""
+    check_graph(request.components)
+    settings.check(request.settings)
+
+    async def work() -> control_pb2.ChangeResult:
+        before = runner.settings()
+        changes = settings.differences(before, request.settings)
+        apply = wire.Apply(components=await loads(runner.catalog, request.components), dry_run=True)
+        if changes and not request.dry_run:
+            # So that a graph that is refused changes no settings, for however short a time.
+            await runner.ask(wire.Request(apply=apply), progress)
+            await runner.ask(wire.Request(configure=request.settings))
+        apply.dry_run = request.dry_run
+        try:
+            result = (await runner.ask(wire.Request(apply=apply), progress)).change
+        except Refusal:
+            if changes and not request.dry_run and runner.up:
+                await runner.ask(wire.Request(configure=before))
+            raise
+        for text in changes:
+            kind = control_pb2.Difference.KIND_SETTINGS
+            result.differences.append(control_pb2.Difference(kind=kind, detail=text))
+        if request.dry_run:
+            return result
+        runner.desired.become(request.components)
+        runner.left_out.clear()
+        runner.desired.choose(request.settings)
+        return await _saved(runner, result)
+
+    result = await runner.change("the application of a graph", work)
+    if not request.dry_run:
+        runner.log.info("graph of %d components applied: %d differed",
+                        len(request.components), len(result.differences))  # fmt: skip
+    return result
+
+
+def left_out(runner: Runner) -> list[graph_pb2.ComponentInfo]:
+    """Return what belongs to the graph but is not loaded, with the reason."""
+    return [
+        graph_pb2.ComponentInfo(
+            full_name=name,
+            spec=runner.desired.components[name],
+            state=graph_pb2.COMPONENT_STATE_LEFT_OUT,
+            fault=reason,
+        )
+        for name, reason in sorted(runner.left_out.items())
+    ]
+
+
+def check_graph(specs: Sequence[graph_pb2.ComponentSpec]) -> None:
+    """Refuse a graph with two components of one name."""
+    seen: set[str] = set()
+    for spec in specs:
+        name = full_name(spec)
+        if name in seen:
+            raise InvalidArgument(f"component {name} is there twice in the graph")
+        seen.add(name)
 
 
 async def set_breaks(

@@ -5,6 +5,9 @@ by id.  A link that ends fails all requests that wait for it.
 """
 
 import asyncio
+import os
+import socket
+import struct
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +17,7 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcfd import errors, frames
 
 PROTOCOL = 1
+_CREDENTIALS = struct.Struct("3i")  # struct ucred, unix(7)
 
 Progress = Callable[[str], None]
 Unasked = Callable[[wire.Response], None]
@@ -45,20 +49,31 @@ class Link:
         writer: asyncio.StreamWriter,
         on_unasked: Unasked,
     ) -> None:
-        self._peer = peer
+        self.peer = peer
         self._writer = writer
         self._on_unasked = on_unasked
         self._next_id = 1
         self._pending: dict[int, _Pending] = {}
         self.problem = ""  # why the peer was cut off; empty = it closed
         self.ended = asyncio.Event()
+        credentials = writer.get_extra_info("socket").getsockopt(
+            socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size
+        )
+        # Of the process that listens, by the kernel's word.
+        self.peer_pid, self.peer_uid, _ = _CREDENTIALS.unpack(credentials)
         self._reading = asyncio.create_task(self._read(reader))
 
     @classmethod
     async def connect(cls, peer: str, path: Path, on_unasked: Unasked) -> "Link":
-        """Connect to the executor's socket; raises OSError."""
+        """Connect to the executor's socket; raises OSError, or a refusal of a foreign one."""
         reader, writer = await asyncio.open_unix_connection(path)
-        return cls(peer, reader, writer, on_unasked)
+        link = cls(peer, reader, writer, on_unasked)
+        if link.peer_uid not in (os.geteuid(), 0):
+            await link.close()
+            raise errors.Unavailable(
+                f"{path} is served by user {link.peer_uid}, not by us: remove it"
+            )
+        return link
 
     async def hello(self, timeout_s: float) -> wire.HelloResult:
         """Open the conversation and check that both speak the same protocol."""
@@ -66,7 +81,7 @@ class Link:
         result = (await self.request(request, timeout_s)).hello
         if result.protocol != PROTOCOL:
             raise errors.FailedPrecondition(
-                f"{self._peer} speaks protocol {result.protocol}, rtcfd {PROTOCOL}: "
+                f"{self.peer} speaks protocol {result.protocol}, rtcfd {PROTOCOL}: "
                 "install rtcfd and its executor of the same version"
             )
         return result
@@ -91,7 +106,7 @@ class Link:
                 response = await pending.result
         except TimeoutError:
             raise errors.Unavailable(
-                f"{self._peer} did not answer {request.WhichOneof('kind')} within {timeout_s:g} s"
+                f"{self.peer} did not answer {request.WhichOneof('kind')} within {timeout_s:g} s"
             ) from None
         except frames.FrameError as error:
             raise errors.InvalidArgument(f"request too large: {error}") from None
@@ -117,7 +132,7 @@ class Link:
             while (message := await frames.read(reader)) is not None:
                 self._dispatch(wire.Response.FromString(message))
         except (frames.FrameError, DecodeError) as error:
-            self.problem = f"{self._peer} does not keep to the protocol: {error}"
+            self.problem = f"{self.peer} does not keep to the protocol: {error}"
         finally:
             self._writer.close()
             self._fail_pending()
@@ -142,4 +157,4 @@ class Link:
                 pending.result.set_exception(errors.Unavailable(self._lost()))
 
     def _lost(self) -> str:
-        return self.problem or f"{self._peer} closed its connection"
+        return self.problem or f"{self.peer} closed its connection"

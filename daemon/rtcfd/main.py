@@ -18,6 +18,7 @@ from rtcfd.describe import Describer
 from rtcfd.desired import Desired
 from rtcfd.endpoint import Endpoint
 from rtcfd.errors import FailedPrecondition, Refusal
+from rtcfd.executor import left_overs
 from rtcfd.names import DEFAULT_RUNNER
 from rtcfd.notify import Notify
 from rtcfd.runner import Surroundings
@@ -50,6 +51,7 @@ class Daemon:
         )
         self._server = grpc.aio.server(options=_SERVER_OPTIONS)
         self._endpoint = Endpoint(given.socket)
+        self._left_over: list[str] = []  # runners of executors that outlived another rtcfd
         control_pb2_grpc.add_ControlServicer_to_server(  # type: ignore[no-untyped-call]
             Control(self._runners, catalog), self._server
         )
@@ -67,6 +69,7 @@ class Daemon:
                 f"cannot make the state folder {self._options.state_dir}: {error.strerror}"
             ) from None
         self._endpoint.listen(self._server)
+        self._left_over = left_overs(self._command.folder)
         states = self._store.load()
         if self._options.default_runner and DEFAULT_RUNNER not in [s.runner for s in states]:
             states.append(Desired(DEFAULT_RUNNER))
@@ -87,7 +90,7 @@ class Daemon:
         log.info("ended")
 
     async def _start(self) -> None:
-        await self._runners.bring_up()
+        await self._runners.bring_up(self._left_over)
         self._notify.ready(self._runners.summary())
         log.info("ready; runners: %s", self._runners.summary())
 

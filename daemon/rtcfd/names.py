@@ -4,6 +4,8 @@ import difflib
 import re
 from collections.abc import Iterable
 
+from rtcf.v1 import graph_pb2
+
 from rtcfd.errors import InvalidArgument
 
 DEFAULT_RUNNER = "rt_runner"
@@ -27,6 +29,12 @@ def check_base_name(kind: str, name: str) -> str:
 def absolute(name: str) -> str:
     """Resolve a component's name as requests give it: relative ones are taken in "/"."""
     return name if name.startswith("/") else "/" + name
+
+
+def full_name(spec: graph_pb2.ComponentSpec) -> str:
+    """Return namespace and name of a component as the executor makes them."""
+    parts = [part for part in spec.ns.split("/") if part]
+    return "/" + "/".join([*parts, spec.name or spec.type])
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:

@@ -62,7 +62,13 @@ def parse(arguments: Sequence[str] | None, build_tree: Path | None) -> Options:
         state_dir=_absolute(state_dir) if state_dir else None,
         executor=_absolute(args.executor or file.executor or paths.executor(build_tree)),
         folders=paths.component_folders([*args.path, *file.path], build_tree),
-        defaults=settings.merged(settings.defaults(_REALTIME[realtime]), file.runner),
+        defaults=settings.merged(
+            settings.defaults(
+                _REALTIME[realtime],
+                settings.PRIVATE_ORPHAN_TIMEOUT_S if args.foreground else settings.ORPHAN_TIMEOUT_S,
+            ),
+            file.runner,
+        ),
         default_runner=args.default_runner,
         verbose=args.verbose,
     )
@@ -79,7 +85,8 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
             Without --foreground it is the systemd service: files under /run/rtcfd and
             /var/lib/rtcfd, real time required, settings from /etc/rtcfd/rtcfd.toml.
             With it, it is private: preferred real time, no state kept unless --state-dir
-            is given, no settings read unless --config is given.
+            is given, no settings read unless --config is given, and its loops stop soon
+            after it however it ends (orphan_timeout_s = 2 instead of 60).
 
             Components are looked for in <folder>/<package>/*.so, in this order:
               each --path, then each `path` of the configuration file, then

@@ -1,25 +1,29 @@
 """One runner: its executor, its desired state, and its loop.
 
 Owned by Runners.  Changes take turns; `stop` and queries wait for none of
-them.  What changes the components is in graph.py.
+them.  What changes the components is in graph.py, how an executor gets its
+graph (again) in revival.py.
 """
 
 import asyncio
+import contextlib
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, runner_pb2
 
-from rtcfd import settings
+from rtcfd import revival, settings
 from rtcfd.catalog import Catalog
 from rtcfd.command import ExecutorCommand
+from rtcfd.crash import Crashes, judge
 from rtcfd.desired import Desired
 from rtcfd.errors import Refusal, Unavailable
 from rtcfd.executor import CONNECT_TIMEOUT_S, Executor
 from rtcfd.link import Progress
+from rtcfd.process import End
 from rtcfd.relay import Relay, logger_of
 from rtcfd.store import Store
 from rtcfd.turns import Turns
@@ -27,6 +31,7 @@ from rtcfd.turns import Turns
 CHANGE_TIMEOUT_S = 60.0  # for one change, waiting for those before it included
 STOP_TIMEOUT_S = 30.0
 STATUS_TIMEOUT_S = 2.0
+_LAST_WORDS_S = 2.0  # from the loss of a link to the end of its executor
 _WORTH_SAYING_S = 2.0  # a change that takes longer shows in the status
 
 Result = TypeVar("Result")
@@ -49,23 +54,32 @@ class Runner:
     def __init__(self, desired: Desired, surroundings: Surroundings) -> None:
         self.name = desired.runner
         self.desired = desired
-        self.left_out: dict[str, str] = {}  # components that did not load, and why
+        self.left_out: dict[str, str] = {}  # components that are not loaded, and why
+        self.crashes = Crashes()
+        self.held = ""  # why the loop is not started, if that was not asked for
+        self.running = False  # the loop, as far as told
         self.log = logger_of(self.name)
         self._shared = surroundings
         self._turns = Turns(self.name, self.log)
         self._relay = Relay(self.name, self._loop_ended)
         self._executor: Executor | None = None
         self._trouble = "its executor is not started"  # why there is none
+        self._saving = asyncio.Lock()
         self._unsaved = ""  # why the desired state is not on disk
-        self._running = False  # the loop, as far as told
         self._closing = False
         self._settled = asyncio.Event()  # not set while an executor is being started
+        self._background: set[asyncio.Task[None]] = set()
 
     # -- life ---------------------------------------------------------------
 
-    async def bring_up(self) -> None:
-        """Start the executor and load the components, held: the loop is not started."""
-        await self.change("the start of its executor", self._start_executor)
+    async def bring_up(self, only_left_over: bool = False) -> bool:
+        """Adopt the executor that is there, or start one (unless `only_left_over`) and load
+        the components; held, or as `on_boot` says.  Tell whether there is one."""
+
+        async def work() -> bool:
+            return await self.start_executor(only_left_over, boot=True)
+
+        return await self.change("the start of its executor", work)
 
     async def shut_down(self) -> None:
         """Stop the loop in order and end the executor."""
@@ -75,13 +89,21 @@ class Runner:
         if executor is not None:
             await executor.shut_down()
         await self._turns.drain()
+        await asyncio.gather(*self._background)
 
-    async def _start_executor(self) -> None:
-        complete = self.desired.complete(self._shared.defaults)
+    async def start_executor(self, only_left_over: bool = False, boot: bool = False) -> bool:
+        """Do what bring_up() says, in a turn; without `boot` the loop is held."""
         self._settled.clear()
         self._trouble = "its executor is starting"
         try:
-            executor = await self._launch(complete)
+            executor = await Executor.adopt(
+                self.name, self._shared.command.socket(self.name), self._relay.take, self._ended
+            )
+            adopted = executor is not None
+            if executor is None and only_left_over:
+                self._trouble = "it has no executor"
+                return False
+            executor = executor or await self._launch()
             if self._closing:
                 await executor.shut_down()
                 raise Unavailable(f"runner {self.name} is being ended")
@@ -92,58 +114,72 @@ class Runner:
         finally:
             self._settled.set()
         self._trouble = ""
-        await self._restore()
+        if adopted:
+            await revival.follow(self)
+        else:
+            await revival.restore(self)
+        if boot:
+            await revival.resume(self)
         self._shared.on_change()
+        return True
 
-    async def _launch(self, complete: runner_pb2.RunnerSettings) -> Executor:
+    async def _launch(self) -> Executor:
         executor = await Executor.launch(
-            self.name,
-            self._shared.command,
-            self._relay.take,
-            self._ended,
+            self.name, self._shared.command, self._relay.take, self._ended
         )
         try:
-            await executor.request(wire.Request(configure=complete))
+            await executor.request(wire.Request(configure=self.settings()))
         except BaseException:
             await executor.shut_down()
             raise
         return executor
 
-    async def _restore(self) -> None:
-        """Load what is desired; what does not load is left out and reported."""
-        self.left_out.clear()
-        for full_name, spec in self.desired.components.items():
-            try:
-                library = await self.library(spec.package, spec.type)
-                load = wire.Load(component=spec, library=library)
-                await self.ask(wire.Request(load=load))
-            except Refusal as refusal:
-                self.left_out[full_name] = str(refusal)
-                self.log.error("%s is left out of the loop: %s", full_name, refusal)
-                if not self.up:
-                    return
-        if self.desired.components:
-            count = len(self.desired.components) - len(self.left_out)
-            self.log.info("%d of its components restored, held", count)
-
-    def _ended(self, executor: Executor, how: str) -> None:
+    def _ended(self, executor: Executor, end: End) -> None:
         """An executor of ours is dead."""
-        self._running = False
-        if executor is self._executor:
+        was_running, self.running = self.running, False
+        ours = executor is self._executor
+        if ours:
             self._executor = None
-            self._trouble = (
-                f"its executor (pid {executor.pid}) {how} at {time.strftime('%H:%M:%S')}; "
-                f"`rtcfctl -r {self.name} start` brings it back with its components"
-            )
-        if executor.expected:
-            self.log.info("executor (pid %d) %s", executor.pid, how)
-        else:
-            self.log.error("executor (pid %d) %s: its loop is down", executor.pid, how)
+        if executor.expected or self._closing:
+            self.log.info("executor (pid %d) %s", executor.pid, end)
+            return
+        verdict = judge(end, executor.note())
+        self._trouble = (
+            f"its executor (pid {executor.pid}) {verdict} at {time.strftime('%H:%M:%S')}"
+        )
+        self.log.logger.error(
+            "executor (pid %d) %s: its loop is down",
+            executor.pid,
+            verdict,
+            extra={"runner": self.name, "component": verdict.culprit},
+        )
         self._shared.on_change()
+        if ours:
+            self.crashes.add()
+            self.desired.quarantine(verdict.culprit, str(verdict))
+            # From here on a `stop` counts.
+            self.desired.running = was_running and revival.resumes(self, verdict)
+            self._in_background(revival.recover(self, verdict, self._trouble))
 
     def _loop_ended(self) -> None:
-        self._running = False
+        """The loop has ended by itself."""
+        self._note_running(False)
+        self._in_background(self._save_quietly())
+
+    def _note_running(self, running: bool) -> None:
+        self.running = running
+        # What ends because rtcfd does is to run again.
+        if not self._closing:
+            self.desired.running = running
         self._shared.on_change()
+
+    async def _save_quietly(self) -> None:
+        await self.save()
+
+    def _in_background(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.create_task(work)
+        self._background.add(task)
+        task.add_done_callback(self._background.discard)
 
     # -- queries ------------------------------------------------------------
 
@@ -156,14 +192,32 @@ class Runner:
         """Return one word on the loop."""
         if not self.up:
             return "down"
-        return "running" if self._running else "stopped"
+        return "running" if self.running else "stopped"
+
+    @property
+    def trouble(self) -> str:
+        """Why there is no executor."""
+        return self._trouble
+
+    @property
+    def closing(self) -> bool:
+        """Tell whether it is being ended."""
+        return self._closing
+
+    def settings(self) -> runner_pb2.RunnerSettings:
+        """Return all settings."""
+        return self.desired.complete(self._shared.defaults)
+
+    @property
+    def defaults(self) -> runner_pb2.RunnerSettings:
+        """What settings are unless chosen."""
+        return self._shared.defaults
 
     async def status(self) -> runner_pb2.RunnerStatus:
         """Return what the runner is doing, whatever state it is in."""
         status = runner_pb2.RunnerStatus(
             runner=self.name,
             state=runner_pb2.RUNNER_STATE_DOWN,
-            settings=self.desired.complete(self._shared.defaults),
         )
         executor = self._executor
         lines = [self._trouble]
@@ -180,6 +234,13 @@ class Runner:
                     lines.append(self._trouble)  # it has just died
             status.runner = self.name
             status.pid = executor.pid if executor is self._executor else 0
+        # Some settings are rtcfd's alone.
+        status.settings.CopyFrom(settings.merged(self.settings(), status.settings))
+        status.chosen.CopyFrom(self.desired.chosen)
+        if self.held:
+            lines.append(self.held)
+            if status.state == runner_pb2.RUNNER_STATE_STOPPED:
+                status.state = runner_pb2.RUNNER_STATE_FAULTED
         lines.append(self._turns.busy(longer_than_s=_WORTH_SAYING_S))
         lines += [f"{name} is left out: {reason}" for name, reason in self.left_out.items()]
         lines.append(self._unsaved)
@@ -214,48 +275,91 @@ class Runner:
         """Start the loop; an executor that is down is brought back first."""
 
         async def work() -> control_pb2.ChangeResult:
-            if not self.up:
-                progress("starting the executor")
-                await self._start_executor()
-            response = await self.ask(wire.Request(start=wire.Start()), progress)
-            self._running = True
-            return response.change
+            await self._need_executor(progress)
+            return await self.start_loop(progress)
 
         result = await self.change("the start", work)
         self.log.info("loop started")
-        self._shared.on_change()
         return result
+
+    async def start_loop(self, progress: Progress | None = None) -> control_pb2.ChangeResult:
+        """Start the loop, in a turn."""
+        response = await self.ask(wire.Request(start=wire.Start()), progress)
+        self.held = ""
+        self._note_running(True)
+        response.change.notes.extend(await self.save())
+        return response.change
 
     async def stop(self, progress: Progress) -> control_pb2.ChangeResult:
         """End the loop at the next boundary.  Never queues; a dead loop is a stopped loop."""
+        if self.up:
+            request = wire.Request(stop=wire.Stop())
+            result = (await self._alive().request(request, STOP_TIMEOUT_S, progress)).change
+            self.log.info("loop stopped")
+        else:
+            result = control_pb2.ChangeResult(notes=[f"no loop to stop: {self._trouble}"])
+        was_desired = self.desired.running
+        self._note_running(False)
+        if was_desired:
+            result.notes.extend(await self.save())
+        return result
+
+    async def step(self, cycles: int, progress: Progress) -> control_pb2.ChangeResult:
+        """Run cycles of a stopped loop on a simulated clock; takes as long as they take."""
+
+        async def work() -> control_pb2.ChangeResult:
+            await self._need_executor(progress)
+            step = control_pb2.StepRequest(cycles=cycles)
+            return (await self.ask(wire.Request(step=step), progress)).change
+
+        result = await self.change("stepping", work, timeout_s=None)
+        self.log.info("%d cycles stepped", cycles)
+        return result
+
+    async def _need_executor(self, progress: Progress) -> None:
         if not self.up:
-            return control_pb2.ChangeResult(notes=[f"no loop to stop: {self._trouble}"])
-        request = wire.Request(stop=wire.Stop())
-        response = await self._alive().request(request, STOP_TIMEOUT_S, progress)
-        self.log.info("loop stopped")
-        self._loop_ended()
-        return response.change
+            progress("starting the executor")
+            await self.start_executor()
 
-    # -- for graph.py -------------------------------------------------------
+    # -- for graph.py and revival.py ----------------------------------------
 
-    async def library(self, package: str, type_name: str) -> str:
-        """Return the library of a component type."""
-        return await self._shared.catalog.find(package, type_name)
+    @property
+    def catalog(self) -> Catalog:
+        """Where libraries are found."""
+        return self._shared.catalog
 
-    async def change(self, what: str, work: Callable[[], Awaitable[Result]]) -> Result:
+    async def change(
+        self,
+        what: str,
+        work: Callable[[], Awaitable[Result]],
+        timeout_s: float | None = CHANGE_TIMEOUT_S,
+    ) -> Result:
         """Do one change in its turn."""
-        return await self._turns.take(what, work, CHANGE_TIMEOUT_S)
+        return await self._turns.take(what, work, timeout_s)
 
     async def ask(self, request: wire.Request, progress: Progress | None = None) -> wire.Response:
         """Ask the executor for a change; its caller's limit is change()'s."""
-        return await self._alive().request(request, None, progress)
+        executor = self._alive()
+        try:
+            return await executor.request(request, None, progress)
+        except Unavailable:
+            if executor.connected:
+                raise
+            # It may have died of this change: then its end says more than the lost link.
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(_LAST_WORDS_S):
+                    await executor.ended.wait()
+            if executor is self._executor or self._closing:
+                raise
+            raise Unavailable(f"runner {self.name}: {self._trouble}") from None
 
     async def save(self) -> list[str]:
         """Save the desired state; return a note if that failed: the change stands."""
-        text = self._shared.store.text(self.desired)
         try:
-            # Not here: fsync may take long.
-            await asyncio.to_thread(self._shared.store.save, self.name, text)
+            async with self._saving:
+                text = self._shared.store.text(self.desired)
+                # Not here: fsync may take long.
+                await asyncio.to_thread(self._shared.store.save, self.name, text)
         except OSError as error:
             self._unsaved = f"not saved: {error.strerror}"
             self.log.error("its state is %s", self._unsaved)

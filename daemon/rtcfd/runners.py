@@ -4,12 +4,14 @@ import asyncio
 import logging
 from collections.abc import Iterable
 
-from rtcf.v1 import runner_pb2
+from rtcf.v1 import control_pb2, runner_pb2
 
-from rtcfd import settings
+from rtcfd import graph, settings
+from rtcfd.catalog import loads
 from rtcfd.desired import Desired
 from rtcfd.errors import AlreadyExists, NotFound, Refusal, Unavailable
-from rtcfd.names import DEFAULT_RUNNER, check_base_name, listing, suggestion
+from rtcfd.link import Progress
+from rtcfd.names import DEFAULT_RUNNER, check_base_name, full_name, listing, suggestion
 from rtcfd.runner import Runner, Surroundings
 
 log = logging.getLogger(__name__)
@@ -28,8 +30,9 @@ class Runners:
         for desired in states:
             self._runners[desired.runner] = Runner(desired, self._shared)
 
-    async def bring_up(self) -> None:
-        """Start the executors of all runners; failures are reported and show in the status."""
+    async def bring_up(self, left_over: Iterable[str] = ()) -> None:
+        """Adopt or start the executors of all runners, and adopt those of runners that are not
+        known but have left an executor; failures are reported and show in the status."""
 
         async def one(runner: Runner) -> None:
             try:
@@ -37,7 +40,22 @@ class Runners:
             except Refusal as refusal:
                 runner.log.error("%s", refusal)
 
-        await asyncio.gather(*(one(runner) for runner in self._runners.values()))
+        unknown = [name for name in left_over if name not in self._runners]
+        await asyncio.gather(
+            *(one(runner) for runner in self._runners.values()),
+            *(self._take_left_over(name) for name in unknown),
+        )
+
+    async def _take_left_over(self, name: str) -> None:
+        runner = self._runners[name] = Runner(Desired(name), self._shared)
+        try:
+            if await runner.bring_up(only_left_over=True):
+                runner.log.warning("runner %s was not in the saved state", name)
+                await runner.save()
+                return
+        except Refusal as refusal:
+            runner.log.error("%s", refusal)
+        del self._runners[name]
 
     def get(self, name: str) -> Runner:
         """Return a runner; empty is the default one."""
@@ -80,6 +98,35 @@ class Runners:
         await runner.save()
         runner.log.info("runner added")
         return runner
+
+    async def apply(
+        self, request: control_pb2.ApplyRequest, progress: Progress
+    ) -> control_pb2.ChangeResult:
+        """Apply a graph to a runner that may have to be added."""
+        name = request.runner or DEFAULT_RUNNER
+        if name in self._runners:
+            return await graph.apply(self._runners[name], request, progress)
+        check_base_name("runner", name)
+        settings.check(request.settings)
+        graph.check_graph(request.components)
+        if request.dry_run:
+            await loads(self._shared.catalog, request.components)
+            return control_pb2.ChangeResult(
+                notes=[f"runner {name} would be added; its graph is wired when it is applied"],
+                differences=[
+                    control_pb2.Difference(
+                        kind=control_pb2.Difference.KIND_LOAD, component=full_name(spec)
+                    )
+                    for spec in request.components
+                ],
+            )
+        progress(f"adding runner {name}")
+        runner = await self.add(name, request.settings)
+        try:
+            return await graph.apply(runner, request, progress)
+        except Refusal:
+            await self.remove(name)
+            raise
 
     async def remove(self, name: str) -> None:
         """Stop a runner and forget it."""

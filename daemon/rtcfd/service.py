@@ -135,6 +135,12 @@ class Control(control_pb2_grpc.ControlServicer):
         return self._runners.get(request.runner).stop
 
     @_changing
+    def Step(self, request: control_pb2.StepRequest) -> Any:
+        """Run cycles on a simulated clock."""
+        runner = self._runners.get(request.runner)
+        return lambda progress: runner.step(request.cycles, progress)
+
+    @_changing
     def Load(self, request: control_pb2.LoadRequest) -> Any:
         """Load a component."""
         runner = self._runners.get(request.runner)
@@ -155,6 +161,17 @@ class Control(control_pb2_grpc.ControlServicer):
         )
 
     @_changing
+    def Apply(self, request: control_pb2.ApplyRequest) -> Any:
+        """Make the graph what the request says."""
+        return lambda progress: self._runners.apply(request, progress)
+
+    @_changing
+    def Release(self, request: control_pb2.ReleaseRequest) -> Any:
+        """Load components again."""
+        runner = self._runners.get(request.runner)
+        return lambda progress: graph.release(runner, list(request.components), progress)
+
+    @_changing
     def SetBreaks(self, request: control_pb2.SetBreaksRequest) -> Any:
         """Set or remove loop breaks."""
         runner = self._runners.get(request.runner)
@@ -168,8 +185,10 @@ class Control(control_pb2_grpc.ControlServicer):
 
     @_answering
     async def ListComponents(self, request: control_pb2.ListComponentsRequest) -> Any:
-        """All components, in order of the schedule."""
-        return control_pb2.ListComponentsResponse(components=await self._components(request.runner))
+        """All components, in order of the schedule; then those that are left out."""
+        components = await self._components(request.runner)
+        left_out = graph.left_out(self._runners.get(request.runner))
+        return control_pb2.ListComponentsResponse(components=components + left_out)
 
     @_answering
     async def GetComponent(self, request: control_pb2.GetComponentRequest) -> Any:
@@ -177,6 +196,9 @@ class Control(control_pb2_grpc.ControlServicer):
         name = absolute(request.component)
         query = control_pb2.GetComponentRequest(runner=request.runner, component=name)
         runner = self._runners.get(request.runner)
+        for info in graph.left_out(runner):
+            if info.full_name == name:
+                return info
         return (await runner.query(wire.Request(get_component=query))).component
 
     @_answering

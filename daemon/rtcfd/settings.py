@@ -6,19 +6,29 @@ engine that will use them.
 
 import math
 import os
+from typing import Any, TypeVar
 
+from rtcf.enums import word
 from rtcf.v1 import runner_pb2
 
 from rtcfd.errors import InvalidArgument
 
+Settings = TypeVar("Settings", runner_pb2.RunnerSettings, runner_pb2.RosSettings)
+
 FREQUENCY_HZ = (0.1, 20000.0)
 PRIORITY = (1, 98)  # 99 is the kernel's own watchdog and migration threads'
 LAST_CPU = -1  # the last one that is allowed
+ORPHAN_TIMEOUT_S = 60.0
+# A private rtcfd takes its executors with it, however it ends.
+PRIVATE_ORPHAN_TIMEOUT_S = 2.0
+_LONGEST_S = 86400.0
 _MAX_MEMORY_KB = 64 * 1024 * 1024
 _DEFAULT_MASTER = "http://localhost:11311"
 
 
-def defaults(realtime: runner_pb2.Realtime) -> runner_pb2.RunnerSettings:
+def defaults(
+    realtime: runner_pb2.Realtime, orphan_timeout_s: float = ORPHAN_TIMEOUT_S
+) -> runner_pb2.RunnerSettings:
     """Return complete settings; ROS_MASTER_URI of our environment is part of them."""
     return runner_pb2.RunnerSettings(
         frequency_hz=1000.0,
@@ -31,6 +41,12 @@ def defaults(realtime: runner_pb2.Realtime) -> runner_pb2.RunnerSettings:
         lock_memory=True,
         heap_kb=8192,
         stack_kb=256,
+        warmup_cycles=10,
+        stall_timeout_ms=2000,
+        orphan_timeout_s=orphan_timeout_s,
+        spin_auto=False,
+        on_boot=runner_pb2.ON_BOOT_HOLD,
+        on_crash=runner_pb2.ON_CRASH_HOLD,
         ros=runner_pb2.RosSettings(
             enabled=True,
             master_uri=os.environ.get("ROS_MASTER_URI") or _DEFAULT_MASTER,
@@ -47,14 +63,53 @@ def merged(
     """Return `base` with what `change` sets; what is UNSPECIFIED there counts as unset."""
     effective = runner_pb2.RunnerSettings()
     effective.CopyFrom(change)
-    if effective.realtime == runner_pb2.REALTIME_UNSPECIFIED:
-        effective.ClearField("realtime")
-    if effective.overrun == runner_pb2.OVERRUN_POLICY_UNSPECIFIED:
-        effective.ClearField("overrun")
+    for field in ("realtime", "overrun", "on_boot", "on_crash"):
+        if not getattr(effective, field):
+            effective.ClearField(field)
     result = runner_pb2.RunnerSettings()
     result.CopyFrom(base)
     result.MergeFrom(effective)
     return result
+
+
+def changed(base: Settings, other: Settings) -> Settings:
+    """Return the settings of `other` that are set and not as in `base`."""
+    result = type(other)()
+    for field, value in other.ListFields():
+        if field.message_type is not None:
+            inner = changed(getattr(base, field.name), value)
+            if inner.ListFields():
+                getattr(result, field.name).CopyFrom(inner)
+        elif not _same(getattr(base, field.name), value):
+            setattr(result, field.name, value)
+    return result
+
+
+def differences(base: Settings, other: Settings, prefix: str = "") -> list[str]:
+    """Return a line for each setting of `other` that is set and not as in `base`."""
+    lines: list[str] = []
+    for field, value in changed(base, other).ListFields():
+        old = getattr(base, field.name)
+        if field.message_type is not None:
+            lines += differences(old, value, f"{field.name}.")
+        else:
+            lines.append(f"{prefix}{field.name} {_text(field, old)} -> {_text(field, value)}")
+    return lines
+
+
+def _same(one: Any, other: Any) -> bool:
+    # An executor counts in ns; what it tells may be rounded.
+    if isinstance(one, float):
+        return math.isclose(one, other, rel_tol=1e-9, abs_tol=1e-9)
+    return bool(one == other)
+
+
+def _text(field: Any, value: Any) -> str:
+    if field.enum_type is not None:
+        return word(field.enum_type, value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f"{value:g}" if isinstance(value, float) else str(value) or "''"
 
 
 def check(settings: runner_pb2.RunnerSettings) -> None:
@@ -81,6 +136,12 @@ def check(settings: runner_pb2.RunnerSettings) -> None:
         if settings.HasField(field) and getattr(settings, field) > _MAX_MEMORY_KB:
             raise InvalidArgument(
                 f"{field} of {getattr(settings, field)} is out of range: at most {_MAX_MEMORY_KB}"
+            )
+    if settings.HasField("orphan_timeout_s"):
+        value = settings.orphan_timeout_s
+        if not (math.isfinite(value) and 0.0 <= value <= _LONGEST_S):
+            raise InvalidArgument(
+                f"orphan timeout of {value:g} s is out of range: 0 to {_LONGEST_S:g} s"
             )
     if settings.HasField("ros") and settings.ros.HasField("master_uri"):
         uri = settings.ros.master_uri

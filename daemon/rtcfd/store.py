@@ -14,7 +14,7 @@ from rtcf.v1 import graph_pb2
 
 from rtcfd.desired import Desired
 from rtcfd.errors import Refusal
-from rtcfd.names import absolute, check_base_name
+from rtcfd.names import check_base_name, full_name
 
 log = logging.getLogger(__name__)
 
@@ -58,6 +58,8 @@ class Store:
             f'  "version": {VERSION},\n'
             f'  "runner": {json.dumps(desired.runner)},\n'
             f'  "settings": {chosen},\n'
+            f'  "running": {json.dumps(desired.running)},\n'
+            f'  "quarantined": {json.dumps(desired.quarantined)},\n'
             f'  "components": [\n{components}\n  ]\n'
             "}\n"
         ).encode()
@@ -119,10 +121,8 @@ def _parse(runner: str, text: bytes) -> Desired:
     json_format.ParseDict(document.get("settings", {}), desired.chosen)
     for entry in document.get("components", []):
         spec = json_format.ParseDict(entry, graph_pb2.ComponentSpec())
-        desired.put(_full_name(spec), spec)
+        desired.put(full_name(spec), spec)
+    desired.running = document.get("running", False) is True
+    for name, reason in document.get("quarantined", {}).items():
+        desired.quarantine(name, str(reason))
     return desired
-
-
-def _full_name(spec: graph_pb2.ComponentSpec) -> str:
-    namespace = absolute(spec.ns).rstrip("/")
-    return f"{namespace}/{spec.name or spec.type}"

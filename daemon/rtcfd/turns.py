@@ -27,9 +27,10 @@ class Turns:
         self._tasks: set[asyncio.Task[Any]] = set()
 
     async def take(
-        self, what: str, work: Callable[[], Awaitable[Result]], timeout_s: float
+        self, what: str, work: Callable[[], Awaitable[Result]], timeout_s: float | None
     ) -> Result:
-        """Do `work` when it is its turn; `timeout_s` counts from now, on the wall clock."""
+        """Do `work` when it is its turn; `timeout_s` counts from now, on the wall clock (None:
+        no limit)."""
         task = asyncio.create_task(self._run(what, work))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)

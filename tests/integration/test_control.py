@@ -1,48 +1,23 @@
-"""rtcfd with the real executor: graphs, refusals, deaths, restarts; without ROS."""
+"""The client library: graphs, refusals, deaths, restarts, several runners; without ROS."""
 
 import os
 import signal
 
+import fig_1
 import pytest
 import rtcf
-from conftest import Daemon, wait_for
+from daemon_process import Daemon, wait_for
+from fig_1 import mimo
 from rtcf.v1 import graph_pb2, runner_pb2
-
-# Fig. 1 of the paper: ports and the names they are mapped to.
-FIG_1 = {
-    "R3": {"in1": "F1_R", "in2": "R2_R3", "out1": "R3_G2H1"},
-    "R2": {"in1": "F1_R", "in2": "H1_R", "in3": "R1_H1R2", "in4": "G2_R2", "out1": "R2_R3"},
-    "R1": {"in1": "H1_R", "out1": "R1_H1R2"},
-    "F1": {"in1": "H1_F1", "out1": "F1_R"},
-    "H1": {"in1": "R3_G2H1", "in2": "R1_H1R2", "out1": "H1_F1", "out2": "H1_R"},
-}
-PORTS = ("in1", "in2", "in3", "in4", "out1", "out2")
-
-
-def mimo(name: str, mapped: dict[str, str], *, first: bool = False) -> graph_pb2.ComponentSpec:
-    """Return a Mimo; ports that are not mapped get a name of their own."""
-    remaps = [f"{port}:=/{mapped.get(port, f'{name}_{port}')}" for port in PORTS]
-    return rtcf.component("rtcf_examples", "Mimo", name=name, remaps=remaps, first=first)
-
-
-def load_fig_1(client: rtcf.Client) -> None:
-    for name, mapped in FIG_1.items():
-        # H1 is loaded last, when all it reads is there: `first` makes the loop legal.
-        client.load(mimo(name, mapped, first=name == "H1"))
-
-
-def iteration(client: rtcf.Client) -> int:
-    return int(client.get_status().runners[0].iteration)
-
+from values import iteration
 
 def test_fig_1_runs_in_its_order(client: rtcf.Client) -> None:
-    load_fig_1(client)
-    order = ["/H1", "/F1", "/R1", "/R2", "/R3"]
-    assert client.get_order() == order
+    fig_1.load(client)
+    assert client.get_order() == fig_1.ORDER
     client.start()
     wait_for(lambda: iteration(client) > 100, "100 cycles")
     statistics = client.get_statistics()
-    assert [each.component for each in statistics.components] == order
+    assert [each.component for each in statistics.components] == fig_1.ORDER
     assert statistics.duration.count > 0
     ports = {port.name: port for port in client.get_component("R3").ports}
     assert ports["out1"].mapped_name == "/R3_G2H1"
@@ -52,14 +27,14 @@ def test_fig_1_runs_in_its_order(client: rtcf.Client) -> None:
 
 
 def test_a_cycle_is_refused_with_the_command_that_breaks_it(client: rtcf.Client) -> None:
-    client.load(mimo("A", {"in1": "b", "out1": "a"}))
+    client.load(mimo("A", {"in1": "/b", "out1": "/a"}))
     with pytest.raises(rtcf.RefusedError, match=r"rtcfctl break") as refused:
-        client.load(mimo("B", {"in1": "a", "out1": "b"}))
+        client.load(mimo("B", {"in1": "/a", "out1": "/b"}))
     assert refused.value.code == "FAILED_PRECONDITION"
     assert "/A.in1" in str(refused.value)
     assert client.get_order() == ["/A"]
     client.set_breaks([rtcf.parse_port("A.in1")], True)
-    client.load(mimo("B", {"in1": "a", "out1": "b"}))
+    client.load(mimo("B", {"in1": "/a", "out1": "/b"}))
     assert client.get_order() == ["/A", "/B"]
 
 
@@ -67,9 +42,9 @@ def test_a_cycle_is_refused_with_the_command_that_breaks_it(client: rtcf.Client)
     ("spec", "code", "text"),
     [
         (mimo("A", {}), "ALREADY_EXISTS", "/A"),
-        (mimo("B", {"out1": "A_out1"}), "FAILED_PRECONDITION", r"/A\.out1.*/B\.out1"),
+        (mimo("B", {"out1": "/A/out1"}), "FAILED_PRECONDITION", r"/A\.out1.*/B\.out1"),
         (
-            rtcf.component("rtcf_examples", "PaperExample", remaps=["in_port:=/A_out1"]),
+            rtcf.component("rtcf_examples", "PaperExample", remaps=["in_port:=/A/out1"]),
             "FAILED_PRECONDITION",
             r"std_msgs/Float.*std_msgs/Float",
         ),
@@ -95,21 +70,8 @@ def test_a_refused_load_changes_nothing(
     assert client.get_status().runners[0].generation == generation
 
 
-def test_changes_while_the_loop_runs(client: rtcf.Client) -> None:
-    load_fig_1(client)
-    client.start()
-    client.load(rtcf.component("rtcf_examples", "PaperExample"))
-    client.set_parameters("PaperExample", [rtcf.parse_parameter("test_param:=2.5")])
-    (parameter,) = client.get_component("PaperExample").parameters
-    assert parameter.value.double_value == 2.5
-    client.replace("R1", rtcf.component("rtcf_examples", "Mimo"))
-    client.unload(["PaperExample", "R3"])
-    assert client.get_order() == ["/H1", "/F1", "/R1", "/R2"]
-    assert client.get_status().runners[0].state == runner_pb2.RUNNER_STATE_RUNNING
-
-
 def test_a_dead_executor_comes_back_with_its_graph(daemon: Daemon, client: rtcf.Client) -> None:
-    load_fig_1(client)
+    fig_1.load(client)
     client.start()
     wait_for(lambda: iteration(client) > 0, "a cycle")
     os.kill(client.get_status().runners[0].pid, signal.SIGKILL)
@@ -118,25 +80,25 @@ def test_a_dead_executor_comes_back_with_its_graph(daemon: Daemon, client: rtcf.
     )
     assert "was killed by SIGKILL" in daemon.log()
     client.start()
-    assert client.get_order() == ["/H1", "/F1", "/R1", "/R2", "/R3"]
+    assert client.get_order() == fig_1.ORDER
     wait_for(lambda: iteration(client) > 100, "100 cycles")
 
 
 def test_a_restart_of_rtcfd_brings_the_graph_back_held(daemon: Daemon, client: rtcf.Client) -> None:
-    load_fig_1(client)
+    fig_1.load(client)
     client.start()
     pid = client.get_status().runners[0].pid
     assert daemon.end() == 0
     assert not os.path.exists(f"/proc/{pid}")
     daemon.start()
     with rtcf.Client(daemon.socket) as again:
-        assert again.get_order() == ["/H1", "/F1", "/R1", "/R2", "/R3"]
+        assert again.get_order() == fig_1.ORDER
         assert again.get_status().runners[0].state == runner_pb2.RUNNER_STATE_STOPPED
 
 
 def test_runners_are_independent(client: rtcf.Client) -> None:
     client.add_runner("arm", runner_pb2.RunnerSettings(frequency_hz=100.0))
-    load_fig_1(client)
+    fig_1.load(client)
     client.load(mimo("H1", {}), "arm")
     client.start()
     client.start("arm")

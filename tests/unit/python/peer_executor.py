@@ -5,6 +5,10 @@ A "library" here is a JSON file: {"types": {"Name": "behaviour"}, "problem":
 "...", "crash": "SIGSEGV"}; behaviours of a type at its load: "fine",
 "refused", "crashes", "slow" (until the file named by its parameter `until`
 exists), "logs".
+
+A parameter `die` that is set lets it die as if in the component's update:
+"SIGSEGV" and so on with a note in the flight recorder, "stall" likewise,
+"exit" and "SIGKILL" without.  The loop counts its cycles by the wall clock.
 """
 
 import argparse
@@ -13,14 +17,17 @@ import json
 import os
 import signal
 import sys
+import time
 from pathlib import Path
 
+from flight_writer import FlightWriter
 from google.protobuf import json_format
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 from rtcfd import frames
 
 POLL_S = 0.005
+GRAPH_SLOT, UPDATE_SLOT = 1, 2
 
 
 def describe(library: Path, package: str) -> int:
@@ -47,17 +54,26 @@ class Peer:
         self.runner = runner
         self.settings = runner_pb2.RunnerSettings()
         self.running = False
+        self.started = 0.0
+        self.connections = 0
         self.generation = 0
         self.components: dict[str, graph_pb2.ComponentSpec] = {}
+        self.live: dict[str, dict[str, graph_pb2.ParameterValue]] = {}
+        self.recorder = FlightWriter()
         self.end = asyncio.Event()
         self.tasks: set[asyncio.Task[None]] = set()
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.writer = writer
+        self.connections += 1
         while (message := await frames.read(reader)) is not None:
             task = asyncio.create_task(self.answer(wire.Request.FromString(message)))
             self.tasks.add(task)
             task.add_done_callback(self.tasks.discard)
+        self.connections -= 1
+        await asyncio.sleep(self.settings.orphan_timeout_s)
+        if not self.connections:
+            self.end.set()
 
     def send(self, response: wire.Response) -> None:
         self.writer.write(frames.pack(response.SerializeToString()))
@@ -77,7 +93,12 @@ class Peer:
 
     async def hello(self, _: wire.Hello, __: int) -> wire.Response:
         return wire.Response(
-            hello=wire.HelloResult(protocol=1, runner=self.runner, pid=os.getpid())
+            hello=wire.HelloResult(
+                protocol=int(os.environ.get("PEER_PROTOCOL", "1")),
+                runner=self.runner,
+                pid=os.getpid(),
+                flight_recorder_fd=self.recorder.descriptor,
+            )
         )
 
     async def configure(self, change: runner_pb2.RunnerSettings, _: int) -> wire.Response:
@@ -93,12 +114,19 @@ class Peer:
                 runner=self.runner,
                 state=state,
                 settings=self.settings,
+                iteration=self.iteration(),
                 components=len(self.components),
                 degraded=["no permission for SCHED_FIFO"],
             )
         )
 
+    def iteration(self) -> int:
+        """Cycles since the start, at 1 kHz."""
+        return int(1000 * (time.monotonic() - self.started)) if self.running else 0
+
     async def start(self, _: wire.Start, __: int) -> wire.Response:
+        if not self.running:
+            self.started = time.monotonic()
         self.running = True
         return self.changed()
 
@@ -120,6 +148,9 @@ class Peer:
         if behaviour == "refused":
             raise Refused(wire.Error.CODE_FAILED_PRECONDITION, f"{spec.type}.configure failed")
         if behaviour == "crashes":
+            name = f"{spec.ns.rstrip('/')}/{spec.name or spec.type}"
+            self.recorder.hook(self.recorder.name(GRAPH_SLOT, name), 2)
+            self.recorder.crash(signal.SIGSEGV, 2)
             os.kill(os.getpid(), signal.SIGSEGV)
         if behaviour == "slow":
             self.send(wire.Response(id=id_, progress=f"configuring {spec.type}"))
@@ -139,7 +170,35 @@ class Peer:
             )
             self.send(wire.Response(log=record))
 
+    async def apply(self, request: wire.Apply, id_: int) -> wire.Response:
+        wanted = {}
+        result = self.changed()
+        kinds = control_pb2.Difference
+        for load in request.components:
+            spec = load.component
+            name = f"{spec.ns.rstrip('/')}/{spec.name or spec.type}"
+            known = self.components.get(name)
+            if known is None:
+                kind = kinds.KIND_LOAD
+                await self.behave(load.library, spec, id_)
+            elif known != spec:
+                kind = kinds.KIND_REPLACE
+            else:
+                kind = kinds.KIND_UNSPECIFIED
+            if kind:
+                result.change.differences.append(kinds(kind=kind, component=name))
+            wanted[name] = spec
+        for name in self.components:
+            if name not in wanted:
+                result.change.differences.append(kinds(kind=kinds.KIND_UNLOAD, component=name))
+        if not request.dry_run:
+            self.components = wanted
+            result.change.order[:] = sorted(wanted)
+        return result
+
     async def unload(self, request: control_pb2.UnloadRequest, _: int) -> wire.Response:
+        if not request.components:
+            raise Refused(wire.Error.CODE_INVALID_ARGUMENT, "no component to unload is named")
         for name in request.components:
             if name not in self.components:
                 raise Refused(wire.Error.CODE_NOT_FOUND, f"no component {name}")
@@ -160,8 +219,26 @@ class Peer:
     async def set_breaks(self, _: control_pb2.SetBreaksRequest, __: int) -> wire.Response:
         return self.changed()
 
-    async def set_parameters(self, _: control_pb2.SetParametersRequest, __: int) -> wire.Response:
+    async def set_parameters(
+        self, request: control_pb2.SetParametersRequest, _: int
+    ) -> wire.Response:
+        for setting in request.parameters:
+            if setting.name == "die":
+                self.die(request.component, setting.value.string_value)
+        self.live[request.component] = {each.name: each.value for each in request.parameters}
         return self.changed()
+
+    def die(self, name: str, how: str) -> None:
+        self.recorder.loop(self.iteration(), self.running)
+        self.recorder.update(self.recorder.name(UPDATE_SLOT, name))
+        if how == "exit":
+            os._exit(3)
+        if how == "stall":
+            self.recorder.crash(signal.SIGABRT, 1, stalled=True)
+            os.kill(os.getpid(), signal.SIGABRT)
+        if how != "SIGKILL":
+            self.recorder.crash(signal.Signals[how], 1, address=0x10)
+        os.kill(os.getpid(), signal.Signals[how])
 
     async def list_components(self, _: wire.ListComponents, __: int) -> wire.Response:
         infos = [self.info(name, at) for at, name in enumerate(sorted(self.components))]
@@ -181,13 +258,17 @@ class Peer:
              "type": "std_msgs/Float64", "value": "1.5", "age_ns": "2500000"},
             {"name": "out1", "direction": "DIRECTION_OUTPUT", "mapped_name": "/b",
              "type": "double"}],
-            "parameters": [{"name": "kp", "type": "double", "value": {"double_value": 1.5},
+            "parameters": [{"name": "kp", "type": "double", "value": {"double_value": 1.0},
              "default_value": {"double_value": 1.0}, "minimum": 0.0, "doc": "gain"}]}"""
         info = graph_pb2.ComponentInfo()
         json_format.Parse(text, info)
         info.full_name = name
         info.position = position
         info.spec.CopyFrom(self.components[name])
+        given = {each.name: each.value for each in info.spec.parameters}
+        given |= self.live.get(name, {})
+        if "kp" in given:
+            info.parameters[0].value.CopyFrom(given["kp"])
         return info
 
     async def list_connections(self, _: wire.ListConnections, __: int) -> wire.Response:

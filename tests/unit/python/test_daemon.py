@@ -59,15 +59,6 @@ def test_a_live_socket_is_refused(daemon: DaemonUnderTest, tmp_path: Path) -> No
     assert daemon.executor_pid()
 
 
-def test_a_left_over_executor_is_ended(daemon: DaemonUnderTest) -> None:
-    orphan = daemon.executor_pid()
-    daemon.end(signal.SIGKILL)
-    assert is_alive(orphan)
-    daemon.start()
-    wait_for(lambda: not is_alive(orphan), "the orphan to end")
-    assert daemon.executor_pid() != orphan
-
-
 def test_no_executor_binary_is_one_line(stopped_daemon: DaemonUnderTest) -> None:
     stopped_daemon.executor.unlink()
     stopped_daemon.start()
@@ -90,31 +81,6 @@ def test_an_executor_that_ends_at_once_shows_in_the_status(
         assert "exit status 7" in status.status
         with pytest.raises(rtcf.RefusedError, match="exit status 7"):
             client.get_order()
-
-
-def test_death_of_an_executor_is_told_and_mended_by_start(
-    daemon: DaemonUnderTest, client: rtcf.Client
-) -> None:
-    client.load(rtcf.component("demo", "Fine", name="kept"))
-    client.start()
-    pid = daemon.executor_pid()
-    os.kill(pid, signal.SIGABRT)
-    wait_for(
-        lambda: client.get_status().runners[0].state == runner_pb2.RUNNER_STATE_DOWN, "its death"
-    )
-    status = client.get_status().runners[0]
-    assert f"pid {pid}) was killed by SIGABRT" in status.status
-    assert "rtcfctl -r rt_runner start" in status.status
-    assert status.pid == 0
-    with pytest.raises(rtcf.RefusedError) as refused:
-        client.load(rtcf.component("demo", "Fine"))
-    assert refused.value.code == "UNAVAILABLE"
-    assert "was killed by SIGABRT" in daemon.log()
-    assert "no loop to stop" in client.stop().notes[0]
-
-    assert client.start().order == ["/kept"]
-    status = client.get_status().runners[0]
-    assert (status.state, status.status) == (runner_pb2.RUNNER_STATE_RUNNING, "")
 
 
 def test_an_executor_that_does_not_answer_is_stuck(

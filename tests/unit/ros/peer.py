@@ -11,9 +11,9 @@ import os
 import sys
 from typing import Any
 
-import roscpp.srv  # type: ignore[import]
-import rospy  # type: ignore[import]
-import std_msgs.msg  # type: ignore[import]
+import roscpp.srv
+import rospy
+import std_msgs.msg
 
 
 def show(message: Any) -> None:

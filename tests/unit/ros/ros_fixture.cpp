@@ -51,9 +51,15 @@ std::map<std::string, std::string> RosFixture::environment() const {
 }
 
 void RosFixture::startMaster() {
-    master_ = std::make_unique<ChildProcess>(
-        std::vector<std::string>{"rosmaster", "--core", "-p", std::to_string(port_)},
-        environment());
+    startMaster({"rosmaster", "--core", "-p", std::to_string(port_)});
+}
+
+void RosFixture::startDeafMaster() {
+    startMaster({"/usr/bin/python3", RTCF_DEAF_MASTER, std::to_string(port_)});
+}
+
+void RosFixture::startMaster(const std::vector<std::string>& command) {
+    master_ = std::make_unique<ChildProcess>(command, environment());
     ASSERT_TRUE(eventually([this] {
         const std::atomic<bool> never{false};
         rtcf::ros1::MasterClient client("127.0.0.1", static_cast<std::uint32_t>(port_), 500ms,
@@ -61,7 +67,7 @@ void RosFixture::startMaster() {
         XmlRpc::XmlRpcValue arguments;
         arguments[0] = std::string("/test");
         return !client.call("getPid", arguments).silent();
-    })) << "rosmaster does not come up";
+    })) << "the master does not come up";
 }
 
 std::unique_ptr<ChildProcess> RosFixture::listen(const std::string& topic,

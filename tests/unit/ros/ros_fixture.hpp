@@ -66,6 +66,8 @@ class RosFixture : public ::testing::Test {
 
     /// Starts a master, the same port each time, and waits until it answers.
     void startMaster();
+    /// Starts one that answers until a topic is registered.
+    void startDeafMaster();
     void stopMaster() { master_.reset(); }
     ChildProcess& master() { return *master_; }
     std::string masterUri() const { return "http://127.0.0.1:" + std::to_string(port_); }
@@ -99,6 +101,7 @@ class RosFixture : public ::testing::Test {
 
    private:
     std::map<std::string, std::string> environment() const;
+    void startMaster(const std::vector<std::string>& command);
 
     std::filesystem::path folder_;
     int port_ = 0;

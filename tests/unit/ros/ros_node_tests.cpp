@@ -297,6 +297,18 @@ TEST_F(RosNodeTest, EndsSoonWithAMasterThatHangs) {
     EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
 }
 
+// The process must end too, which roscpp's exit handler would prevent.
+TEST_F(RosNodeTest, EndsSoonWithAMasterThatHangsInACall) {
+    startDeafMaster();
+    Source source("/out");
+    startNode();
+    serve({&source}, {});
+    ASSERT_EQ(master().line(10s).value_or(""), "asked");
+    const auto begin = std::chrono::steady_clock::now();
+    stopNode();
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
+}
+
 TEST_F(RosNodeTest, LeavesNothingAtTheMaster) {
     startMaster();
     Source source("/out");

@@ -1,0 +1,138 @@
+"""`rtcfctl apply|save`: graph files, see docs/graph-files.md."""
+
+import argparse
+import os
+import sys
+from typing import Any
+
+import rtcf
+from rtcf.v1 import control_pb2
+
+from rtcfctl.output import Output
+from rtcfctl.plain import enumerator
+
+_STYLES = {
+    control_pb2.Difference.KIND_LOAD: "green",
+    control_pb2.Difference.KIND_UNLOAD: "red",
+}
+
+
+def register(verbs: Any, common: argparse.ArgumentParser) -> None:
+    """Add the verbs."""
+    applying = verbs.add_parser(
+        "apply", parents=[common], help="make the graph what a file says, at one cycle"
+    )
+    applying.add_argument("file", metavar="FILE", help="a graph file; - is standard input")
+    applying.add_argument("--dry-run", action="store_true", help="only show what would change")
+    applying.set_defaults(run=apply)
+
+    saving = verbs.add_parser("save", parents=[common], help="write the graph as `apply` reads it")
+    saving.add_argument("file", metavar="FILE", nargs="?", default="-")
+    saving.add_argument("--all", action="store_true", help="the graphs of all runners")
+    saving.set_defaults(run=save)
+
+
+def apply(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Apply a graph file; of several runners none is changed if one is refused."""
+    graphs = _chosen(rtcf.read_graphs(*_read(args.file)), args)
+    if args.dry_run or len(graphs) > 1:
+        dry = [_apply(client, graph, True, output) for graph in graphs]
+    if args.dry_run:
+        _print(graphs, dry, output, "would change nothing", "nothing was changed")
+        return
+    done = [_apply(client, graph, False, output) for graph in graphs]
+    _print(graphs, done, output, "nothing to change", "applied")
+
+
+def save(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Write graphs with the values that parameters have now."""
+    runners = client.get_status("" if args.all else args.runner or "rt_runner").runners
+    text = rtcf.write_graphs(
+        rtcf.Graph(
+            runner.runner,
+            runner.chosen,
+            [rtcf.live_spec(each) for each in client.list_components(runner.runner)],
+        )
+        for runner in runners
+    )
+    if args.file == "-":
+        print(text, end="")
+        return
+    _write(args.file, text)
+    if output.for_people:
+        print(f"saved {', '.join(runner.runner for runner in runners)} to {args.file}")
+
+
+def _apply(
+    client: rtcf.Client, graph: rtcf.Graph, dry_run: bool, output: Output
+) -> control_pb2.ChangeResult:
+    return client.apply(graph.components, graph.runner, graph.settings, dry_run, output.progress)
+
+
+def _chosen(graphs: list[rtcf.Graph], args: argparse.Namespace) -> list[rtcf.Graph]:
+    """Return the graphs of the runner that --runner names, or all."""
+    if len(graphs) == 1 and (args.runner or not graphs[0].runner):
+        graphs[0].runner = args.runner or "rt_runner"
+    if not args.runner:
+        return graphs
+    found = [graph for graph in graphs if graph.runner == args.runner]
+    if not found:
+        names = ", ".join(graph.runner for graph in graphs)
+        raise rtcf.GraphFileError(
+            f"{args.file}: it has no runner {args.runner} (runners: {names or 'none'})"
+        )
+    return found
+
+
+def _print(
+    graphs: list[rtcf.Graph],
+    results: list[control_pb2.ChangeResult],
+    output: Output,
+    nothing: str,
+    sentence: str,
+) -> None:
+    if not output.for_people:
+        output.data({graph.runner: result for graph, result in zip(graphs, results, strict=True)})
+        return
+    rows = [
+        (graph.runner, each) for graph, result in zip(graphs, results, strict=True)
+        for each in result.differences
+    ]  # fmt: skip
+    if rows:
+        output.table(
+            ("runner", "change", "component", "detail"),
+            (
+                (runner, (enumerator(each, "kind"), _STYLES.get(each.kind, "")), each.component,
+                 each.detail)
+                for runner, each in rows
+            ),
+        )  # fmt: skip
+    print(sentence if rows else nothing)
+    for result in results:
+        output.notes(result)
+
+
+def _read(file: str) -> tuple[str, str]:
+    """Return the text of a file, and its name for messages."""
+    try:
+        if file == "-":
+            return sys.stdin.read(), "standard input"
+        with open(file, encoding="utf-8") as opened:
+            return opened.read(), file
+    except OSError as error:
+        raise rtcf.GraphFileError(f"{file}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise rtcf.GraphFileError(f"{file}: it is not UTF-8 text") from None
+
+
+def _write(file: str, text: str) -> None:
+    """Replace a file at once: half a graph would be another graph."""
+    temporary = f"{file}.new"
+    try:
+        with open(temporary, "w", encoding="utf-8") as out:
+            out.write(text)
+            out.flush()
+            os.fsync(out.fileno())
+        os.replace(temporary, file)
+    except OSError as error:
+        raise rtcf.RtcfError(f"{file}: {error.strerror}") from None

@@ -1,0 +1,86 @@
+"""Reads an executor's flight recorder: what its threads were doing when it died.
+
+A shared memory of the executor (layout in executor.proto) that this rtcfd
+opens at hello and holds; it outlives the process.  Owned by the Executor.
+"""
+
+import mmap
+import os
+import struct
+from dataclasses import dataclass
+from enum import IntEnum
+
+_HEADER = struct.Struct("<IIQIIIIIIQIIQ")
+_MAGIC = 0x46435452
+_VERSION = 1
+_NAMES = 64
+_NAME_BYTES = 128
+_HOOKS = ("", "constructor", "configure", "start", "stop", "cleanup")
+
+
+class Thread(IntEnum):
+    """Threads of an executor, in the recorder's numbers."""
+
+    NONE = 0
+    REALTIME = 1
+    GRAPH = 2
+    OTHER = 3
+
+
+@dataclass(frozen=True)
+class Note:
+    """What the recorder says."""
+
+    iteration: int = 0
+    running: bool = False  # the loop
+    updating: str = ""  # full name of the component in the real-time thread
+    hooking: str = ""  # full name of the component whose hook the graph thread runs
+    hook: str = ""
+    signal: int = 0  # of a crash that was noted; 0 = none
+    thread: int = Thread.NONE  # that crashed
+    stalled: bool = False  # the crash was made because a cycle did not end
+    address: int = 0  # of the fault
+
+
+class FlightRecorder:
+    """The recorder of one executor."""
+
+    def __init__(self, pid: int, descriptor: int) -> None:
+        """Open a recorder by its number in the executor; raises OSError or ValueError."""
+        own = os.open(f"/proc/{pid}/fd/{descriptor}", os.O_RDONLY | os.O_CLOEXEC)
+        try:
+            self._memory = mmap.mmap(own, 0, prot=mmap.PROT_READ)
+        finally:
+            os.close(own)
+        magic, version, *_ = _HEADER.unpack_from(self._memory)
+        if (magic, version) != (_MAGIC, _VERSION):
+            self._memory.close()
+            raise ValueError(f"it is no flight recorder of version {_VERSION}")
+
+    def read(self) -> Note:
+        """Return what it says now."""
+        (_, _, iteration, updating, hooking, hook, signal, thread, reason, address, running,
+         slots, _) = _HEADER.unpack_from(self._memory)  # fmt: skip
+        return Note(
+            iteration=iteration,
+            running=bool(running),
+            updating=self._name(updating, slots),
+            hooking=self._name(hooking, slots),
+            hook=_HOOKS[hook] if hook < len(_HOOKS) else f"hook {hook}",
+            signal=signal,
+            thread=thread,
+            stalled=reason == 1,
+            address=address,
+        )
+
+    def close(self) -> None:
+        """Let go of it."""
+        self._memory.close()
+
+    def _name(self, slot: int, slots: int) -> str:
+        begin = _NAMES + slot * _NAME_BYTES
+        if not 0 < slot < slots or begin + _NAME_BYTES > len(self._memory):
+            return ""
+        return (
+            self._memory[begin : begin + _NAME_BYTES].partition(b"\0")[0].decode(errors="replace")
+        )

@@ -1,0 +1,73 @@
+#include "bench_graph.hpp"
+
+#include <fmt/format.h>
+
+namespace rtcf::bench {
+
+namespace {
+
+constexpr double kFrequencyHz = 2000.0;
+constexpr std::int64_t kAdoptionTimeoutNs = 1'000'000'000;
+
+}  // namespace
+
+std::vector<Node> chain(std::size_t length) {
+    std::vector<Node> nodes;
+    for (std::size_t i = 0; i < length; ++i) {
+        Node node{fmt::format("C{:04}", i), {{"out1", fmt::format("/c{:04}", i)}}, false};
+        if (i > 0) node.remaps.emplace_back("in1", fmt::format("/c{:04}", i - 1));
+        nodes.push_back(std::move(node));
+    }
+    return nodes;
+}
+
+std::vector<Node> paperGraph() {
+    return {
+        {"H1", {{"in1", "/R3_G2H1"}, {"in2", "/R1_H1R2"}, {"out1", "/H1_F1"}, {"out2", "/H1_R1R2"}}, true},
+        {"F1", {{"in1", "/H1_F1"}, {"out1", "/F1_R2R3"}}, false},
+        {"R1", {{"in1", "/H1_R1R2"}, {"out1", "/R1_H1R2"}}, false},
+        {"R2", {{"in1", "/F1_R2R3"}, {"in2", "/H1_R1R2"}, {"in3", "/R1_H1R2"}, {"in4", "/G2_R2"}, {"out1", "/R2_R3"}},
+         false},
+        {"R3", {{"in1", "/F1_R2R3"}, {"in2", "/R2_R3"}, {"out1", "/R3_G2H1"}}, false},
+    };
+}
+
+BenchGraph::BenchGraph(const std::vector<Node>& nodes, const std::string& library, const std::string& mapped)
+    : log_([](executor::LogEntry&&) {}), loop_(log_) {
+    executor::Graph graph;
+    const std::shared_ptr<const executor::Library> code = libraries_.open(library);
+    for (const Node& node : nodes) {
+        executor::ComponentDefinition definition;
+        definition.name = node.name;
+        definition.package = "rtcf_examples";
+        definition.type = "Mimo";
+        definition.first = node.first;
+        // A port without a connection gets a name of its own.
+        for (const char* port : {"in1", "in2", "in3", "in4", "out1", "out2"}) {
+            definition.remaps.emplace_back(port, fmt::format("/{}/{}", node.name, port));
+        }
+        for (const auto& [port, connection] : node.remaps) {
+            for (auto& [from, to] : definition.remaps) {
+                if (from == port) to = connection;
+            }
+        }
+        auto instance =
+            std::make_shared<executor::Instance>(std::move(definition), code, "bench", loop_.clock(), log_);
+        instance->configure();
+        instance->start();
+        graph.add({instance, {}});
+        instances_.push_back(std::move(instance));
+    }
+    executor::Wiring wiring = executor::wire(graph, {executor::NamePattern("bench", mapped), {}}, {});
+    executor::Adoption adoption;
+    plan_ = executor::buildPlan(graph, std::move(wiring), *empty_, kFrequencyHz, adoption);
+    loop_.adopt(adoption, kAdoptionTimeoutNs);
+    for (const executor::Step& step : plan_->schedule.steps) order_.push_back(step.component);
+}
+
+BenchGraph::~BenchGraph() {
+    loop_.requestStop();
+    loop_.join(INT64_MAX);
+}
+
+}  // namespace rtcf::bench

@@ -1,0 +1,56 @@
+/// @file
+/// Graphs of the paper's Mimo component for the benches, made by the executor's
+/// own plugin loading, wiring and planning, and run by its own loop; without
+/// rtcfd, ROS and sockets. Owned by a bench's main().
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "graph/plan.hpp"
+#include "logging/log.hpp"
+#include "loop/loop.hpp"
+
+namespace rtcf::bench {
+
+/// One component of a graph: its name, and the mapped names of those of its ports that are connected.
+struct Node {
+    std::string name;
+    std::vector<std::pair<std::string, std::string>> remaps;  ///< port, connection
+    bool first = false;
+};
+
+/// `length` components, each reading its predecessor by one connection.
+std::vector<Node> chain(std::size_t length);
+
+/// The example architecture of the paper, Fig. 1.
+std::vector<Node> paperGraph();
+
+/// A graph and a loop that has adopted it.
+class BenchGraph {
+   public:
+    /// @param library of rtcf_examples
+    /// @param mapped  regular expression of connections that get a tap or an injector; empty = none
+    /// @throws executor::Refusal
+    BenchGraph(const std::vector<Node>& nodes, const std::string& library, const std::string& mapped = {});
+    ~BenchGraph();
+
+    executor::Loop& loop() noexcept { return loop_; }
+    executor::Plan& plan() noexcept { return *plan_; }
+    /// The components in order of execution.
+    const std::vector<Component*>& order() const noexcept { return order_; }
+
+   private:
+    executor::Log log_;
+    executor::Loop loop_;
+    executor::LibraryStore libraries_;
+    std::vector<std::shared_ptr<executor::Instance>> instances_;
+    std::unique_ptr<executor::Plan> empty_ = std::make_unique<executor::Plan>();
+    std::unique_ptr<executor::Plan> plan_;
+    std::vector<Component*> order_;
+};
+
+}  // namespace rtcf::bench

@@ -1,0 +1,98 @@
+"""A private ROS master, and nodes at it; each a process of its own."""
+
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import rosgraph
+from daemon_process import DEADLINE_S, clean_environment, wait_for
+
+_PEER = Path(__file__).with_name("peer.py")
+
+
+def free_port() -> int:
+    """Return a TCP port that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("localhost", 0))
+        return int(probe.getsockname()[1])
+
+
+class Master:
+    """roscore; all its files are in `folder`."""
+
+    def __init__(self, folder: Path, port: int = 0) -> None:
+        self.port = port or free_port()
+        self.uri = f"http://localhost:{self.port}"
+        self._folder = folder
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        """Start it and return as soon as it answers."""
+        with (self._folder / "roscore.log").open("wb") as log:
+            self._process = subprocess.Popen(
+                ["/usr/bin/roscore", "-p", str(self.port)],
+                env=self.environment(),
+                cwd=self._folder,
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
+            )
+        wait_for(lambda: rosgraph.is_master_online(self.uri), f"a ROS master at {self.uri}")
+
+    def end(self) -> None:
+        """End it."""
+        assert self._process is not None
+        self._process.send_signal(signal.SIGINT)
+        assert self._process.wait(DEADLINE_S) == 0
+
+    def environment(self) -> dict[str, str]:
+        """Return the environment of the master and its nodes."""
+        return clean_environment() | {
+            "ROS_MASTER_URI": self.uri,
+            "ROS_HOSTNAME": "localhost",
+            "ROS_HOME": str(self._folder / "ros"),
+            "ROS_LOG_DIR": str(self._folder / "ros" / "log"),
+        }
+
+    def topics(self) -> tuple[set[str], set[str]]:
+        """Return the topics that are published and those that are subscribed."""
+        state = rosgraph.Master("/test", self.uri).getSystemState()
+        return {topic for topic, _ in state[0]}, {topic for topic, _ in state[1]}
+
+    def node(self, *arguments: str) -> "Node":
+        """Start a node of peer.py."""
+        return Node(self, *arguments)
+
+
+class Node:
+    """A rospy node, see peer.py; what it prints is in a file."""
+
+    def __init__(self, master: Master, *arguments: str) -> None:
+        self._output = master._folder / f"node-{time.monotonic_ns()}"
+        with self._output.open("wb") as output:
+            self._process = subprocess.Popen(
+                [sys.executable, str(_PEER), *arguments],
+                env=master.environment(),
+                cwd=master._folder,
+                stdout=output,
+            )
+
+    def wait_until_connected(self) -> None:
+        """Return when it says that it has met its peer."""
+        wait_for(lambda: "connected" in self._lines()[:1], "the node's connection")
+
+    def values(self) -> list[float]:
+        """Return what it has received so far."""
+        return [float.fromhex(line) for line in self._lines()[1:]]
+
+    def end(self) -> None:
+        """End it."""
+        self._process.send_signal(signal.SIGTERM)
+        assert self._process.wait(DEADLINE_S) == 0
+
+    def _lines(self) -> list[str]:
+        # The last one may be half written.
+        return self._output.read_text().split("\n")[:-1]

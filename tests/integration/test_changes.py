@@ -1,0 +1,114 @@
+"""Changes of the graph while its loop runs at 1 kHz: the loop goes on, what stays keeps its
+values."""
+
+import json
+
+import fig_1
+import rtcf
+from daemon_process import Daemon, wait_for
+from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+from values import iteration, port_value
+
+ROUNDS = 20
+
+
+def _counter(name: str) -> graph_pb2.ComponentSpec:
+    return rtcf.component(
+        "rtcf_test", "Counter", name=name, remaps=[f"in:=/{name}/in", f"out:=/{name}/out"]
+    )
+
+
+def _ports(text: str) -> list[control_pb2.PortName]:
+    return [rtcf.parse_port(text)]
+
+
+def test_the_loop_misses_no_cycle_and_what_stays_keeps_its_values(client: rtcf.Client) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=1000.0))
+    client.load(_counter("stays"))
+    fig_1.load(client)
+    client.start()
+    seen = iteration(client)
+    for _ in range(ROUNDS):
+        client.load(_counter("guest"))
+        client.load(fig_1.mimo("spy", {"in1": "/R3_G2H1"}))
+        # R2 reads the previous cycle's values of F1, then those of this one again.
+        client.set_breaks(_ports("R2.in1"), True)
+        assert client.get_order().index("/R2") < client.get_order().index("/R3")
+        client.set_breaks(_ports("R2.in1"), False)
+        client.replace("guest", _counter("guest"))
+        client.replace("R1", fig_1.mimo("R1", fig_1.WIRES["R1"]))
+        client.unload(["guest", "spy"])
+        assert client.get_order() == ["/H1", "/F1", "/R1", "/R2", "/R3", "/stays"]
+        wait_for(lambda seen=seen: iteration(client) > seen, "the next cycle")
+        seen = iteration(client)
+    assert client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_RUNNING
+    client.stop()
+    # It was updated in each cycle, and never began anew.
+    assert port_value(client, "stays", "out") == iteration(client)
+
+
+def test_a_replacement_begins_anew(client: rtcf.Client) -> None:
+    client.load(_counter("old"))
+    client.start()
+    wait_for(lambda: port_value(client, "old", "out") > 500, "500 cycles")
+    client.replace("old", _counter("young"))
+    client.stop()
+    assert client.get_order() == ["/young"]
+    cycles = iteration(client)
+    assert 0 < port_value(client, "young", "out") <= cycles - 500
+
+
+def test_an_input_keeps_its_value_when_its_writer_leaves(client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_examples", "Mimo", name="source", remaps=["out1:=/x"]))
+    client.load(rtcf.component("rtcf_examples", "Identity", name="sink", remaps=["in:=/x"]))
+    client.start()
+    wait_for(lambda: port_value(client, "sink", "out") == 1.0, "a value")
+    client.unload(["source"])
+    before = iteration(client)
+    wait_for(lambda: iteration(client) > before + 10, "cycles without the source")
+    assert port_value(client, "sink", "in") == 1.0
+    (port,) = (each for each in client.get_component("sink").ports if each.name == "in")
+    assert not port.connected
+
+
+def test_a_broken_input_reads_the_previous_cycle(daemon: Daemon, client: rtcf.Client) -> None:
+    # A ramp: each cycle, /x is one more than before.
+    client.load(fig_1.mimo("ramp", {"in1": "/x", "out1": "/x", "in2": "/one"}, first=True))
+    client.load(fig_1.mimo("one", {"out1": "/one"}))
+    client.load(fig_1.mimo("reader", {"in1": "/x", "out1": "/y"}))
+    client.step(100)
+    ramp = port_value(client, "ramp", "out1")
+    assert port_value(client, "reader", "out1") == ramp
+    assert daemon.ctl("break", "reader.in1").returncode == 0
+    client.step(100)
+    assert port_value(client, "ramp", "out1") == ramp + 100
+    assert port_value(client, "reader", "out1") == ramp + 99
+    connections = json.loads(daemon.ctl("connections", "-o", "json").stdout)
+    (x,) = (each for each in connections if each["name"] == "/x")
+    assert {end["component"]: end["broken"] for end in x["readers"]} == {
+        "/ramp": True,
+        "/reader": True,
+    }
+    assert daemon.ctl("unbreak", "reader.in1").returncode == 0
+    client.step(100)
+    assert port_value(client, "reader", "out1") == ramp + 200
+
+
+def test_parameters_change_while_the_loop_runs(daemon: Daemon, client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", parameters=["rate:=2.5"]))
+    client.start()
+    wait_for(lambda: port_value(client, "knobs", "product") == 5.0, "2 * 2.5")
+    before = iteration(client)
+    done = daemon.ctl("set", "knobs", "count:=4", "rate:=0.25", "label:=four", "mode:=run")
+    assert (done.returncode, done.stderr) == (0, "")
+    wait_for(lambda: port_value(client, "knobs", "product") == 1.0, "4 * 0.25")
+    assert port_value(client, "knobs", "length") == 4
+    assert daemon.ctl("set", "knobs", "mode:=idle").returncode == 0
+    wait_for(lambda: port_value(client, "knobs", "product") == 0.0, "nothing")
+    # An integer is taken for a double.
+    assert daemon.ctl("set", "knobs", "mode:=run", "rate:=3", "enabled:=true").returncode == 0
+    wait_for(lambda: port_value(client, "knobs", "product") == 12.0, "4 * 3")
+    info = json.loads(daemon.ctl("info", "knobs", "-o", "json").stdout)
+    values = {each["name"]: each["value"] for each in info["parameters"]}
+    assert values == {"enabled": True, "count": 4, "rate": 3.0, "label": "four", "mode": "run"}
+    assert iteration(client) > before

@@ -1,0 +1,106 @@
+"""How rtcfd and its executors end: in order, with nothing left, whoever asks."""
+
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import rtcf
+from daemon_process import Daemon, wait_for
+from values import iteration
+
+HOOKS = ["configure", "start", "update", "safe", "stop", "cleanup"]
+
+
+def _hooks(daemon: Daemon) -> list[str]:
+    """Return the hooks of the Witness, in the order of its log records."""
+    return [line.partition("hook ")[2].split()[0] for line in daemon.log().splitlines()
+            if "hook " in line]  # fmt: skip
+
+
+def _executor(client: rtcf.Client) -> int:
+    return int(client.get_status("rt_runner").runners[0].pid)
+
+
+def _is_gone(pid: int) -> bool:
+    return not Path(f"/proc/{pid}").exists()
+
+
+@pytest.mark.parametrize(
+    "end",
+    [
+        lambda daemon: daemon.end(signal.SIGTERM),
+        lambda daemon: daemon.end(signal.SIGINT),
+        Daemon.press_ctrl_c,
+    ],
+    ids=["SIGTERM", "SIGINT", "Ctrl-C"],
+)
+def test_a_signal_ends_loop_and_executor_in_order(
+    daemon: Daemon, client: rtcf.Client, end: Callable[[Daemon], int]
+) -> None:
+    client.load(rtcf.component("rtcf_test", "Witness"))
+    client.start()
+    wait_for(lambda: iteration(client) > 100, "100 cycles")
+    executor = _executor(client)
+
+    assert end(daemon) == 0
+
+    assert _is_gone(executor)
+    assert _hooks(daemon) == HOOKS
+    assert f"executor (pid {executor}) ended with exit status 0" in daemon.log()
+    assert not daemon.socket.exists()
+    assert not daemon.socket.with_name(daemon.socket.name + ".d").exists()
+
+
+def test_stop_ends_the_loop_in_order_and_keeps_the_executor(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    client.load(rtcf.component("rtcf_test", "Witness"))
+    client.start()
+    wait_for(lambda: iteration(client) > 100, "100 cycles")
+    executor = _executor(client)
+    assert daemon.ctl("stop").returncode == 0
+    cycles = iteration(client)
+    wait_for(lambda: "hook stop" in daemon.log(), "the stop hook")
+    assert _hooks(daemon) == HOOKS[:-1]
+    assert (iteration(client), _executor(client)) == (cycles, executor)
+    # Neither is refused where there is nothing to do.
+    assert daemon.ctl("stop").returncode == 0
+    assert daemon.ctl("start").returncode == 0
+    assert daemon.ctl("start").returncode == 0
+
+
+def test_the_executor_ends_by_a_signal_of_its_own_in_order(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    client.load(rtcf.component("rtcf_test", "Witness"))
+    client.start()
+    wait_for(lambda: iteration(client) > 100, "100 cycles")
+    executor = _executor(client)
+    os.kill(executor, signal.SIGTERM)
+    wait_for(lambda: "its loop is down" in daemon.log(), "rtcfd's word on it")
+    assert _is_gone(executor)
+    assert _hooks(daemon) == HOOKS
+
+
+def test_exit_codes(daemon: Daemon) -> None:
+    codes = {
+        "status": 0,
+        "start": 0,
+        "unload nobody": 1,
+        "-r nobody status": 1,
+        "unload": 2,
+        "no-such-verb": 2,
+        "load rtcf_examples Mimo --remap a": 2,
+        "--socket /nowhere/at/all status": 3,
+    }
+    for command, code in codes.items():
+        done = daemon.ctl(*command.split())
+        assert done.returncode == code, command
+        assert bool(done.stderr) == bool(code)
+    daemon.end()
+    done = daemon.ctl("status")
+    assert (done.returncode, done.stdout) == (3, "")
+    assert str(daemon.socket) in done.stderr
+    assert done.stderr.count("\n") == 1

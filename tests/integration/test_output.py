@@ -1,0 +1,64 @@
+"""What rtcfctl prints for machines: each verb speaks JSON and YAML."""
+
+import json
+import shlex
+
+import pytest
+import yaml
+from daemon_process import Daemon
+
+# In an order in which each is accepted.
+SESSION = [
+    "status",
+    "types",
+    "types rtcf_examples --long",
+    "runner add arm --frequency 100 --no-ros",
+    "runner set arm --frequency 200",
+    "runner list",
+    "load rtcf_examples Mimo --name a --remap out1:=/x",
+    "load rtcf_examples Identity --name b --ns /arm --remap in:=/x --ignore '/x'",
+    "load rtcf_test Knobs --name knobs --param rate:=2.5",
+    "set knobs count:=3 'label:=a \"b\" µ'",
+    "break a.in1",
+    "unbreak a.in1",
+    "list",
+    "order",
+    "connections",
+    "info knobs",
+    "step 10",
+    "info a",
+    "start",
+    "stats",
+    "stats --reset",
+    "replace a rtcf_examples Mimo",
+    "unload a /arm/b",
+    "stop",
+    "runner remove arm",
+]
+
+
+@pytest.mark.parametrize("kind", ["json", "yaml"])
+def test_each_verb_speaks_to_machines(daemon: Daemon, kind: str) -> None:
+    for command in SESSION:
+        done = daemon.ctl(*shlex.split(command), "-o", kind)
+        assert done.returncode == 0, (command, done.stderr)
+        assert done.stdout.strip(), command
+        found = json.loads(done.stdout) if kind == "json" else yaml.safe_load(done.stdout)
+        assert isinstance(found, dict | list), command
+
+
+def test_values_have_the_types_they_were_declared_with(daemon: Daemon) -> None:
+    daemon.ctl("load", "rtcf_test", "Knobs", "--name", "k", "--param", "label:='5'")
+    daemon.ctl("step", "1")
+    found = json.loads(daemon.ctl("info", "k", "-o", "json").stdout)
+    parameters = {each["name"]: each for each in found["parameters"]}
+    assert [(p["type"], p["value"]) for p in parameters.values()] == [
+        ("bool", True), ("int", 2), ("double", 1.5), ("string", "5"), ("enum", "run"),
+    ]  # fmt: skip
+    rate = parameters["rate"]
+    assert (rate["minimum"], rate["maximum"], rate["unit"]) == (-1.0, 1000.0, "m/s")
+    assert parameters["mode"]["choices"] == ["idle", "run"]
+    assert parameters["enabled"]["minimum"] is None
+    ports = {each["name"]: each for each in found["ports"]}
+    assert (ports["product"]["value"], ports["product"]["count"]) == ("data: 3", 1)
+    assert ports["product"]["direction"] == "output"

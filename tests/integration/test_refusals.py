@@ -1,0 +1,249 @@
+"""What is refused: one clear line and exit code 1, and nothing has changed; with the loop
+stopped, and running."""
+
+import json
+import re
+import shlex
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+import rtcf
+from daemon_process import Daemon, wait_for
+from rtcf.v1 import runner_pb2
+from rtcfctl.plain import plain
+from values import iteration
+
+MIMO = "rtcf_examples Mimo"
+IDENTITY = "rtcf_examples Identity"
+TEST = "rtcf_test"
+NEW = f"load {MIMO} --name new"
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A command, and what its line must tell, in any order."""
+
+    command: str
+    words: list[str] = field(default_factory=list)
+
+
+# The graph: a writes /x, b reads it; knobs has parameters of all types.
+GRAPH = [
+    f"load {MIMO} --name a --remap out1:=/x",
+    f"load {MIMO} --name b --ns /arm --remap in1:=/x --remap out1:=/y",
+    f"load {TEST} Knobs --name knobs --param rate:=2.5",
+]
+
+REFUSALS = {
+    "unknown package": Refusal("load rtcf_exampels Mimo", ['"rtcf_exampels"', 'did you mean "rtcf_examples"']),
+    "unknown type": Refusal("load rtcf_examples Minmo", ['"Minmo"', '"Mimo"?', "Identity"]),
+    "malformed package": Refusal("load ../etc Mimo", ['"../etc"', "letters"]),
+    "library that does not load": Refusal(
+        f"load {TEST} Unresolved",
+        ["rtcf_test_unresolved.so", "rtcf_test_symbol_that_nobody_has", "build it again"],
+    ),
+    "library of another ABI": Refusal(
+        f"load {TEST} OtherAbi", ["rtcf_test_other_abi.so", "ABI 4711", "build it again"]
+    ),
+    "constructor that throws": Refusal(
+        f"load {TEST} ThrowingConstructor",
+        ["ThrowingConstructor", "constructor", "no constructor should do this"],
+    ),
+    "configure that says why it fails": Refusal(
+        f"load {TEST} FailingConfigure --name grip",
+        ["/grip", "configure", "/dev/gripper does not answer: is it plugged in?"],
+    ),
+    "configure that returns false": Refusal(
+        f"load {TEST} SilentConfigure", ["/SilentConfigure", "configure", "returned false"]
+    ),
+    "configure that throws": Refusal(
+        f"load {TEST} ThrowingConfigure",
+        ["/ThrowingConfigure", "configure", "threw", "the calibration is from yesterday"],
+    ),
+    "configure that throws no std::exception": Refusal(
+        f"load {TEST} OddlyThrowingConfigure", ["/OddlyThrowingConfigure", "configure", "threw"]
+    ),
+    "replacement that fails to configure": Refusal(
+        f"replace a {TEST} FailingConfigure", ["/a", "configure", "/dev/gripper"]
+    ),
+    "duplicate name": Refusal(f"load {MIMO} --name a", ["/a", "loaded already", "--name"]),
+    "duplicate name in a namespace": Refusal(f"load {MIMO} --name b --ns arm", ["/arm/b"]),
+    "illegal name": Refusal(f"load {MIMO} --name a/b", ["'a/b'", "--ns"]),
+    "illegal remap": Refusal(f"{NEW} --remap in1:=1x", ["in1:=1x", "'1x'"]),
+    "type mismatch at an input": Refusal(
+        f"load {TEST} Counter --name count --remap in:=/x",
+        ["/x", "/a.out1", "std_msgs/Float64", "/count.in", "int32", "remap"],
+    ),
+    "type mismatch at an output": Refusal(
+        f"load rtcf_examples PaperExample --name paper --remap out_port:=/arm/in2",
+        ["/arm/in2", "/arm/b.in2", "std_msgs/Float64", "/paper.out_port", "std_msgs/Float32"],
+    ),
+    "second writer": Refusal(
+        f"{NEW} --remap out2:=/x", ["/x", "two writers", "/a.out1", "/new.out2", "--remap"]
+    ),
+    "a loop": Refusal(
+        f"load {IDENTITY} --name new --remap in:=/y --remap out:=/in1",
+        ["/a.out1 → /arm/b.in1", "/arm/b.out1 → /new.in", "/new.out → /a.in1",
+         "rtcfctl break a.in1", "rtcfctl break /arm/b.in1", "--break in"],
+    ),
+    "a loop of one": Refusal(
+        f"load {IDENTITY} --name new --remap in:=/z --remap out:=/z",
+        ["/new.out → /new.in", "--break in"],
+    ),
+    "unknown component": Refusal("unload nobody", ["/nobody", "/a", "/arm/b"]),
+    "unknown component to set": Refusal("set nobody rate:=1.0", ["/nobody"]),
+    "unknown component to replace": Refusal(f"replace nobody {MIMO}", ["/nobody"]),
+    "unknown component to look at": Refusal("info nobody", ["/nobody"]),
+    "one unknown component of two": Refusal("unload a nobody", ["/nobody"]),
+    "unknown input to break": Refusal("break a.out1", ["/a", "out1", "in1, in2"]),
+    "one unknown input of two": Refusal("break a.in1 a.in9", ["/a", "in9"]),
+    "unknown input to load with a break": Refusal(f"{NEW} --break in9", ["/new", "in9"]),
+    "unknown runner": Refusal("-r rt_runer start", ['"rt_runer"', "rt_runner"]),
+    "unknown runner to load into": Refusal(f"-r arm {NEW}", ['"arm"', "rt_runner"]),
+    "unknown runner to set": Refusal("runner set arm --frequency 5", ['"arm"', "rt_runner"]),
+    "unknown runner to remove": Refusal("runner remove arm", ['"arm"', "rt_runner"]),
+    "runner that is there already": Refusal("runner add rt_runner", ["rt_runner", "already"]),
+    "illegal name of a runner": Refusal("runner add ../x", ['"../x"', "letters"]),
+    "frequency of 0": Refusal("runner set --frequency 0", ["0 Hz", "0.1 to 20000 Hz"]),
+    "frequency too high": Refusal("runner set --frequency 20001", ["20001 Hz", "0.1 to 20000"]),
+    "negative frequency": Refusal("runner set --frequency=-5", ["-5 Hz", "0.1 to 20000"]),
+    "frequency that is no number": Refusal("runner set --frequency nan", ["nan Hz", "0.1 to"]),
+    "new runner with a bad frequency": Refusal("runner add arm --frequency 1e9", ["0.1 to 20000"]),
+    "CPU that is not there": Refusal("runner set --cpu 4000", ["CPU 4000", "-1"]),
+    "priority out of range": Refusal("runner set --priority 99", ["priority 99", "1 to 98"]),
+    "bad expression to ignore": Refusal(f"{NEW} --ignore '['", ["ignore", "/new", "'['"]),
+    "bad whitelist": Refusal("runner set --whitelist '(a'", ["whitelist", "'(a'"]),
+    "bad blacklist": Refusal("runner set --blacklist '*x'", ["blacklist", "'*x'"]),
+    "value below its minimum": Refusal(
+        "set knobs rate:=-1.5", ["/knobs", "rate", "-1.5", "minimum", "-1 m/s"]
+    ),
+    "value above its maximum": Refusal("set knobs count:=11", ["/knobs", "count", "11", "10"]),
+    "value of another type": Refusal("set knobs count:=1.5", ["count", "an int", "a double"]),
+    "text for a bool": Refusal("set knobs enabled:=perhaps", ["enabled", "a bool", "a string"]),
+    "number for a string": Refusal("set knobs label:=5", ["label", "a string", "an int"]),
+    "not a number": Refusal("set knobs rate:=.nan", ["rate", "finite"]),
+    "unknown enumerator": Refusal("set knobs mode:=walk", ["mode", "walk", "idle, run"]),
+    "unknown parameter": Refusal("set knobs speed:=1.0", ["/knobs", "speed", "rate"]),
+    "one bad value of two": Refusal("set knobs count:=3 rate:=1e6", ["rate", "1000 m/s"]),
+    "bad value at load": Refusal(f"load {TEST} Knobs --name k --param count:=-1", ["/k", "count"]),
+    "bad type at load": Refusal(f"load {TEST} Knobs --name k --param rate:=fast", ["/k", "rate"]),
+    "unknown parameter at load": Refusal(
+        f"load {TEST} Knobs --name k --param speed:=1.0", ["/k", "speed", "enabled"]
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A daemon with GRAPH; shared by all refusals, as none may change it."""
+
+    daemon: Daemon
+    client: rtcf.Client
+    picture: list[Any]
+
+
+def picture(client: rtcf.Client) -> list[Any]:
+    """Return all that a refusal must not change, as `rtcfctl -o json` would print it."""
+    runners = client.get_status().runners
+    for runner in runners:
+        # These go on by themselves.
+        for counter in ("iteration", "overruns", "missed"):
+            runner.ClearField(counter)
+    return [
+        client.get_order(),
+        [plain(each) for each in client.list_components()],
+        [plain(each) for each in client.list_connections()],
+        [plain(each) for each in client.get_component("knobs").parameters],
+        [plain(each) for each in runners],
+    ]
+
+
+@pytest.fixture(scope="module", params=["stopped", "running"])
+def loaded(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Loaded]:
+    daemon = Daemon(tmp_path_factory.mktemp("refusals"))
+    daemon.start()
+    for command in GRAPH:
+        done = daemon.ctl(*shlex.split(command))
+        assert done.returncode == 0, done.stderr
+    with rtcf.Client(daemon.socket) as client:
+        if request.param == "running":
+            client.start()
+        yield Loaded(daemon, client, picture(client))
+    daemon.end()
+
+
+@pytest.mark.parametrize("refusal", REFUSALS.values(), ids=REFUSALS)
+def test_refused_in_one_line_and_nothing_changed(loaded: Loaded, refusal: Refusal) -> None:
+    done = loaded.daemon.ctl(*shlex.split(refusal.command))
+    assert done.returncode == 1, done
+    assert done.stdout == ""
+    assert re.fullmatch(r"rtcfctl: [^\n]+\n", done.stderr), done.stderr
+    for word in refusal.words:
+        assert word in done.stderr
+    assert picture(loaded.client) == loaded.picture
+
+
+def test_refusals_do_not_stop_the_loop(loaded: Loaded) -> None:
+    status = loaded.client.get_status("rt_runner").runners[0]
+    if status.state == runner_pb2.RUNNER_STATE_STOPPED:
+        assert status.iteration == 0
+    else:
+        wait_for(lambda: iteration(loaded.client) > status.iteration + 100, "100 cycles")
+
+
+def test_each_suggested_break_lets_the_loop_be_loaded(daemon: Daemon) -> None:
+    load_a = f"load {IDENTITY} --name a --remap in:=/y --remap out:=/x"
+    load_b = f"load {IDENTITY} --name b --remap in:=/x --remap out:=/y"
+    assert daemon.ctl(*load_a.split()).returncode == 0
+    refused = daemon.ctl(*load_b.split())
+    assert refused.returncode == 1
+    (command,) = re.findall(r"`(rtcfctl break [^`]+)`", refused.stderr)
+    (option,) = re.findall(r"`(--break [^`]+)`", refused.stderr)
+
+    assert daemon.run(*shlex.split(command)).returncode == 0
+    assert daemon.ctl(*load_b.split()).returncode == 0
+    assert daemon.ctl("order").stdout.split() == ["/a", "/b"]
+    assert "broken" in daemon.ctl("connections").stdout
+
+    assert daemon.ctl("unload", "b").returncode == 0
+    assert daemon.ctl("unbreak", "a.in").returncode == 0
+    assert daemon.ctl(*load_b.split()).returncode == 1
+    assert daemon.ctl(*load_b.split(), *shlex.split(option)).returncode == 0
+    assert daemon.ctl("order").stdout.split() == ["/b", "/a"]
+
+
+def test_unbreaking_the_last_break_of_a_loop_is_refused(daemon: Daemon) -> None:
+    daemon.ctl(*f"load {IDENTITY} --name a --remap in:=/y --remap out:=/x --break in".split())
+    daemon.ctl(*f"load {IDENTITY} --name b --remap in:=/x --remap out:=/y".split())
+    refused = daemon.ctl("unbreak", "a.in")
+    assert refused.returncode == 1
+    assert "/b.out → /a.in" in refused.stderr
+    assert daemon.ctl("order").stdout.split() == ["/a", "/b"]
+
+
+def test_a_start_that_a_component_refuses_leaves_the_loop_stopped(daemon: Daemon) -> None:
+    daemon.ctl("load", TEST, "Witness")
+    daemon.ctl("load", TEST, "FailingStart", "--name", "last")
+    refused = daemon.ctl("start")
+    assert refused.returncode == 1
+    assert refused.stderr == (
+        "rtcfctl: /last (rtcf_test/FailingStart): start failed: the emergency stop is pressed\n"
+    )
+    (runner,) = json.loads(daemon.ctl("runner", "list", "-o", "json").stdout)
+    assert (runner["state"], runner["iteration"]) == ("stopped", 0)
+    # What had been started is stopped again.
+    wait_for(lambda: "hook stop" in daemon.log(), "the stop hook")
+
+
+def test_a_component_that_does_not_start_is_not_loaded_into_a_running_loop(daemon: Daemon) -> None:
+    daemon.ctl("load", TEST, "Counter")
+    daemon.ctl("start")
+    before = daemon.ctl("list", "-o", "json").stdout
+    refused = daemon.ctl("load", TEST, "FailingStart")
+    assert refused.returncode == 1
+    assert "start failed: the emergency stop is pressed" in refused.stderr
+    assert daemon.ctl("list", "-o", "json").stdout == before

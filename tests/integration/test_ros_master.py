@@ -1,0 +1,59 @@
+"""rtcfd without a ROS master, and with one that comes later."""
+
+import time
+from pathlib import Path
+
+import fig_1
+import rtcf
+from daemon_process import Daemon, wait_for, with_ros
+from ros_processes import Master, free_port
+from rtcf.v1 import runner_pb2
+from values import iteration
+
+
+def test_topics_appear_once_a_master_is_there(tmp_path: Path) -> None:
+    master = Master(tmp_path, free_port())
+    daemon = Daemon(tmp_path, with_ros(master.uri, fig_1.WHITELIST))
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            fig_1.load(client)
+            client.start()
+            wait_for(lambda: iteration(client) > 100, "a loop that runs without a master")
+            ros = client.get_status("rt_runner").runners[0].ros
+            assert (ros.connected, ros.publications, ros.subscriptions) == (False, 0, 0)
+            assert master.uri in ros.problem
+
+            master.start()
+            begin = time.monotonic()
+            try:
+                _wait_for_topics(master)
+                seconds = time.monotonic() - begin
+                # A figure to look at, not a limit: the machine may be busy.
+                print(f"topics {seconds:.2f} s after the master began to answer")
+                assert client.get_status("rt_runner").runners[0].ros.connected
+                node = master.node("record", "/R1_H1R2")
+                node.wait_until_connected()
+                wait_for(lambda: len(node.values()) > 100, "messages")
+                node.end()
+            finally:
+                master.end()
+
+            status = client.get_status("rt_runner").runners[0]
+            assert status.state == runner_pb2.RUNNER_STATE_RUNNING
+            wait_for(lambda: iteration(client) > status.iteration + 100, "the loop to go on")
+    finally:
+        daemon.end()
+
+
+def _wait_for_topics(master: Master) -> None:
+    def there() -> bool:
+        published, subscribed = master.topics()
+        return {"/R3_G2H1", "/R1_H1R2"} <= published and "/G2_R2" in subscribed
+
+    wait_for(there, "the topics of the loop")
+    published, subscribed = master.topics()
+    # What the whitelist does not name stays inside.
+    assert not {"/H1_F1", "/F1_R2R3", "/R2_R3"} & (published | subscribed)
+    # An input that a component feeds takes nothing from ROS.
+    assert not {"/R3_G2H1", "/R1_H1R2"} & subscribed

@@ -1,0 +1,99 @@
+"""Stepping: cycles without real time, on a simulated clock, with the same values every time."""
+
+import itertools
+from pathlib import Path
+
+import fig_1
+import pytest
+import rtcf
+from daemon_process import Daemon
+from rtcf.v1 import runner_pb2
+from values import iteration, number, port_value
+
+CYCLES = 10_000
+
+
+def _values(client: rtcf.Client) -> dict[str, str]:
+    """Return the text of each value in the graph, exact to the last bit."""
+    return {
+        f"{component.full_name}.{port.name}": port.value
+        for component in map(client.get_component, fig_1.ORDER)
+        for port in component.ports
+        if port.HasField("value")
+    }
+
+
+def _fresh_run(folder: Path) -> dict[str, str]:
+    folder.mkdir()
+    daemon = Daemon(folder)
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            fig_1.load(client)
+            client.step(CYCLES)
+            assert iteration(client) == CYCLES
+            return _values(client)
+    finally:
+        daemon.end()
+
+
+def test_two_runs_give_the_same_bits_and_those_of_the_simulation(tmp_path: Path) -> None:
+    first = _fresh_run(tmp_path / "1")
+    second = _fresh_run(tmp_path / "2")
+    assert first == second
+    wanted = next(itertools.islice(fig_1.simulate(), CYCLES - 1, None))
+    for name, value in wanted.items():
+        assert number(first[f"/{name}.out1"]) == value
+
+
+def test_each_step_goes_on_where_the_last_one_paused(daemon: Daemon, client: rtcf.Client) -> None:
+    fig_1.load(client)
+    wanted = list(itertools.islice(fig_1.simulate(), 45))
+    for cycle in range(40):
+        client.step(1)
+        assert iteration(client) == cycle + 1
+        assert port_value(client, "R3", "out1") == wanted[cycle]["R3"]
+    done = daemon.ctl("step", "5")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "stepped 5 cycles\n", "")
+    assert port_value(client, "R3", "out1") == wanted[44]["R3"]
+    assert client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_STEPPING
+    client.stop()
+    assert client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_STOPPED
+
+
+def test_time_advances_by_a_period_each_cycle(client: rtcf.Client) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=10.0))
+    client.load(rtcf.component("rtcf_examples", "Mimo", name="source", remaps=["out1:=/x"]))
+    client.load(rtcf.component("rtcf_examples", "Identity", name="sink", remaps=["in:=/x"]))
+    client.step(10)
+    client.unload(["source"])
+    client.step(10)
+    (out,) = (port for port in client.get_component("sink").ports if port.name == "out")
+    assert (out.count, out.age_ns) == (10, 1_000_000_000)
+
+
+@pytest.mark.parametrize("cycles", ["0", "-1", "x", str(2**64)])
+def test_what_is_no_number_of_cycles_is_bad_usage(daemon: Daemon, cycles: str) -> None:
+    assert daemon.ctl("step", cycles).returncode == 2
+
+
+def test_a_loop_that_runs_is_not_stepped(daemon: Daemon, client: rtcf.Client) -> None:
+    client.start()
+    done = daemon.ctl("step", "1")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "stop it first" in done.stderr
+    assert client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_RUNNING
+
+
+def test_a_long_step_says_how_far_it_is_and_can_be_stopped(client: rtcf.Client) -> None:
+    fig_1.load(client)
+    lines: list[str] = []
+
+    def stop_soon(line: str) -> None:
+        lines.append(line)
+        if len(lines) == 20:
+            client.stop()
+
+    client.step(10**9, on_progress=stop_soon)
+    assert any("of 1000000000 cycles" in line for line in lines)
+    assert 0 < iteration(client) < 10**9

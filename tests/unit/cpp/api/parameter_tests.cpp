@@ -1,0 +1,149 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "support/bare_component.hpp"
+
+namespace rtcf::test {
+namespace {
+
+using Int = std::int64_t;
+
+// Checks and, if that goes well, sets. @return what is wrong
+std::string set(ParameterBase& parameter, ParameterValue value) {
+    std::string why = parameter.check(value);
+    if (why.empty()) {
+        parameter.stage(value);
+        parameter.commit();
+    }
+    return why;
+}
+
+class ParameterTest : public ::testing::Test {
+   protected:
+    BareComponent component;
+};
+
+TEST_F(ParameterTest, HasItsDefaultAtFirst) {
+    const Parameter<double> gain{&component, "gain", 1.5, Min(0.0), Max(2.0), Unit("N/m"), Doc("stiffness")};
+    EXPECT_EQ(gain.value(), 1.5);
+    const ParameterDeclaration& declaration = gain.declaration();
+    EXPECT_EQ(declaration.type, "double");
+    EXPECT_EQ(std::get<double>(declaration.default_value), 1.5);
+    EXPECT_EQ(declaration.minimum, 0.0);
+    EXPECT_EQ(declaration.maximum, 2.0);
+    EXPECT_EQ(declaration.unit, "N/m");
+    EXPECT_EQ(declaration.doc, "stiffness");
+}
+
+TEST_F(ParameterTest, ChangesAtCommitOnly) {
+    Parameter<double> gain{&component, "gain", 1.0};
+    gain.stage(2.0);
+    EXPECT_EQ(gain.value(), 1.0);
+    gain.commit();
+    EXPECT_EQ(gain.value(), 2.0);
+}
+
+TEST_F(ParameterTest, BoundsAreInclusive) {
+    Parameter<double> gain{&component, "gain", 1.0, Min(0.0), Max(2.0)};
+    EXPECT_EQ(set(gain, 0.0), "");
+    EXPECT_EQ(set(gain, 2.0), "");
+    EXPECT_NE(set(gain, std::nextafter(2.0, 3.0)), "");
+    EXPECT_NE(set(gain, -1e-300), "");
+    EXPECT_EQ(gain.value(), 2.0);
+}
+
+TEST_F(ParameterTest, RefusalNamesParameterValueBoundAndUnit) {
+    Parameter<double> gain{&component, "gain", 1.0, Min(0.5), Unit("N")};
+    EXPECT_EQ(set(gain, 0.25), "parameter gain = 0.25 is below its minimum 0.5 N");
+}
+
+TEST_F(ParameterTest, NotFiniteIsRefused) {
+    Parameter<double> gain{&component, "gain", 1.0};
+    EXPECT_NE(set(gain, std::nan("")), "");
+    EXPECT_NE(set(gain, std::numeric_limits<double>::infinity()), "");
+    EXPECT_NE(set(gain, -std::numeric_limits<double>::infinity()), "");
+}
+
+TEST_F(ParameterTest, NotFiniteDefaultMeansNoLimit) {
+    const Parameter<double> limit{&component, "limit", std::numeric_limits<double>::infinity()};
+    EXPECT_TRUE(std::isinf(limit.value()));
+}
+
+TEST_F(ParameterTest, DefaultOutsideItsBoundsIsRefused) {
+    const auto declare = [this] { const Parameter<double> gain{&component, "gain", 3.0, Max(2.0)}; };
+    EXPECT_THROW(declare(), std::logic_error);
+}
+
+TEST_F(ParameterTest, IntegerIsTakenForADoubleAndNotTheOtherWay) {
+    Parameter<double> gain{&component, "gain", 1.0};
+    Parameter<Int> count{&component, "count", 1};
+    EXPECT_EQ(set(gain, Int{3}), "");
+    EXPECT_EQ(gain.value(), 3.0);
+    EXPECT_EQ(set(count, 3.0), "parameter count takes an int, not a double");
+}
+
+TEST_F(ParameterTest, OtherTypesAreRefused) {
+    Parameter<bool> enabled{&component, "enabled", true};
+    Parameter<std::string> device{&component, "device", "none"};
+    EXPECT_EQ(set(enabled, Int{0}), "parameter enabled takes a bool, not an int");
+    EXPECT_EQ(set(device, true), "parameter device takes a string, not a bool");
+    EXPECT_EQ(set(enabled, false), "");
+    EXPECT_EQ(set(device, std::string("can0")), "");
+    EXPECT_FALSE(enabled.value());
+    EXPECT_EQ(device.value(), "can0");
+}
+
+TEST_F(ParameterTest, IntegersOfOtherWidthsAreNarrowed) {
+    Parameter<std::int8_t> small{&component, "small", std::int8_t{1}};
+    EXPECT_EQ(set(small, Int{127}), "");
+    EXPECT_NE(set(small, Int{128}), "");
+    EXPECT_NE(set(small, Int{-129}), "");
+    Parameter<std::uint16_t> port{&component, "port", std::uint16_t{80}, Max(1e9)};
+    EXPECT_NE(set(port, Int{-1}), "");
+    EXPECT_NE(set(port, Int{65536}), "");
+    EXPECT_EQ(set(port, Int{65535}), "");
+    EXPECT_EQ(port.value(), 65535);
+    Parameter<std::uint64_t> large{&component, "large", std::uint64_t{1}};
+    EXPECT_NE(set(large, Int{-1}), "");
+    EXPECT_EQ(set(large, std::numeric_limits<Int>::max()), "");
+}
+
+TEST_F(ParameterTest, FloatTakesNoDoubleBeyondItsRange) {
+    Parameter<float> gain{&component, "gain", 1.0F};
+    EXPECT_NE(set(gain, 1e39), "");
+    EXPECT_EQ(set(gain, 1e38), "");
+    EXPECT_EQ(gain.value(), 1e38F);
+}
+
+enum class Mode { Off = 3, Slow = 7, Fast = 1 };
+
+TEST_F(ParameterTest, EnumeratorTravelsByName) {
+    Parameter<Mode> mode{&component, "mode", Mode::Slow, Choice("off", Mode::Off), Choice("slow", Mode::Slow),
+                         Choice("fast", Mode::Fast)};
+    EXPECT_EQ(mode.declaration().type, "enum");
+    EXPECT_EQ(std::get<std::string>(mode.declaration().default_value), "slow");
+    EXPECT_EQ(set(mode, std::string("fast")), "");
+    EXPECT_EQ(mode.value(), Mode::Fast);
+    EXPECT_EQ(set(mode, std::string("warp")), "parameter mode = warp is none of off, slow, fast");
+    EXPECT_EQ(set(mode, Int{1}), "parameter mode takes a name, not an int");
+    EXPECT_EQ(mode.value(), Mode::Fast);
+}
+
+TEST_F(ParameterTest, EnumDefaultWithoutAChoiceIsRefused) {
+    const auto declare = [this] { const Parameter<Mode> mode{&component, "mode", Mode::Off, Choice("fast", Mode::Fast)}; };
+    EXPECT_THROW(declare(), std::logic_error);
+}
+
+TEST_F(ParameterTest, DeclaredTwiceIsRefused) {
+    const Parameter<double> gain{&component, "gain", 1.0};
+    const auto again = [this] { const Parameter<bool> other{&component, "gain", true}; };
+    EXPECT_THROW(again(), std::logic_error);
+}
+
+}  // namespace
+}  // namespace rtcf::test

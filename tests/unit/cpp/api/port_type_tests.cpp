@@ -1,0 +1,259 @@
+// Each port type against roscpp's own serialisation of the message it travels as.
+#include <geometry_msgs/Pose.h>
+#include <geometry_msgs/Quaternion.h>
+#include <geometry_msgs/Vector3.h>
+#include <gtest/gtest.h>
+#include <ros/serialization.h>
+#include <sensor_msgs/JointState.h>
+#include <std_msgs/Float32MultiArray.h>
+#include <std_msgs/Float64MultiArray.h>
+#include <std_msgs/String.h>
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "rtcf/component.hpp"
+#include "rtcf/eigen_type.hpp"
+
+namespace rtcf::test {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+template <typename Message>
+Bytes roscppBytes(const Message& message) {
+    Bytes bytes(ros::serialization::serializationLength(message));
+    ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+    ros::serialization::serialize(stream, message);
+    return bytes;
+}
+
+// By the type-erased functions, as the executor does it.
+template <typename T>
+Bytes rtcfBytes(const T& value) {
+    Slot<T> slot;
+    slot.value = value;
+    const TypeInfo& type = typeInfo<T>();
+    Bytes bytes(type.length(slot));
+    type.serialize(slot, bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+    return bytes;
+}
+
+template <typename T>
+bool deserialize(const Bytes& bytes, T& value) {
+    Slot<T> slot;
+    const bool done = typeInfo<T>().deserialize(slot, bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+    value = slot.value;
+    return done;
+}
+
+template <typename T>
+T roundTrip(const T& value) {
+    T result{};
+    EXPECT_TRUE(deserialize(rtcfBytes(value), result));
+    return result;
+}
+
+// Every prefix of the bytes, and the bytes with one more, is no message.
+template <typename T>
+void expectOtherLengthsRefused(const T& value) {
+    const Bytes bytes = rtcfBytes(value);
+    T ignored{};
+    for (std::size_t size = 0; size < bytes.size(); ++size) {
+        ASSERT_FALSE(deserialize(Bytes(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size)), ignored)) << size;
+    }
+    Bytes longer = bytes;
+    longer.push_back(0);
+    ASSERT_FALSE(deserialize(longer, ignored));
+}
+
+template <typename Message, typename T>
+void expectArithmetic(const char* name) {
+    for (const T value : {std::numeric_limits<T>::lowest(), T{0}, T{1}, std::numeric_limits<T>::max()}) {
+        Message message;
+        message.data = value;
+        EXPECT_EQ(rtcfBytes(value), roscppBytes(message)) << name;
+        EXPECT_EQ(roundTrip(value), value) << name;
+    }
+    const TypeInfo& type = typeInfo<T>();
+    EXPECT_STREQ(type.name, name);
+    EXPECT_STREQ(type.ros_type, ros::message_traits::datatype<Message>());
+    EXPECT_STREQ(type.ros_md5, ros::message_traits::md5sum<Message>());
+    EXPECT_TRUE(type.fixed_size);
+    expectOtherLengthsRefused(T{1});
+}
+
+TEST(ArithmeticType, TravelsAsTheMessageOfItsWidth) {
+    expectArithmetic<std_msgs::Bool, bool>("bool");
+    expectArithmetic<std_msgs::Int8, std::int8_t>("int8");
+    expectArithmetic<std_msgs::Int16, std::int16_t>("int16");
+    expectArithmetic<std_msgs::Int32, std::int32_t>("int32");
+    expectArithmetic<std_msgs::Int64, std::int64_t>("int64");
+    expectArithmetic<std_msgs::UInt8, std::uint8_t>("uint8");
+    expectArithmetic<std_msgs::UInt16, std::uint16_t>("uint16");
+    expectArithmetic<std_msgs::UInt32, std::uint32_t>("uint32");
+    expectArithmetic<std_msgs::UInt64, std::uint64_t>("uint64");
+    expectArithmetic<std_msgs::Float32, float>("float");
+    expectArithmetic<std_msgs::Float64, double>("double");
+}
+
+TEST(EigenType, Vector3dIsAVector3) {
+    geometry_msgs::Vector3 message;
+    message.x = 1.0;
+    message.y = -2.0;
+    message.z = 3.5;
+    const Eigen::Vector3d value(1.0, -2.0, 3.5);
+    EXPECT_EQ(rtcfBytes(value), roscppBytes(message));
+    EXPECT_EQ(roundTrip(value), value);
+    expectOtherLengthsRefused(value);
+}
+
+TEST(EigenType, QuaterniondIsAQuaternion) {
+    geometry_msgs::Quaternion message;
+    message.x = 0.1;
+    message.y = 0.2;
+    message.z = 0.3;
+    message.w = 0.9;
+    const Eigen::Quaterniond value(0.9, 0.1, 0.2, 0.3);
+    EXPECT_EQ(rtcfBytes(value), roscppBytes(message));
+    EXPECT_EQ(roundTrip(value).coeffs(), value.coeffs());
+    expectOtherLengthsRefused(value);
+}
+
+TEST(EigenType, Isometry3dIsAPose) {
+    Eigen::Isometry3d value = Eigen::Isometry3d::Identity();
+    value.linear() = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1.0, 2.0, 3.0).normalized()).toRotationMatrix();
+    value.translation() = Eigen::Vector3d(4.0, 5.0, 6.0);
+    const Eigen::Quaterniond rotation(value.linear());
+    geometry_msgs::Pose message;
+    message.position.x = 4.0;
+    message.position.y = 5.0;
+    message.position.z = 6.0;
+    message.orientation.x = rotation.x();
+    message.orientation.y = rotation.y();
+    message.orientation.z = rotation.z();
+    message.orientation.w = rotation.w();
+    EXPECT_EQ(rtcfBytes(value), roscppBytes(message));
+    EXPECT_TRUE(roundTrip(value).isApprox(value, 1e-12));
+    expectOtherLengthsRefused(value);
+}
+
+template <typename Message, typename Matrix>
+Message multiArrayOf(const Matrix& value) {
+    Message message;
+    message.layout.dim.resize(2);
+    message.layout.dim[0].label = "rows";
+    message.layout.dim[0].size = static_cast<std::uint32_t>(value.rows());
+    message.layout.dim[0].stride = static_cast<std::uint32_t>(value.size());
+    message.layout.dim[1].label = "cols";
+    message.layout.dim[1].size = static_cast<std::uint32_t>(value.cols());
+    message.layout.dim[1].stride = static_cast<std::uint32_t>(value.cols());
+    for (Eigen::Index row = 0; row < value.rows(); ++row) {
+        for (Eigen::Index col = 0; col < value.cols(); ++col) message.data.push_back(value(row, col));
+    }
+    return message;
+}
+
+template <typename Message, typename Matrix>
+void expectMatrix() {
+    const Matrix value = Matrix::Random();
+    EXPECT_EQ(rtcfBytes(value), roscppBytes(multiArrayOf<Message>(value)));
+    EXPECT_EQ(roundTrip(value), value);
+    EXPECT_TRUE(typeInfo<Matrix>().fixed_size);
+    expectOtherLengthsRefused(value);
+}
+
+TEST(EigenType, MatrixIsAMultiArrayRowByRow) {
+    expectMatrix<std_msgs::Float64MultiArray, Eigen::Matrix<double, 7, 1>>();
+    expectMatrix<std_msgs::Float64MultiArray, Eigen::Matrix<double, 1, 4>>();
+    expectMatrix<std_msgs::Float64MultiArray, Eigen::Matrix4d>();
+    expectMatrix<std_msgs::Float64MultiArray, Eigen::Matrix<double, 2, 3>>();
+    expectMatrix<std_msgs::Float64MultiArray, Eigen::Matrix<double, 2, 3, Eigen::RowMajor>>();
+    expectMatrix<std_msgs::Float32MultiArray, Eigen::Vector3f>();
+    expectMatrix<std_msgs::Float32MultiArray, Eigen::Matrix<float, 3, 2>>();
+}
+
+TEST(EigenType, MatrixOfAnotherSizeIsRefused) {
+    Eigen::Matrix2d ignored;
+    EXPECT_FALSE(deserialize(rtcfBytes(Eigen::Matrix<double, 2, 3>::Zero().eval()), ignored));
+    EXPECT_FALSE(deserialize(rtcfBytes(Eigen::Matrix<double, 1, 3>::Zero().eval()), ignored));
+}
+
+TEST(EigenType, MatrixWithoutLayoutIsTakenByItsSize) {
+    std_msgs::Float64MultiArray message;
+    message.data = {1.0, 2.0, 3.0, 4.0};
+    Eigen::Matrix2d value;
+    ASSERT_TRUE(deserialize(roscppBytes(message), value));
+    EXPECT_EQ(value(0, 1), 2.0);
+    EXPECT_EQ(value(1, 0), 3.0);
+}
+
+TEST(MessageType, IsAsRoscppHasIt) {
+    sensor_msgs::JointState message;
+    message.header.frame_id = "base";
+    message.name = {"shoulder", "elbow"};
+    message.position = {0.5, -0.5};
+    EXPECT_EQ(rtcfBytes(message), roscppBytes(message));
+    EXPECT_EQ(roundTrip(message), message);
+    EXPECT_FALSE(typeInfo<sensor_msgs::JointState>().fixed_size);
+    expectOtherLengthsRefused(message);
+}
+
+TEST(MessageType, IsPrintedOnOneLine) {
+    Slot<geometry_msgs::Pose> slot;
+    const std::string text = typeInfo<geometry_msgs::Pose>().print(slot);
+    EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+    EXPECT_NE(text.find("orientation"), std::string::npos) << text;
+}
+
+TEST(PortType, SlotIsMadeWithTheSamplesValue) {
+    Slot<std_msgs::String> sample;
+    sample.value.data = "long enough not to fit into the string itself";
+    sample.sequence = 5;
+    const auto made = typeInfo<std_msgs::String>().make_slot(&sample);
+    EXPECT_EQ(static_cast<Slot<std_msgs::String>&>(*made).value.data, sample.value.data);
+    EXPECT_EQ(made->sequence, 0U) << "made, not written";
+}
+
+TEST(PortType, CopyTakesValueAndHeader) {
+    Slot<double> from;
+    from.value = 2.5;
+    from.sequence = 3;
+    from.iteration = 4;
+    from.time_ns = 5;
+    Slot<double> to;
+    typeInfo<double>().copy(to, from);
+    EXPECT_EQ(to.value, 2.5);
+    EXPECT_EQ(to.sequence, 3U);
+    EXPECT_EQ(to.iteration, 4U);
+    EXPECT_EQ(to.time_ns, 5);
+}
+
+TEST(SameType, IsByNameMd5SizeAndAlignment) {
+    const TypeInfo& original = typeInfo<std_msgs::Float64>();
+    TypeInfo other = original;  // as another library has it
+    const std::string name = original.name;
+    other.name = name.c_str();
+    EXPECT_TRUE(sameType(original, other));
+    other.md5 = "00000000000000000000000000000000";
+    EXPECT_FALSE(sameType(original, other));
+    other = original;
+    other.size *= 2;
+    EXPECT_FALSE(sameType(original, other));
+    other = original;
+    other.alignment *= 2;
+    EXPECT_FALSE(sameType(original, other));
+}
+
+TEST(SameType, TellsTypesOfTheSameMessageApart) {
+    EXPECT_FALSE(sameType(typeInfo<double>(), typeInfo<std_msgs::Float64>()));
+    EXPECT_FALSE(sameType(typeInfo<Eigen::Matrix2d>(), typeInfo<Eigen::Matrix<double, 4, 1>>()));
+    EXPECT_FALSE(sameType(typeInfo<Eigen::Matrix<double, 2, 3>>(),
+                          typeInfo<Eigen::Matrix<double, 2, 3, Eigen::RowMajor>>()))
+        << "their values lie in memory in another order";
+}
+
+}  // namespace
+}  // namespace rtcf::test

@@ -1,0 +1,108 @@
+#include "bridge/injector.hpp"
+
+#include <gtest/gtest.h>
+#include <std_msgs/String.h>
+
+#include <atomic>
+#include <cstring>
+#include <thread>
+#include <vector>
+
+#include "rtcf/component.hpp"
+
+namespace rtcf::test {
+namespace {
+
+using executor::Injector;
+
+std::vector<std::uint8_t> bytesOf(double value) {
+    std::vector<std::uint8_t> bytes(sizeof value);
+    std::memcpy(bytes.data(), &value, sizeof value);
+    return bytes;
+}
+
+bool deliver(Injector& injector, double value) {
+    const auto bytes = bytesOf(value);
+    return injector.deliver(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+}
+
+double front(const Injector& injector) { return static_cast<const Slot<double>*>(injector.front())->value; }
+
+TEST(Injector, HasNothingAtFirst) {
+    Injector injector("/x", typeInfo<double>());
+    EXPECT_FALSE(injector.adopt(LoopClock{}));
+    EXPECT_EQ(injector.front()->sequence, 0U);
+}
+
+TEST(Injector, GivesTheNewestOfSeveral) {
+    Injector injector("/x", typeInfo<double>());
+    for (int i = 1; i <= 5; ++i) deliver(injector, i);
+    EXPECT_TRUE(injector.adopt(LoopClock{}));
+    EXPECT_EQ(front(injector), 5.0);
+    EXPECT_FALSE(injector.adopt(LoopClock{})) << "there is nothing newer";
+    EXPECT_EQ(front(injector), 5.0);
+    EXPECT_EQ(injector.delivered(), 5U);
+}
+
+TEST(Injector, StampsWithTheLoopsClock) {
+    Injector injector("/x", typeInfo<double>());
+    LoopClock clock;
+    clock.iteration = 9;
+    clock.time_ns = 1234;
+    for (std::uint64_t i = 1; i <= 3; ++i) {
+        deliver(injector, 1.0);
+        ASSERT_TRUE(injector.adopt(clock));
+        EXPECT_EQ(injector.front()->sequence, i);
+        EXPECT_EQ(injector.front()->iteration, 9U);
+        EXPECT_EQ(injector.front()->time_ns, 1234);
+    }
+}
+
+TEST(Injector, RefusesWhatIsNoMessageAndKeepsTheLastOne) {
+    Injector injector("/x", typeInfo<double>());
+    deliver(injector, 1.0);
+    const std::vector<std::uint8_t> few(3);
+    EXPECT_FALSE(injector.deliver(few.data(), 3));
+    EXPECT_EQ(injector.refused(), 1U);
+    EXPECT_EQ(injector.delivered(), 1U);
+    ASSERT_TRUE(injector.adopt(LoopClock{}));
+    EXPECT_EQ(front(injector), 1.0);
+}
+
+// Values of two numbers that belong together: neither thread ever sees half of one.
+TEST(Injector, IsNeverTornBetweenTwoThreads) {
+    constexpr int kCount = 100'000;
+    Injector injector("/x", typeInfo<std_msgs::String>());
+    std::atomic<bool> done{false};
+    std::thread producer([&] {
+        for (std::uint32_t i = 1; i <= kCount; ++i) {
+            // A string of 8 bytes: i, twice.
+            std::vector<std::uint8_t> bytes(12);
+            const std::uint32_t length = 8;
+            std::memcpy(bytes.data(), &length, 4);
+            std::memcpy(bytes.data() + 4, &i, 4);
+            std::memcpy(bytes.data() + 8, &i, 4);
+            injector.deliver(bytes.data(), 12);
+        }
+        done = true;
+    });
+    std::uint32_t last = 0;
+    for (bool over = false; !over;) {
+        over = done;
+        if (!injector.adopt(LoopClock{})) continue;
+        const std::string& text = static_cast<const Slot<std_msgs::String>*>(injector.front())->value.data;
+        ASSERT_EQ(text.size(), 8U);
+        std::uint32_t first = 0;
+        std::uint32_t second = 0;
+        std::memcpy(&first, text.data(), 4);
+        std::memcpy(&second, text.data() + 4, 4);
+        ASSERT_EQ(first, second);
+        ASSERT_GT(first, last);
+        last = first;
+    }
+    producer.join();
+    EXPECT_EQ(last, static_cast<std::uint32_t>(kCount)) << "the newest wins";
+}
+
+}  // namespace
+}  // namespace rtcf::test

@@ -1,0 +1,84 @@
+// Notes every call of its hooks, and fails where it is told to.
+#include <std_msgs/Float64.h>
+
+#include <chrono>
+#include <rtcf/component.hpp>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "journal.hpp"
+
+namespace {
+
+class Recorder : public rtcf::Component {
+   public:
+    double count() const { return count_; }
+
+   protected:
+    rtcf::Input<std_msgs::Float64> in{this, "in"};
+    rtcf::Output<std_msgs::Float64> out{this, "out"};
+    rtcf::Parameter<std::string> refuses{this, "refuses", "", rtcf::Doc("hook that returns false")};
+    rtcf::Parameter<std::string> throws{this, "throws", "", rtcf::Doc("hook that throws")};
+    rtcf::Parameter<std::int64_t> throws_at{this, "throws_at", -1, rtcf::Doc("update, from 0, that throws")};
+    rtcf::Parameter<double> gain{this, "gain", 1.0, rtcf::Min(0.0), rtcf::Max(10.0)};
+
+    bool configure() override { return hook("configure"); }
+    bool start() override { return hook("start"); }
+    void stop() override { hook("stop"); }
+    void cleanup() override { hook("cleanup"); }
+
+    // Its output counts its updates, so that one can see from outside whether its state was kept.
+    void update() override {
+        if (static_cast<std::int64_t>(count_) == throws_at) throw std::runtime_error("as told");
+        if (count_ == 0.0) note("update");
+        in.read();
+        count_ += 1.0;
+        out.value().data = count_ * gain;
+        out.publish();
+    }
+
+    void safe() noexcept override { note("safe"); }
+
+    void takeOver(const rtcf::Component& previous) noexcept override {
+        note("takeOver");
+        if (const auto* same = dynamic_cast<const Recorder*>(&previous)) count_ = same->count();
+    }
+
+    void note(const char* what) const noexcept {
+        if (rtcf_unit_test_journal != nullptr) rtcf_unit_test_journal()->note(fullName(), what);
+    }
+
+    bool hook(const char* name) {
+        note(name);
+        if (throws.value() == name) throw std::runtime_error("as told");
+        return refuses.value() != name || fail("told to refuse {}", name);
+    }
+
+   private:
+    double count_ = 0.0;
+};
+
+// Its hook of the parameter's name waits until the test opens the journal's gate.
+class Blocker final : public Recorder {
+    rtcf::Parameter<std::string> blocks{this, "blocks", "configure"};
+
+    bool configure() override { return Recorder::configure() && pass("configure"); }
+    bool start() override { return Recorder::start() && pass("start"); }
+    void stop() override {
+        Recorder::stop();
+        pass("stop");
+    }
+
+    bool pass(const char* name) {
+        while (blocks.value() == name && !rtcf_unit_test_journal()->gate_open.load()) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        }
+        return true;
+    }
+};
+
+}  // namespace
+
+RTCF_COMPONENT(Recorder, "Notes its hooks in the test's journal")
+RTCF_COMPONENT(Blocker, "Has a hook that waits for the test")

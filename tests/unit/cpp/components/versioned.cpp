@@ -1,0 +1,13 @@
+// Built twice, with another VERSION each: the same type before and after a rebuild.
+#include <rtcf/component.hpp>
+
+namespace {
+
+class Versioned final : public rtcf::Component {
+    rtcf::Output<std::int32_t> out{this, "out"};
+    void update() override { out.write(VERSION); }
+};
+
+}  // namespace
+
+RTCF_COMPONENT(Versioned, "Writes the version it was built as")

@@ -1,0 +1,123 @@
+#include "statistics/histogram.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <random>
+#include <vector>
+
+namespace rtcf::test {
+namespace {
+
+using namespace executor;
+
+constexpr double kError = 0.03;
+
+TEST(Histogram, EachBucketBeginsWhereTheLastOneEnds) {
+    for (std::size_t i = 0; i + 1 < Histogram::kBuckets; ++i) {
+        ASSERT_EQ(Histogram::lowerBound(i) + Histogram::width(i), Histogram::lowerBound(i + 1)) << i;
+    }
+}
+
+TEST(Histogram, PutsBothEndsOfABucketIntoIt) {
+    for (std::size_t i = 0; i < Histogram::kBuckets; ++i) {
+        ASSERT_EQ(Histogram::bucketOf(Histogram::lowerBound(i)), i);
+        ASSERT_EQ(Histogram::bucketOf(Histogram::lowerBound(i) + Histogram::width(i) - 1), i);
+    }
+}
+
+TEST(Histogram, HasLessThan3PercentErrorUpTo10Seconds) {
+    const auto ten_seconds_of_3_ghz = std::int64_t{30'000'000'000};
+    for (std::size_t i = 0; Histogram::lowerBound(i) <= ten_seconds_of_3_ghz; ++i) {
+        ASSERT_LT(i + 1, Histogram::kBuckets);
+        const auto low = static_cast<double>(Histogram::lowerBound(i));
+        const double half = 0.5 * static_cast<double>(Histogram::width(i) - 1);
+        ASSERT_LE(half, kError * std::max(1.0, low));
+    }
+}
+
+TEST(Histogram, TakesValuesOutsideItsRange) {
+    EXPECT_EQ(Histogram::bucketOf(-5), 0U);
+    EXPECT_EQ(Histogram::bucketOf(std::numeric_limits<std::int64_t>::max()), Histogram::kBuckets - 1);
+}
+
+// The value of rank ceil(q n), as quantiles are defined.
+double exactQuantile(const std::vector<std::int64_t>& sorted, double q) {
+    const auto rank = static_cast<std::size_t>(std::ceil(q * static_cast<double>(sorted.size())));
+    return static_cast<double>(sorted[rank - 1]);
+}
+
+TEST(Histogram, GivesTheQuantilesOfWhatWasAdded) {
+    std::mt19937_64 random(1);
+    for (const double spread : {0.2, 1.0, 3.0}) {
+        std::lognormal_distribution<double> durations(9.0, spread);
+        Histogram histogram;
+        std::vector<std::int64_t> values;
+        for (int i = 0; i < 20000; ++i) values.push_back(std::llround(durations(random)));
+        for (const std::int64_t value : values) histogram.add(value);
+        std::sort(values.begin(), values.end());
+        const DistributionSummary summary = summarize(histogram.snapshot(), 1.0);
+        EXPECT_EQ(summary.count, values.size());
+        const auto near = [](double expected) { return kError * expected + 0.5; };
+        EXPECT_NEAR(summary.min, static_cast<double>(values.front()), near(static_cast<double>(values.front())));
+        EXPECT_NEAR(summary.p50, exactQuantile(values, 0.5), near(exactQuantile(values, 0.5)));
+        EXPECT_NEAR(summary.p99, exactQuantile(values, 0.99), near(exactQuantile(values, 0.99)));
+        EXPECT_NEAR(summary.p999, exactQuantile(values, 0.999), near(exactQuantile(values, 0.999)));
+        EXPECT_EQ(summary.max, static_cast<double>(values.back()));
+        double sum = 0.0;
+        for (const std::int64_t value : values) sum += static_cast<double>(value);
+        EXPECT_NEAR(summary.mean, sum / 20000.0, 1e-6 * summary.mean);
+    }
+}
+
+TEST(Histogram, OrdersItsFiguresAlsoForOneValue) {
+    for (const std::int64_t value : {0, 1, 65, 97, 12345, 1'000'000'007}) {
+        Histogram histogram;
+        histogram.add(value);
+        const DistributionSummary summary = summarize(histogram.snapshot(), 1.0);
+        EXPECT_LE(summary.min, summary.p50);
+        EXPECT_LE(summary.p50, summary.p99);
+        EXPECT_LE(summary.p99, summary.p999);
+        EXPECT_LE(summary.p999, summary.max);
+        EXPECT_EQ(summary.max, static_cast<double>(value));
+    }
+}
+
+TEST(Histogram, OfNothingIsAllZero) {
+    const DistributionSummary summary = summarize(Histogram().snapshot(), 1.0);
+    EXPECT_EQ(summary.count, 0U);
+    EXPECT_EQ(summary.max, 0.0);
+}
+
+TEST(Histogram, ScalesItsFigures) {
+    Histogram histogram;
+    histogram.add(40);
+    const DistributionSummary summary = summarize(histogram.snapshot(), 0.5);
+    EXPECT_DOUBLE_EQ(summary.p50, 20.0);
+    EXPECT_DOUBLE_EQ(summary.mean, 20.0);
+    EXPECT_DOUBLE_EQ(summary.max, 20.0);
+}
+
+TEST(HistogramDifference, CountsWhatCameSince) {
+    Histogram histogram;
+    for (int i = 0; i < 100; ++i) histogram.add(1000);
+    const HistogramSnapshot before = histogram.snapshot();
+    for (int i = 0; i < 10; ++i) histogram.add(10);
+    const DistributionSummary since = summarize(difference(histogram.snapshot(), before), 1.0);
+    EXPECT_EQ(since.count, 10U);
+    EXPECT_DOUBLE_EQ(since.mean, 10.0);
+    EXPECT_DOUBLE_EQ(since.p999, 10.0);
+    EXPECT_DOUBLE_EQ(since.max, 10.0) << "the older maximum does not count";
+}
+
+TEST(HistogramDifference, ToNothingIsAll) {
+    Histogram histogram;
+    histogram.add(5);
+    EXPECT_EQ(difference(histogram.snapshot(), {}).count, 1U);
+}
+
+}  // namespace
+}  // namespace rtcf::test

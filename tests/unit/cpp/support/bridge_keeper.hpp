@@ -1,0 +1,38 @@
+/// @file
+/// The test's end of the executor's bridge: holds the taps and injectors that
+/// a graph offers, in place of the ROS node.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "bridge/bridge.hpp"
+
+namespace rtcf::test {
+
+/// What a bridge was given; shared by the bridge, which the runner owns, and the test.
+class BridgeRecord {
+   public:
+    /// @return null if there is none of that topic
+    std::shared_ptr<executor::Tap> tap(const std::string& topic) const;
+    std::shared_ptr<executor::Injector> injector(const std::string& topic) const;
+    void set(std::shared_ptr<const executor::BridgeTable> table);
+
+   private:
+    mutable std::mutex mutex_;
+    std::shared_ptr<const executor::BridgeTable> table_ = std::make_shared<executor::BridgeTable>();
+};
+
+class BridgeKeeper final : public executor::Bridge {
+   public:
+    explicit BridgeKeeper(std::shared_ptr<BridgeRecord> record) : record_(std::move(record)) {}
+    void configure(const executor::BridgeSettings&) override {}
+    void setTable(std::shared_ptr<const executor::BridgeTable> table) override { record_->set(std::move(table)); }
+    executor::BridgeStatus status() const override { return {}; }
+
+   private:
+    std::shared_ptr<BridgeRecord> record_;
+};
+
+}  // namespace rtcf::test

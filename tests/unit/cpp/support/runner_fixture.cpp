@@ -1,0 +1,130 @@
+#include "support/runner_fixture.hpp"
+
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+
+namespace rtcf::test {
+
+namespace {
+
+const std::string kLibrary = RTCF_UNIT_COMPONENTS "/rtcf_unit_test.so";
+const Runner::Progress kSilent = [](const std::string&) {};
+
+}  // namespace
+
+ComponentDefinition definition(const std::string& type, const std::string& name) {
+    ComponentDefinition result;
+    result.name = name;
+    result.package = "rtcf_unit_test";
+    result.type = type;
+    return result;
+}
+
+RunnerFixture::RunnerFixture()
+    : log_([this](LogEntry&& entry) {
+          const std::lock_guard<std::mutex> lock(mutex_);
+          logged_.push_back(std::move(entry));
+      }) {
+    journal().clear();
+    runner_ = std::make_unique<Runner>(
+        "rt_runner", log_,
+        [this](const RunnerEvent& event) {
+            const std::lock_guard<std::mutex> lock(mutex_);
+            events_.push_back(event);
+        },
+        std::make_unique<BridgeKeeper>(bridge_), recorder_);
+    configure([](RunnerSettings& settings) {
+        settings.loop.realtime.lock_memory = false;
+        settings.loop.realtime.heap_bytes = 0;
+    });
+}
+
+RunnerFixture::~RunnerFixture() { journal().gate_open.store(true); }
+
+ChangeOutcome RunnerFixture::load(const ComponentDefinition& component) {
+    return onGraphThread([&] { return runner_->load(component, kLibrary, kSilent); });
+}
+
+ChangeOutcome RunnerFixture::loadExample(const std::string& type, const std::string& name, executor::Remaps remaps,
+                                         bool first) {
+    ComponentDefinition component = definition(type, name);
+    component.package = "rtcf_examples";
+    component.remaps = std::move(remaps);
+    component.first = first;
+    return onGraphThread([&] { return runner_->load(component, RTCF_EXAMPLES, kSilent); });
+}
+
+ChangeOutcome RunnerFixture::unload(const std::string& name) {
+    return onGraphThread([&] { return runner_->unload({name}, kSilent); });
+}
+
+ChangeOutcome RunnerFixture::replace(const std::string& name, const ComponentDefinition& component) {
+    return onGraphThread([&] { return runner_->replace(name, component, kLibrary, kSilent); });
+}
+
+ChangeOutcome RunnerFixture::setBreak(const std::string& name, const std::string& port, bool broken) {
+    return onGraphThread([&] { return runner_->setBreaks({{name, port}}, broken); });
+}
+
+ChangeOutcome RunnerFixture::setParameters(const std::string& name,
+                                           const std::vector<std::pair<std::string, ParameterValue>>& batch) {
+    return onGraphThread([&] { return runner_->setParameters(name, batch); });
+}
+
+ChangeOutcome RunnerFixture::start() {
+    return onGraphThread([&] { return runner_->start(kSilent); });
+}
+
+ChangeOutcome RunnerFixture::stop() {
+    return onGraphThread([&] { return runner_->stop(kSilent); });
+}
+
+ChangeOutcome RunnerFixture::step(std::uint64_t cycles) {
+    return onGraphThread([&] { return runner_->step(cycles, kSilent); });
+}
+
+void RunnerFixture::configure(const std::function<void(RunnerSettings&)>& change) {
+    onGraphThread([&] {
+        RunnerSettings settings = runner_->settings();
+        change(settings);
+        runner_->configure(settings);
+    });
+}
+
+double RunnerFixture::value(const std::string& component, const std::string& port) {
+    const auto snapshot = runner_->snapshot();
+    const auto& ports = snapshot->get(component).ports;
+    const auto values = onGraphThread([&] { return runner_->probe(component); });
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        if (ports[i].name != port || !values[i].text) continue;
+        const std::string& text = *values[i].text;  // "data: 1.5"
+        return std::strtod(text.c_str() + text.find(' '), nullptr);
+    }
+    return std::numeric_limits<double>::quiet_NaN();
+}
+
+bool RunnerFixture::runs(std::uint64_t cycles) {
+    const std::uint64_t target = iteration() + cycles;
+    return eventually([&] { return iteration() >= target; });
+}
+
+std::vector<std::string> RunnerFixture::order() const {
+    std::vector<std::string> names;
+    const auto snapshot = runner_->snapshot();
+    for (const auto& component : snapshot->components) names.push_back(component->full_name);
+    return names;
+}
+
+std::vector<RunnerEvent> RunnerFixture::events() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return events_;
+}
+
+std::vector<LogEntry> RunnerFixture::logged() {
+    log_.drain();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return logged_;
+}
+
+}  // namespace rtcf::test

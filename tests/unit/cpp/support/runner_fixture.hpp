@@ -1,0 +1,123 @@
+/// @file
+/// A real runner for a test, with a loop at 1 kHz, and short words for what one
+/// asks of it. Changes run on the runner's graph thread, as the server has them
+/// run; refusals are thrown here.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <exception>
+#include <functional>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "components/journal.hpp"
+#include "faults/flight_recorder.hpp"
+#include "logging/log.hpp"
+#include "refusal.hpp"
+#include "runner/runner.hpp"
+#include "support/bridge_keeper.hpp"
+#include "support/eventually.hpp"
+
+namespace rtcf::test {
+
+using executor::ChangeOutcome;
+using executor::ComponentDefinition;
+using executor::LogEntry;
+using executor::Refusal;
+using executor::Runner;
+using executor::RunnerEvent;
+using executor::RunnerSettings;
+using executor::RunnerState;
+
+/// A component of package rtcf_unit_test; remaps and parameters are added by the caller.
+ComponentDefinition definition(const std::string& type, const std::string& name);
+
+class RunnerFixture : public ::testing::Test {
+   protected:
+    RunnerFixture();
+    ~RunnerFixture() override;
+
+    /// Runs `work` on the graph thread. @throws what it throws
+    template <typename Work>
+    auto onGraphThread(Work work) -> decltype(work());
+
+    /// Posts `work` and does not wait for it.
+    template <typename Work>
+    auto begin(Work work) -> std::future<decltype(work())>;
+
+    ChangeOutcome load(const ComponentDefinition& component);
+    ChangeOutcome loadExample(const std::string& type, const std::string& name, executor::Remaps remaps,
+                              bool first = false);
+    ChangeOutcome unload(const std::string& name);
+    ChangeOutcome replace(const std::string& name, const ComponentDefinition& component);
+    ChangeOutcome setBreak(const std::string& name, const std::string& port, bool broken);
+    ChangeOutcome setParameters(const std::string& name,
+                                const std::vector<std::pair<std::string, ParameterValue>>& batch);
+    ChangeOutcome start();
+    ChangeOutcome stop();
+    ChangeOutcome step(std::uint64_t cycles);
+    /// Changes settings, starting from the present ones.
+    void configure(const std::function<void(RunnerSettings&)>& change);
+
+    /// What the refusal of `work` says; empty if it is not refused.
+    template <typename Work>
+    std::string refusal(Work work);
+
+    /// Newest value of a port that carries a std_msgs number. @return NaN without a value
+    double value(const std::string& component, const std::string& port);
+    std::uint64_t iteration() const { return runner_->loop().figures().iteration.load(); }
+    /// Waits until the loop has executed `cycles` more. @return false if it does not
+    bool runs(std::uint64_t cycles = 20);
+    RunnerState state() const { return runner_->picture().state; }
+    std::vector<std::string> order() const;
+
+    std::vector<RunnerEvent> events() const;
+    std::vector<LogEntry> logged();
+    rtcf_unit_test::Journal& journal() { return *rtcf_unit_test_journal(); }
+    BridgeRecord& bridge() { return *bridge_; }
+
+    /// Ends the runner, as at the end of the executor.
+    void endRunner() { runner_.reset(); }
+
+    Runner& runner() { return *runner_; }
+
+   private:
+    mutable std::mutex mutex_;
+    std::vector<RunnerEvent> events_;
+    std::vector<LogEntry> logged_;
+    executor::FlightRecorder recorder_;
+    executor::Log log_;
+    std::shared_ptr<BridgeRecord> bridge_ = std::make_shared<BridgeRecord>();
+    std::unique_ptr<Runner> runner_;
+};
+
+template <typename Work>
+auto RunnerFixture::begin(Work work) -> std::future<decltype(work())> {
+    using Result = decltype(work());
+    auto task = std::make_shared<std::packaged_task<Result()>>(std::move(work));
+    std::future<Result> result = task->get_future();
+    runner_->post([task] { (*task)(); });
+    return result;
+}
+
+template <typename Work>
+auto RunnerFixture::onGraphThread(Work work) -> decltype(work()) {
+    return begin(std::move(work)).get();
+}
+
+template <typename Work>
+std::string RunnerFixture::refusal(Work work) {
+    try {
+        work();
+        return {};
+    } catch (const Refusal& refused) {
+        return refused.what();
+    }
+}
+
+}  // namespace rtcf::test

@@ -1,0 +1,31 @@
+#!/usr/bin/python3
+"""A ROS master that stops answering in the middle: it never replies to registerPublisher.
+
+deaf_master.py PORT   prints `asked` when a topic is registered; the test ends it
+"""
+
+import socketserver
+import sys
+import threading
+from typing import Any
+from xmlrpc.server import SimpleXMLRPCServer
+
+
+class DeafMaster(socketserver.ThreadingMixIn, SimpleXMLRPCServer):
+    """Knows one node, by the service that it registers."""
+
+    daemon_threads = True
+    node = ""
+
+    def _dispatch(self, method: str, params: Any) -> Any:
+        if method == "registerPublisher":
+            print("asked", flush=True)
+            threading.Event().wait()
+        if method == "registerService":
+            self.node = params[3]
+        if method == "lookupNode":
+            return [1, "", self.node]
+        return [-1 if method == "getParam" else 1, "", 0]
+
+
+DeafMaster(("127.0.0.1", int(sys.argv[1])), logRequests=False).serve_forever()

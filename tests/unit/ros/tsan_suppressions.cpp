@@ -1,0 +1,23 @@
+/// @file
+/// What ThreadSanitizer is not to report in these tests: it does not see into
+/// Debian's roscpp. The paths by which roscpp calls our code (callback queue,
+/// XML-RPC server, log) are not in the list.
+
+extern "C" const char* __tsan_default_suppressions();
+
+extern "C" const char* __tsan_default_suppressions() {
+    return
+        // roscpp takes its own mutexes in differing order, all in its poll thread.
+        "deadlock:libroscpp.so\n"
+        // Objects counted by boost: the last owner is seen, roscpp's part in the count is not.
+        "race:boost::detail::sp_counted\n"
+        "race:ros::SerializedMessage\n"
+        "race:ros::Publication::\n"
+        "race:ros::Subscription::\n"
+        "race:ros::TopicManager::\n"
+        // Bytes handed from one of its threads to another.
+        "race:ros::Connection::\n"
+        "race:ros::TransportTCP\n"
+        "race:ros::TransportSubscriberLink\n"
+        "race:ros::TransportPublisherLink\n";
+}
