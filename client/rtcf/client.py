@@ -1,7 +1,7 @@
 """The client of rtcfd: one method per call of `rtcf.v1.Control`."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
 from typing import Any
 
@@ -17,6 +17,8 @@ CHANGE_TIMEOUT_S = 120.0
 
 _OPTIONS = (
     ("grpc.max_receive_message_length", 64 * 1024 * 1024),
+    # A refusal travels as metadata, of which gRPC takes 8 KiB by default.
+    ("grpc.max_metadata_size", 1024 * 1024),
     # A connection of its own: a shared one may belong to a rtcfd that has ended.
     ("grpc.use_local_subchannel_pool", 1),
     # After a restart of rtcfd a client is to be back soon, not in gRPC's 1 to 120 s.
@@ -222,6 +224,18 @@ class Client:
         """Return the figures of a runner's loop and of its components."""
         request = control_pb2.GetStatisticsRequest(runner=runner)
         return self._ask(self._stub.GetStatistics, request)  # type: ignore[no-any-return]
+
+    def watch_statistics(
+        self, runner: str = "", interval_s: float = 1.0
+    ) -> Iterator[runner_pb2.RunnerStatistics]:
+        """Yield the figures now and after each interval (at least 0.1 s), without end."""
+        request = control_pb2.WatchStatisticsRequest(
+            runner=runner, interval_ms=round(interval_s * 1000)
+        )
+        try:
+            yield from self._stub.WatchStatistics(request)
+        except grpc.RpcError as error:
+            raise errors.from_grpc(error, self.socket) from None
 
     def reset_statistics(self, runner: str = "") -> None:
         """Begin the figures anew."""

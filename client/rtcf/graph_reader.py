@@ -153,7 +153,7 @@ class _Reader:
     def _value(self, node: Any, where: str) -> graph_pb2.ParameterValue:
         if node.id != "scalar":
             raise self._error(node, f"{where} must be a single value, not a {node.id}")
-        if node.style is not None:  # quoted, or a block of text
+        if node.style:  # quoted, or a block of text
             return graph_pb2.ParameterValue(string_value=node.value)
         if node.value in _NOTHING:
             raise self._error(node, f"{where} has no value; empty text is ''")

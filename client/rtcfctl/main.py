@@ -4,20 +4,22 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 import rtcf
 
-from rtcfctl import component, files, graph, loop, parameter, runner, stats, status, types
+from rtcfctl import check, component, files, graph, loop, parameter, runner, stats, status, types
 from rtcfctl.output import Output
 
 DONE, REFUSED, USAGE, UNREACHABLE = range(4)
 
-_NOUNS = (status, runner, loop, component, graph, files, parameter, types, stats)
+_NOUNS = (status, runner, loop, component, graph, files, parameter, types, stats, check)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None) -> int:
     """Run one command; return its exit code."""
     args = parser().parse_args(arguments)
+    args.build_tree = build_tree
     output = Output(args.output, args.verbose)
     try:
         with rtcf.Client(args.socket) as client:

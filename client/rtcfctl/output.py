@@ -73,6 +73,15 @@ class Output:
             )
         self._rich().print(table)
 
+    def begin_anew(self) -> None:
+        """Before output that takes the place of the last: clear a terminal; elsewhere begin
+        another YAML document (JSON documents just follow each other)."""
+        if not self.for_people:
+            if self._kind == "yaml":
+                print("---")
+        elif sys.stdout.isatty():
+            self._rich().clear()
+
     def progress(self, line: str) -> None:
         """Show what a long call is doing."""
         if self._verbose:

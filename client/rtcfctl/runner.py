@@ -76,6 +76,8 @@ def remove_runner(client: rtcf.Client, args: argparse.Namespace, output: Output)
     client.remove_runner(args.name)
     if output.for_people:
         print(f"runner {args.name} removed")
+    else:
+        output.data({"runner": args.name})
 
 
 def settings_of(args: argparse.Namespace) -> runner_pb2.RunnerSettings:

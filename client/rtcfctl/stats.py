@@ -1,6 +1,7 @@
 """`rtcfctl stats`."""
 
 import argparse
+import sys
 from typing import Any
 
 import rtcf
@@ -10,6 +11,7 @@ from rtcfctl.output import Output
 from rtcfctl.words import microseconds
 
 _FIGURES = ("min_ns", "mean_ns", "p50_ns", "p99_ns", "p999_ns", "max_ns")
+_SHORTEST_WATCH_S = 0.1
 _COLUMNS = ("count", "min", "mean", "p50", "p99", "p99.9", "max")
 
 
@@ -17,14 +19,43 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
     stats = verbs.add_parser("stats", parents=[common], help="durations, latencies, overruns")
     stats.add_argument("--reset", action="store_true", help="begin the figures anew afterwards")
+    stats.add_argument(
+        "--watch",
+        type=float,
+        nargs="?",
+        const=1.0,
+        metavar="S",
+        help="again and again, each second or each S seconds, until Ctrl-C",
+    )
     stats.set_defaults(run=show)
 
 
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Print the figures of a loop and of its components."""
-    found = client.get_statistics(args.runner)
+    if args.watch is not None:
+        _watch(client, args, output)
+        return
+    _print(client.get_statistics(args.runner), output)
     if args.reset:
         client.reset_statistics(args.runner)
+
+
+def _watch(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Print the figures until the user has had enough; on a terminal in one place."""
+    if not args.watch >= _SHORTEST_WATCH_S:
+        raise ValueError(f"--watch {args.watch:g}: at least {_SHORTEST_WATCH_S} s")
+    if args.reset:
+        client.reset_statistics(args.runner)
+    try:
+        for found in client.watch_statistics(args.runner, args.watch):
+            output.begin_anew()
+            _print(found, output)
+            sys.stdout.flush()
+    except KeyboardInterrupt:
+        return
+
+
+def _print(found: runner_pb2.RunnerStatistics, output: Output) -> None:
     if not output.for_people:
         output.data(found)
         return

@@ -16,14 +16,12 @@ class Mimo final : public rtcf::Component {
     rtcf::Output<Number> out1{this, "out1"};
     rtcf::Output<Number> out2{this, "out2"};
 
-    // What an input adds: its new value, or `otherwise`.
-    static double term(rtcf::Input<Number>& input, double otherwise) noexcept RTCF_NONBLOCKING {
-        return input.read() == rtcf::DataStatus::New ? input.value().data : otherwise;
-    }
-
     void update() override {
         // in1 counts 1 without new data, so that a loop of sums does not stay at 0.
-        double sum = term(in1, 1.0) + term(in2, 0.0) + term(in3, 0.0) + term(in4, 0.0);
+        double sum = in1.read() == rtcf::DataStatus::New ? in1.value().data : 1.0;
+        if (in2.read() == rtcf::DataStatus::New) sum += in2.value().data;
+        if (in3.read() == rtcf::DataStatus::New) sum += in3.value().data;
+        if (in4.read() == rtcf::DataStatus::New) sum += in4.value().data;
         if (sum > kLimit) sum = 1.0;
         out1.value().data = sum;
         out1.publish();

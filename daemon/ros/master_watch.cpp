@@ -1,6 +1,7 @@
 #include "ros/master_watch.hpp"
 
 #include <ros/node_handle.h>
+#include <xmlrpcpp/XmlRpcException.h>
 
 #include <cstdlib>
 
@@ -104,7 +105,14 @@ void MasterWatch::run() {
             if (stop_) break;
             if (!settings_) continue;
         }
-        step();
+        // What a master answers must never end the executor.
+        try {
+            step();
+        } catch (const std::exception& error) {
+            setProblem(std::string("ROS: ") + error.what());
+        } catch (const XmlRpc::XmlRpcException& error) {  // not a std::exception
+            setProblem("the ROS master's answer is not understood: " + error.getMessage());
+        }
     }
     end();
     {
@@ -166,8 +174,10 @@ bool MasterWatch::startNode(const std::string& uri) {
         node_.start(uri);
     } catch (const std::exception& error) {
         failed_ = true;
-        setProblem(std::string("the ROS node could not be started: ") + error.what());
-        say(std::string("the ROS node could not be started: ") + error.what());
+        const std::string problem =
+            std::string("the ROS node could not be started: ") + error.what();
+        setProblem(problem);
+        say(problem);
         return false;
     }
     refusals_ = std::make_unique<Refusals>();

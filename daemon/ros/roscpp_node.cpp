@@ -11,6 +11,7 @@
 #include <ros/xmlrpc_manager.h>
 #include <sys/socket.h>
 #include <unistd.h>
+#include <xmlrpcpp/XmlRpcException.h>
 
 #include <stdexcept>
 
@@ -71,7 +72,11 @@ void RoscppNode::start(const std::string& master_uri) {
               ros::init_options::NoSigintHandler | ros::init_options::NoRosout);
     // A call that roscpp repeats until the master is there holds up everything else.
     ros::master::setRetryTimeout(ros::WallDuration(0.2));
-    ros::start();
+    try {
+        ros::start();
+    } catch (const XmlRpc::XmlRpcException& error) {  // not a std::exception
+        throw std::runtime_error("the master's answer is not understood: " + error.getMessage());
+    }
 
     // Debian 12's get_loggers() corrupts log4cxx: the next log call would crash.
     const auto& services = ros::ServiceManager::instance();

@@ -5,11 +5,12 @@ folders of the search path; of two types with one name the first found wins.
 """
 
 import asyncio
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.folders import packages
 from rtcf.v1 import graph_pb2
 
 from rtcfd.describe import Describer
@@ -36,7 +37,7 @@ class Catalog:
         """Return the path of the library that offers a type, or refuse and say why."""
         check_base_name("package", package)
         check_base_name("type", type_name)
-        libraries = self._packages().get(package)
+        libraries = packages(self._folders).get(package)
         if libraries is None:
             raise NotFound(self._no_package(package))
         contents = await self._contents(package, libraries)
@@ -56,26 +57,16 @@ class Catalog:
 
     async def types(self, package: str = "") -> tuple[list[graph_pb2.ComponentType], list[str]]:
         """Return the types of one package or of all, by name, and what does not load."""
-        packages = self._packages()
+        known = packages(self._folders)
         if package:
             check_base_name("package", package)
-            if package not in packages:
+            if package not in known:
                 raise NotFound(self._no_package(package))
-            packages = {package: packages[package]}
-        names = sorted(packages)
-        every = await asyncio.gather(*(self._contents(name, packages[name]) for name in names))
+            known = {package: known[package]}
+        names = sorted(known)
+        every = await asyncio.gather(*(self._contents(name, known[name]) for name in names))
         types = [contents.types[name] for contents in every for name in sorted(contents.types)]
         return types, [problem for contents in every for problem in contents.problems]
-
-    def _packages(self) -> dict[str, list[Path]]:
-        """Return the libraries of each package, in the order in which they count."""
-        packages: dict[str, list[Path]] = {}
-        for folder in self._folders:
-            for package in _sub_folders(folder):
-                libraries = sorted(package.glob("*.so"))
-                if libraries:
-                    packages.setdefault(package.name, []).extend(libraries)
-        return packages
 
     async def _contents(self, package: str, libraries: list[Path]) -> _Contents:
         contents = _Contents()
@@ -97,7 +88,7 @@ class Catalog:
         folders = ", ".join(str(folder) for folder in self._folders)
         return (
             f'no package "{package}" with component libraries in {folders}'
-            f"{suggestion(package, self._packages())}"
+            f"{suggestion(package, packages(self._folders))}"
         )
 
 
@@ -117,10 +108,3 @@ def _one_problem(library: Path, problem: str) -> str:
     """Name the library, unless the dynamic loader's text begins with it already."""
     text = " ".join(problem.split())
     return text if str(library) in text else f"{library}: {text}"
-
-
-def _sub_folders(folder: Path) -> Iterator[Path]:
-    try:
-        yield from sorted(entry for entry in folder.iterdir() if entry.is_dir())
-    except OSError:
-        return  # a folder of the search path need not exist

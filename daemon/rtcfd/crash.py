@@ -33,6 +33,7 @@ class Verdict:
     how: str  # "was killed by SIGSEGV …"
     running: str  # "while /H1.update was running in cycle 7"
     culprit: str = ""  # full name of the component to quarantine; empty = none
+    orderly: bool = False  # somebody asked the executor itself to end, e.g. by SIGTERM
 
     def __str__(self) -> str:
         return f"{self.how} {self.running}"
@@ -65,7 +66,12 @@ def judge(end: End, note: Note | None) -> Verdict:
     running = f"while {busy} was running" if busy else "while no component was running"
     own = end.status is not None and (end.status >= 0 or -end.status in _OWN_SIGNALS)
     alone = bool(update) != bool(hook)
-    return Verdict(how, running, (note.updating or note.hooking) if own and alone else "")
+    return Verdict(
+        how,
+        running,
+        culprit=(note.updating or note.hooking) if own and alone else "",
+        orderly=end.status == 0 and not busy,
+    )
 
 
 class Crashes:

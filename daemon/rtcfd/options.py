@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from rtcf.folders import component_folders
 from rtcf.v1 import runner_pb2
 
 from rtcfd import VERSION, config, paths, settings
@@ -61,7 +62,7 @@ def parse(arguments: Sequence[str] | None, build_tree: Path | None) -> Options:
         own_runtime_dir=own_runtime_dir,
         state_dir=_absolute(state_dir) if state_dir else None,
         executor=_absolute(args.executor or file.executor or paths.executor(build_tree)),
-        folders=paths.component_folders([*args.path, *file.path], build_tree),
+        folders=component_folders([*args.path, *file.path], build_tree),
         defaults=settings.merged(
             settings.defaults(
                 _REALTIME[realtime],
@@ -75,7 +76,7 @@ def parse(arguments: Sequence[str] | None, build_tree: Path | None) -> Options:
 
 
 def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
-    folders = "\n".join(f"  {folder}" for folder in paths.component_folders([], build_tree))
+    folders = "\n".join(f"  {folder}" for folder in component_folders([], build_tree))
     parser = argparse.ArgumentParser(
         prog="rtcfd",
         formatter_class=argparse.RawDescriptionHelpFormatter,

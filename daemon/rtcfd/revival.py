@@ -101,10 +101,7 @@ async def recover(runner: "Runner", verdict: Verdict, trouble: str) -> None:
         if runner.up or runner.closing:
             return
         if runner.crashes.recent >= MOST_ATTEMPTS:
-            runner.log.error(
-                "%d executors died in %g s: no other is started until `rtcfctl -r %s start`",
-                runner.crashes.recent, WINDOW_S, runner.name,
-            )  # fmt: skip
+            runner.give_up(f"{trouble}, the last of {runner.crashes.recent} in {WINDOW_S:g} s")
             return
         await runner.start_executor()
         if not runner.up:
@@ -122,7 +119,8 @@ async def recover(runner: "Runner", verdict: Verdict, trouble: str) -> None:
     try:
         await runner.change("the recovery of its executor", work)
     except Refusal as refusal:
-        runner.log.error("not recovered: %s", refusal)
+        if not runner.up and not runner.closing:
+            runner.give_up(f"{trouble}; not recovered: {refusal}")
 
 
 def resumes(runner: "Runner", verdict: Verdict) -> bool:

@@ -154,7 +154,10 @@ class Runner:
             extra={"runner": self.name, "component": verdict.culprit},
         )
         self._shared.on_change()
-        if ours:
+        if ours and verdict.orderly:
+            self._trouble += f"; `rtcfctl -r {self.name} start` brings it back with its components"
+            self._loop_ended()
+        elif ours:
             self.crashes.add()
             self.desired.quarantine(verdict.culprit, str(verdict))
             # From here on a `stop` counts.
@@ -194,10 +197,11 @@ class Runner:
             return "down"
         return "running" if self.running else "stopped"
 
-    @property
-    def trouble(self) -> str:
-        """Why there is no executor."""
-        return self._trouble
+    def give_up(self, trouble: str) -> None:
+        """Say why there is no executor, and no other is started by itself."""
+        self._trouble = f"{trouble}; `rtcfctl -r {self.name} start` tries again"
+        self.log.error("%s", self._trouble)
+        self._shared.on_change()
 
     @property
     def closing(self) -> bool:

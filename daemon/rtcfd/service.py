@@ -31,6 +31,8 @@ STATUS_CODES: dict[type[errors.Refusal], grpc.StatusCode] = {
     errors.FailedPrecondition: grpc.StatusCode.FAILED_PRECONDITION,
     errors.Unavailable: grpc.StatusCode.UNAVAILABLE,
 }
+_WATCH_MS = 1000
+_SHORTEST_WATCH_MS = 100
 # Tells a client that rtcfd itself spoke, and not gRPC about a lost connection.
 REFUSAL_KEY = "rtcf-refusal"
 
@@ -226,11 +228,19 @@ class Control(control_pb2_grpc.ControlServicer):
     @_answering
     async def GetStatistics(self, request: control_pb2.GetStatisticsRequest) -> Any:
         """The figures."""
-        runner = self._runners.get(request.runner)
-        query = wire.Request(get_statistics=wire.GetStatistics())
-        statistics: runner_pb2.RunnerStatistics = (await runner.query(query)).statistics
-        statistics.runner = runner.name
-        return statistics
+        return await self._statistics(request.runner)
+
+    async def WatchStatistics(
+        self, request: control_pb2.WatchStatisticsRequest, context: Any
+    ) -> AsyncIterator[runner_pb2.RunnerStatistics]:
+        """The figures, again and again."""
+        interval_s = max(request.interval_ms or _WATCH_MS, _SHORTEST_WATCH_MS) / 1000
+        try:
+            while True:
+                yield await self._statistics(request.runner)
+                await asyncio.sleep(interval_s)
+        except Exception as error:
+            await _abort(context, error)
 
     @_answering
     async def ResetStatistics(self, request: control_pb2.ResetStatisticsRequest) -> Any:
@@ -238,6 +248,13 @@ class Control(control_pb2_grpc.ControlServicer):
         runner = self._runners.get(request.runner)
         await runner.query(wire.Request(reset_statistics=wire.ResetStatistics()))
         return control_pb2.ResetStatisticsResponse()
+
+    async def _statistics(self, name: str) -> runner_pb2.RunnerStatistics:
+        runner = self._runners.get(name)
+        query = wire.Request(get_statistics=wire.GetStatistics())
+        statistics: runner_pb2.RunnerStatistics = (await runner.query(query)).statistics
+        statistics.runner = runner.name
+        return statistics
 
     async def _components(self, runner: str) -> list[graph_pb2.ComponentInfo]:
         query = wire.Request(list_components=wire.ListComponents())

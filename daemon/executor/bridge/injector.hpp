@@ -45,7 +45,6 @@ class Injector {
         front_ = middle_.exchange(front_, std::memory_order_acq_rel) & ~kFresh;
         SlotHeader& slot = *slots_[front_];
         slot.sequence = ++sequence_;
-        slot.iteration = clock.iteration;
         slot.time_ns = clock.time_ns;
         return true;
     }

@@ -9,7 +9,11 @@ Tap::Tap(std::string topic, const TypeInfo& type, std::shared_ptr<const SlotHead
     : topic_(std::move(topic)), type_(type), source_(std::move(source)), last_sequence_(0) {
     // Of a value of its own: the loop may be writing the source's.
     const std::size_t one = kAlign + padded(type_.length(*type_.make_slot(nullptr)));
-    ring_.resize(padded(std::max(capacity, 2 * one)));
+    // A power of two, so that a place in the ring is found without a division.
+    std::size_t size = kAlign;
+    while (size < std::max(capacity, 2 * one)) size *= 2;
+    ring_.resize(size);
+    mask_ = size - 1;
 }
 
 std::uint32_t Tap::lengthAt(std::size_t offset) const noexcept {
@@ -24,9 +28,9 @@ void Tap::push() noexcept RTCF_NONBLOCKING {
     const std::uint32_t length = type_.length(*source_);
     const std::size_t record = kAlign + padded(length);
     std::size_t head = head_.load(std::memory_order_relaxed);
-    const std::size_t free = ring_.size() - (head - tail_.load(std::memory_order_acquire));
-    std::size_t offset = head % ring_.size();
-    const std::size_t to_end = ring_.size() - offset;
+    const std::size_t free = mask_ + 1 - (head - tail_.load(std::memory_order_acquire));
+    std::size_t offset = head & mask_;
+    const std::size_t to_end = mask_ + 1 - offset;
     const std::size_t skipped = record > to_end ? to_end : 0;
     if (record + skipped > free) {
         dropped_.store(dropped_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);

@@ -52,6 +52,7 @@ class Tap {
     std::shared_ptr<const SlotHeader> source_;
     std::uint64_t last_sequence_ = 0;
     std::vector<std::uint8_t> ring_;
+    std::size_t mask_ = 0;              // the ring's size minus 1
     std::atomic<std::size_t> head_{0};  // bytes ever written, by the producer
     std::atomic<std::size_t> tail_{0};  // bytes ever read, by the consumer
     std::atomic<std::uint64_t> dropped_{0};
@@ -62,10 +63,10 @@ bool Tap::pop(Use&& use) {
     std::size_t tail = tail_.load(std::memory_order_relaxed);
     const std::size_t head = head_.load(std::memory_order_acquire);
     if (tail == head) return false;
-    std::size_t offset = tail % ring_.size();
+    std::size_t offset = tail & mask_;
     std::uint32_t length = lengthAt(offset);
     if (length == kSkip) {
-        tail += ring_.size() - offset;
+        tail += mask_ + 1 - offset;
         offset = 0;
         length = lengthAt(0);
     }

@@ -32,6 +32,8 @@ const char* hookName(Hook hook) noexcept {
             return "stop";
         case Hook::Cleanup:
             return "cleanup";
+        case Hook::Prepare:
+            return "prepare";
         case Hook::None:
             break;
     }

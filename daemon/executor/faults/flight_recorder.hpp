@@ -18,7 +18,7 @@ namespace rtcf::executor {
 enum class ThreadRole : std::uint32_t { None = 0, Realtime = 1, Graph = 2, Other = 3 };
 
 /// Which hook the graph thread is in, in the recorder's numbers.
-enum class Hook : std::uint32_t { None = 0, Constructor = 1, Configure = 2, Start = 3, Stop = 4, Cleanup = 5 };
+enum class Hook : std::uint32_t { None = 0, Constructor = 1, Configure = 2, Start = 3, Stop = 4, Cleanup = 5, Prepare = 6 };
 
 const char* hookName(Hook hook) noexcept;
 
@@ -46,13 +46,9 @@ class FlightRecorder {
 
     /// @name Notes; real-time safe
     /// @{
-    void setIteration(std::uint64_t iteration) noexcept RTCF_NONBLOCKING {
-        page_->iteration.store(iteration, std::memory_order_relaxed);
-    }
-    void enterComponent(std::uint32_t slot) noexcept RTCF_NONBLOCKING {
-        page_->realtime_slot.store(slot, std::memory_order_relaxed);
-    }
-    void leaveComponents() noexcept RTCF_NONBLOCKING { enterComponent(0); }
+    /// The real-time thread's own, see below.
+    class RealtimeNotes;
+    inline RealtimeNotes realtimeNotes() noexcept;
     void setRunning(bool running) noexcept RTCF_NONBLOCKING {
         page_->running.store(running ? 1 : 0, std::memory_order_relaxed);
     }
@@ -92,5 +88,25 @@ class FlightRecorder {
     std::vector<std::uint32_t> free_;
     std::uint32_t next_ = 1;
 };
+
+/// What the real-time thread notes in each cycle. To be copied into a local
+/// variable, so that a note is one store. Real-time safe.
+class FlightRecorder::RealtimeNotes {
+   public:
+    void setIteration(std::uint64_t iteration) const noexcept RTCF_NONBLOCKING {
+        page_->iteration.store(iteration, std::memory_order_relaxed);
+    }
+    void enterComponent(std::uint32_t slot) const noexcept RTCF_NONBLOCKING {
+        page_->realtime_slot.store(slot, std::memory_order_relaxed);
+    }
+    void leaveComponents() const noexcept RTCF_NONBLOCKING { enterComponent(0); }
+
+   private:
+    friend class FlightRecorder;
+    explicit RealtimeNotes(Page* page) noexcept : page_(page) {}
+    Page* page_;
+};
+
+inline FlightRecorder::RealtimeNotes FlightRecorder::realtimeNotes() noexcept { return RealtimeNotes(page_); }
 
 }  // namespace rtcf::executor

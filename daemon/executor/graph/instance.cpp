@@ -70,7 +70,8 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
         for (const ParameterBase* parameter : component_->parameters()) {
             parameter_values_.push_back(parameter->declaration().default_value);
         }
-        for (ParameterBase* parameter : stageParameters(definition_.parameters)) parameter->commit();
+        for (StagedValue* value : stageParameters(definition_.parameters)) value->commit();
+        releaseStaged();
     } catch (const Refusal&) {
         recorder_.removeSlot(slot_);
         throw;
@@ -185,8 +186,17 @@ InputBase* Instance::findInput(const std::string& port) const noexcept {
     return nullptr;
 }
 
-std::vector<ParameterBase*> Instance::stageParameters(
-    const std::vector<std::pair<std::string, ParameterValue>>& batch) {
+void Instance::restoreParameterValues(std::vector<ParameterValue> values) {
+    parameter_values_ = std::move(values);
+    releaseStaged();
+}
+
+void Instance::releaseStaged() noexcept {
+    for (ParameterBase* parameter : component_->parameters()) parameter->release();
+    for (DerivedBase* derived : component_->derived()) derived->release();
+}
+
+std::vector<StagedValue*> Instance::stageParameters(const std::vector<std::pair<std::string, ParameterValue>>& batch) {
     const auto& declared = component_->parameters();
     std::vector<std::pair<std::size_t, ParameterValue>> checked;
     for (const auto& [name, given] : batch) {
@@ -203,12 +213,21 @@ std::vector<ParameterBase*> Instance::stageParameters(
         }
         checked.emplace_back(found - declared.begin(), std::move(value));
     }
-    std::vector<ParameterBase*> staged;
-    for (auto& [index, value] : checked) {
-        declared[index]->stage(value);
-        parameter_values_[index] = std::move(value);
-        if (std::find(staged.begin(), staged.end(), declared[index]) == staged.end()) staged.push_back(declared[index]);
+    for (const auto& [index, value] : checked) declared[index]->stage(value);
+    try {
+        callHook(Hook::Prepare, [this] { return component_->prepare(Values{}); });
+    } catch (const Refusal&) {
+        releaseStaged();
+        throw;
     }
+    std::vector<StagedValue*> staged;
+    for (ParameterBase* parameter : declared) {
+        if (parameter->staged()) staged.push_back(parameter);
+    }
+    for (DerivedBase* derived : component_->derived()) {
+        if (derived->staged()) staged.push_back(derived);
+    }
+    for (auto& [index, value] : checked) parameter_values_[index] = std::move(value);
     return staged;
 }
 

@@ -64,15 +64,17 @@ class Instance {
     void setPhase(std::uint32_t phase) noexcept { phase_ = phase; }
     /// Not null if it paces the loop.
     Source* source() const noexcept { return dynamic_cast<Source*>(component_.get()); }
+    /// Frees what an adopted batch has replaced.
+    void releaseStaged() noexcept;
     InputBase* findInput(const std::string& port) const noexcept;
 
     /// The parameters' values as last staged, in the order of declaration.
     const std::vector<ParameterValue>& parameterValues() const noexcept { return parameter_values_; }
     /// Takes back a batch that the loop did not adopt.
-    void restoreParameterValues(std::vector<ParameterValue> values) { parameter_values_ = std::move(values); }
-    /// Checks a batch and stages it. @return the parameters to commit at the boundary
-    /// @throws Refusal naming the first bad one; nothing is staged then
-    std::vector<ParameterBase*> stageParameters(const std::vector<std::pair<std::string, ParameterValue>>& batch);
+    void restoreParameterValues(std::vector<ParameterValue> values);
+    /// Checks a batch, stages it and lets the component prepare for it. @return what to commit at the
+    /// boundary @throws Refusal naming the first bad one; nothing is staged then
+    std::vector<StagedValue*> stageParameters(const std::vector<std::pair<std::string, ParameterValue>>& batch);
 
     /// What it threw out of update(); empty = nothing.
     const std::string& faultText() const noexcept { return fault_; }

@@ -2,15 +2,31 @@
 
 #include <fmt/format.h>
 
+#include <cstring>
+
 #include "refusal.hpp"
 
 namespace rtcf::executor {
 
 namespace {
 
-const char* reason(std::regex_constants::error_type code) {
+// The shell's way to write 'any text'; libstdc++ takes it for a missing parenthesis.
+bool repeatsNothing(const std::string& expression) {
+    constexpr const char* kBegin = "(|";
+    char before = '|';
+    for (const char c : expression) {
+        const bool group = before == '(' && c == '?';  // (?: and the like
+        if (std::strchr("*+?", c) != nullptr && std::strchr(kBegin, before) != nullptr && !group) return true;
+        before = c;
+    }
+    return false;
+}
+
+const char* reason(std::regex_constants::error_type code, const std::string& expression = {}) {
     using namespace std::regex_constants;
-    if (code == error_badrepeat) return "a repeat (*, +, ?) has nothing before it; 'any text' is .*";
+    if (code == error_badrepeat || repeatsNothing(expression)) {
+        return "a repeat (*, +, ?) has nothing before it; 'any text' is .*";
+    }
     if (code == error_brack) return "a [ is not closed";
     if (code == error_paren) return "a ( is not closed, or a ) not opened";
     if (code == error_brace || code == error_badbrace) return "a { } is not complete";
@@ -28,7 +44,7 @@ NamePattern::NamePattern(const std::string& what, const std::string& expression)
         regex_.emplace(expression, std::regex::ECMAScript | std::regex::optimize);
     } catch (const std::regex_error& error) {
         throw Refusal(RefusalKind::InvalidArgument,
-                      fmt::format("{}: bad regular expression '{}': {}", what, expression, reason(error.code())));
+                      fmt::format("{}: bad regular expression '{}': {}", what, expression, reason(error.code(), expression)));
     }
 }
 

@@ -103,15 +103,25 @@ std::string breakCommand(const Graph& graph, const std::vector<Edge>& cut, const
 }
 
 [[noreturn]] void refuseLoop(const Graph& graph, const OrderResult& result, const std::string& loading) {
+    // Of a loop that nobody could read, both ends.
+    constexpr std::size_t kListedAtEachEnd = 10;
+    constexpr std::size_t kListedCuts = 5;
+    const std::size_t length = result.loop.size();
     std::string loop;
-    for (const Edge& edge : result.loop) {
+    for (std::size_t i = 0; i < length; ++i) {
+        if (length > 2 * kListedAtEachEnd && i == kListedAtEachEnd) {
+            i = length - kListedAtEachEnd;
+            loop += fmt::format(" → … {} more connections …", length - 2 * kListedAtEachEnd);
+        }
+        const Edge& edge = result.loop[i];
         loop += fmt::format("{}{} → {}", loop.empty() ? "" : " → ", portName(graph, edge.from, edge.from_port),
                             portName(graph, edge.to, edge.to_port));
     }
     std::string advice;
-    for (const std::vector<Edge>& cut : result.cuts) {
-        advice += (advice.empty() ? "" : ", or ") + breakCommand(graph, cut, loading);
+    for (std::size_t i = 0; i < result.cuts.size() && i < kListedCuts; ++i) {
+        advice += (advice.empty() ? "" : ", or ") + breakCommand(graph, result.cuts[i], loading);
     }
+    if (result.cuts.size() > kListedCuts) advice += ", or elsewhere in the loop";
     throw Refusal(RefusalKind::FailedPrecondition,
                   fmt::format("the connections form a loop: {}; let one input read the previous cycle: {}", loop, advice));
 }

@@ -56,30 +56,34 @@ void Log::write(LogLevel level, const std::string& component, std::string messag
 
 void Log::drain() {
     const std::lock_guard<std::mutex> lock(drain_mutex_);
-    drainRing(others_);
-    drainRing(realtime_);
+    for (;;) {
+        const LogRecord* other = others_.front();
+        const LogRecord* realtime = realtime_.front();
+        if (other == nullptr && realtime == nullptr) break;
+        const bool is_realtime = other == nullptr || (realtime != nullptr && realtime->time_ns < other->time_ns);
+        drainOne(is_realtime ? realtime_ : others_);
+    }
     reportDrops();
 }
 
-void Log::drainRing(Ring& ring) {
-    while (const LogRecord* record = ring.front()) {
-        LogEntry entry;
-        entry.level = record->site->level;
-        entry.time_ns = record->time_ns;
-        entry.iteration = record->iteration;
-        entry.component = record->component;
-        entry.file = record->site->file;
-        entry.line = record->site->line;
-        entry.function = record->site->function;
-        entry.realtime = record->realtime;
-        try {
-            record->render(*record, entry.message);
-        } catch (const std::exception& error) {
-            entry.message = fmt::format("{} (cannot be formatted: {})", record->site->format, error.what());
-        }
-        ring.pop();
-        consumer_(std::move(entry));
+void Log::drainOne(Ring& ring) {
+    const LogRecord* record = ring.front();
+    LogEntry entry;
+    entry.level = record->site->level;
+    entry.time_ns = record->time_ns;
+    entry.iteration = record->iteration;
+    entry.component = record->component;
+    entry.file = record->site->file;
+    entry.line = record->site->line;
+    entry.function = record->site->function;
+    entry.realtime = record->realtime;
+    try {
+        record->render(*record, entry.message);
+    } catch (const std::exception& error) {
+        entry.message = fmt::format("{} (cannot be formatted: {})", record->site->format, error.what());
     }
+    ring.pop();
+    consumer_(std::move(entry));
 }
 
 void Log::reportDrops() {

@@ -41,7 +41,7 @@ class Log final : public LogSink {
     /// A record of the executor's own. Not real-time safe.
     void write(LogLevel level, const std::string& component, std::string message);
 
-    /// Hands all pending records to the consumer, oldest first in each ring. Any
+    /// Hands all pending records to the consumer, the oldest first. Any
     /// thread that is not real-time. Called before a component goes away, as
     /// records refer to its name and library.
     void drain();
@@ -58,7 +58,7 @@ class Log final : public LogSink {
     static constexpr std::size_t kCapacity = 1024;
     using Ring = SpscRing<LogRecord, kCapacity>;
 
-    void drainRing(Ring& ring);
+    void drainOne(Ring& ring);
     void reportDrops();
 
     Consumer consumer_;

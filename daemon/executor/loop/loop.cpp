@@ -35,7 +35,7 @@ void bump(std::atomic<std::uint64_t>& counter, std::uint64_t by = 1) {
 }  // namespace
 
 Loop::Loop(Log& log, FlightRecorder& recorder)
-    : log_(log), recorder_(recorder), counter_(CycleCounter::calibrate()), schedule_(&empty_) {
+    : log_(log), recorder_(recorder), notes_(recorder.realtimeNotes()), counter_(CycleCounter::calibrate()), schedule_(&empty_) {
     log_.setIteration(&figures_.iteration);
 }
 
@@ -59,6 +59,7 @@ void Loop::reset(const LoopSettings& settings) {
         step.context->updated_ns = -1;
         step.context->disabled = false;
     }
+    noteSchedule();
     figures_.iteration.store(0, std::memory_order_relaxed);
     bucket_ = 0;
     cycles_on_time_ = 0;
@@ -106,14 +107,16 @@ RealtimeProblems Loop::start(const LoopSettings& settings) {
 
 bool Loop::join(std::int64_t timeout_ns) {
     if (!joinable()) return true;
-    int error = 0;
-    if (timeout_ns == INT64_MAX) {
-        error = pthread_join(thread_, nullptr);
-    } else {
-        const timespec until = toTimespec(clockNow(CLOCK_MONOTONIC) + timeout_ns);
-        error = pthread_clockjoin_np(thread_, nullptr, CLOCK_MONOTONIC, &until);
+    if (timeout_ns != INT64_MAX) {
+        const std::int64_t until = clockNow(CLOCK_MONOTONIC) + timeout_ns;
+        while (running()) {
+            if (clockNow(CLOCK_MONOTONIC) > until) return false;
+            const timespec pause{0, 100'000};
+            nanosleep(&pause, nullptr);
+        }
     }
-    if (error != 0) return false;
+    // Not running any more is the last thing it does, so that this takes no time.
+    if (pthread_join(thread_, nullptr) != 0) return false;
     joinable_.store(false, std::memory_order_release);
     idle_guard_.reset();
     thread_id_.store(0, std::memory_order_relaxed);
@@ -197,7 +200,10 @@ void Loop::run() noexcept {
         }
         const std::int64_t begin = readCycleCounter();
         cycle(deadline, wake);
-        deadline = nextDeadline(deadline, wake + counter_.toNs(readCycleCounter() - begin));
+        const std::int64_t end = wake + counter_.toNs(readCycleCounter() - begin);
+        const std::int64_t limit = deadline + clock_.period_ns;
+        if (end >= limit) blameOverrun(begin, begin + counter_.toTicks(limit - wake));
+        deadline = nextDeadline(deadline, end);
     }
     makeSafe();
     recorder_.setRunning(false);
@@ -233,57 +239,58 @@ std::int64_t Loop::waitFor(std::int64_t deadline_ns) noexcept {
 
 void Loop::cycle(std::int64_t deadline_ns, std::int64_t wake_ns) noexcept RTCF_NONBLOCKING {
     const std::int64_t begin = readCycleCounter();
-    takeProbe();
-    if (pending_.load(std::memory_order_relaxed) != nullptr) takeAdoption();
+    if (requested()) {
+        takeProbe();
+        takeAdoption();
+    }
     const Schedule& schedule = *schedule_;
+    const FlightRecorder::RealtimeNotes notes = notes_;
     clock_.time_ns = deadline_ns;
     clock_.stamp_ns = deadline_ns + stamp_offset_ns_.load(std::memory_order_relaxed);
-    feed();
-    for (const Latch& latch : schedule.latches) latch.copy();
-    const std::int64_t limit = begin + counter_.toTicks(deadline_ns + clock_.period_ns - wake_ns);
-    const bool plain = schedule.plain && !any_disabled_ && clock_.iteration >= warmup_cycles_;
-    recorder_.setIteration(clock_.iteration);
-    total_elapsed_ns_ += elapsed_ns_;
+    if (exchanges_) {
+        feed();
+        for (const Latch& latch : schedule.latches) latch.copy();
+    }
+    const std::uint64_t iteration = clock_.iteration;
+    notes.setIteration(iteration);
     const bool complete =
-        plain ? update<true>(schedule, begin, limit) : update<false>(schedule, begin, limit);
-    recorder_.leaveComponents();
-    if (complete) {
+        iteration >= plain_from_ ? update<true>(schedule, notes, begin) : updateSelected(schedule, begin);
+    notes.leaveComponents();
+    if (exchanges_ && complete) {
         for (Tap* tap : schedule.taps) tap->push();
     }
     const std::int64_t duration = readCycleCounter() - begin;
-    if (clock_.iteration >= warmup_cycles_) {
+    if (iteration >= warmup_cycles_) {
         figures_.duration.add(duration);
         figures_.latency.add(wake_ns - deadline_ns);
     }
     if (CycleRecord* record = records_.claim()) {
-        *record = {clock_.iteration, clock_.stamp_ns, wake_ns - deadline_ns, counter_.toNs(duration)};
+        *record = {iteration, clock_.stamp_ns, wake_ns - deadline_ns, counter_.toNs(duration)};
         records_.commit();
     }
-    clock_.iteration = clock_.iteration + 1;
-    figures_.iteration.store(clock_.iteration, std::memory_order_relaxed);
+    clock_.iteration = iteration + 1;
+    figures_.iteration.store(iteration + 1, std::memory_order_relaxed);
 }
 
 // The one frame that catches: a component may throw, the loop may not. `Plain` leaves out what
 // most graphs do not have, so that it costs them nothing.
 template <bool Plain>
-bool Loop::update(const Schedule& schedule, std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept {
+[[gnu::always_inline]] inline bool Loop::update(const Schedule& schedule, FlightRecorder::RealtimeNotes notes,
+                                                 std::int64_t begin_ticks) noexcept {
     std::int64_t before = begin_ticks;
     const Step* running = nullptr;
     try {
         for (const Step& step : schedule.steps) {
             if (!Plain && !due(step)) continue;
-            if (Plain) step.context->elapsed_ns = elapsed_ns_;
             running = &step;
-            recorder_.enterComponent(step.slot);
+            notes.enterComponent(step.slot);
             step.component->update();
             if (!Plain) commitFinite(step);
             const std::int64_t after = readCycleCounter();
-            if (Plain || clock_.iteration >= warmup_cycles_) step.figures->duration.add(after - before);
-            if (after > limit_ticks) {  // this one was running when the next cycle should have begun
-                bump(step.figures->overruns);
-                limit_ticks = INT64_MAX;
-            }
+            const std::int64_t duration = after - before;
             before = after;
+            step.ended_ticks = after;
+            if (Plain || clock_.iteration >= warmup_cycles_) step.figures->duration.add(duration);
         }
         return true;
     } catch (const std::exception& error) {
@@ -292,6 +299,12 @@ bool Loop::update(const Schedule& schedule, std::int64_t begin_ticks, std::int64
         componentFailed(LoopFault::Kind::Exception, *running, "an exception of unknown type");
     }
     return false;
+}
+
+// Cycles in which not all is plain; a function of its own, as it needs registers that the others do not.
+[[gnu::noinline]] bool Loop::updateSelected(const Schedule& schedule, std::int64_t begin_ticks) noexcept {
+    total_elapsed_ns_ += elapsed_ns_;
+    return update<false>(schedule, notes_, begin_ticks);
 }
 
 // Whether a component runs in this cycle; then its clock is set.
@@ -322,6 +335,7 @@ void Loop::componentFailed(LoopFault::Kind kind, const Step& step, const char* t
     }
     step.context->disabled = true;
     any_disabled_ = true;
+    noteSchedule();
     reportFault(kind, step.component, text);
 }
 
@@ -358,7 +372,22 @@ void Loop::takeAdoption() noexcept RTCF_NONBLOCKING {
         elapsed_ns_ = adoption->period_ns;
     }
     for (const Step& step : schedule_->steps) step.context->period_ns = clock_.period_ns * step.every;
+    noteSchedule();
     pending_.store(nullptr, std::memory_order_release);
+}
+
+// What a cycle has to look at, decided once for all cycles until the schedule changes.
+void Loop::noteSchedule() noexcept RTCF_NONBLOCKING {
+    plain_from_ = schedule_->plain && !any_disabled_ ? warmup_cycles_ : UINT64_MAX;
+    for (const Step& step : schedule_->steps) step.context->elapsed_ns = elapsed_ns_;
+    exchanges_ = !schedule_->feeds.empty() || !schedule_->latches.empty() || !schedule_->taps.empty();
+}
+
+// Components learn of it when it changes: after an overrun, and in the cycle after that.
+void Loop::setElapsed(std::int64_t elapsed_ns) noexcept RTCF_NONBLOCKING {
+    if (elapsed_ns == elapsed_ns_) return;
+    elapsed_ns_ = elapsed_ns;
+    for (const Step& step : schedule_->steps) step.context->elapsed_ns = elapsed_ns;
 }
 
 bool Loop::probe(Probe& probe, std::int64_t timeout_ns) {
@@ -378,6 +407,12 @@ bool Loop::probe(Probe& probe, std::int64_t timeout_ns) {
     return true;
 }
 
+bool Loop::requested() const noexcept RTCF_NONBLOCKING {
+    // Both at once: nearly every cycle finds neither.
+    return (reinterpret_cast<std::uintptr_t>(probe_.load(std::memory_order_relaxed)) |
+            reinterpret_cast<std::uintptr_t>(pending_.load(std::memory_order_relaxed))) != 0;
+}
+
 void Loop::takeProbe() noexcept RTCF_NONBLOCKING {
     Probe* probe = probe_.load(std::memory_order_relaxed);
     if (probe == nullptr || probe == &claimed_probe_) return;
@@ -393,11 +428,20 @@ void Loop::feed() noexcept RTCF_NONBLOCKING {
     }
 }
 
+// Counts an overrun for the component that was running when the next cycle should have begun.
+void Loop::blameOverrun(std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept RTCF_NONBLOCKING {
+    for (const Step& step : schedule_->steps) {
+        if (step.ended_ticks < begin_ticks || step.ended_ticks <= limit_ticks) continue;  // not now, or in time
+        bump(step.figures->overruns);
+        return;
+    }
+}
+
 std::int64_t Loop::nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) noexcept RTCF_NONBLOCKING {
     const std::int64_t period = clock_.period_ns;
     const std::int64_t next = deadline_ns + period;
-    elapsed_ns_ = period;
     if (end_ns < next) {
+        setElapsed(period);
         if (bucket_ > 0 && ++cycles_on_time_ % kBucketLeak == 0) --bucket_;
         return next;
     }
@@ -408,16 +452,17 @@ std::int64_t Loop::nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) n
     }
     switch (overrun_policy_.load(std::memory_order_relaxed)) {
         case OverrunPolicy::CatchUp:
+            setElapsed(period);
             return next;
         case OverrunPolicy::Relative:
-            elapsed_ns_ = (end_ns + period - deadline_ns) / period * period;
+            setElapsed((end_ns + period - deadline_ns) / period * period);
             return end_ns + period;
         case OverrunPolicy::Skip:
             break;
     }
     const std::int64_t dropped = (end_ns - next) / period + 1;
     bump(figures_.missed, static_cast<std::uint64_t>(dropped));
-    elapsed_ns_ = (dropped + 1) * period;
+    setElapsed((dropped + 1) * period);
     return next + dropped * period;
 }
 

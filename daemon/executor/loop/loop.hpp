@@ -145,7 +145,9 @@ class Loop {
     void run() noexcept;
     void cycle(std::int64_t deadline_ns, std::int64_t wake_ns) noexcept RTCF_NONBLOCKING;
     template <bool Plain>
-    bool update(const Schedule& schedule, std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept;
+    bool update(const Schedule& schedule, FlightRecorder::RealtimeNotes notes, std::int64_t begin_ticks) noexcept;
+    bool updateSelected(const Schedule& schedule, std::int64_t begin_ticks) noexcept;
+    bool requested() const noexcept RTCF_NONBLOCKING;
     bool due(const Step& step) noexcept RTCF_NONBLOCKING;
     void commitFinite(const Step& step) noexcept RTCF_NONBLOCKING;
     void componentFailed(LoopFault::Kind kind, const Step& step, const char* text) noexcept;
@@ -154,6 +156,9 @@ class Loop {
     void takeAdoption() noexcept RTCF_NONBLOCKING;
     void takeProbe() noexcept RTCF_NONBLOCKING;
     void feed() noexcept RTCF_NONBLOCKING;
+    void noteSchedule() noexcept RTCF_NONBLOCKING;
+    void setElapsed(std::int64_t elapsed_ns) noexcept RTCF_NONBLOCKING;
+    void blameOverrun(std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept RTCF_NONBLOCKING;
     std::int64_t nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) noexcept RTCF_NONBLOCKING;
     std::int64_t waitFor(std::int64_t deadline_ns) noexcept;
     std::int64_t waitForSource(Source& source) noexcept;
@@ -161,6 +166,7 @@ class Loop {
 
     Log& log_;
     FlightRecorder& recorder_;
+    const FlightRecorder::RealtimeNotes notes_;
     CycleCounter counter_;
     pthread_t thread_{};
     std::unique_ptr<IdleStateGuard> idle_guard_;
@@ -172,6 +178,8 @@ class Loop {
     std::int64_t total_elapsed_ns_ = 0;  // loop time in whole periods
     std::uint64_t warmup_cycles_ = 0;
     bool any_disabled_ = false;
+    std::uint64_t plain_from_ = UINT64_MAX;    // first iteration in which all is plain, see update()
+    bool exchanges_ = false;                   // the schedule has feeds, latches or taps
     std::uint32_t bucket_ = 0;
     std::uint64_t cycles_on_time_ = 0;
     LoopFault fault_;

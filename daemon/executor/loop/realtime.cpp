@@ -20,7 +20,11 @@ namespace rtcf::executor {
 namespace {
 
 constexpr std::size_t kThreadStack = 512 * 1024;  // for threads that are not real-time
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+constexpr std::size_t kStackReserve = 2048 * 1024;  // a sanitizer keeps much of its own in each stack
+#else
 constexpr std::size_t kStackReserve = 64 * 1024;  // for libc and the loop itself
+#endif
 
 std::string systemError(int error) { return std::strerror(error); }
 

@@ -30,6 +30,8 @@ struct Step {
     std::uint32_t every = 1;    ///< runs in each n-th cycle,
     std::uint32_t phase = 0;    ///< in which the iteration modulo n is this
     bool optional = false;      ///< a fault takes it out, and the loop goes on
+    /// When its last update() ended. Noted here by whoever runs the cycle, as this memory is at hand then.
+    mutable std::int64_t ended_ticks = 0;
 };
 
 /// A copy of an output's value, made before any component runs, for inputs that
@@ -94,14 +96,14 @@ struct Adoption {
     std::vector<Latch> new_latches;            ///< to be filled before inputs read them
     std::vector<Rewire> rewires;
     std::vector<HandOver> hand_overs;
-    std::vector<ParameterBase*> parameters;    ///< with a staged value
+    std::vector<StagedValue*> values;          ///< parameters, and what derives from them
     std::int64_t period_ns = 0;                ///< the loop's new period; 0 = stays
 
     /// Makes the change. By whoever runs the cycle; real-time safe.
     void apply() noexcept {
         for (const Latch& latch : new_latches) latch.copy();
         for (Rewire& rewire : rewires) rewire.apply();
-        for (ParameterBase* parameter : parameters) parameter->commit();
+        for (StagedValue* value : values) value->commit();
         for (const HandOver& hand_over : hand_overs) hand_over.successor->takeOver(*hand_over.previous);
     }
 };

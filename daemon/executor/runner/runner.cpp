@@ -337,7 +337,7 @@ void Runner::adopt(Change change, const Progress& progress) {
     Wiring wiring = wire(graph, filter(), change.loading);
     Adoption adoption;
     std::unique_ptr<Plan> plan = buildPlan(graph, std::move(wiring), *plan_, settings_.frequency_hz, adoption);
-    adoption.parameters = std::move(change.parameters);
+    adoption.values = std::move(change.values);
     adoption.hand_overs = std::move(change.hand_overs);
     adoption.period_ns = change.period_ns;
     if (loop_.running() || state_ == RunnerState::Stepping) {
@@ -358,6 +358,9 @@ void Runner::adopt(Change change, const Progress& progress) {
     std::swap(plan_, plan);
     if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>(plan_->bridgeTable()));
     publish(change.changed);
+    if (!adoption.values.empty()) {
+        for (const GraphNode& node : plan_->graph.nodes()) node.instance->releaseStaged();
+    }
     // Out of the loop since its last boundary: what left may take its time.
     for (const auto& instance : change.leaving) {
         note(instance->fullName() + ".stop");
@@ -456,7 +459,7 @@ void Runner::addDifference(Change& change, const Difference& difference, const P
             return;
         case Difference::Kind::Parameters: {
             const auto staged = change.graph.get(name).instance->stageParameters(difference.parameters);
-            change.parameters.insert(change.parameters.end(), staged.begin(), staged.end());
+            change.values.insert(change.values.end(), staged.begin(), staged.end());
             change.changed.insert(name);
             return;
         }
@@ -493,7 +496,7 @@ ChangeOutcome Runner::setParameters(const std::string& name,
     Change change;
     change.graph = plan_->graph;
     change.changed = {name};
-    change.parameters = instance.stageParameters(batch);
+    change.values = instance.stageParameters(batch);
     try {
         adopt(std::move(change), [](const std::string&) {});
     } catch (const Refusal&) {

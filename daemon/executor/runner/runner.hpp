@@ -122,7 +122,7 @@ class Runner {
         std::set<std::string> changed;              // components to picture anew
         std::vector<std::shared_ptr<Instance>> arriving;
         std::vector<std::shared_ptr<Instance>> leaving;
-        std::vector<ParameterBase*> parameters;
+        std::vector<StagedValue*> values;
         std::vector<HandOver> hand_overs;
         std::int64_t period_ns = 0;
     };

@@ -65,7 +65,9 @@ std::shared_ptr<const GraphSnapshot> takeSnapshot(const Plan& plan, const GraphS
         const auto found = known.find(node.instance.get());
         const bool same = found != known.end() && found->second->full_name == node.instance->fullName() &&
                           found->second->figures == node.instance->figures() &&
-                          found->second->definition.breaks == node.breaks && changed.count(node.instance->fullName()) == 0;
+                          found->second->definition.breaks == node.breaks &&
+                          found->second->fault == node.instance->faultText() &&
+                          changed.count(node.instance->fullName()) == 0;
         result->components.push_back(same ? found->second : picture(node));
     }
     for (const auto& [name, connection] : plan.wiring.connections) {

@@ -346,6 +346,10 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
         throw Refusal(RefusalKind::Unavailable,
                       fmt::format("runner {} is stuck in {}(): only stop and restart it", runner_->name(), where));
     }
+    // Statistics are of one run of the loop, which has not begun yet.
+    const bool begins = request.kind_case() == v1::Request::kStart ||
+                        (request.kind_case() == v1::Request::kStep && runner_->picture().state != RunnerState::Stepping);
+    if (begins && !runner_->loop().running()) resetStatistics();
     // Steps take as long as they take; they report progress.
     const bool endless = request.kind_case() == v1::Request::kStep;
     waiting_[{connection, id}] = {endless ? INT64_MAX : monotonicNow() + kHookTimeout, [this, id] {

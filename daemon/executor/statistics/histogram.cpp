@@ -5,27 +5,42 @@
 
 namespace rtcf::executor {
 
+void Histogram::addLarge(std::int64_t value) noexcept RTCF_NONBLOCKING {
+    buckets_[bucketOf(value)].add(1);
+    if (value < 0) return;
+    large_sum_.add(static_cast<std::uint64_t>(value));
+    if (value > maximum_.load(std::memory_order_relaxed))
+        maximum_.store(value, std::memory_order_relaxed);
+}
+
 std::int64_t Histogram::lowerBound(std::size_t bucket) noexcept {
-    const std::size_t octave = bucket >> kSubBits;
-    if (octave <= 1) return static_cast<std::int64_t>(bucket);
-    const std::size_t within = bucket - ((octave - 1) << kSubBits);
-    return static_cast<std::int64_t>(within << (octave - 1));
+    if (bucket < kExact) return static_cast<std::int64_t>(bucket);
+    const std::size_t octave = (bucket - kExact) >> kSubBits;
+    const std::size_t within = (bucket - kExact) & ((std::size_t{1} << kSubBits) - 1);
+    return static_cast<std::int64_t>(((std::size_t{1} << kSubBits) + within)
+                                     << (octave + kExactBits - kSubBits));
 }
 
 std::int64_t Histogram::width(std::size_t bucket) noexcept {
-    const std::size_t octave = bucket >> kSubBits;
-    return octave <= 1 ? 1 : std::int64_t{1} << (octave - 1);
+    if (bucket < kExact) return 1;
+    return std::int64_t{1} << (((bucket - kExact) >> kSubBits) + kExactBits - kSubBits);
 }
 
 HistogramSnapshot Histogram::snapshot() const {
     HistogramSnapshot result;
     result.buckets.reserve(kBuckets);
-    for (const auto& bucket : buckets_) {
-        result.buckets.push_back(bucket.load(std::memory_order_relaxed));
-        result.count += result.buckets.back();
-    }
-    result.sum = sum_.load(std::memory_order_relaxed);
+    result.sum = static_cast<std::int64_t>(large_sum_.value());
     result.maximum = maximum_.load(std::memory_order_relaxed);
+    for (const Counter& bucket : buckets_) {
+        const std::size_t index = result.buckets.size();
+        const std::uint64_t count = bucket.value();
+        result.buckets.push_back(count);
+        result.count += count;
+        if (index >= kExact || count == 0) continue;
+        const auto value = static_cast<std::int64_t>(index);
+        result.sum += value * static_cast<std::int64_t>(count);
+        result.maximum = std::max(result.maximum, value);
+    }
     return result;
 }
 
@@ -54,10 +69,12 @@ DistributionSummary summarize(const HistogramSnapshot& snapshot, double scale) {
         top = i;
         bottom = std::min(bottom, i);
     }
-    const double maximum = Histogram::bucketOf(snapshot.maximum) == top ? static_cast<double>(snapshot.maximum)
-                                                                        : middle(top);
+    const double maximum = Histogram::bucketOf(snapshot.maximum) == top
+                               ? static_cast<double>(snapshot.maximum)
+                               : middle(top);
     const auto quantile = [&](double q) {
-        const auto rank = static_cast<std::uint64_t>(std::ceil(q * static_cast<double>(snapshot.count)));
+        const auto rank =
+            static_cast<std::uint64_t>(std::ceil(q * static_cast<double>(snapshot.count)));
         std::uint64_t below = 0;
         for (std::size_t i = bottom; i <= top; ++i) {
             below += snapshot.buckets[i];

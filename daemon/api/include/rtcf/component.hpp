@@ -15,6 +15,7 @@
 #include <string_view>
 #include <vector>
 
+#include "rtcf/derived.hpp"
 #include "rtcf/logging.hpp"
 #include "rtcf/parameter.hpp"
 #include "rtcf/port.hpp"
@@ -51,6 +52,12 @@ class Component {
     /// @name Hooks
     /// A hook that returns false or throws refuses what was asked for; fail() says why.
     /// @{
+    /// Checks a batch of parameters as a whole and computes what derives from it into Derived
+    /// members; before configure(), and whenever parameters are to change. Not real-time.
+    virtual bool prepare(const Values& proposed) {
+        (void)proposed;
+        return true;
+    }
     virtual bool configure() { return true; }  ///< Acquire what is needed. Not real-time.
     virtual bool start() { return true; }      ///< The loop is about to run. Not real-time.
     virtual void update() = 0;                 ///< One cycle. Real-time.
@@ -95,12 +102,16 @@ class Component {
 
     /// @name For the executor
     /// @{
-    void attach(ComponentContext& context) noexcept { context_ = &context; }
+    void attach(ComponentContext& context) noexcept {
+        context_ = &context;
+        for (OutputBase* output : outputs_) output->setClock(clock());
+    }
     /// Nothing can be declared from here on.
     void freeze() noexcept { frozen_ = true; }
     const std::vector<InputBase*>& inputs() const noexcept { return inputs_; }
     const std::vector<OutputBase*>& outputs() const noexcept { return outputs_; }
     const std::vector<ParameterBase*>& parameters() const noexcept { return parameters_; }
+    const std::vector<DerivedBase*>& derived() const noexcept { return derived_; }
     /// Outputs whose values are checked before anybody reads them.
     const std::vector<OutputBase*>& finiteOutputs() const noexcept { return finite_outputs_; }
     ComponentContext& context() const noexcept { return *context_; }
@@ -113,6 +124,7 @@ class Component {
     /// @{
     void declare(InputBase* input) { declareIn(inputs_, input, input->name(), "port"); }
     void declare(OutputBase* output) { declareIn(outputs_, output, output->name(), "port"); }
+    void declare(DerivedBase* derived) { derived_.push_back(derived); }
     void declareFinite(OutputBase* output) { finite_outputs_.push_back(output); }
     void declare(ParameterBase* parameter) {
         declareIn(parameters_, parameter, parameter->declaration().name, "parameter");
@@ -142,6 +154,7 @@ class Component {
     std::vector<InputBase*> inputs_;
     std::vector<OutputBase*> outputs_;
     std::vector<ParameterBase*> parameters_;
+    std::vector<DerivedBase*> derived_;
     std::vector<OutputBase*> finite_outputs_;
     std::string failure_;
 };
@@ -174,33 +187,29 @@ void Component::declareIn(std::vector<T*>& members, T* member, const std::string
 }
 
 inline InputBase::InputBase(Component* owner, std::string name, const TypeInfo& type, const SlotHeader& empty)
-    : source_(&empty), current_(&empty), owner_(owner), name_(std::move(name)), type_(type) {
-    owner_->declare(this);
+    : source_(&empty), current_(&empty), identity_(new PortIdentity{owner, std::move(name), {}, type}) {
+    owner->declare(this);
 }
 
 inline std::int64_t InputBase::age() const noexcept RTCF_NONBLOCKING {
     // The loop's time goes back when a simulated clock begins anew.
-    return current_->sequence == 0 ? -1 : std::max<std::int64_t>(0, owner_->time() - current_->time_ns);
+    return current_->sequence == 0 ? -1 : std::max<std::int64_t>(0, identity_->owner->time() - current_->time_ns);
 }
 
 inline OutputBase::OutputBase(Component* owner, std::string name, std::string unit, const TypeInfo& type,
                               const Finite* finite)
-    : owner_(owner), slot_(type.make_slot(nullptr)), name_(std::move(name)), unit_(std::move(unit)), type_(type) {
-    raw_ = slot_.get();
-    owner_->declare(this);
+    : clock_(&owner->clock()),
+      rest_(new Rest{{owner, std::move(name), std::move(unit), type}, type.make_slot(nullptr), nullptr}) {
+    raw_ = rest_->slot.get();
+    owner->declare(this);
     if (finite == nullptr) return;
-    policy_ = finite->policy;
-    staged_ = type.make_slot(nullptr);
-    raw_ = staged_.get();
-    owner_->declareFinite(this);
+    rest_->policy = finite->policy;
+    rest_->staged = type.make_slot(nullptr);
+    raw_ = rest_->staged.get();
+    owner->declareFinite(this);
 }
 
-inline void OutputBase::stampWrite() noexcept RTCF_NONBLOCKING {
-    const LoopClock& clock = owner_->clock();
-    ++raw_->sequence;
-    raw_->iteration = clock.iteration;
-    raw_->time_ns = clock.time_ns;
-}
+inline DerivedBase::DerivedBase(Component* owner) { owner->declare(this); }
 
 inline ParameterBase::ParameterBase(Component* owner, ParameterDeclaration declaration)
     : declaration_(std::move(declaration)) {

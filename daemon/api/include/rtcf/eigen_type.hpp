@@ -108,7 +108,8 @@ struct PortType<Eigen::Matrix<Scalar, Rows, Cols, Options, MaxRows, MaxCols>,
 
     static const char* name() {
         static const std::string text = std::string("Eigen::Matrix<") + detail::MultiArray<Scalar>::scalar +
-                                        "," + std::to_string(Rows) + "," + std::to_string(Cols) + ">";
+                                        "," + std::to_string(Rows) + "," + std::to_string(Cols) +
+                                        (kTransposed ? ",RowMajor>" : ">");
         return text.c_str();
     }
     static const char* md5() { return PortType<Message>::md5(); }
@@ -152,6 +153,8 @@ struct PortType<Eigen::Matrix<Scalar, Rows, Cols, Options, MaxRows, MaxCols>,
     }
 
    private:
+    // Another type, as readers take values from the writer's memory; a vector is the same either way.
+    static constexpr bool kTransposed = (Options & Eigen::RowMajor) != 0 && Rows > 1 && Cols > 1;
     static constexpr std::uint32_t kLabelLength = 4;  // "rows", "cols"
 
     static void dimension(ros::serialization::OStream& stream, const char* label, int size, int stride) {

@@ -64,11 +64,27 @@ struct ParameterDeclaration {
     std::vector<Choice> choices;
 };
 
-/// What the executor handles of any parameter.
-class ParameterBase {
+/// A value of a component with a successor, which takes its place at a cycle
+/// boundary. Staged, discarded and released by the graph thread.
+class StagedValue {
    public:
-    ParameterBase(const ParameterBase&) = delete;
-    ParameterBase& operator=(const ParameterBase&) = delete;
+    StagedValue() = default;
+    StagedValue(const StagedValue&) = delete;
+    StagedValue& operator=(const StagedValue&) = delete;
+
+    virtual void commit() noexcept RTCF_NONBLOCKING = 0;  ///< At the boundary; real-time safe.
+    /// Lets go of what is staged, or of the value that commit() has replaced. Not real-time safe.
+    virtual void release() noexcept = 0;
+    bool staged() const noexcept RTCF_NONBLOCKING { return is_staged_; }
+
+   protected:
+    ~StagedValue() = default;
+    bool is_staged_ = false;
+};
+
+/// What the executor handles of any parameter.
+class ParameterBase : public StagedValue {
+   public:
 
     const ParameterDeclaration& declaration() const noexcept { return declaration_; }
 
@@ -77,11 +93,7 @@ class ParameterBase {
     /// double is declared. Not real-time safe.
     std::string check(ParameterValue& value) const;
 
-    /// @name A change: staged by the graph thread, committed at a cycle boundary
-    /// @{
-    virtual void stage(const ParameterValue& checked) = 0;  ///< Not real-time safe.
-    virtual void commit() noexcept RTCF_NONBLOCKING = 0;    ///< Real-time safe.
-    /// @}
+    virtual void stage(const ParameterValue& checked) = 0;  ///< A successor. Not real-time safe.
 
    protected:
     ParameterBase(Component* owner, ParameterDeclaration declaration);
@@ -108,7 +120,11 @@ class Parameter final : public ParameterBase {
     const T& value() const noexcept RTCF_NONBLOCKING { return value_; }
     operator const T&() const noexcept RTCF_NONBLOCKING { return value_; }  // NOLINT(google-explicit-constructor)
 
+    /// The value as it will be if the batch is adopted that prepare() is about.
+    const T& proposed() const noexcept { return is_staged_ ? staged_ : value_; }
+
     void stage(const ParameterValue& checked) override {
+        is_staged_ = true;
         if constexpr (std::is_same_v<T, bool> || std::is_same_v<T, std::string>) {
             staged_ = std::get<T>(checked);
         } else if constexpr (std::is_enum_v<T>) {
@@ -121,7 +137,11 @@ class Parameter final : public ParameterBase {
             staged_ = static_cast<T>(std::get<double>(checked));
         }
     }
-    void commit() noexcept RTCF_NONBLOCKING override { std::swap(value_, staged_); }
+    void commit() noexcept RTCF_NONBLOCKING override {
+        std::swap(value_, staged_);
+        is_staged_ = false;
+    }
+    void release() noexcept override { is_staged_ = false; }
 
    private:
     static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, std::string>,
@@ -178,6 +198,16 @@ class Parameter final : public ParameterBase {
 
     T value_;
     T staged_;
+};
+
+/// The values of a component's parameters as a batch proposes them:
+/// `proposed[kp]`. Those that the batch leaves alone have their present value.
+class Values {
+   public:
+    template <typename T>
+    const T& operator[](const Parameter<T>& parameter) const noexcept {
+        return parameter.proposed();
+    }
 };
 
 }  // namespace rtcf

@@ -12,9 +12,8 @@ namespace rtcf {
 /// When a value was written. Plain data: only the real-time thread touches it
 /// while the loop runs.
 struct SlotHeader {
-    std::uint64_t sequence = 0;   ///< writes so far; 0 = never written
-    std::uint64_t iteration = 0;  ///< the loop's iteration at the last write
-    std::int64_t time_ns = 0;     ///< the loop's time at the last write, ns
+    std::uint64_t sequence = 0;  ///< writes so far; 0 = never written
+    std::int64_t time_ns = 0;    ///< the loop's time at the last write, ns
 };
 
 /// A value with its bookkeeping.

@@ -1,0 +1,160 @@
+"""Runs a component under RealtimeSanitizer, in a process of its own and without rtcfd.
+
+Uses the executor that is built with it (Debian package rtcf-check).
+"""
+
+import difflib
+import os
+import shutil
+import signal
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rtcf.errors import RtcfError
+from rtcf.folders import component_folders, packages
+from rtcf.sanitizer import Violation, violations
+
+INSTALLED = Path("/usr/lib/rtcf/rtcf-executor-rtsan")
+CONFIGURATION = Path("/etc/rtcfd/rtcfd.toml")
+_DESCRIBE_TIMEOUT_S = 30.0
+# The sanitizer knows how to speak with either, by its name.
+_SYMBOLIZERS = ("llvm-symbolizer", "addr2line")
+
+
+@dataclass
+class Checked:
+    """What came of it."""
+
+    library: str
+    violations: list[Violation] = field(default_factory=list)
+    log: list[str] = field(default_factory=list)  # what else was said
+
+
+def executor_of(build_tree: Path | None) -> Path:
+    """Return the executor with RealtimeSanitizer that belongs to this tree, or is installed."""
+    if build_tree is None:
+        return INSTALLED
+    return build_tree.with_name(f"{build_tree.name}-rtsan") / "bin" / "rtcf-executor"
+
+
+def check(
+    executor: Path,
+    package: str,
+    type_name: str,
+    cycles: int,
+    parameters: Sequence[str] = (),
+    folders: Sequence[Path] = (),
+    build_tree: Path | None = None,
+) -> Checked:
+    """Run a component for some cycles; `parameters` are "name:=value".  Raises RtcfError."""
+    if not os.access(executor, os.X_OK):
+        raise RtcfError(
+            f"no executor with RealtimeSanitizer at {executor}: install rtcf-check, "
+            "or name one with --executor"
+        )
+    searched = component_folders([*folders, *_configured()], build_tree)
+    library = _find(executor, searched, package, type_name)
+    command = [str(executor), "--check", str(library), "--package", package, "--type", type_name,
+               "--cycles", str(cycles)]  # fmt: skip
+    for parameter in parameters:
+        command += ["--param", parameter]
+    done = subprocess.run(
+        command,
+        env=os.environ | {"RTSAN_OPTIONS": _options()},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        check=False,
+    )
+    lines = done.stderr.splitlines()
+    found = Checked(str(library), list(violations(lines)))
+    found.log = [line for line in lines if line.startswith("/checked: ")]
+    if done.returncode and not found.violations:
+        raise RtcfError(_why(done.returncode, lines))
+    if done.returncode:
+        found.log.append(_why(done.returncode, lines))
+    return found
+
+
+def _find(executor: Path, folders: Sequence[Path], package: str, type_name: str) -> Path:
+    """Return the library that offers a type, as rtcfd would choose it."""
+    # Comes with the executor, other than the rest of this module.
+    from rtcf.executor.v1 import executor_pb2
+
+    known = packages(folders)
+    if package not in known:
+        listed = ", ".join(map(str, folders))
+        raise RtcfError(
+            f'no package "{package}" with component libraries in {listed}{_meant(package, known)}'
+        )
+    types: list[str] = []
+    problems: list[str] = []
+    for library in known[package]:
+        try:
+            done = subprocess.run(
+                [executor, "--describe", library, "--package", package],
+                capture_output=True,
+                timeout=_DESCRIBE_TIMEOUT_S,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            problems.append(f"{library}: loading it did not end")
+            continue
+        description = executor_pb2.LibraryDescription()
+        if done.returncode >= 0:
+            description.ParseFromString(done.stdout)
+        if done.returncode and not description.problem:
+            description.problem = f"{library}: the process that loaded it failed"
+        if description.problem:
+            problems.append(" ".join(str(description.problem).split()))
+        offered = [str(each.type) for each in description.types]
+        if type_name in offered:
+            return library
+        types += offered
+    raise RtcfError(
+        "; ".join(
+            [
+                f'no type "{type_name}" in package "{package}"{_meant(type_name, types)} '
+                f"(types: {', '.join(sorted(types)) or 'none'})",
+                *problems,
+            ]
+        )
+    )
+
+
+def _options() -> str:
+    """Return the sanitizer's options: all reports, with source lines by what there is."""
+    options = ["halt_on_error=false", "print_stats_on_exit=false"]
+    symbolizer = next(filter(None, map(shutil.which, _SYMBOLIZERS)), None)
+    if symbolizer:
+        options.append(f"external_symbolizer_path={symbolizer}")
+    return ":".join(options)
+
+
+def _configured() -> list[Path]:
+    """Return the folders that the system's rtcfd searches besides."""
+    import tomllib
+
+    try:
+        document = tomllib.loads(CONFIGURATION.read_text(encoding="utf-8"))
+        return [Path(folder) for folder in document["daemon"]["path"]]
+    except (OSError, KeyError, TypeError, ValueError):
+        return []  # rtcfd itself says what is wrong with it
+
+
+def _why(status: int, lines: Sequence[str]) -> str:
+    if status < 0:
+        return f"the component ended its process: {signal.Signals(-status).name}"
+    said = [line for line in lines if line.startswith("rtcf-executor: ")]
+    if said:
+        return said[-1].removeprefix("rtcf-executor: ")
+    return f"the process of the component ended with exit status {status}"
+
+
+def _meant(name: str, known: Sequence[str] | dict[str, list[Path]]) -> str:
+    close = difflib.get_close_matches(name, list(known), n=1)
+    return f'; did you mean "{close[0]}"?' if close else ""

@@ -1,0 +1,47 @@
+"""Where component libraries are: the folders that rtcfd and local tools search.
+
+A package is a folder of libraries, `<folder>/<package>/*.so`; of two types
+with one name in a package the first found counts.
+"""
+
+import os
+import sysconfig
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+
+def component_folders(extra: Sequence[Path], build_tree: Path | None) -> list[Path]:
+    """Return the folders that hold packages, the first ones win.
+
+    Those named come first, then the build tree, then workspaces as catkin
+    overlays them, then the system.
+    """
+    folders = list(extra)
+    if build_tree is not None:
+        folders.append(build_tree / "lib" / "rtcf")
+    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep):
+        if prefix.startswith("/"):
+            folders.append(Path(prefix) / "lib" / "rtcf")
+    triplet = sysconfig.get_config_var("MULTIARCH")
+    if triplet:
+        folders.append(Path("/usr/lib") / triplet / "rtcf")
+    folders.append(Path("/usr/lib/rtcf"))
+    return list(dict.fromkeys(Path(os.path.abspath(folder)) for folder in folders))
+
+
+def packages(folders: Sequence[Path]) -> dict[str, list[Path]]:
+    """Return the libraries of each package, in the order in which they count."""
+    found: dict[str, list[Path]] = {}
+    for folder in folders:
+        for package in _sub_folders(folder):
+            libraries = sorted(package.glob("*.so"))
+            if libraries:
+                found.setdefault(package.name, []).extend(libraries)
+    return found
+
+
+def _sub_folders(folder: Path) -> Iterator[Path]:
+    try:
+        yield from sorted(entry for entry in folder.iterdir() if entry.is_dir())
+    except OSError:
+        return  # a folder of the search path need not exist

@@ -1,0 +1,58 @@
+/// @file
+/// What a component computes from its parameters: filter coefficients, a
+/// discretised model, a table. Built by prepare(), outside the real-time
+/// thread, and exchanged together with the parameters at one cycle boundary.
+#pragma once
+
+#include <memory>
+#include <utility>
+
+#include "rtcf/parameter.hpp"
+#include "rtcf/realtime.hpp"
+
+namespace rtcf {
+
+class Component;
+
+/// What the executor handles of any derived value.
+class DerivedBase : public StagedValue {
+   protected:
+    explicit DerivedBase(Component* owner);
+    ~DerivedBase() = default;
+};
+
+/// A value of any type, also one that owns memory: it is freed outside the real-time thread.
+template <typename T>
+class Derived final : public DerivedBase {
+   public:
+    /// @param owner the component, `this`
+    /// @param initial value before the first prepare()
+    explicit Derived(Component* owner, T initial = T{})
+        : DerivedBase(owner), value_(std::make_unique<T>(std::move(initial))) {}
+
+    /// The value, constant during a cycle. Real-time safe.
+    const T& value() const noexcept RTCF_NONBLOCKING { return *value_; }
+    const T& operator*() const noexcept RTCF_NONBLOCKING { return *value_; }
+    const T* operator->() const noexcept RTCF_NONBLOCKING { return value_.get(); }
+
+    /// Gives the successor. In prepare(); not real-time safe.
+    void stage(T value) {
+        other_ = std::make_unique<T>(std::move(value));
+        is_staged_ = true;
+    }
+
+    void commit() noexcept RTCF_NONBLOCKING override {
+        std::swap(value_, other_);
+        is_staged_ = false;
+    }
+    void release() noexcept override {
+        other_.reset();
+        is_staged_ = false;
+    }
+
+   private:
+    std::unique_ptr<T> value_;
+    std::unique_ptr<T> other_;  // staged, or replaced and not yet freed
+};
+
+}  // namespace rtcf
