@@ -28,12 +28,12 @@ test-long: all ## the same with the tests that take hours
 	@tools/install-dependencies test
 	@tests/run --long
 
-bench: all ## measure cost per component, latency and load times
+bench: all ## measure against HAL, cyclictest and direct calls; HOURS=3: a long run
 	@tools/install-dependencies bench
 	@tests/bench/run
 
 bench-rt: all ## measure in a PREEMPT_RT machine with instruction-counted time
-	@tools/install-dependencies bench
+	@tools/install-dependencies bench-rt
 	@tests/bench/run-rt
 
 deb: dependencies ## build the Debian packages into build/deb/

@@ -4,7 +4,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +20,7 @@ NO_ROS = "[runner.ros]\nenabled = false\n"
 
 def with_ros(master_uri: str, whitelist: str) -> str:
     """Return settings for a ROS node that loses nothing to a slow subscriber."""
-    return (
-        f"[runner.ros]\nmaster_uri = '{master_uri}'\nwhitelist = '{whitelist}'\nqueue = 100000\n"
-    )
+    return f"[runner.ros]\nmaster_uri = '{master_uri}'\nwhitelist = '{whitelist}'\nqueue = 100000\n"
 
 
 def wait_for(condition: Callable[[], Any], what: str, deadline_s: float = DEADLINE_S) -> Any:

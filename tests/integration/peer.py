@@ -3,7 +3,7 @@
 peer.py record TOPIC       prints each std_msgs/Float64 it receives, exactly (hexadecimal)
 peer.py latch TOPIC VALUE  publishes one std_msgs/Float64, latched
 
-Both print `connected` first, when they have met a peer.
+Both print `connected` when they have met a peer.
 """
 
 import sys

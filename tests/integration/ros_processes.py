@@ -28,6 +28,7 @@ class Master:
         self.uri = f"http://localhost:{self.port}"
         self._folder = folder
         self._process: subprocess.Popen[bytes] | None = None
+        self._nodes: list[Node] = []
 
     def start(self) -> None:
         """Start it and return as soon as it answers."""
@@ -43,7 +44,9 @@ class Master:
         wait_for(lambda: rosgraph.is_master_online(self.uri), f"a ROS master at {self.uri}")
 
     def end(self) -> None:
-        """End it."""
+        """End it, and nodes that a test that failed has left."""
+        for node in self._nodes:
+            node.kill()
         assert self._process is not None
         self._process.send_signal(signal.SIGINT)
         assert self._process.wait(DEADLINE_S) == 0
@@ -64,34 +67,45 @@ class Master:
 
     def node(self, *arguments: str) -> "Node":
         """Start a node of peer.py."""
-        return Node(self, *arguments)
+        node = Node(self.environment(), self._folder, *arguments)
+        self._nodes.append(node)
+        return node
 
 
 class Node:
     """A rospy node, see peer.py; what it prints is in a file."""
 
-    def __init__(self, master: Master, *arguments: str) -> None:
-        self._output = master._folder / f"node-{time.monotonic_ns()}"
+    def __init__(self, environment: dict[str, str], folder: Path, *arguments: str) -> None:
+        self._output = folder / f"node-{time.monotonic_ns()}"
         with self._output.open("wb") as output:
             self._process = subprocess.Popen(
                 [sys.executable, str(_PEER), *arguments],
-                env=master.environment(),
-                cwd=master._folder,
+                env=environment,
+                cwd=folder,
                 stdout=output,
             )
 
     def wait_until_connected(self) -> None:
         """Return when it says that it has met its peer."""
-        wait_for(lambda: "connected" in self._lines()[:1], "the node's connection")
+        wait_for(lambda: "connected" in self._lines(), "the node's connection")
+
+    def wait_for_values(self, count: int) -> None:
+        """Return when it has received so many."""
+        wait_for(lambda: len(self.values()) >= count, f"{count} messages")
 
     def values(self) -> list[float]:
         """Return what it has received so far."""
-        return [float.fromhex(line) for line in self._lines()[1:]]
+        return [float.fromhex(line) for line in self._lines() if line != "connected"]
 
     def end(self) -> None:
         """End it."""
         self._process.send_signal(signal.SIGTERM)
         assert self._process.wait(DEADLINE_S) == 0
+
+    def kill(self) -> None:
+        """End it at once, if it has not ended."""
+        self._process.kill()
+        self._process.wait()
 
     def _lines(self) -> list[str]:
         # The last one may be half written.

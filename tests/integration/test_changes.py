@@ -7,7 +7,7 @@ import fig_1
 import rtcf
 from daemon_process import Daemon, wait_for
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
-from values import iteration, port_value
+from values import iteration, port_value, wait_until_after
 
 ROUNDS = 20
 
@@ -39,8 +39,7 @@ def test_the_loop_misses_no_cycle_and_what_stays_keeps_its_values(client: rtcf.C
         client.replace("R1", fig_1.mimo("R1", fig_1.WIRES["R1"]))
         client.unload(["guest", "spy"])
         assert client.get_order() == ["/H1", "/F1", "/R1", "/R2", "/R3", "/stays"]
-        wait_for(lambda seen=seen: iteration(client) > seen, "the next cycle")
-        seen = iteration(client)
+        seen = wait_until_after(client, seen)
     assert client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_RUNNING
     client.stop()
     # It was updated in each cycle, and never began anew.

@@ -11,6 +11,7 @@ from fig_1 import mimo
 from rtcf.v1 import graph_pb2, runner_pb2
 from values import iteration
 
+
 def test_fig_1_runs_in_its_order(client: rtcf.Client) -> None:
     fig_1.load(client)
     assert client.get_order() == fig_1.ORDER

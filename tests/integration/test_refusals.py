@@ -37,7 +37,9 @@ GRAPH = [
 ]
 
 REFUSALS = {
-    "unknown package": Refusal("load rtcf_exampels Mimo", ['"rtcf_exampels"', 'did you mean "rtcf_examples"']),
+    "unknown package": Refusal(
+        "load rtcf_exampels Mimo", ['"rtcf_exampels"', 'did you mean "rtcf_examples"']
+    ),
     "unknown type": Refusal("load rtcf_examples Minmo", ['"Minmo"', '"Mimo"?', "Identity"]),
     "malformed package": Refusal("load ../etc Mimo", ['"../etc"', "letters"]),
     "library that does not load": Refusal(
@@ -77,7 +79,7 @@ REFUSALS = {
         ["/x", "/a.out1", "std_msgs/Float64", "/count.in", "int32", "remap"],
     ),
     "type mismatch at an output": Refusal(
-        f"load rtcf_examples PaperExample --name paper --remap out_port:=/arm/in2",
+        "load rtcf_examples PaperExample --name paper --remap out_port:=/arm/in2",
         ["/arm/in2", "/arm/b.in2", "std_msgs/Float64", "/paper.out_port", "std_msgs/Float32"],
     ),
     "second writer": Refusal(

@@ -20,7 +20,7 @@ def test_topics_appear_once_a_master_is_there(tmp_path: Path) -> None:
             fig_1.load(client)
             client.start()
             wait_for(lambda: iteration(client) > 100, "a loop that runs without a master")
-            ros = client.get_status("rt_runner").runners[0].ros
+            ros = _ros(client)
             assert (ros.connected, ros.publications, ros.subscriptions) == (False, 0, 0)
             assert master.uri in ros.problem
 
@@ -31,10 +31,10 @@ def test_topics_appear_once_a_master_is_there(tmp_path: Path) -> None:
                 seconds = time.monotonic() - begin
                 # A figure to look at, not a limit: the machine may be busy.
                 print(f"topics {seconds:.2f} s after the master began to answer")
-                assert client.get_status("rt_runner").runners[0].ros.connected
+                wait_for(lambda: _ros(client).connected, "the status to say so")
                 node = master.node("record", "/R1_H1R2")
                 node.wait_until_connected()
-                wait_for(lambda: len(node.values()) > 100, "messages")
+                node.wait_for_values(100)
                 node.end()
             finally:
                 master.end()
@@ -44,6 +44,11 @@ def test_topics_appear_once_a_master_is_there(tmp_path: Path) -> None:
             wait_for(lambda: iteration(client) > status.iteration + 100, "the loop to go on")
     finally:
         daemon.end()
+
+
+def _ros(client: rtcf.Client) -> runner_pb2.RosStatus:
+    ros: runner_pb2.RosStatus = client.get_status("rt_runner").runners[0].ros
+    return ros
 
 
 def _wait_for_topics(master: Master) -> None:

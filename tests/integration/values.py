@@ -3,6 +3,7 @@
 import re
 
 import rtcf
+from daemon_process import wait_for
 
 
 def port_value(client: rtcf.Client, component: str, port: str) -> float:
@@ -21,3 +22,9 @@ def number(text: str) -> float:
 def iteration(client: rtcf.Client, runner: str = "rt_runner") -> int:
     """Return how many cycles the loop has run."""
     return int(client.get_status(runner).runners[0].iteration)
+
+
+def wait_until_after(client: rtcf.Client, cycle: int) -> int:
+    """Wait until the loop has run more than `cycle` cycles; return how many it has run."""
+    wait_for(lambda: iteration(client) > cycle, f"cycle {cycle + 1}")
+    return iteration(client)

@@ -23,17 +23,25 @@ std::vector<Node> chain(std::size_t length) {
 
 std::vector<Node> paperGraph() {
     return {
-        {"H1", {{"in1", "/R3_G2H1"}, {"in2", "/R1_H1R2"}, {"out1", "/H1_F1"}, {"out2", "/H1_R1R2"}}, true},
+        {"H1",
+         {{"in1", "/R3_G2H1"}, {"in2", "/R1_H1R2"}, {"out1", "/H1_F1"}, {"out2", "/H1_R1R2"}},
+         true},
         {"F1", {{"in1", "/H1_F1"}, {"out1", "/F1_R2R3"}}, false},
         {"R1", {{"in1", "/H1_R1R2"}, {"out1", "/R1_H1R2"}}, false},
-        {"R2", {{"in1", "/F1_R2R3"}, {"in2", "/H1_R1R2"}, {"in3", "/R1_H1R2"}, {"in4", "/G2_R2"}, {"out1", "/R2_R3"}},
+        {"R2",
+         {{"in1", "/F1_R2R3"},
+          {"in2", "/H1_R1R2"},
+          {"in3", "/R1_H1R2"},
+          {"in4", "/G2_R2"},
+          {"out1", "/R2_R3"}},
          false},
         {"R3", {{"in1", "/F1_R2R3"}, {"in2", "/R2_R3"}, {"out1", "/R3_G2H1"}}, false},
     };
 }
 
-BenchGraph::BenchGraph(const std::vector<Node>& nodes, const std::string& library, const std::string& mapped)
-    : log_([](executor::LogEntry&&) {}), loop_(log_) {
+BenchGraph::BenchGraph(const std::vector<Node>& nodes, const std::string& library,
+                       const std::string& mapped)
+    : log_([](executor::LogEntry&&) {}), loop_(log_, recorder_) {
     executor::Graph graph;
     const std::shared_ptr<const executor::Library> code = libraries_.open(library);
     for (const Node& node : nodes) {
@@ -51,18 +59,28 @@ BenchGraph::BenchGraph(const std::vector<Node>& nodes, const std::string& librar
                 if (from == port) to = connection;
             }
         }
-        auto instance =
-            std::make_shared<executor::Instance>(std::move(definition), code, "bench", loop_.clock(), log_);
+        auto instance = std::make_shared<executor::Instance>(std::move(definition), code, "bench",
+                                                             loop_.clock(), log_, recorder_);
         instance->configure();
         instance->start();
         graph.add({instance, {}});
         instances_.push_back(std::move(instance));
     }
-    executor::Wiring wiring = executor::wire(graph, {executor::NamePattern("bench", mapped), {}}, {});
+    executor::Wiring wiring =
+        executor::wire(graph, {executor::NamePattern("bench", mapped), {}}, {});
     executor::Adoption adoption;
     plan_ = executor::buildPlan(graph, std::move(wiring), *empty_, kFrequencyHz, adoption);
     loop_.adopt(adoption, kAdoptionTimeoutNs);
     for (const executor::Step& step : plan_->schedule.steps) order_.push_back(step.component);
+}
+
+void BenchGraph::deliver() {
+    for (const auto& [topic, injector] : plan_->injectors) {
+        const std::shared_ptr<SlotHeader> slot = injector->type().make_slot(nullptr);
+        std::vector<std::uint8_t> bytes(injector->type().length(*slot));
+        injector->type().serialize(*slot, bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+        injector->deliver(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+    }
 }
 
 BenchGraph::~BenchGraph() {

@@ -10,13 +10,15 @@
 #include <string>
 #include <vector>
 
+#include "faults/flight_recorder.hpp"
 #include "graph/plan.hpp"
 #include "logging/log.hpp"
 #include "loop/loop.hpp"
 
 namespace rtcf::bench {
 
-/// One component of a graph: its name, and the mapped names of those of its ports that are connected.
+/// One component of a graph: its name, and the mapped names of those of its ports that are
+/// connected.
 struct Node {
     std::string name;
     std::vector<std::pair<std::string, std::string>> remaps;  ///< port, connection
@@ -35,16 +37,20 @@ class BenchGraph {
     /// @param library of rtcf_examples
     /// @param mapped  regular expression of connections that get a tap or an injector; empty = none
     /// @throws executor::Refusal
-    BenchGraph(const std::vector<Node>& nodes, const std::string& library, const std::string& mapped = {});
+    BenchGraph(const std::vector<Node>& nodes, const std::string& library,
+               const std::string& mapped = {});
     ~BenchGraph();
 
     executor::Loop& loop() noexcept { return loop_; }
     executor::Plan& plan() noexcept { return *plan_; }
+    /// A new value for each mapped input, as from a topic.
+    void deliver();
     /// The components in order of execution.
     const std::vector<Component*>& order() const noexcept { return order_; }
 
    private:
     executor::Log log_;
+    executor::FlightRecorder recorder_;
     executor::Loop loop_;
     executor::LibraryStore libraries_;
     std::vector<std::shared_ptr<executor::Instance>> instances_;

@@ -109,22 +109,27 @@ int main(int argc, char** argv) try {
     const double scale = graphs[0]->loop().counter().nsPerTick();
     std::vector<Row> rows;
     for (std::size_t i = 0; i < kCount; ++i) {
-        rows.push_back({kLengths[i], median(loop[i]) * scale, median(direct[i]) * scale, median(difference[i]) * scale});
+        rows.push_back({kLengths[i], median(loop[i]) * scale, median(direct[i]) * scale,
+                        median(difference[i]) * scale});
     }
     const double read_ns = median(reads) * scale;
     const double budget_ns = read_ns + kBudgetAboveReadNs;
-    fmt::print("{{\"counter_read_ns\": {:.2f}, \"budget_ns\": {:.2f}, \"rounds\": {}, \"chains\": [", read_ns, budget_ns,
-               rounds);
+    fmt::print(
+        "{{\"counter_read_ns\": {:.2f}, \"budget_ns\": {:.2f}, \"rounds\": {}, \"chains\": [",
+        read_ns, budget_ns, rounds);
     const double first = rows[0].framework_ns;
     for (const Row& row : rows) {
-        // A cycle costs something by itself, which the chain of one shows; what each further component
-        // costs is the slope from there.
+        // A cycle costs something by itself, which the chain of one shows; what each further
+        // component costs is the slope from there.
         const double per_component =
-            row.length == 1 ? row.framework_ns : (row.framework_ns - first) / static_cast<double>(row.length - 1);
-        fmt::print("{}{{\"length\": {}, \"loop_ns\": {:.1f}, \"direct_ns\": {:.1f}, \"framework_ns\": {:.1f}, "
-                   "\"share_ns\": {:.2f}, \"per_component_ns\": {:.2f}}}",
-                   row.length == 1 ? "" : ", ", row.length, row.loop_ns, row.direct_ns, row.framework_ns,
-                   row.framework_ns / static_cast<double>(row.length), per_component);
+            row.length == 1 ? row.framework_ns
+                            : (row.framework_ns - first) / static_cast<double>(row.length - 1);
+        fmt::print(
+            "{}{{\"length\": {}, \"loop_ns\": {:.1f}, \"direct_ns\": {:.1f}, \"framework_ns\": "
+            "{:.1f}, "
+            "\"share_ns\": {:.2f}, \"per_component_ns\": {:.2f}}}",
+            row.length == 1 ? "" : ", ", row.length, row.loop_ns, row.direct_ns, row.framework_ns,
+            row.framework_ns / static_cast<double>(row.length), per_component);
     }
     fmt::print("]}}\n");
     return 0;

@@ -87,9 +87,23 @@ class DaemonUnderTest:
             timeout=DEADLINE_S,
         )
 
+    def ctl_process(self, *arguments: str) -> subprocess.Popen[str]:
+        """Begin a call of rtcfctl."""
+        return subprocess.Popen(
+            [str(BUILD_TREE / "bin" / "rtcfctl"), *arguments],
+            env={**os.environ, "RTCF_SOCKET": str(self.socket)},
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
     def executor_pid(self, runner: str = "") -> int:
         with self.client() as client:
             return int(client.get_status(runner or "rt_runner").runners[0].pid)
+
+    def saved(self, runner: str = "rt_runner") -> dict[str, Any]:
+        """Return the state on disk."""
+        document: dict[str, Any] = json.loads((self.state / f"{runner}.json").read_text())
+        return document
 
     def end(self, number: signal.Signals = signal.SIGTERM) -> int:
         """Send a signal and return the exit status."""

@@ -225,7 +225,8 @@ class Peer:
         for setting in request.parameters:
             if setting.name == "die":
                 self.die(request.component, setting.value.string_value)
-        self.live[request.component] = {each.name: each.value for each in request.parameters}
+        name = "/" + request.component.lstrip("/")
+        self.live[name] = {each.name: each.value for each in request.parameters}
         return self.changed()
 
     def die(self, name: str, how: str) -> None:

@@ -217,6 +217,8 @@ def test_a_component_can_be_taken_out_while_the_executor_is_down(
 ) -> None:
     client.load(rtcf.component("demo", "Fine", name="a"))
     client.load(rtcf.component("demo", "Fine", name="b"))
+    works = daemon.executor.read_text()
+    daemon.executor.write_text("#!/bin/sh\nexit 7\n")
     os.kill(daemon.executor_pid(), signal.SIGKILL)
     wait_for(
         lambda: client.get_status().runners[0].state == runner_pb2.RUNNER_STATE_DOWN, "its death"
@@ -224,6 +226,7 @@ def test_a_component_can_be_taken_out_while_the_executor_is_down(
     with pytest.raises(rtcf.RefusedError, match="no component /c"):
         client.unload(["c"])
     assert client.unload(["a"]).notes == ["taken out of the saved graph only"]
+    daemon.executor.write_text(works)
     assert client.start().order == ["/b"]
 
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import socket
 from pathlib import Path
 
@@ -139,3 +140,23 @@ def test_plain_has_numbers_short_words_and_nulls() -> None:
     assert result["settings"]["overrun"] == "catch_up"
     assert result["settings"]["cpu"] is None
     assert plain(rtcf.parse_value(".nan")) == "nan"
+
+
+def test_figures_are_watched(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
+    figures = client.watch_statistics(interval_s=0.1)
+    assert [next(figures).iterations for _ in range(3)] == [10, 10, 10]
+    with pytest.raises(rtcf.RefusedError, match='no runner "nobody"'):
+        next(client.watch_statistics("nobody"))
+    assert daemon.ctl("stats", "--watch", "0").returncode == 2
+
+
+def test_watched_figures_are_documents_until_ctrl_c(daemon: DaemonUnderTest) -> None:
+    with daemon.ctl_process("stats", "--watch", "0.1", "-o", "yaml") as process:
+        assert process.stdout is not None
+        text = ""
+        while text.count("---") < 3:
+            text += process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        text += process.stdout.read()
+        assert process.wait() == 0
+    assert [each["iterations"] for each in yaml.safe_load_all(text)][:2] == [10, 10]

@@ -21,9 +21,12 @@ ChildProcess::ChildProcess(const std::vector<std::string>& command,
         const std::string text = *variable;
         if (environment.count(text.substr(0, text.find('='))) == 0) variables.push_back(text);
     }
+    // A test that crashes or is ended for its time must not leave processes.
+    std::vector<std::string> words{"setpriv", "--pdeathsig", "KILL"};
+    words.insert(words.end(), command.begin(), command.end());
     std::vector<char*> arguments;
     std::vector<char*> settings;
-    for (const auto& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
+    for (const auto& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
     for (const auto& variable : variables) settings.push_back(const_cast<char*>(variable.c_str()));
     arguments.push_back(nullptr);
     settings.push_back(nullptr);

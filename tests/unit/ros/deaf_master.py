@@ -25,6 +25,8 @@ class DeafMaster(socketserver.ThreadingMixIn, SimpleXMLRPCServer):
             self.node = params[3]
         if method == "lookupNode":
             return [1, "", self.node]
+        if method == "hasParam":
+            return [1, "", False]
         return [-1 if method == "getParam" else 1, "", 0]
 
 

@@ -37,14 +37,14 @@ class Ticker final : public rtcf::Component {
     }
 };
 
-// Takes `busy_us` for each update, and tells whole periods since the last one.
+// Takes `busy_us` for some updates, and sums up what elapsed() says, in periods.
 class Spinner final : public rtcf::Component {
     rtcf::Output<std_msgs::Float64> periods{this, "periods"};
     rtcf::Parameter<std::int64_t> busy_us{this, "busy_us", 0, rtcf::Min(0)};
     rtcf::Parameter<std::int64_t> busy_cycles{this, "busy_cycles", 1, rtcf::Min(0)};
 
     void update() override {
-        periods.value().data = static_cast<double>(elapsed()) / static_cast<double>(period());
+        periods.value().data += static_cast<double>(elapsed()) / static_cast<double>(period());
         periods.publish();
         if (iteration() < 20 || iteration() >= 20 + static_cast<std::uint64_t>(busy_cycles.value())) return;
         timespec now{};

@@ -166,7 +166,7 @@ TEST_P(AllDigraphs, AreOrderedOrRefusedWithATrueLoopAndCutsThatHelp) {
 INSTANTIATE_TEST_SUITE_P(UpTo5Nodes, AllDigraphs,
                          ::testing::Values(ClassCount{1, 2, 1}, ClassCount{2, 10, 2}, ClassCount{3, 104, 6},
                                            ClassCount{4, 3044, 31}, ClassCount{5, 291968, 302}),
-                         [](const auto& info) { return "Of" + std::to_string(info.param.nodes); });
+                         [](const auto& suite) { return "Of" + std::to_string(suite.param.nodes); });
 
 }  // namespace
 }  // namespace rtcf::test

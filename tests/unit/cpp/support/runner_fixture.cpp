@@ -46,6 +46,10 @@ ChangeOutcome RunnerFixture::load(const ComponentDefinition& component) {
     return onGraphThread([&] { return runner_->load(component, kLibrary, kSilent); });
 }
 
+Pending<ChangeOutcome> RunnerFixture::beginLoad(const ComponentDefinition& component) {
+    return begin([this, component] { return runner_->load(component, kLibrary, kSilent); });
+}
+
 ChangeOutcome RunnerFixture::loadExample(const std::string& type, const std::string& name, executor::Remaps remaps,
                                          bool first) {
     ComponentDefinition component = definition(type, name);
@@ -53,6 +57,20 @@ ChangeOutcome RunnerFixture::loadExample(const std::string& type, const std::str
     component.remaps = std::move(remaps);
     component.first = first;
     return onGraphThread([&] { return runner_->load(component, RTCF_EXAMPLES, kSilent); });
+}
+
+void RunnerFixture::loadFig1() {
+    const auto loadMimo = [this](const std::string& name, const executor::Remaps& connected) {
+        executor::Remaps remaps;
+        for (const char* port : {"in1", "in2", "in3", "in4", "out1", "out2"}) remaps.emplace_back(port, name + "_" + port);
+        remaps.insert(remaps.end(), connected.begin(), connected.end());
+        loadExample("Mimo", name, remaps, name == "H1");
+    };
+    loadMimo("R3", {{"in1", "F1_R2R3"}, {"in2", "R2_R3"}, {"out1", "R3_G2H1"}});
+    loadMimo("R1", {{"in1", "H1_R1R2"}, {"out1", "R1_H1R2"}});
+    loadMimo("H1", {{"in1", "R3_G2H1"}, {"in2", "R1_H1R2"}, {"out1", "H1_F1"}, {"out2", "H1_R1R2"}});
+    loadMimo("R2", {{"in1", "F1_R2R3"}, {"in2", "H1_R1R2"}, {"in3", "R1_H1R2"}, {"in4", "G2_R2"}, {"out1", "R2_R3"}});
+    loadMimo("F1", {{"in1", "H1_F1"}, {"out1", "F1_R2R3"}});
 }
 
 ChangeOutcome RunnerFixture::unload(const std::string& name) {
@@ -89,6 +107,7 @@ void RunnerFixture::configure(const std::function<void(RunnerSettings&)>& change
         RunnerSettings settings = runner_->settings();
         change(settings);
         runner_->configure(settings);
+        return true;
     });
 }
 

@@ -1,0 +1,113 @@
+// Counts the instructions of a cycle: the executor's loop runs a graph in a
+// child process, single-stepped, and every read of its time stamp counter gets
+// the number of instructions so far. What the loop then says of itself, its
+// calculation duration and that of each component, is in instructions, and
+// repeats to the instruction. Prints JSON. x86-64 only.
+// Usage: instruction_count LIBRARY fig1|mapped|CHAIN [CYCLES]
+#include <fmt/format.h>
+#include <sys/ptrace.h>
+#include <sys/user.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <string>
+
+#include "bench_graph.hpp"
+#include "statistics/histogram.hpp"
+
+namespace {
+
+constexpr const char* kTopics = ".*R3_G2H1|.*R1_H1R2|.*G2_R2";
+constexpr std::uint64_t kWarmUp = 10;  // cycles
+
+// The child: stops itself before and after what is to be counted.
+int runCounted(const std::string& library, const std::string& which, std::uint64_t cycles) {
+    using namespace rtcf;
+    const bool paper = which == "fig1" || which == "mapped";
+    bench::BenchGraph graph(paper ? bench::paperGraph() : bench::chain(std::stoul(which)), library,
+                            which == "mapped" ? kTopics : "");
+    executor::LoopSettings settings;
+    settings.warmup_cycles = kWarmUp;
+    graph.loop().beginStepping(settings);
+    graph.loop().step(kWarmUp);
+    ptrace(PTRACE_TRACEME, 0, nullptr, nullptr);
+    raise(SIGSTOP);
+    for (std::uint64_t i = 0; i < cycles; ++i) {
+        graph.deliver();
+        graph.loop().step(1);
+    }
+    raise(SIGSTOP);
+    // The mean and the maximum are exact, the histogram's quantiles are not.
+    const executor::DistributionSummary cycle =
+        summarize(graph.loop().figures().duration.snapshot(), 1.0);
+    fmt::print(
+        "{{\"graph\": \"{}\", \"cycles\": {}, \"instructions\": {:.1f}, \"max\": {}, "
+        "\"components\": {{",
+        which, cycle.count, cycle.mean, cycle.max);
+    const char* separator = "";
+    for (const executor::Step& step : graph.plan().schedule.steps) {
+        const auto update = summarize(step.figures->duration.snapshot(), 1.0);
+        fmt::print("{}\"{}\": {}", separator, step.component->name(), update.p50);
+        separator = ", ";
+    }
+    fmt::print("}}}}\n");
+    return 0;
+}
+
+bool waitForStop(pid_t child) {
+    int status = 0;
+    return waitpid(child, &status, 0) == child && WIFSTOPPED(status);
+}
+
+// @return whether the child's next instruction is RDTSC
+bool readsCounter(pid_t child, const user_regs_struct& registers) {
+    constexpr long kOpcode = 0x310f;
+    errno = 0;
+    const long word = ptrace(PTRACE_PEEKTEXT, child, registers.rip, nullptr);
+    return errno == 0 && (word & 0xffff) == kOpcode;
+}
+
+// Steps the child from its first SIGSTOP to its second.
+bool count(pid_t child) {
+    if (!waitForStop(child)) return false;
+    for (std::uint64_t instructions = 0;; ++instructions) {
+        user_regs_struct registers{};
+        ptrace(PTRACE_GETREGS, child, nullptr, &registers);
+        const bool counter = readsCounter(child, registers);
+        if (ptrace(PTRACE_SINGLESTEP, child, nullptr, nullptr) != 0) return false;
+        int status = 0;
+        if (waitpid(child, &status, 0) != child || !WIFSTOPPED(status)) return false;
+        if (WSTOPSIG(status) == SIGSTOP) break;
+        if (!counter) continue;
+        ptrace(PTRACE_GETREGS, child, nullptr, &registers);
+        registers.rax = instructions & 0xffffffffU;
+        registers.rdx = instructions >> 32U;
+        ptrace(PTRACE_SETREGS, child, nullptr, &registers);
+    }
+    ptrace(PTRACE_DETACH, child, nullptr, nullptr);
+    int status = 0;
+    return waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+    if (argc < 3 || argc > 4) {
+        std::fputs("usage: instruction_count LIBRARY fig1|mapped|LENGTH [CYCLES]\n", stderr);
+        return 2;
+    }
+    const std::uint64_t cycles = argc == 4 ? std::stoull(argv[3]) : 50;
+    const pid_t child = fork();
+    if (child == 0) return runCounted(argv[1], argv[2], cycles);
+    if (count(child)) return 0;
+    std::fputs("instruction_count: the counted process failed\n", stderr);
+    return 1;
+} catch (const std::exception& error) {
+    std::fprintf(stderr, "instruction_count: %s\n", error.what());
+    return 1;
+}

@@ -1,0 +1,41 @@
+"""What the framework costs per component, against the same update() called directly."""
+
+import json
+
+from processes import output_of
+from result import Budget, Result
+from setting import Setting
+
+
+def run(setting: Setting) -> Result:
+    """Measure chains of 1 to 1000 components, as fast as they go."""
+    found = json.loads(output_of([setting.program("component_cost"), str(setting.library)]))
+    result = Result(
+        "component_cost",
+        "cost per component: the loop against a plain loop over the same update(), warm",
+        ["chain", "loop ns", "direct ns", "framework ns", "ns per further component"],
+    )
+    for chain in found["chains"]:
+        result.rows.append(
+            [
+                chain["length"],
+                chain["loop_ns"],
+                chain["direct_ns"],
+                chain["framework_ns"],
+                chain["per_component_ns"] if chain["length"] > 1 else None,
+            ]
+        )
+        if chain["length"] > 1:
+            result.budgets.append(
+                Budget(
+                    f"chain of {chain['length']}, a counter read + 5 ns",
+                    chain["per_component_ns"],
+                    found["budget_ns"],
+                    "ns",
+                )
+            )
+    result.notes.append(
+        f"one counter read takes {found['counter_read_ns']:.1f} ns; medians of "
+        f"{found['rounds']} interleaved rounds; the chain of 1 shows what a cycle costs by itself"
+    )
+    return result

@@ -1,0 +1,39 @@
+"""How many instructions a cycle takes: exact, whatever the machine is doing."""
+
+import json
+
+from processes import output_of
+from result import Budget, Result
+from setting import Setting
+
+HAL_FIG_1 = 315.0  # LinuxCNC HAL 2.9 on the same graph, see docs of `make bench-rt`
+PER_MAPPED_PORT = 100.0
+_MAPPED_PORTS = 3
+
+
+def run(setting: Setting) -> Result:
+    """Count by single-stepping the executor's loop."""
+    result = Result(
+        "instructions",
+        "instructions of a cycle, from the end of the wait to before the cycle record",
+        ["graph", "instructions", "max"],
+    )
+    counts: dict[str, float] = {}
+    titles = {
+        "1": "chain of 1",
+        "2": "chain of 2",
+        "10": "chain of 10",
+        "fig1": "Fig. 1",
+        "mapped": "Fig. 1 with 3 mapped ports, a message in each cycle",
+    }
+    for graph, title in titles.items():
+        command = [setting.program("instruction_count"), str(setting.library), graph]
+        found = json.loads(output_of(command))
+        counts[graph] = found["instructions"]
+        result.rows.append([title, found["instructions"], found["max"]])
+    ports = (counts["mapped"] - counts["fig1"]) / _MAPPED_PORTS
+    result.budgets = [
+        Budget("Fig. 1", counts["fig1"], HAL_FIG_1, "instructions"),
+        Budget("each mapped port on top", ports, PER_MAPPED_PORT, "instructions"),
+    ]
+    return result

@@ -1,0 +1,141 @@
+"""Runs of Fig. 1 of the paper in real time: by rtcf's loop, and by LinuxCNC HAL."""
+
+import contextlib
+import json
+import os
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from figures import Samples
+from processes import Failed, output_of
+from setting import FREQUENCY_HZ, PRIORITY, Setting
+
+_HAL = Path(__file__).resolve().parent.parent / "hal"
+_MODULES = Path("/usr/lib/linuxcnc/modules")
+_COMPONENTS = ("rtcf_mimo", "rtcf_record")
+_SKIP = 3000  # cycles, in which the threads get their priority
+_NOBODY = 65534
+
+
+@dataclass
+class PaperRun:
+    """The cycles of one run of rtcf."""
+
+    durations_ns: Samples
+    latencies_ns: Samples
+    missed: int
+
+
+def run_rtcf(
+    setting: Setting,
+    seconds: float,
+    frequency_hz: int = FREQUENCY_HZ,
+    spin_us: int = 0,
+    samples: Path | None = None,
+) -> PaperRun:
+    """Run Fig. 1 by rtcf; `samples` is where to keep the cycles' figures."""
+    file = samples or setting.output / "rtcf.samples"
+    command = [
+        *(setting.program("paper_run"), str(setting.library), str(frequency_hz), str(seconds)),
+        *(str(PRIORITY), str(setting.cpu), str(spin_us), str(file)),
+    ]
+    found = json.loads(output_of(command, seconds))
+    pairs = np.fromfile(file, sep=" ")
+    return PaperRun(pairs[0::2], pairs[1::2], found["missed"])
+
+
+@contextlib.contextmanager
+def hal_components(setting: Setting) -> Iterator[None]:
+    """Build HAL's Mimo and lend it to the HAL of this machine, which has one folder for all."""
+    folder = setting.output / "hal"
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in _COMPONENTS:
+        (folder / f"{name}.comp").write_bytes((_HAL / f"{name}.comp").read_bytes())
+        source = ["halcompile", "--compile", f"{name}.comp"]
+        done = subprocess.run(source, cwd=folder, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise Failed(f"halcompile {name}: {done.stderr.strip()}")
+    links = [_MODULES / f"{name}.so" for name in _COMPONENTS]
+    try:
+        for name, link in zip(_COMPONENTS, links, strict=True):
+            link.unlink(missing_ok=True)
+            link.symlink_to((folder / f"{name}.so").resolve())
+        yield
+    except PermissionError:
+        raise Failed(f"no permission to write {_MODULES}: HAL's benches need root") from None
+    finally:
+        for link in links:
+            with contextlib.suppress(OSError):
+                link.unlink()
+
+
+def run_hal(seconds: float, frequency_hz: int = FREQUENCY_HZ) -> Samples:
+    """Run Fig. 1 by HAL, with hal_components(); return the cycles' durations in ns."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        folder.chmod(0o777)  # HAL gives up its rights before it writes
+        text = (_HAL / "fig1.hal.in").read_text()
+        for key, value in {
+            "SAMPLES": str(folder / "samples"),
+            "SKIP": str(_SKIP),
+            "PERIOD_NS": str(1_000_000_000 // frequency_hz),
+            "SECONDS": str(seconds + _SKIP / frequency_hz),
+        }.items():
+            text = text.replace(f"@{key}@", value)
+        (folder / "fig1.hal").write_text(text)
+        environment = {
+            **os.environ,
+            "RTAPI_UID": str(_NOBODY),
+            "RTAPI_FIFO_PATH": str(folder / "fifo"),
+            "LINUXCNC_FORCE_REALTIME": "1",
+        }
+        with (folder / "log").open("w") as log:
+            process = subprocess.Popen(
+                ["halrun", str(folder / "fig1.hal")], env=environment, stdout=log, stderr=log
+            )
+            try:
+                _make_realtime(process, deadline_s=_SKIP / frequency_hz)
+                process.wait(seconds + 60)
+            except subprocess.TimeoutExpired:
+                raise Failed("halrun does not end") from None
+            finally:
+                if process.poll() is None:
+                    process.terminate()
+                    process.wait()
+                    subprocess.run(
+                        ["halrun", "-U"], env=environment, capture_output=True, check=False
+                    )
+        if process.returncode != 0 or not (folder / "samples").exists():
+            raise Failed(f"halrun: {(folder / 'log').read_text().strip()}")
+        return np.fromfile(folder / "samples", sep=" ")
+
+
+def _make_realtime(process: "subprocess.Popen[bytes]", deadline_s: float) -> None:
+    """Give HAL's threads the priority that rtcf's has, where HAL does not do it by itself.
+
+    HAL asks for I/O privileges first, which many virtual machines refuse, and goes on without
+    real time then.
+    """
+    deadline = time.monotonic() + deadline_s
+    while time.monotonic() < deadline and process.poll() is None:
+        for thread in _other_threads("rtapi_app"):
+            with contextlib.suppress(ProcessLookupError):
+                if os.sched_getscheduler(thread) != os.SCHED_FIFO:
+                    os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        time.sleep(0.02)
+
+
+def _other_threads(program: str) -> list[int]:
+    """Return all threads but the first one of each process that runs this program."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            if os.readlink(folder / "exe").endswith(f"/{program}"):
+                threads = [int(thread.name) for thread in (folder / "task").iterdir()]
+                found += [thread for thread in threads if thread != int(folder.name)]
+    return found

@@ -1,0 +1,42 @@
+"""How long a runner is down when its executor dies."""
+
+import os
+import signal
+import time
+
+from daemon import Daemon
+from figures import median
+from graphs import paper
+from result import Budget, Result
+from setting import Setting
+
+_ROUNDS = 3  # more within a minute would make rtcfd hold the runner
+_DEADLINE_S = 30.0
+
+
+def run(setting: Setting) -> Result:
+    """Kill the executor and wait for the next one with the same graph."""
+    result = Result("restart", "executor killed, to a new one with its graph", ["run", "s"])
+    with Daemon(setting) as daemon:
+        for component in paper():
+            daemon.client.load(component)
+        daemon.client.start()
+        times = []
+        for number in range(_ROUNDS):
+            before = daemon.executor
+            begin = time.monotonic()
+            os.kill(before, signal.SIGKILL)
+            while not _restored(daemon, before):
+                if time.monotonic() - begin > _DEADLINE_S:
+                    result.skipped = "the graph does not come back"
+                    return result
+                time.sleep(0.005)
+            times.append(time.monotonic() - begin)
+            result.rows.append([f"{number + 1}", times[-1]])
+    result.budgets = [Budget("crash to the executor back with its graph", median(times), 1.0, "s")]
+    return result
+
+
+def _restored(daemon: Daemon, before: int) -> bool:
+    runner = daemon.client.get_status().runners[0]
+    return runner.pid not in (0, before) and runner.components == len(paper())

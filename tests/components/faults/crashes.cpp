@@ -1,0 +1,97 @@
+// Components that end their process, each in another way.
+#include <array>
+#include <cstdlib>
+#include <stdexcept>
+
+#include "faulty.hpp"
+
+namespace {
+
+// Through volatile: otherwise the compiler sees what is coming and makes
+// something else of it.
+volatile int zero = 0;  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables)
+
+class NullDereference final : public Faulty {
+    void fault() override {
+        volatile int* volatile nowhere = nullptr;
+        *nowhere = 1;
+    }
+};
+
+class DivisionByZero final : public Faulty {
+    void fault() override { zero = 7 / zero; }
+};
+
+class StackOverflow final : public Faulty {
+    static int deeper(volatile char* above) {
+        std::array<volatile char, 4096> frame{};
+        frame[0] = *above;
+        return deeper(frame.data()) + frame[0];
+    }
+    void fault() override {
+        volatile char bottom = 1;
+        zero = deeper(&bottom);
+    }
+};
+
+class HeapCorruption final : public Faulty {
+    void fault() override {
+        // Over what the allocator notes before and behind a block, on which it then stumbles.
+        auto* block = static_cast<volatile char*>(std::malloc(24));
+        for (int i = -8; i < 64; ++i) block[i] = 0x5a;
+        std::free(const_cast<char*>(block));  // NOLINT(cppcoreguidelines-pro-type-const-cast)
+    }
+};
+
+class CallsAbort final : public Faulty {
+    void fault() override { std::abort(); }
+};
+
+class CallsExit final : public Faulty {
+    // NOLINTNEXTLINE(concurrency-mt-unsafe): that is what is wrong with it
+    void fault() override { std::exit(3); }
+};
+
+class NeverReturns final : public Faulty {
+    void fault() override {
+        while (zero == 0) {
+        }
+    }
+};
+
+class ThrowsThroughNoexcept final : public Faulty {
+    [[gnu::noinline]] static void raise() {
+        if (zero == 0) throw std::runtime_error("nobody can catch this");
+    }
+    void fault() noexcept override { raise(); }
+};
+
+class CrashingConfigure final : public rtcf::Component {
+    bool configure() override {
+        volatile int* volatile nowhere = nullptr;
+        *nowhere = 1;
+        return true;
+    }
+    void update() override {}
+};
+
+class CrashingStop final : public rtcf::Component {
+    void stop() override {
+        volatile int* volatile nowhere = nullptr;
+        *nowhere = 1;
+    }
+    void update() override {}
+};
+
+}  // namespace
+
+RTCF_COMPONENT(NullDereference, "Writes through a null pointer")
+RTCF_COMPONENT(DivisionByZero, "Divides an integer by zero")
+RTCF_COMPONENT(StackOverflow, "Calls itself without end")
+RTCF_COMPONENT(HeapCorruption, "Writes behind a block of the heap")
+RTCF_COMPONENT(CallsAbort, "Calls abort()")
+RTCF_COMPONENT(CallsExit, "Calls exit(3)")
+RTCF_COMPONENT(NeverReturns, "Does not return from update()")
+RTCF_COMPONENT(ThrowsThroughNoexcept, "Throws where nothing may be thrown")
+RTCF_COMPONENT(CrashingConfigure, "Crashes in configure()")
+RTCF_COMPONENT(CrashingStop, "Crashes in stop()")

@@ -1,0 +1,200 @@
+"""Each fault, by a component that really does it: what is said, and what goes on."""
+
+import os
+import re
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rtcf
+from daemon_process import Daemon, wait_for
+from rtcf.v1 import graph_pb2, runner_pb2
+
+SETTINGS = "[runner]\nstall_timeout_ms = 300\n[runner.ros]\nenabled = false\n"
+
+
+@pytest.fixture
+def daemon(tmp_path: Path) -> Iterator[Daemon]:
+    """Give an rtcfd whose loops are soon taken for stalled."""
+    daemon = Daemon(tmp_path, SETTINGS)
+    daemon.start()
+    yield daemon
+    if not daemon.ended:
+        daemon.end()
+
+
+def state(client: rtcf.Client, runner: str = "rt_runner") -> runner_pb2.RunnerStatus:
+    status: runner_pb2.RunnerStatus = client.get_status(runner).runners[0]
+    return status
+
+
+def faulty(type_name: str, *, optional: bool = False, after: int = 20) -> graph_pb2.ComponentSpec:
+    return rtcf.component(
+        "rtcf_faults", type_name, name="bad", optional=optional, parameters=[f"after:={after}"]
+    )
+
+
+def load(client: rtcf.Client, bad: graph_pb2.ComponentSpec) -> None:
+    """Load a faulty component and, around it in the order, two that are not."""
+    client.load(rtcf.component("rtcf_test", "Counter", name="a", remaps=["out:=/a"]))
+    client.load(bad)
+    client.load(rtcf.component("rtcf_test", "Counter", name="z", remaps=["in:=/a", "out:=/z"]))
+
+
+CRASHES = {
+    "NullDereference": r"was killed by SIGSEGV \(.*\) at address 0x0 while /bad\.update",
+    "DivisionByZero": r"was killed by SIGFPE \(.*\) at address 0x[0-9a-f]+ while /bad\.update",
+    "StackOverflow": r"was killed by SIGSEGV \(.*\) at address 0x[0-9a-f]+ while /bad\.update",
+    "CallsAbort": r"was killed by SIGABRT \(.*\) while /bad\.update",
+    "ThrowsThroughNoexcept": r"was killed by SIGABRT \(.*\) while /bad\.update",
+    "CallsExit": r"ended with exit status 3 while /bad\.update",
+    "NeverReturns": r"was ended because a cycle made no progress while /bad\.update",
+}
+
+
+@pytest.mark.parametrize("type_name", CRASHES)
+def test_what_crashes_the_process_is_named_and_taken_out(
+    daemon: Daemon, client: rtcf.Client, type_name: str
+) -> None:
+    client.add_runner("other")
+    client.load(rtcf.component("rtcf_test", "Counter"), "other")
+    client.start("other")
+    load(client, faulty(type_name))
+    client.start()
+    wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
+    status = state(client)
+    assert re.search(CRASHES[type_name], status.status), status.status
+    assert re.search(r"in cycle \d+", status.status)
+    assert status.state == runner_pb2.RUNNER_STATE_FAULTED
+    assert client.get_order() == ["/a", "/z"]
+    assert client.get_component("bad").state == graph_pb2.COMPONENT_STATE_LEFT_OUT
+    # The other loop has noticed nothing.
+    before = state(client, "other")
+    assert before.state == runner_pb2.RUNNER_STATE_RUNNING
+    wait_for(lambda: state(client, "other").iteration > before.iteration, "a cycle")
+    # And this one runs without the culprit.
+    client.start()
+    wait_for(lambda: state(client).iteration > 100, "100 cycles")
+
+
+def test_heap_corruption_names_what_was_running_or_nothing(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    load(client, faulty("HeapCorruption"))
+    client.start()
+    wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
+    assert client.get_order() in (["/a", "/z"], ["/a", "/bad", "/z"])
+    assert state(client).state == runner_pb2.RUNNER_STATE_FAULTED
+
+
+def test_a_hook_that_crashes_refuses_the_change(daemon: Daemon, client: rtcf.Client) -> None:
+    load(client, faulty("Sleeps"))
+    with pytest.raises(
+        rtcf.RefusedError, match=r"SIGSEGV .* while /CrashingConfigure\.configure was running"
+    ):
+        client.load(rtcf.component("rtcf_faults", "CrashingConfigure"))
+    wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
+    assert client.get_order() == ["/a", "/bad", "/z"]
+
+
+def test_a_stop_hook_that_crashes_is_taken_out(daemon: Daemon, client: rtcf.Client) -> None:
+    load(client, rtcf.component("rtcf_faults", "CrashingStop", name="bad"))
+    client.start()
+    with pytest.raises(rtcf.RefusedError):
+        client.stop()
+    wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
+    assert "while /bad.stop was running" in daemon.log()
+    assert client.get_order() == ["/a", "/z"]
+
+
+def test_a_loop_goes_on_without_an_optional_component_that_crashed(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(on_crash=runner_pb2.ON_CRASH_RESUME))
+    load(client, faulty("NullDereference", optional=True))
+    client.start()
+    wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
+    assert client.get_order() == ["/a", "/z"]
+    assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
+    wait_for(lambda: state(client).iteration > 100, "100 cycles")
+
+
+def test_an_exception_stops_the_loop_in_order(daemon: Daemon, client: rtcf.Client) -> None:
+    load(client, faulty("Throws"))
+    client.start()
+    wait_for(lambda: state(client).state == runner_pb2.RUNNER_STATE_FAULTED, "the fault")
+    assert "/bad: update() threw: the encoder jumped" in state(client).status
+    assert client.get_component("bad").state == graph_pb2.COMPONENT_STATE_FAULTED
+    assert client.get_order() == ["/a", "/bad", "/z"]
+    wait_for(lambda: "the encoder jumped" in daemon.log(), "the log")
+
+
+def test_an_exception_of_an_optional_component_takes_it_out(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    load(client, faulty("Throws", optional=True))
+    client.start()
+    wait_for(lambda: client.get_component("bad").fault, "the fault")
+    before = state(client)
+    assert before.state == runner_pb2.RUNNER_STATE_RUNNING
+    wait_for(lambda: state(client).iteration > before.iteration + 100, "100 cycles")
+
+
+def test_a_value_that_is_not_finite_is_held_back(daemon: Daemon, client: rtcf.Client) -> None:
+    load(client, faulty("NotFinite"))
+    client.start()
+    fault = wait_for(lambda: client.get_component("bad").fault, "the fault")
+    assert "is not finite" in fault
+    assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
+
+
+def test_a_value_that_is_not_finite_stops_the_loop_where_it_is_to(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    load(client, faulty("NotFiniteStops"))
+    client.start()
+    wait_for(lambda: state(client).state == runner_pb2.RUNNER_STATE_FAULTED, "the fault")
+    assert "is not finite" in state(client).status
+
+
+@pytest.mark.parametrize("type_name", ["Allocates", "Sleeps"])
+def test_what_is_slow_shows_in_the_figures(
+    daemon: Daemon, client: rtcf.Client, type_name: str
+) -> None:
+    load(client, faulty(type_name, after=0))
+    client.start()
+
+    def longest() -> tuple[float, float]:
+        figures = {each.component: each.duration for each in client.get_statistics().components}
+        return figures["/bad"].p50_ns, figures["/a"].p50_ns
+
+    wait_for(lambda: longest()[0] > 5e4 > longest()[1] > 0, "the figures")
+
+
+def test_a_crash_is_recovered_within_a_second(daemon: Daemon, client: rtcf.Client) -> None:
+    load(client, faulty("NullDereference"))
+    client.start()
+    wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
+    (took,) = re.findall(r"executor restarted in ([0-9.]+) s", daemon.log())
+    print(f"restored {took} s after the death")
+
+
+def test_an_executor_that_dies_all_the_time_is_given_up(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter", name="a"))
+    seen = set()
+    while (status := state(client)).state != runner_pb2.RUNNER_STATE_DOWN:
+        if status.pid and status.pid not in seen:
+            seen.add(status.pid)
+            os.kill(status.pid, signal.SIGKILL)
+        time.sleep(0.01)
+        assert len(seen) < 20
+        if "the last of" not in daemon.log():
+            wait_for(
+                lambda: state(client).pid not in (0, *seen) or "the last of" in daemon.log(),
+                "another executor, or none any more",
+            )
+    assert client.start().order == ["/a"]

@@ -1,0 +1,122 @@
+"""`rtcfctl apply` and `save` against a loop that runs."""
+
+from pathlib import Path
+
+import pytest
+import rtcf
+import yaml
+from daemon_process import Daemon, wait_for
+
+GRAPH = """\
+settings:
+  frequency_hz: 500
+components:
+  - {name: steady, package: rtcf_test, type: Counter}
+  - name: knobs
+    ns: /arm
+    package: rtcf_test
+    type: Knobs
+    remaps: {product: /p}
+    parameters: {rate: 2.5, label: abcdef, mode: idle}
+  - {name: slow, package: rtcf_test, type: Counter, remaps: {in: /out, out: /s}, every: 4, phase: 1}
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    file = tmp_path / "graph.yaml"
+    file.write_text(GRAPH)
+    return file
+
+
+def changes(daemon: Daemon, *arguments: str) -> set[tuple[str, str]]:
+    """Apply, and return what was changed and where."""
+    done = daemon.ctl("apply", *arguments, "-o", "yaml")
+    assert done.returncode == 0, done.stderr
+    differences = yaml.safe_load(done.stdout)["rt_runner"]["differences"]
+    return {(each["kind"], each["component"]) for each in differences}
+
+
+def count(client: rtcf.Client, name: str) -> int:
+    ports = {port.name: port for port in client.get_component(name).ports}
+    return int((ports["out"].value or "0").removeprefix("data: "))
+
+
+def test_a_file_becomes_the_graph_and_again_changes_nothing(
+    daemon: Daemon, client: rtcf.Client, file: Path
+) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter", name="gone"))
+    client.start()
+    expected = {
+        ("unload", "/gone"), ("load", "/steady"), ("load", "/arm/knobs"), ("load", "/slow"),
+        ("settings", ""),
+    }  # fmt: skip
+    assert changes(daemon, str(file), "--dry-run") == expected
+    assert client.get_order() == ["/gone"]
+    assert changes(daemon, str(file)) == expected
+    assert set(client.get_order()) == {"/steady", "/arm/knobs", "/slow"}
+    assert client.get_status().runners[0].settings.frequency_hz == 500.0
+    assert changes(daemon, str(file)) == set()
+
+
+def test_what_stays_is_not_touched(daemon: Daemon, client: rtcf.Client, file: Path) -> None:
+    changes(daemon, str(file))
+    client.start()
+    wait_for(lambda: count(client, "steady") > 50, "50 cycles")
+    before = count(client, "steady")
+    file.write_text(
+        GRAPH.replace("rate: 2.5", "rate: 1.0").replace(
+            "type: Counter, remaps", "type: Counter, first: true, remaps"
+        )
+    )
+    assert changes(daemon, str(file)) == {("parameters", "/arm/knobs"), ("replace", "/slow")}
+    assert count(client, "steady") > before
+    (rate,) = [
+        each.value.double_value
+        for each in client.get_component("/arm/knobs").parameters
+        if each.name == "rate"
+    ]
+    assert rate == 1.0
+
+
+def test_a_refused_file_changes_nothing(daemon: Daemon, client: rtcf.Client, file: Path) -> None:
+    changes(daemon, str(file))
+    order = client.get_order()
+    file.write_text(
+        GRAPH.replace("500", "800") + "  - {package: rtcf_test, type: FailingConfigure}\n"
+    )
+    done = daemon.ctl("apply", str(file))
+    assert done.returncode == 1
+    assert "/dev/gripper does not answer" in done.stderr
+    assert client.get_order() == order
+    assert client.get_status().runners[0].settings.frequency_hz == 500.0
+
+
+def test_save_and_apply_are_inverse(daemon: Daemon, client: rtcf.Client, file: Path) -> None:
+    changes(daemon, str(file))
+    client.set_parameters("/arm/knobs", [rtcf.parse_parameter("count:=5")])
+    client.set_breaks([rtcf.parse_port("slow.in")], True)
+    saved = file.with_name("saved.yaml")
+    assert daemon.ctl("save", str(saved)).returncode == 0
+    assert changes(daemon, str(saved)) == set()
+    client.unload(["steady", "/arm/knobs", "slow"])
+    changes(daemon, str(saved))
+    assert daemon.ctl("save").stdout == saved.read_text()
+    (graph,) = rtcf.read_graphs(saved.read_text(), "saved")
+    (knobs,) = [each for each in graph.components if each.name == "knobs"]
+    values = {each.name: each.value for each in knobs.parameters}
+    assert values["count"].int_value == 5
+    assert values["mode"].string_value == "idle"
+
+
+def test_the_graph_of_a_file_comes_back_after_a_crash(
+    daemon: Daemon, client: rtcf.Client, file: Path
+) -> None:
+    changes(daemon, str(file))
+    order = client.get_order()
+    daemon.end()
+    daemon.start()
+    with rtcf.Client(daemon.socket) as again:
+        assert again.get_order() == order
+        assert again.get_component("slow").spec.every == 4
+    assert changes(daemon, str(file)) == set()

@@ -1,0 +1,237 @@
+"""Loops and their graphs survive the deaths of rtcfd and of executors, at any moment."""
+
+import contextlib
+import functools
+import json
+import os
+import random
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import rtcf
+from daemon_process import Daemon, wait_for
+from rtcf.v1 import runner_pb2
+
+# As long as the system's, other than a private daemon's own default.
+SETTINGS = "[runner]\norphan_timeout_s = 60\n[runner.ros]\nenabled = false\n"
+LONGEST_WAIT_S = 0.2  # before a death
+
+
+@pytest.fixture
+def daemon(tmp_path: Path) -> Iterator[Daemon]:
+    """Give an rtcfd whose executors outlive it for a minute."""
+    daemon = Daemon(tmp_path, SETTINGS)
+    daemon.start()
+    yield daemon
+    if not daemon.ended:
+        daemon.end()
+
+
+def state(client: rtcf.Client) -> runner_pb2.RunnerStatus:
+    status: runner_pb2.RunnerStatus = client.get_status("rt_runner").runners[0]
+    return status
+
+
+def is_gone(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except OSError:
+        return True
+
+
+def count(client: rtcf.Client) -> int:
+    ports = {port.name: port for port in client.get_component("steady").ports}
+    return int(ports["out"].value.removeprefix("data: "))
+
+
+def test_a_loop_runs_on_without_rtcfd_and_is_adopted_as_it_is(daemon: Daemon) -> None:
+    with rtcf.Client(daemon.socket) as client:
+        client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
+        client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", parameters=["rate:=2.5"]))
+        client.set_parameters("knobs", [rtcf.parse_parameter("count:=7")])
+        client.start()
+        wait_for(lambda: state(client).iteration > 100, "100 cycles")
+        before = state(client)
+    daemon.end(signal.SIGKILL)
+    daemon.start()
+    assert "adopted: loop running, iteration " in daemon.log()
+    assert "the executor's is kept" not in daemon.log()
+    with rtcf.Client(daemon.socket) as client:
+        after = state(client)
+        assert (after.pid, after.state) == (before.pid, runner_pb2.RUNNER_STATE_RUNNING)
+        assert after.iteration > before.iteration
+        assert after.missed == before.missed or after.overruns > before.overruns
+        assert client.get_order() == ["/knobs", "/steady"]
+        # One count for each cycle: none was run without it, none twice.
+        assert abs(count(client) - int(state(client).iteration)) < 1000
+        counted = count(client)
+        client.load(rtcf.component("rtcf_test", "Counter", name="new", remaps=["out:=/new"]))
+        wait_for(lambda: count(client) > counted, "a cycle")
+    assert daemon.end() == 0
+    wait_for(lambda: is_gone(before.pid), "its end")
+
+
+def test_the_crash_of_an_adopted_executor_is_told_by_its_flight_recorder(daemon: Daemon) -> None:
+    with rtcf.Client(daemon.socket) as client:
+        client.load(
+            rtcf.component(
+                "rtcf_faults", "NullDereference", name="bad", parameters=["after:=2000000"]
+            )
+        )
+        client.start()
+    daemon.end(signal.SIGKILL)
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        with contextlib.suppress(rtcf.RefusedError):  # its answer may come first
+            client.set_parameters("bad", [rtcf.parse_parameter("after:=0")])
+        wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
+        assert "was killed by SIGSEGV" in state(client).status
+        assert "while /bad.update was running" in state(client).status
+        assert client.get_order() == []
+
+
+def test_a_private_rtcfd_takes_its_executors_with_it(tmp_path: Path) -> None:
+    daemon = Daemon(tmp_path)
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        client.load(rtcf.component("rtcf_test", "Witness"))
+        client.start()
+        pid = state(client).pid
+    daemon.end(signal.SIGKILL)
+    wait_for(lambda: is_gone(pid), "its end")
+
+
+class Churn:
+    """Changes a graph at random, and knows what it must be: the acknowledged
+    changes, and perhaps the one that was under way when the other side died."""
+
+    def __init__(self, seed: int) -> None:
+        self.random = random.Random(seed)
+        self.known: dict[str, float] = {}
+        self.perhaps: dict[str, float] = {}
+        self._next = 0
+
+    def run(self, client: rtcf.Client, over: threading.Event) -> None:
+        """Change one thing after another until a change fails, or it is over."""
+        while not over.is_set():
+            self.perhaps = dict(self.known)
+            try:
+                self._change(client)
+            except rtcf.RtcfError:
+                return
+            self.known = self.perhaps
+
+    def _change(self, client: rtcf.Client) -> None:
+        choice = self.random.random()
+        names = sorted(self.known)
+        if not names or (choice < 0.4 and len(names) < 8):
+            name, rate = f"k{self._next}", self.random.uniform(0.0, 9.0)
+            self._next += 1
+            self.perhaps[f"/{name}"] = rate
+            remaps = [f"{port}:=/{name}/{port}" for port in ("product", "length")]
+            client.load(
+                rtcf.component(
+                    "rtcf_test", "Knobs", name=name, remaps=remaps, parameters=[f"rate:={rate}"]
+                )
+            )
+        elif choice < 0.7:
+            name, rate = self.random.choice(names), self.random.uniform(0.0, 9.0)
+            self.perhaps[name] = rate
+            client.set_parameters(name, [rtcf.parse_parameter(f"rate:={rate}")])
+        else:
+            name = self.random.choice(names)
+            del self.perhaps[name]
+            client.unload([name])
+
+    def accept(self, found: dict[str, float]) -> None:
+        """Check what there is now."""
+        assert found in (self.known, self.perhaps)
+        self.known = found
+
+
+def rates(client: rtcf.Client) -> dict[str, float]:
+    found = {}
+    for each in client.list_components():
+        values = {parameter.name: parameter.value.double_value for parameter in each.parameters}
+        if "rate" in values:
+            found[each.full_name] = values["rate"]
+    return found
+
+
+def saved_rates(daemon: Daemon) -> dict[str, float]:
+    """What the state on disk says."""
+    file = daemon.socket.with_name("state") / "rt_runner.json"
+    found = {}
+    for each in json.loads(file.read_text())["components"]:
+        for parameter in each.get("parameters", []):
+            if parameter["name"] == "rate":
+                found[f"/{each['name']}"] = float(parameter["value"]["double_value"])
+    return found
+
+
+def churn_until(churn: Churn, client: rtcf.Client, death: Callable[[], None]) -> None:
+    """Change the graph until the death, which comes at a random moment."""
+    over = threading.Event()
+
+    def die() -> None:
+        death()
+        over.set()
+
+    timer = threading.Timer(churn.random.uniform(0.0, LONGEST_WAIT_S), die)
+    timer.start()
+    churn.run(client, over)
+    timer.join()
+
+
+@pytest.mark.parametrize("times", [5, pytest.param(100, marks=pytest.mark.long)])
+def test_no_kill_of_rtcfd_stops_a_loop_or_loses_its_graph(daemon: Daemon, times: int) -> None:
+    churn = Churn(seed=times)
+    with rtcf.Client(daemon.socket) as client:
+        client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
+        client.start()
+        first = state(client)
+    iteration = first.iteration
+    for _ in range(times):
+        with rtcf.Client(daemon.socket) as client:
+            churn_until(churn, client, lambda: os.kill(daemon.pid, signal.SIGKILL))
+        daemon.end(signal.SIGKILL)
+        assert saved_rates(daemon) in (churn.known, churn.perhaps)
+        daemon.start()
+        with rtcf.Client(daemon.socket) as client:
+            now = state(client)
+            assert (now.pid, now.state) == (first.pid, runner_pb2.RUNNER_STATE_RUNNING)
+            assert now.iteration > iteration
+            iteration = now.iteration
+            churn.accept(rates(client))
+            assert saved_rates(daemon) == churn.known
+    assert "is corrupt" not in daemon.log()
+
+
+def revive(client: rtcf.Client, dead: int) -> None:
+    """Wait until another executor has the graph; so many deaths may take a `start`."""
+
+    def is_up() -> bool:
+        status = state(client)
+        if "tries again" in status.status:
+            client.start()
+        return status.pid not in (0, dead) and "/steady" in client.get_order()
+
+    wait_for(is_up, "another executor with its graph")
+
+
+@pytest.mark.parametrize("times", [5, pytest.param(100, marks=pytest.mark.long)])
+def test_no_kill_of_an_executor_loses_its_graph(daemon: Daemon, times: int) -> None:
+    churn = Churn(seed=times)
+    with rtcf.Client(daemon.socket) as client:
+        client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
+        for _ in range(times):
+            client.start()
+            pid = state(client).pid
+            churn_until(churn, client, functools.partial(os.kill, pid, signal.SIGKILL))
+            revive(client, pid)
+            churn.accept(rates(client))
+            assert saved_rates(daemon) == churn.known
+    assert "quarantined" in (daemon.socket.with_name("state") / "rt_runner.json").read_text()

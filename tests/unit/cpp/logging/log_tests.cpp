@@ -1,0 +1,105 @@
+#include "logging/log.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <map>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "support/bare_component.hpp"
+
+namespace rtcf::test {
+namespace {
+
+using executor::Log;
+using executor::LogEntry;
+
+class LogTest : public ::testing::Test {
+   protected:
+    LogTest() { component.context.log = &log; }
+
+    std::vector<LogEntry> entries;
+    Log log{[this](LogEntry&& entry) { entries.push_back(std::move(entry)); }};
+    BareComponent component;
+};
+
+TEST_F(LogTest, KeepsTheOrderOfOneThread) {
+    BareComponent* self = &component;
+    for (int i = 0; i < 100; ++i) RTCF_INFO(self, "{}", i);
+    log.drain();
+    ASSERT_EQ(entries.size(), 100U);
+    for (int i = 0; i < 100; ++i) EXPECT_EQ(entries[static_cast<std::size_t>(i)].message, std::to_string(i));
+}
+
+TEST_F(LogTest, RecordsThatFindItFullAreCountedAndReportedOnce) {
+    BareComponent* self = &component;
+    for (int i = 0; i < 1030; ++i) RTCF_INFO(self, "{}", i);
+    EXPECT_EQ(log.dropped(), 6U);
+    log.drain();
+    ASSERT_EQ(entries.size(), 1025U);
+    EXPECT_EQ(entries.back().level, LogLevel::Warn);
+    EXPECT_EQ(entries.back().message.rfind("6 log records were lost", 0), 0U) << entries.back().message;
+    entries.clear();
+    RTCF_INFO(self, "one more");
+    log.drain();
+    EXPECT_EQ(entries.size(), 1U);
+}
+
+TEST_F(LogTest, NotesIterationAndThread) {
+    BareComponent* self = &component;
+    const std::atomic<std::uint64_t> iteration{42};
+    log.setIteration(&iteration);
+    std::thread([&] {
+        Log::setRealtimeThread(true);
+        RTCF_INFO(self, "in the loop");
+    }).join();
+    log.drain();
+    ASSERT_EQ(entries.size(), 1U);
+    EXPECT_TRUE(entries[0].realtime);
+    EXPECT_EQ(entries[0].iteration, 42U);
+}
+
+TEST_F(LogTest, OwnRecordGoesToTheConsumerAtOnce) {
+    log.write(LogLevel::Error, "/H1", "text");
+    ASSERT_EQ(entries.size(), 1U);
+    EXPECT_EQ(entries[0].message, "text");
+    EXPECT_EQ(entries[0].component, "/H1");
+}
+
+TEST_F(LogTest, TakesRecordsOfManyThreadsAtOnce) {
+    constexpr int kThreads = 4;
+    constexpr int kEach = 5000;
+    std::atomic<int> running{kThreads};
+    std::vector<std::thread> threads;
+    for (int id = 0; id < kThreads; ++id) {
+        threads.emplace_back([&, id] {
+            Log::setRealtimeThread(id == 0);
+            BareComponent* self = &component;
+            for (int i = 0; i < kEach; ++i) RTCF_INFO(self, "{} {}", id, i);
+            --running;
+        });
+    }
+    while (running > 0) log.drain();
+    for (std::thread& thread : threads) thread.join();
+    log.drain();
+    std::map<int, int> last;
+    std::uint64_t seen = 0;
+    for (const LogEntry& entry : entries) {
+        if (entry.component.empty()) continue;  // a report of lost records
+        int id = 0;
+        int number = 0;
+        ASSERT_EQ(std::sscanf(entry.message.c_str(), "%d %d", &id, &number), 2) << entry.message;
+        if (const auto before = last.find(id); before != last.end()) {
+            ASSERT_GT(number, before->second);
+        }
+        last[id] = number;
+        ++seen;
+    }
+    EXPECT_EQ(seen + log.dropped(), std::uint64_t{kThreads * kEach});
+}
+
+}  // namespace
+}  // namespace rtcf::test

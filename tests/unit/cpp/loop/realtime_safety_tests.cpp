@@ -1,0 +1,76 @@
+// Only in a build with RealtimeSanitizer, which ends the program at the first
+// call in the cycle that may block: allocation, lock, system call.
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "support/runner_fixture.hpp"
+
+namespace rtcf::test {
+namespace {
+
+class RealtimeSafety : public RunnerFixture {
+   protected:
+    void drainTaps() {
+        for (const char* topic : {"/R3_G2H1", "/R1_H1R2", "/T_out"}) {
+            const auto tap = bridge().tap(topic);
+            while (tap && tap->pop([](const std::uint8_t*, std::uint32_t) {})) {
+            }
+        }
+    }
+
+    void deliver(double number) {
+        const auto injector = bridge().injector("/G2_R2");
+        ASSERT_NE(injector, nullptr);
+        injector->deliver(reinterpret_cast<const std::uint8_t*>(&number), sizeof number);
+    }
+};
+
+TEST_F(RealtimeSafety, Fig1WithTopicsLogsAndHotSwapsBreaksNoRule) {
+    loadFig1();
+    configure([](RunnerSettings& settings) { settings.whitelist = ".*R3_G2H1|.*R1_H1R2|.*G2_R2|/T_out"; });
+    start();
+    ASSERT_TRUE(runs());
+    ComponentDefinition talker = definition("Talker", "T");
+    talker.remaps = {{"out", "T_out"}};
+    ComponentDefinition recorder = definition("Recorder", "Z");
+    recorder.remaps = {{"in", "R3_G2H1"}, {"out", "Z_out"}};
+    recorder.breaks = {"in"};
+    load(definition("Chatter", "C"));
+    for (int round = 0; round < 30; ++round) {
+        load(talker);
+        load(recorder);
+        deliver(static_cast<double>(round));
+        ASSERT_TRUE(runs(30));
+        setParameters("/Z", {{"gain", 2.0}});
+        replace("/Z", recorder);
+        setBreak("/R2", "in4", round % 2 == 0);
+        onGraphThread([this] { return runner().probe("/T"); });
+        ASSERT_TRUE(runs(30));
+        drainTaps();
+        unload("/T");
+        unload("/Z");
+    }
+    stop();
+    EXPECT_GT(iteration(), 1800U);
+    EXPECT_EQ(state(), RunnerState::Stopped);
+}
+
+TEST_F(RealtimeSafety, SteppedCyclesBreakNoRule) {
+    loadFig1();
+    step(5000);
+    EXPECT_EQ(iteration(), 5000U);
+}
+
+TEST_F(RealtimeSafety, ComponentThatAllocatesIsCaught) {
+    GTEST_FLAG_SET(death_test_style, "threadsafe");
+    EXPECT_DEATH(
+        {
+            load(definition("Allocator", "A"));
+            step(10);
+        },
+        "unsafe-library-call");
+}
+
+}  // namespace
+}  // namespace rtcf::test

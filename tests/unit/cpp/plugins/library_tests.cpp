@@ -1,0 +1,93 @@
+#include "plugins/library.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "refusal.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace rtcf::test {
+namespace {
+
+using namespace executor;
+
+const std::string kFolder = RTCF_UNIT_COMPONENTS "/";
+
+std::string refusalOf(const std::string& path) {
+    try {
+        const Library library(path);
+        return {};
+    } catch (const Refusal& refused) {
+        return refused.what();
+    }
+}
+
+// What a Versioned component of this library writes.
+std::int32_t versionOf(const Library& library) {
+    const std::unique_ptr<Component> component(library.find("Versioned")->create());
+    component->update();
+    return static_cast<const Slot<std::int32_t>&>(*component->outputs()[0]->slot()).value;
+}
+
+TEST(Library, ListsItsTypesByName) {
+    const Library library(RTCF_EXAMPLES);
+    ASSERT_EQ(library.types().size(), 3U);
+    EXPECT_STREQ(library.types()[0]->type, "Identity");
+    EXPECT_STREQ(library.types()[1]->type, "Mimo");
+    EXPECT_STREQ(library.types()[2]->type, "PaperExample");
+    EXPECT_EQ(library.find("Nothing"), nullptr);
+}
+
+TEST(Library, MissingFileIsNamed) {
+    EXPECT_EQ(refusalOf("/nowhere/x.so"), "library /nowhere/x.so: No such file or directory");
+}
+
+TEST(Library, FolderIsRefused) { EXPECT_NE(refusalOf("/tmp").find("not a regular file"), std::string::npos); }
+
+TEST(Library, MissingSymbolIsNamed) {
+    const std::string text = refusalOf(kFolder + "missing_symbol.so");
+    EXPECT_NE(text.find("missing_symbol.so: does not load"), std::string::npos) << text;
+    EXPECT_NE(text.find("undefined symbol: rtcf_unit_test_undefined_function"), std::string::npos) << text;
+    EXPECT_EQ(text.find("/proc/"), std::string::npos) << "the name of the private copy means nothing to a person";
+}
+
+TEST(Library, WithoutEntryPointIsRefused) {
+    const std::string text = refusalOf(kFolder + "no_entry_point.so");
+    EXPECT_NE(text.find("has no components"), std::string::npos) << text;
+    EXPECT_NE(text.find("rtcf_add_components()"), std::string::npos) << text;
+}
+
+TEST(Library, OfAnotherAbiIsRefusedWithBothNumbers) {
+    const std::string text = refusalOf(kFolder + "wrong_abi.so");
+    EXPECT_NE(text.find("ABI 4711"), std::string::npos) << text;
+    EXPECT_NE(text.find("this executor has " + std::to_string(RTCF_ABI_VERSION)), std::string::npos) << text;
+}
+
+TEST(Library, ThatIsNoLibraryIsRefused) {
+    const std::string text = refusalOf(__FILE__);
+    EXPECT_NE(text.find("does not load"), std::string::npos) << text;
+}
+
+TEST(LibraryStore, OpensAnUnchangedFileOnce) {
+    LibraryStore store;
+    EXPECT_EQ(store.open(kFolder + "versioned_1.so"), store.open(kFolder + "versioned_1.so"));
+}
+
+TEST(LibraryStore, LoadsARebuiltFileBesideTheOldCode) {
+    const TemporaryFolder folder;
+    const std::string path = folder.path("versioned.so");
+    LibraryStore store;
+    std::filesystem::copy_file(kFolder + "versioned_1.so", path);
+    const auto before = store.open(path);
+    // In place, as a linker does it: the same file with other bytes.
+    std::filesystem::copy_file(kFolder + "versioned_2.so", path, std::filesystem::copy_options::overwrite_existing);
+    const auto after = store.open(path);
+    EXPECT_NE(before, after);
+    EXPECT_EQ(versionOf(*before), 1);
+    EXPECT_EQ(versionOf(*after), 2);
+}
+
+}  // namespace
+}  // namespace rtcf::test

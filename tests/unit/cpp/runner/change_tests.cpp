@@ -1,0 +1,310 @@
+// Changes of a graph while its loop runs: whole, at one boundary, or not at all.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "support/runner_fixture.hpp"
+
+namespace rtcf::test {
+namespace {
+
+class Change : public RunnerFixture {
+   protected:
+    static ComponentDefinition recorder(const std::string& name) {
+        ComponentDefinition result = definition("Recorder", name);
+        result.remaps = {{"in", name + "_in"}, {"out", name + "_out"}};
+        return result;
+    }
+
+    void startWithA() {
+        load(recorder("A"));
+        start();
+        ASSERT_TRUE(runs());
+    }
+
+    // A change that fails has left everything as it was.
+    void expectUnchanged(const std::vector<std::string>& order_before, std::uint64_t generation_before) {
+        EXPECT_EQ(order(), order_before);
+        EXPECT_EQ(generation(), generation_before);
+        EXPECT_EQ(state(), RunnerState::Running);
+        EXPECT_TRUE(runs());
+    }
+};
+
+TEST_F(Change, LoadedComponentRunsAndOthersKeepTheirState) {
+    startWithA();
+    const double before = value("/A", "out");
+    const ChangeOutcome outcome = load(recorder("B"));
+    EXPECT_EQ(outcome.component, "/B");
+    EXPECT_EQ(outcome.order, (std::vector<std::string>{"/A", "/B"}));
+    ASSERT_TRUE(runs());
+    EXPECT_GT(value("/A", "out"), before);
+    EXPECT_GT(value("/B", "out"), 0.0);
+    EXPECT_EQ(journal().count("/A start"), 1U);
+    EXPECT_EQ(journal().count("/B start"), 1U);
+}
+
+TEST_F(Change, UnloadedComponentIsStoppedAndCleanedUpAfterItLeftTheLoop) {
+    startWithA();
+    load(recorder("B"));
+    ASSERT_TRUE(runs());
+    unload("/B");
+    EXPECT_EQ(journal().count("/B stop"), 1U);
+    EXPECT_EQ(journal().count("/B cleanup"), 1U);
+    EXPECT_EQ(journal().count("/B safe"), 0U) << "the loop goes on";
+    EXPECT_EQ(order(), std::vector<std::string>{"/A"});
+    EXPECT_TRUE(runs());
+}
+
+TEST_F(Change, EachCycleOfAComponentThatStaysIsCounted) {
+    startWithA();
+    for (int i = 0; i < 10; ++i) {
+        load(recorder("B"));
+        unload("/B");
+    }
+    stop();
+    EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration())) << "one update in every cycle, none twice";
+}
+
+TEST_F(Change, ReplacementTakesOverAtTheBoundary) {
+    startWithA();
+    replace("/A", recorder("A"));
+    ASSERT_TRUE(runs());
+    stop();
+    EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration())) << "it counts on from its predecessor's count";
+    EXPECT_EQ(journal().notes(),
+              (std::vector<std::string>{"/A configure", "/A start", "/A update", "/A configure", "/A start",
+                                        "/A takeOver", "/A stop", "/A cleanup", "/A safe", "/A stop"}));
+}
+
+TEST_F(Change, ReplacementByAnotherNameTakesOverToo) {
+    startWithA();
+    replace("/A", recorder("B"));
+    EXPECT_EQ(order(), std::vector<std::string>{"/B"});
+    EXPECT_EQ(journal().count("/B takeOver"), 1U);
+    EXPECT_EQ(journal().count("/A cleanup"), 1U);
+    EXPECT_GT(value("/B", "out"), 0.0);
+}
+
+TEST_F(Change, ReplacementThatIsRefusedLeavesTheOldOneRunning) {
+    startWithA();
+    const auto before = generation();
+    ComponentDefinition bad = recorder("A");
+    bad.parameters = {{"refuses", std::string("start")}};
+    EXPECT_NE(refusal([&] { replace("/A", bad); }), "");
+    expectUnchanged({"/A"}, before);
+    EXPECT_EQ(journal().count("/A takeOver"), 0U);
+    EXPECT_EQ(journal().count("/A cleanup"), 1U) << "the new one's";
+    EXPECT_EQ(journal().count("/A stop"), 0U);
+}
+
+TEST_F(Change, ConfigureThatRefusesIsToldAndUndone) {
+    startWithA();
+    const auto before = generation();
+    ComponentDefinition bad = recorder("B");
+    bad.parameters = {{"refuses", std::string("configure")}};
+    EXPECT_EQ(refusal([&] { load(bad); }),
+              "/B (rtcf_unit_test/Recorder): configure failed: told to refuse configure");
+    expectUnchanged({"/A"}, before);
+    EXPECT_EQ(journal().count("/B cleanup"), 1U);
+    EXPECT_EQ(journal().count("/B start"), 0U);
+}
+
+TEST_F(Change, ConfigureThatThrowsIsToldAndUndone) {
+    startWithA();
+    const auto before = generation();
+    ComponentDefinition bad = recorder("B");
+    bad.parameters = {{"throws", std::string("configure")}};
+    EXPECT_EQ(refusal([&] { load(bad); }), "/B (rtcf_unit_test/Recorder): configure failed: it threw: as told");
+    expectUnchanged({"/A"}, before);
+    EXPECT_EQ(journal().count("/B cleanup"), 1U);
+}
+
+TEST_F(Change, StartThatRefusesIsToldAndUndone) {
+    startWithA();
+    const auto before = generation();
+    ComponentDefinition bad = recorder("B");
+    bad.parameters = {{"refuses", std::string("start")}};
+    EXPECT_NE(refusal([&] { load(bad); }).find("start failed"), std::string::npos);
+    expectUnchanged({"/A"}, before);
+    EXPECT_EQ(journal().count("/B cleanup"), 1U);
+    EXPECT_EQ(journal().count("/B stop"), 0U) << "it never started";
+    EXPECT_EQ(journal().count("/B update"), 0U);
+}
+
+TEST_F(Change, LoopOfConnectionsIsRefusedAndTheNewComponentCleanedUpOnce) {
+    startWithA();
+    const auto before = generation();
+    ComponentDefinition closing = recorder("B");
+    closing.remaps = {{"in", "A_out"}, {"out", "A_in"}};
+    const std::string text = refusal([&] { load(closing); });
+    EXPECT_NE(text.find("the connections form a loop"), std::string::npos) << text;
+    expectUnchanged({"/A"}, before);
+    EXPECT_EQ(journal().count("/B configure"), 1U);
+    EXPECT_EQ(journal().count("/B cleanup"), 1U);
+    EXPECT_EQ(journal().count("/B start"), 0U);
+}
+
+TEST_F(Change, UnbreakThatWouldCloseALoopIsRefused) {
+    startWithA();
+    ComponentDefinition closing = recorder("B");
+    closing.remaps = {{"in", "A_out"}, {"out", "A_in"}};
+    closing.breaks = {"in"};
+    load(closing);
+    EXPECT_EQ(order(), (std::vector<std::string>{"/B", "/A"}));
+    const auto before = generation();
+    EXPECT_NE(refusal([&] { setBreak("/B", "in", false); }), "");
+    expectUnchanged({"/B", "/A"}, before);
+}
+
+TEST_F(Change, BreaksMoveTheOrderOfARunningLoop) {
+    startWithA();
+    ComponentDefinition closing = recorder("B");
+    closing.remaps = {{"in", "A_out"}, {"out", "A_in"}};
+    closing.breaks = {"in"};
+    load(closing);
+    setBreak("/A", "in", true);
+    setBreak("/B", "in", false);
+    EXPECT_EQ(order(), (std::vector<std::string>{"/A", "/B"}));
+    ASSERT_TRUE(runs());
+    stop();
+    EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration()));
+}
+
+TEST_F(Change, TakenNameIsRefusedBeforeAnythingIsConstructed) {
+    startWithA();
+    const auto before = generation();
+    const std::string text = refusal([&] { load(recorder("A")); });
+    EXPECT_NE(text.find("/A is loaded already"), std::string::npos) << text;
+    EXPECT_EQ(journal().count("/A configure"), 1U);
+    expectUnchanged({"/A"}, before);
+}
+
+TEST_F(Change, UnknownTypeIsRefusedWithTheTypesThereAre) {
+    const std::string text = refusal([&] { load(definition("Nothing", "N")); });
+    EXPECT_NE(text.find("no component type Nothing; it has"), std::string::npos) << text;
+    EXPECT_NE(text.find("Recorder"), std::string::npos) << text;
+}
+
+TEST_F(Change, BadLoadTimeParameterIsRefusedBeforeConfigure) {
+    startWithA();
+    ComponentDefinition bad = recorder("B");
+    bad.parameters = {{"gain", 11.0}};
+    EXPECT_EQ(refusal([&] { load(bad); }), "/B: parameter gain = 11 is above its maximum 10 ");
+    EXPECT_EQ(journal().count("/B configure"), 0U);
+}
+
+TEST_F(Change, BatchOfParametersIsSetInOneCycle) {
+    startWithA();
+    setParameters("/A", {{"gain", 2.0}, {"refuses", std::string("nothing")}});
+    ASSERT_TRUE(runs());
+    stop();
+    EXPECT_EQ(value("/A", "out"), 2.0 * static_cast<double>(iteration()));
+}
+
+TEST_F(Change, BatchWithABadValueSetsNothing) {
+    startWithA();
+    const std::string text = refusal([&] { setParameters("/A", {{"gain", 2.0}, {"throws_at", 1.5}}); });
+    EXPECT_NE(text.find("throws_at"), std::string::npos) << text;
+    EXPECT_NE(refusal([&] { setParameters("/A", {{"gain", 3.0}, {"nonsense", 1.0}}); }).find("nonsense"),
+              std::string::npos);
+    ASSERT_TRUE(runs());
+    stop();
+    EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration())) << "the gain is still 1";
+    const auto snapshot = runner().snapshot();
+    for (const auto& parameter : snapshot->get("/A").parameters) {
+        if (parameter.declaration.name == "gain") {
+            EXPECT_EQ(std::get<double>(parameter.value), 1.0);
+        }
+    }
+}
+
+TEST_F(Change, FrequencyChangesWhileTheLoopRuns) {
+    startWithA();
+    configure([](RunnerSettings& settings) { settings.frequency_hz = 500.0; });
+    ASSERT_TRUE(runs());
+    EXPECT_EQ(runner().loop().clock().period_ns, 2'000'000);
+    EXPECT_EQ(journal().count("/A start"), 1U);
+}
+
+TEST_F(Change, BadSettingsAreRefusedAndTheOldOnesStay) {
+    startWithA();
+    EXPECT_NE(refusal([&] { configure([](RunnerSettings& s) { s.frequency_hz = std::nan(""); }); }), "");
+    EXPECT_NE(refusal([&] { configure([](RunnerSettings& s) { s.whitelist = "("; }); }), "");
+    EXPECT_NE(refusal([&] { configure([](RunnerSettings& s) { s.loop.realtime.priority = 99; }); }), "");
+    EXPECT_EQ(runner().picture().settings.frequency_hz, 1000.0);
+    EXPECT_TRUE(runs());
+}
+
+TEST_F(Change, TopicsFollowTheWhitelistOfARunningLoop) {
+    startWithA();
+    EXPECT_EQ(bridge().tap("/A_out"), nullptr);
+    configure([](RunnerSettings& settings) { settings.whitelist = "/A_.*"; });
+    ASSERT_NE(bridge().tap("/A_out"), nullptr);
+    ASSERT_NE(bridge().injector("/A_in"), nullptr);
+    const auto tap = bridge().tap("/A_out");
+    EXPECT_TRUE(eventually([&] { return tap->pop([](const std::uint8_t*, std::uint32_t) {}); }));
+    load(recorder("B"));
+    EXPECT_EQ(bridge().tap("/A_out"), tap) << "what stays goes on undisturbed";
+}
+
+// A writer inside the loop takes an input from ROS, and gives it back when it leaves.
+TEST_F(Change, InputIsSubscribedOnlyWithoutAWriter) {
+    startWithA();
+    configure([](RunnerSettings& settings) { settings.whitelist = "/A_in"; });
+    ASSERT_NE(bridge().injector("/A_in"), nullptr);
+    ComponentDefinition writer = definition("Ticker", "W");
+    writer.remaps = {{"out", "A_in"}};
+    load(writer);
+    EXPECT_EQ(bridge().injector("/A_in"), nullptr);
+    EXPECT_NE(bridge().tap("/A_in"), nullptr);
+    unload("/W");
+    EXPECT_NE(bridge().injector("/A_in"), nullptr);
+    EXPECT_TRUE(runs());
+}
+
+// The same changes to the graph and to a list of names, at random.
+TEST_F(Change, ManyRandomChangesLeaveTheGraphThatWasAskedFor) {
+    startWithA();
+    std::mt19937 random(7);
+    const auto chance = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
+    std::vector<std::string> loaded{"A"};
+#ifdef RTCF_SANITIZED
+    constexpr int kChanges = 100;
+#else
+    constexpr int kChanges = 400;
+#endif
+    for (int i = 0; i < kChanges; ++i) {
+        const std::string name(1, static_cast<char>('B' + chance(8)));
+        const auto found = std::find(loaded.begin(), loaded.end(), name);
+        ComponentDefinition component = recorder(name);
+        component.remaps[0].second = std::string(1, static_cast<char>('A' + chance(9))) + "_out";
+        component.breaks = {"in"};
+        if (found == loaded.end()) {
+            load(component);
+            loaded.push_back(name);
+        } else if (chance(3) == 0) {
+            replace("/" + name, component);
+        } else if (chance(3) == 0) {
+            setParameters("/" + name, {{"gain", static_cast<double>(chance(10))}});
+        } else {
+            unload("/" + name);
+            loaded.erase(found);
+        }
+        std::vector<std::string> expected;
+        for (const std::string& one : loaded) expected.push_back("/" + one);
+        std::sort(expected.begin(), expected.end());
+        std::vector<std::string> actual = order();
+        std::sort(actual.begin(), actual.end());
+        ASSERT_EQ(actual, expected);
+    }
+    stop();
+    EXPECT_EQ(state(), RunnerState::Stopped);
+    EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration())) << "A was updated in every cycle";
+    EXPECT_TRUE(events().empty() || events().back().kind != RunnerEvent::Kind::LoopEnded);
+}
+
+}  // namespace
+}  // namespace rtcf::test

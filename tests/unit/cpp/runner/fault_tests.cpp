@@ -1,0 +1,154 @@
+// Components that fail in update(), and loops that end by themselves.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "support/runner_fixture.hpp"
+
+namespace rtcf::test {
+namespace {
+
+class Fault : public RunnerFixture {
+   protected:
+    static ComponentDefinition recorder(const std::string& name, std::int64_t throws_at) {
+        ComponentDefinition result = definition("Recorder", name);
+        result.remaps = {{"in", name + "_in"}, {"out", name + "_out"}};
+        result.parameters = {{"throws_at", throws_at}};
+        return result;
+    }
+
+    std::vector<RunnerEvent> ends() const {
+        std::vector<RunnerEvent> result;
+        for (const RunnerEvent& event : events()) {
+            if (event.kind == RunnerEvent::Kind::LoopEnded) result.push_back(event);
+        }
+        return result;
+    }
+
+    bool waitForFault() {
+        return eventually([this] { return state() == RunnerState::Faulted; });
+    }
+};
+
+TEST_F(Fault, ExceptionStopsTheLoopAndIsTold) {
+    load(recorder("A", -1));
+    load(recorder("B", 10));
+    load(recorder("C", -1));
+    start();
+    ASSERT_TRUE(waitForFault());
+    ASSERT_EQ(ends().size(), 1U);
+    const RunnerEvent event = ends()[0];
+    EXPECT_EQ(event.component, "/B");
+    EXPECT_EQ(event.iteration, 10U);
+    for (const char* part : {"iteration 10", "/B", "update()", "threw", "as told"}) {
+        EXPECT_NE(event.message.find(part), std::string::npos) << event.message;
+    }
+    EXPECT_EQ(event.message.find('\n'), std::string::npos);
+    EXPECT_NE(runner().snapshot()->get("/B").fault.find("as told"), std::string::npos);
+    EXPECT_EQ(runner().snapshot()->get("/A").fault, "");
+    EXPECT_EQ(value("/A", "out"), 11.0);
+    EXPECT_EQ(value("/C", "out"), 10.0) << "the cycle was abandoned before it";
+}
+
+TEST_F(Fault, SafeIsCalledForAllButTheCulprit) {
+    load(recorder("A", -1));
+    load(recorder("B", 10));
+    load(recorder("C", -1));
+    start();
+    ASSERT_TRUE(waitForFault());
+    EXPECT_EQ(journal().count("/A safe"), 1U);
+    EXPECT_EQ(journal().count("/B safe"), 0U);
+    EXPECT_EQ(journal().count("/C safe"), 1U);
+    for (const char* note : {"/A stop", "/B stop", "/C stop"}) EXPECT_EQ(journal().count(note), 1U) << note;
+    const auto notes = journal().notes();
+    EXPECT_LT(std::find(notes.begin(), notes.end(), "/A safe"), std::find(notes.begin(), notes.end(), "/C safe"));
+}
+
+TEST_F(Fault, LoopStartsAgainOnceTheCauseIsGone) {
+    load(recorder("B", 10));
+    start();
+    ASSERT_TRUE(waitForFault());
+    setParameters("/B", {{"throws_at", std::int64_t{-1}}});
+    start();
+    EXPECT_EQ(state(), RunnerState::Running);
+    EXPECT_EQ(runner().snapshot()->get("/B").fault, "");
+    EXPECT_EQ(runner().picture().status, "");
+    EXPECT_TRUE(runs());
+}
+
+TEST_F(Fault, GraphCanBeChangedAfterIt) {
+    load(recorder("B", 10));
+    start();
+    ASSERT_TRUE(waitForFault());
+    unload("/B");
+    load(recorder("C", -1));
+    EXPECT_EQ(journal().count("/C start"), 0U);
+    start();
+    EXPECT_TRUE(runs());
+}
+
+// The loop ends while the graph thread is busy; then what threw is unloaded at once.
+TEST_F(Fault, CulpritThatIsUnloadedAtOnceIsStillNamed) {
+    load(recorder("B", 10));
+    start();
+    onGraphThread([this] {
+        EXPECT_TRUE(eventually([this] { return !runner().loop().running(); }));
+        return runner().unload({"/B"}, [](const std::string&) {});
+    });
+    EXPECT_EQ(state(), RunnerState::Faulted);
+    ASSERT_EQ(ends().size(), 1U);
+    EXPECT_EQ(ends()[0].component, "/B");
+    EXPECT_EQ(journal().count("/B stop"), 1U);
+    EXPECT_EQ(journal().count("/B cleanup"), 1U);
+}
+
+TEST_F(Fault, ComponentLoadedRightAfterItIsNotStarted) {
+    load(recorder("B", 10));
+    start();
+    const ComponentDefinition late = recorder("C", -1);
+    onGraphThread([&] {
+        EXPECT_TRUE(eventually([this] { return !runner().loop().running(); }));
+        return runner().load(late, RTCF_UNIT_COMPONENTS "/rtcf_unit_test.so", [](const std::string&) {});
+    });
+    EXPECT_EQ(state(), RunnerState::Faulted);
+    EXPECT_EQ(ends().size(), 1U);
+    EXPECT_EQ(journal().count("/B stop"), 1U);
+    EXPECT_EQ(journal().count("/C start"), 0U);
+}
+
+TEST_F(Fault, StartRightAfterItStartsAllAgain) {
+    load(recorder("A", -1));
+    load(recorder("B", 10));
+    start();
+    onGraphThread([this] {
+        EXPECT_TRUE(eventually([this] { return !runner().loop().running(); }));
+        runner().setParameters("/B", {{"throws_at", std::int64_t{-1}}});
+        return runner().start([](const std::string&) {});
+    });
+    EXPECT_EQ(state(), RunnerState::Running);
+    EXPECT_TRUE(runs());
+    EXPECT_EQ(ends().size(), 1U);
+    EXPECT_EQ(journal().count("/A start"), 2U);
+    EXPECT_EQ(journal().count("/A stop"), 1U);
+}
+
+TEST_F(Fault, StopOfAFaultedRunnerSaysNothing) {
+    load(recorder("B", 10));
+    start();
+    ASSERT_TRUE(waitForFault());
+    EXPECT_NO_THROW(stop());
+    EXPECT_EQ(journal().count("/B stop"), 1U);
+}
+
+TEST_F(Fault, LongExceptionTextIsCut) {
+    // The text of Recorder is short; the culprit's name makes the message long.
+    const std::string name = "B" + std::string(300, 'b');
+    load(recorder(name, 3));
+    start();
+    ASSERT_TRUE(waitForFault());
+    ASSERT_EQ(ends().size(), 1U);
+    EXPECT_NE(ends()[0].message.find("as told"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace rtcf::test

@@ -1,0 +1,214 @@
+// The order of the hooks, and that stop never waits for one.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "support/runner_fixture.hpp"
+
+namespace rtcf::test {
+namespace {
+
+class Lifecycle : public RunnerFixture {
+   protected:
+    // A Recorder that reads `in` and writes `out`.
+    static ComponentDefinition recorder(const std::string& name, const std::string& in, const std::string& out) {
+        ComponentDefinition result = definition("Recorder", name);
+        result.remaps = {{"in", in}, {"out", out}};
+        return result;
+    }
+
+    static ComponentDefinition blocker(const std::string& name, const std::string& hook) {
+        ComponentDefinition result = definition("Blocker", name);
+        result.remaps = {{"in", name + "_in"}, {"out", name + "_out"}};
+        result.parameters = {{"blocks", hook}};
+        return result;
+    }
+
+    // Of the notes, those of one hook.
+    std::vector<std::string> notesOf(const std::string& hook) {
+        std::vector<std::string> result;
+        for (const std::string& note : journal().notes()) {
+            const std::string suffix = " " + hook;
+            if (note.size() > suffix.size() && note.compare(note.size() - suffix.size(), suffix.size(), suffix) == 0) {
+                result.push_back(note.substr(0, note.size() - suffix.size()));
+            }
+        }
+        return result;
+    }
+
+    // The schedule is /C, /B, /A.
+    void loadChain() {
+        load(recorder("A", "b", "a"));
+        load(recorder("B", "c", "b"));
+        load(recorder("C", "none", "c"));
+    }
+};
+
+TEST_F(Lifecycle, HooksKeepTheirOrder) {
+    load(definition("Recorder", "A"));
+    start();
+    ASSERT_TRUE(runs());
+    stop();
+    endRunner();
+    EXPECT_EQ(journal().notes(), (std::vector<std::string>{"/A configure", "/A start", "/A update", "/A safe",
+                                                           "/A stop", "/A cleanup"}));
+}
+
+TEST_F(Lifecycle, ComponentCanBeStartedAgain) {
+    load(definition("Recorder", "A"));
+    for (int i = 0; i < 3; ++i) {
+        start();
+        ASSERT_TRUE(runs());
+        stop();
+        EXPECT_EQ(state(), RunnerState::Stopped);
+    }
+    EXPECT_EQ(journal().count("/A configure"), 1U);
+    EXPECT_EQ(journal().count("/A start"), 3U);
+    EXPECT_EQ(journal().count("/A stop"), 3U);
+    EXPECT_EQ(journal().count("/A safe"), 3U);
+}
+
+TEST_F(Lifecycle, StartAndSafeFollowTheScheduleAndStopGoesBackwards) {
+    loadChain();
+    EXPECT_EQ(order(), (std::vector<std::string>{"/C", "/B", "/A"}));
+    start();
+    ASSERT_TRUE(runs());
+    stop();
+    EXPECT_EQ(notesOf("start"), (std::vector<std::string>{"/C", "/B", "/A"}));
+    EXPECT_EQ(notesOf("safe"), (std::vector<std::string>{"/C", "/B", "/A"}));
+    EXPECT_EQ(notesOf("stop"), (std::vector<std::string>{"/A", "/B", "/C"}));
+}
+
+TEST_F(Lifecycle, StartThatIsRefusedStopsWhatHadStarted) {
+    loadChain();
+    setParameters("/A", {{"refuses", std::string("start")}});
+    const std::string text = refusal([this] { start(); });
+    EXPECT_NE(text.find("/A (rtcf_unit_test/Recorder): start failed: told to refuse start"), std::string::npos) << text;
+    EXPECT_EQ(state(), RunnerState::Stopped);
+    EXPECT_EQ(notesOf("stop"), (std::vector<std::string>{"/B", "/C"}));
+    setParameters("/A", {{"refuses", std::string()}});
+    start();
+    EXPECT_TRUE(runs());
+}
+
+TEST_F(Lifecycle, StartOfARunningLoopChangesNothing) {
+    load(definition("Recorder", "A"));
+    start();
+    ASSERT_TRUE(runs());
+    start();
+    EXPECT_EQ(journal().count("/A start"), 1U);
+    EXPECT_TRUE(runs());
+}
+
+TEST_F(Lifecycle, EmptyGraphRunsToo) {
+    start();
+    EXPECT_TRUE(runs());
+    stop();
+    EXPECT_EQ(state(), RunnerState::Stopped);
+}
+
+TEST_F(Lifecycle, EndOfTheRunnerStopsARunningLoopInOrder) {
+    loadChain();
+    start();
+    ASSERT_TRUE(runs());
+    endRunner();
+    EXPECT_EQ(notesOf("safe").size(), 3U);
+    EXPECT_EQ(notesOf("stop"), (std::vector<std::string>{"/A", "/B", "/C"}));
+    EXPECT_EQ(notesOf("cleanup").size(), 3U);
+}
+
+TEST_F(Lifecycle, QueriesAreAnsweredWhileAHookBlocks) {
+    load(definition("Recorder", "A"));
+    journal().gate_open = false;
+    const ComponentDefinition late = blocker("B", "configure");
+    auto loading = beginLoad(late);
+    ASSERT_TRUE(eventually([this] { return journal().count("/B configure") == 1; }));
+    EXPECT_EQ(order(), std::vector<std::string>{"/A"});
+    EXPECT_EQ(state(), RunnerState::Stopped);
+    EXPECT_EQ(runner().activity().first, "/B.configure");
+    journal().gate_open = true;
+    loading.get();
+    EXPECT_EQ(order(), (std::vector<std::string>{"/A", "/B"}));
+}
+
+TEST_F(Lifecycle, LoopStopsWhileAHookBlocksAndWhatIsLoadedThenIsNotStarted) {
+    load(definition("Recorder", "A"));
+    start();
+    ASSERT_TRUE(runs());
+    journal().gate_open = false;
+    const ComponentDefinition late = blocker("B", "configure");
+    auto loading = beginLoad(late);
+    ASSERT_TRUE(eventually([this] { return journal().count("/B configure") == 1; }));
+    ASSERT_TRUE(runs()) << "the loop does not wait for the hook";
+    runner().requestStop();
+    ASSERT_TRUE(eventually([this] { return !runner().loop().running(); }));
+    EXPECT_EQ(journal().count("/A safe"), 1U);
+    EXPECT_EQ(journal().count("/A stop"), 0U) << "hooks follow when the graph thread is free";
+    journal().gate_open = true;
+    loading.get();
+    ASSERT_TRUE(eventually([this] { return state() == RunnerState::Stopped; }));
+    EXPECT_EQ(journal().count("/A stop"), 1U);
+    EXPECT_EQ(journal().count("/B start"), 0U);
+    start();
+    ASSERT_TRUE(runs());
+    EXPECT_EQ(journal().count("/B start"), 1U);
+}
+
+TEST_F(Lifecycle, LoopEndsWhileAnArrivingComponentStarts) {
+    load(definition("Recorder", "A"));
+    start();
+    ASSERT_TRUE(runs());
+    journal().gate_open = false;
+    const ComponentDefinition late = blocker("B", "start");
+    auto loading = beginLoad(late);
+    ASSERT_TRUE(eventually([this] { return journal().count("/B start") == 1; }));
+    runner().requestStop();
+    ASSERT_TRUE(eventually([this] { return !runner().loop().running(); }));
+    journal().gate_open = true;
+    loading.get();
+    ASSERT_TRUE(eventually([this] { return state() == RunnerState::Stopped; }));
+    EXPECT_EQ(journal().count("/A stop"), 1U);
+    EXPECT_EQ(journal().count("/B stop"), 1U);
+    EXPECT_EQ(journal().count("/B update"), 0U);
+}
+
+TEST_F(Lifecycle, WhatHooksLogComesWithTheComponentsName) {
+    load(definition("Chatter", "A"));
+    start();
+    ASSERT_TRUE(runs());
+    stop();
+    unload("/A");
+    std::vector<std::string> kinds;
+    for (const LogEntry& entry : logged()) {
+        EXPECT_EQ(entry.component, "/A");
+        const std::string kind = entry.message.substr(0, entry.message.find(' '));
+        if (kinds.empty() || kinds.back() != kind) kinds.push_back(kind);
+    }
+    // The loop's own ring is emptied beside the other one, so that those two are in no order to each other.
+    std::sort(kinds.begin(), kinds.end());
+    EXPECT_EQ(kinds, (std::vector<std::string>{"cleanup", "configure", "safe", "start", "stop", "update"}));
+}
+
+TEST_F(Lifecycle, WhatARefusedComponentLoggedIsNotLost) {
+    ComponentDefinition chatter = definition("Chatter", "A");
+    chatter.parameters = {{"refuses", true}};
+    EXPECT_NE(refusal([&] { load(chatter); }), "");
+    std::vector<std::string> messages;
+    for (const LogEntry& entry : logged()) {
+        EXPECT_EQ(entry.component, "/A");
+        messages.push_back(entry.message.substr(0, entry.message.find(' ')));
+    }
+    EXPECT_EQ(messages, (std::vector<std::string>{"configure", "cleanup"}));
+}
+
+TEST_F(Lifecycle, WhatIsLoggedAtTheEndOfTheRunnerIsNotLost) {
+    load(definition("Chatter", "A"));
+    endRunner();
+    const std::vector<LogEntry> entries = logged();
+    ASSERT_FALSE(entries.empty());
+    EXPECT_EQ(entries.back().message, "cleanup");
+    EXPECT_EQ(entries.back().component, "/A");
+}
+
+}  // namespace
+}  // namespace rtcf::test

@@ -1,0 +1,175 @@
+// Cycles on a simulated clock: the same graph gives the same values, every time.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstring>
+
+#include "support/runner_fixture.hpp"
+
+namespace rtcf::test {
+namespace {
+
+class Stepping : public RunnerFixture {
+   protected:
+    void mapPapersTopics() {
+        configure([](RunnerSettings& settings) { settings.whitelist = ".*R3_G2H1|.*R1_H1R2|.*G2_R2"; });
+    }
+
+    void deliver(const std::string& topic, double number) {
+        std::array<std::uint8_t, sizeof number> bytes{};
+        std::memcpy(bytes.data(), &number, sizeof number);
+        ASSERT_TRUE(bridge().injector(topic)->deliver(bytes.data(), sizeof number));
+    }
+
+    std::vector<double> taken(const std::string& topic) {
+        std::vector<double> values;
+        while (bridge().tap(topic)->pop([&](const std::uint8_t* bytes, std::uint32_t size) {
+            double number = 0.0;
+            ASSERT_EQ(size, sizeof number);
+            std::memcpy(&number, bytes, sizeof number);
+            values.push_back(number);
+        })) {
+        }
+        return values;
+    }
+};
+
+// The five sums of Fig. 1 by themselves.
+class Fig1Model {
+   public:
+    // @param g2 what R2.in4 reads in this cycle. @return R3's output
+    double cycle(double g2) {
+        const double h1 = limited(first_ ? 1.0 : r3_ + r1_);
+        const double f1 = limited(h1);
+        r1_ = limited(h1);
+        const double r2 = limited(f1 + h1 + r1_ + g2);
+        r3_ = limited(f1 + r2);
+        first_ = false;
+        return r3_;
+    }
+
+   private:
+    static double limited(double sum) { return sum > 1e20 ? 1.0 : sum; }
+    bool first_ = true;
+    double r1_ = 0.0;
+    double r3_ = 0.0;
+};
+
+TEST_F(Stepping, MessageKIsIterationKOfAnIndependentModel) {
+    loadFig1();
+    mapPapersTopics();
+    deliver("/G2_R2", 0.5);
+    Fig1Model model;
+    for (int round = 0; round < 10; ++round) {
+        step(100);
+        std::vector<double> expected;
+        for (int i = 0; i < 100; ++i) expected.push_back(model.cycle(round == 0 && i == 0 ? 0.5 : 0.0));
+        ASSERT_EQ(taken("/R3_G2H1"), expected) << "round " << round;
+    }
+    EXPECT_EQ(bridge().tap("/R3_G2H1")->dropped(), 0U);
+}
+
+TEST_F(Stepping, InjectedValueIsReadInTheNextCycleOnly) {
+    loadFig1();
+    mapPapersTopics();
+    step(2);
+    Fig1Model model;
+    model.cycle(0.0);
+    model.cycle(0.0);
+    deliver("/G2_R2", 1.0);
+    deliver("/G2_R2", 0.25);  // the newest counts
+    taken("/R3_G2H1");
+    step(2);
+    const std::vector<double> expected{model.cycle(0.25), model.cycle(0.0)};
+    EXPECT_EQ(taken("/R3_G2H1"), expected);
+}
+
+TEST_F(Stepping, LatchedValueFromOutsideIsSeenBeforeTheStart) {
+    loadFig1();
+    mapPapersTopics();
+    deliver("/G2_R2", 7.5);
+    EXPECT_EQ(value("/R2", "in4"), 7.5);
+}
+
+TEST_F(Stepping, RunsExactlyAsManyCyclesAsAsked) {
+    load(definition("Ticker", "T"));
+    EXPECT_EQ(state(), RunnerState::Stopped);
+    step(1);
+    EXPECT_EQ(iteration(), 1U);
+    step(41);
+    EXPECT_EQ(iteration(), 42U);
+    EXPECT_EQ(state(), RunnerState::Stepping);
+    EXPECT_EQ(value("/T", "out"), 41.0);
+}
+
+TEST_F(Stepping, BeginsAnewAfterStop) {
+    load(definition("Ticker", "T"));
+    step(10);
+    stop();
+    EXPECT_EQ(state(), RunnerState::Stopped);
+    step(3);
+    EXPECT_EQ(iteration(), 3U);
+    EXPECT_EQ(value("/T", "out"), 2.0);
+}
+
+TEST_F(Stepping, CallsTheHooksOnceAndSafeAtItsEnd) {
+    load(definition("Recorder", "A"));
+    step(5);
+    step(5);
+    stop();
+    EXPECT_EQ(journal().notes(),
+              (std::vector<std::string>{"/A configure", "/A start", "/A update", "/A safe", "/A stop"}));
+}
+
+TEST_F(Stepping, IsRefusedWhileTheLoopRuns) {
+    load(definition("Ticker", "T"));
+    start();
+    const std::string text = refusal([this] { step(1); });
+    EXPECT_NE(text.find("rtcfctl -r rt_runner stop"), std::string::npos) << text;
+    EXPECT_TRUE(runs());
+}
+
+TEST_F(Stepping, GoesOverIntoRunning) {
+    load(definition("Recorder", "A"));
+    step(5);
+    start();
+    EXPECT_EQ(state(), RunnerState::Running);
+    EXPECT_TRUE(runs());
+    EXPECT_EQ(journal().count("/A safe"), 1U) << "at the end of stepping";
+    EXPECT_EQ(journal().count("/A start"), 2U);
+}
+
+TEST_F(Stepping, EndsByRequest) {
+    load(definition("Ticker", "T"));
+    auto endless = begin([this] { return runner().step(std::uint64_t{1} << 60, [](const std::string&) {}); });
+    ASSERT_TRUE(eventually([this] { return iteration() > 100; }));
+    runner().requestStop();
+    endless.get();
+    EXPECT_EQ(state(), RunnerState::Stopped);
+}
+
+TEST_F(Stepping, EndsWithItsRunner) {
+    load(definition("Ticker", "T"));
+    Runner& ending = runner();
+    const auto endless = [&ending] { return ending.step(std::uint64_t{1} << 60, [](const std::string&) {}); };
+    auto begun = begin(endless);
+    auto queued = begin(endless);
+    ASSERT_TRUE(eventually([this] { return iteration() > 100; }));
+    endRunner();
+    SUCCEED() << "and what waited is not begun";
+}
+
+TEST_F(Stepping, StopsInTheCycleThatFails) {
+    ComponentDefinition failing = definition("Recorder", "B");
+    failing.parameters = {{"throws_at", std::int64_t{3}}};
+    failing.remaps = {{"out", "B_out"}};
+    load(failing);
+    load(definition("Ticker", "T"));
+    step(100);
+    EXPECT_EQ(iteration(), 4U);
+    EXPECT_EQ(state(), RunnerState::Faulted);
+    EXPECT_EQ(value("/T", "out"), 2.0) << "the cycle ended where it failed";
+}
+
+}  // namespace
+}  // namespace rtcf::test

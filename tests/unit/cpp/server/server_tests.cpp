@@ -1,0 +1,318 @@
+// The executor's socket, from connect() on, before a real runner.
+#include "server/server.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "components/journal.hpp"
+#include "faults/flight_recorder.hpp"
+#include "support/eventually.hpp"
+#include "support/executor_client.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace rtcf::test {
+namespace {
+
+using executor::v1::Request;
+using executor::v1::Response;
+
+Request getStatus() {
+    Request request;
+    request.mutable_get_status();
+    return request;
+}
+
+Request load(const std::string& type, const std::string& name) {
+    Request request;
+    request.mutable_load()->set_library(RTCF_UNIT_COMPONENTS "/rtcf_unit_test.so");
+    rtcf::v1::ComponentSpec& component = *request.mutable_load()->mutable_component();
+    component.set_type(type);
+    component.set_name(name);
+    component.set_package("rtcf_unit_test");
+    return request;
+}
+
+Request unload(const std::string& name) {
+    Request request;
+    request.mutable_unload()->add_components(name);
+    return request;
+}
+
+Request start() {
+    Request request;
+    request.mutable_start();
+    return request;
+}
+
+class ServerTest : public ::testing::Test {
+   protected:
+    ServerTest() {
+        journal().clear();
+        thread_ = std::thread([this] { server_.serve(runner_, log_); });
+    }
+
+    ~ServerTest() override {
+        journal().gate_open = true;
+        // Clients of the test are gone by now, so that there is room for this one.
+        EXPECT_TRUE(eventually([this] {
+            ExecutorClient last(socket_);
+            Request hello;
+            hello.mutable_hello();
+            last.send(hello);
+            Request exit;
+            exit.mutable_exit();
+            last.send(exit);
+            const auto answer = last.receive();
+            return answer.has_value() && answer->has_hello();
+        }));
+        thread_.join();
+    }
+
+    static rtcf_unit_test::Journal& journal() { return *rtcf_unit_test_journal(); }
+
+    const TemporaryFolder folder_;
+    const std::string socket_ = folder_.path("executor.sock");
+    executor::Server server_{socket_};
+    executor::Log log_{[this](executor::LogEntry&& entry) { server_.publish(entry); }};
+    executor::FlightRecorder recorder_;
+    executor::Runner runner_{"rt_runner", log_,
+                             [this](const executor::RunnerEvent& event) { server_.publish(event); }, nullptr, recorder_};
+    std::thread thread_;
+};
+
+TEST_F(ServerTest, HelloTellsRunnerAndProtocol) {
+    ExecutorClient client(socket_);
+    Request request;
+    request.mutable_hello()->set_protocol(1);
+    const Response response = client.ask(request);
+    EXPECT_EQ(response.hello().protocol(), 1U);
+    EXPECT_EQ(response.hello().runner(), "rt_runner");
+    EXPECT_EQ(response.hello().pid(), ::getpid());
+}
+
+TEST_F(ServerTest, NothingIsAnsweredBeforeHello) {
+    ExecutorClient client(socket_);
+    const Response response = client.ask(getStatus());
+    ASSERT_TRUE(response.has_error());
+    EXPECT_EQ(response.error().message(), "the first request must be hello");
+    client.hello();
+    EXPECT_TRUE(client.ask(getStatus()).has_status());
+}
+
+TEST_F(ServerTest, FrameMayComeInPieces) {
+    ExecutorClient client(socket_);
+    client.hello();
+    Request request = getStatus();
+    request.set_id(77);
+    for (const char byte : ExecutorClient::frame(request)) client.sendBytes(std::string(1, byte));
+    EXPECT_TRUE(client.answerTo(77).has_status());
+}
+
+TEST_F(ServerTest, ManyFramesMayComeAtOnce) {
+    ExecutorClient client(socket_);
+    client.hello();
+    std::string bytes;
+    for (std::uint64_t id = 1000; id < 1100; ++id) {
+        Request request = getStatus();
+        request.set_id(id);
+        bytes += ExecutorClient::frame(request);
+    }
+    client.sendBytes(bytes);
+    for (std::uint64_t id = 1000; id < 1100; ++id) {
+        const auto response = client.receive();
+        ASSERT_TRUE(response.has_value());
+        EXPECT_EQ(response->id(), id);
+    }
+}
+
+TEST_F(ServerTest, FrameThatIsTooLargeEndsTheConnection) {
+    ExecutorClient client(socket_);
+    client.hello();
+    client.sendBytes(std::string("\x01\x00\x00\x01", 4));  // 16 MiB and a byte
+    EXPECT_TRUE(client.isClosed());
+}
+
+TEST_F(ServerTest, GarbageEndsTheConnectionAndNoOther) {
+    ExecutorClient other(socket_);
+    other.hello();
+    ExecutorClient client(socket_);
+    client.hello();
+    client.sendBytes(std::string("\x04\x00\x00\x00\xff\xff\xff\xff", 8));
+    EXPECT_TRUE(client.isClosed());
+    EXPECT_TRUE(other.ask(getStatus()).has_status());
+}
+
+TEST_F(ServerTest, RequestOfUnknownKindIsRefused) {
+    ExecutorClient client(socket_);
+    client.hello();
+    EXPECT_TRUE(client.ask(Request()).has_error());
+}
+
+TEST_F(ServerTest, PeersBeyondTheLimitAreTurnedAway) {
+    std::vector<std::unique_ptr<ExecutorClient>> clients;
+    for (int i = 0; i < 8; ++i) {
+        clients.push_back(std::make_unique<ExecutorClient>(socket_));
+        clients.back()->hello();
+    }
+    ExecutorClient one_more(socket_);
+    EXPECT_TRUE(one_more.isClosed());
+    EXPECT_TRUE(clients[0]->ask(getStatus()).has_status());
+    clients.pop_back();
+    EXPECT_TRUE(eventually([this] {
+        ExecutorClient again(socket_);
+        Request hello;
+        hello.mutable_hello();
+        again.send(hello);
+        return again.receive().has_value();
+    }));
+}
+
+TEST_F(ServerTest, ChangeIsAnsweredWithProgressAndOutcome) {
+    ExecutorClient client(socket_);
+    client.hello();
+    const std::uint64_t id = client.send(load("Recorder", "A"));
+    std::vector<std::string> progress;
+    for (;;) {
+        const auto response = client.receive();
+        ASSERT_TRUE(response.has_value());
+        if (response->id() != id) continue;
+        if (response->kind_case() != Response::kProgress) {
+            ASSERT_TRUE(response->has_change()) << response->error().message();
+            EXPECT_EQ(response->change().component(), "/A");
+            break;
+        }
+        progress.push_back(response->progress());
+    }
+    EXPECT_EQ(progress, (std::vector<std::string>{"loading /A", "configuring /A"}));
+}
+
+TEST_F(ServerTest, RefusalCarriesItsCodeAndText) {
+    ExecutorClient client(socket_);
+    client.hello();
+    const Response response = client.ask(unload("X"));
+    EXPECT_EQ(response.error().code(), executor::v1::Error::CODE_NOT_FOUND);
+    EXPECT_EQ(response.error().message(), "no component /X in this runner; loaded: none");
+}
+
+TEST_F(ServerTest, QueriesAreAnsweredWhileAHookBlocks) {
+    ExecutorClient client(socket_);
+    client.hello();
+    ASSERT_TRUE(client.ask(load("Recorder", "A")).has_change());
+    journal().gate_open = false;
+    Request blocking = load("Blocker", "B");
+    auto& remap = *blocking.mutable_load()->mutable_component()->add_remaps();
+    remap.set_from("out");
+    remap.set_to("B_out");
+    const std::uint64_t loading = client.send(blocking);
+    ASSERT_TRUE(eventually([] { return journal().count("/B configure") == 1; }));
+    Request list;
+    list.mutable_list_components();
+    EXPECT_EQ(client.ask(list).components().components_size(), 1);
+    EXPECT_TRUE(client.ask(getStatus()).has_status());
+    Request info;
+    info.mutable_get_component()->set_component("A");
+    const Response component = client.ask(info);
+    EXPECT_EQ(component.component().full_name(), "/A") << "without the values of its ports, but at once";
+    journal().gate_open = true;
+    EXPECT_TRUE(client.answerTo(loading).has_change());
+}
+
+TEST_F(ServerTest, StopEndsTheLoopWhileAHookBlocks) {
+    ExecutorClient client(socket_);
+    client.hello();
+    ASSERT_TRUE(client.ask(load("Ticker", "T")).has_change());
+    ASSERT_TRUE(client.ask(start()).has_change());
+    journal().gate_open = false;
+    const std::uint64_t loading = client.send(load("Blocker", "B"));
+    ASSERT_TRUE(eventually([] { return journal().count("/B configure") == 1; }));
+    Request stop;
+    stop.mutable_stop();
+    const std::uint64_t stopping = client.send(stop);
+    EXPECT_TRUE(eventually([this] { return !runner_.loop().running(); }));
+    journal().gate_open = true;
+    (void)loading;
+    EXPECT_TRUE(client.answerTo(stopping).has_change());
+}
+
+TEST_F(ServerTest, EventGoesToAllDaemons) {
+    ExecutorClient first(socket_);
+    ExecutorClient second(socket_);
+    first.hello();
+    second.hello();
+    Request failing = load("Recorder", "A");
+    auto& parameter = *failing.mutable_load()->mutable_component()->add_parameters();
+    parameter.set_name("throws_at");
+    parameter.mutable_value()->set_int_value(5);
+    ASSERT_TRUE(first.ask(failing).has_change());
+    first.send(start());
+    for (ExecutorClient* client : {&first, &second}) {
+        for (;;) {
+            const auto response = client->receive();
+            ASSERT_TRUE(response.has_value());
+            if (!response->has_event() || response->event().kind() != executor::v1::Event::KIND_LOOP_ENDED) continue;
+            EXPECT_EQ(response->id(), 0U);
+            EXPECT_EQ(response->event().component(), "/A");
+            break;
+        }
+    }
+}
+
+TEST_F(ServerTest, LogRecordsWaitForADaemon) {
+    log_.write(LogLevel::Info, "/A", "before anybody came");
+    ExecutorClient client(socket_);
+    client.hello();
+    for (;;) {
+        const auto response = client.receive();
+        ASSERT_TRUE(response.has_value());
+        if (!response->has_log()) continue;
+        EXPECT_EQ(response->log().message(), "before anybody came");
+        break;
+    }
+}
+
+TEST_F(ServerTest, StatisticsBeginAnewWithEachStart) {
+    ExecutorClient client(socket_);
+    client.hello();
+    ASSERT_TRUE(client.ask(load("Ticker", "T")).has_change());
+    Request stop;
+    stop.mutable_stop();
+    Request statistics;
+    statistics.mutable_get_statistics();
+    const auto iterations = [this] { return runner_.loop().figures().iteration.load(); };
+    for (int i = 0; i < 2; ++i) {
+        ASSERT_TRUE(client.ask(start()).has_change());
+        ASSERT_TRUE(eventually([&] { return iterations() > 200; }));
+        ASSERT_TRUE(client.ask(stop).has_change());
+        const rtcf::v1::RunnerStatistics result = client.ask(statistics).statistics();
+        EXPECT_LE(result.iterations(), iterations());
+        EXPECT_GT(result.iterations(), 100U);
+        EXPECT_EQ(result.components(0).duration().count(), result.iterations());
+    }
+}
+
+TEST_F(ServerTest, ResetStatisticsCountFromThere) {
+    ExecutorClient client(socket_);
+    client.hello();
+    ASSERT_TRUE(client.ask(load("Ticker", "T")).has_change());
+    Request step;
+    step.mutable_step()->set_cycles(1000);
+    ASSERT_TRUE(client.ask(step).has_change());
+    Request reset;
+    reset.mutable_reset_statistics();
+    ASSERT_TRUE(client.ask(reset).has_done());
+    step.mutable_step()->set_cycles(10);
+    ASSERT_TRUE(client.ask(step).has_change());
+    Request statistics;
+    statistics.mutable_get_statistics();
+    const Response response = client.ask(statistics);
+    EXPECT_EQ(response.statistics().iterations(), 10U);
+    EXPECT_EQ(response.statistics().components(0).duration().count(), 10U);
+}
+
+}  // namespace
+}  // namespace rtcf::test

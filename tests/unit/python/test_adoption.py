@@ -1,0 +1,216 @@
+"""Executors outlive rtcfd: a new one adopts them."""
+
+import json
+import os
+import signal
+import socket
+from pathlib import Path
+
+import pytest
+import rtcf
+from daemon_under_test import DaemonUnderTest, wait_for
+from rtcf.v1 import graph_pb2, runner_pb2
+from rtcfd.adoption import follow_components, follow_settings
+from rtcfd.desired import Desired
+from rtcfd.settings import defaults
+
+LONG = runner_pb2.RunnerSettings(orphan_timeout_s=60.0)
+
+
+def is_alive(pid: int) -> bool:
+    return Path(f"/proc/{pid}").exists()
+
+
+@pytest.fixture
+def left(daemon: DaemonUnderTest, client: rtcf.Client) -> int:
+    """A loop that runs with two components, its rtcfd killed; returns the executor's pid."""
+    client.set_runner(LONG)
+    client.load(rtcf.component("demo", "Fine", name="a", parameters=["kp:=2.0"]))
+    client.load(rtcf.component("demo", "Fine", name="b"))
+    client.start()
+    pid = daemon.executor_pid()
+    daemon.end(signal.SIGKILL)
+    return pid
+
+
+def test_a_loop_runs_on_when_rtcfd_dies_and_is_adopted(daemon: DaemonUnderTest, left: int) -> None:
+    assert is_alive(left)
+    daemon.start()
+    assert daemon.executor_pid() == left
+    assert "adopted: loop running, iteration " in daemon.log()
+    assert "the executor's is kept" not in daemon.log()
+    with daemon.client() as client:
+        status = client.get_status().runners[0]
+        assert (status.state, status.status) == (runner_pb2.RUNNER_STATE_RUNNING, "")
+        assert client.get_order() == ["/a", "/b"]
+        client.load(rtcf.component("demo", "Fine", name="c"))
+    assert daemon.end() == 0
+    # Not our child: whose it is now reaps it when it likes.
+    wait_for(lambda: not is_alive(left), "its end")
+
+
+def test_what_an_executor_has_is_true(daemon: DaemonUnderTest, left: int) -> None:
+    saved = daemon.saved()
+    saved["components"] = [each for each in saved["components"] if each["name"] == "a"]
+    saved["components"][0]["parameters"] = []
+    saved["settings"] = {"frequency_hz": 500.0}
+    saved["running"] = False
+    (daemon.state / "rt_runner.json").write_text(json.dumps(saved))
+    daemon.start()
+    log = daemon.log()
+    assert "/b was not in the saved graph: the executor's is kept" in log
+    assert "/a differs from the saved graph: parameter kp: the executor's is kept" in log
+    assert "frequency_hz 500 -> 1000: the executor's is kept" in log
+    after = daemon.saved()
+    assert [each["name"] for each in after["components"]] == ["a", "b"]
+    assert after["components"][0]["parameters"][0]["value"] == {"double_value": 2.0}
+    assert after["settings"]["frequency_hz"] == 1000.0
+    assert after["running"] is True
+
+
+def test_what_a_running_loop_lacks_stays_out_of_it_and_in_the_state(
+    daemon: DaemonUnderTest, left: int
+) -> None:
+    saved = daemon.saved()
+    saved["components"].append({**saved["components"][0], "name": "x"})
+    (daemon.state / "rt_runner.json").write_text(json.dumps(saved))
+    daemon.start()
+    with daemon.client() as client:
+        assert client.get_order() == ["/a", "/b"]
+        assert (
+            "/x is left out: its executor does not have it" in client.get_status().runners[0].status
+        )
+        (x,) = [each for each in client.list_components() if each.full_name == "/x"]
+        assert x.state == graph_pb2.COMPONENT_STATE_LEFT_OUT
+        client.release(["x"])
+        assert client.get_order() == ["/a", "/b", "/x"]
+        with pytest.raises(rtcf.RefusedError, match="/x is not left out"):
+            client.release(["x"])
+
+
+def test_a_graph_that_was_being_restored_is_completed(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
+    client.set_runner(LONG)
+    client.load(rtcf.component("demo", "Fine", name="a"))
+    daemon.end(signal.SIGKILL)
+    saved = daemon.saved()
+    saved["components"].append({**saved["components"][0], "name": "x"})
+    (daemon.state / "rt_runner.json").write_text(json.dumps(saved))
+    daemon.start()
+    with daemon.client() as again:
+        assert again.get_order() == ["/a", "/x"]
+
+
+def test_a_runner_that_is_not_in_the_state_is_adopted(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
+    client.add_runner("arm", LONG)
+    pid = daemon.executor_pid("arm")
+    daemon.end(signal.SIGKILL)
+    (daemon.state / "arm.json").unlink()
+    daemon.start()
+    assert daemon.executor_pid("arm") == pid
+    assert "runner arm was not in the saved state" in daemon.log()
+    assert (daemon.state / "arm.json").exists()
+
+
+def test_the_death_of_an_adopted_executor_is_noticed(daemon: DaemonUnderTest, left: int) -> None:
+    daemon.start()
+    os.kill(left, signal.SIGKILL)
+    wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
+    assert "its exit status is unknown" in daemon.log()
+    with daemon.client() as client:
+        status = client.get_status().runners[0]
+        assert status.pid != left
+        assert status.state == runner_pb2.RUNNER_STATE_FAULTED
+        assert client.get_order() == ["/a", "/b"]
+
+
+def test_a_dead_socket_is_removed(daemon: DaemonUnderTest, left: int) -> None:
+    os.kill(left, signal.SIGKILL)
+    wait_for(lambda: not is_alive(left), "its death")
+    stale = Path(f"{daemon.socket}.d/executors/old.sock")
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(str(stale))
+    daemon.start()
+    assert not stale.exists()
+    with daemon.client() as client:
+        assert [runner.runner for runner in client.get_status().runners] == ["rt_runner"]
+        assert client.get_order() == ["/a", "/b"]
+
+
+def test_an_executor_of_another_protocol_is_ended(
+    stopped_daemon: DaemonUnderTest, tmp_path: Path
+) -> None:
+    works = stopped_daemon.executor.read_text()
+    stopped_daemon.start()
+    with stopped_daemon.client() as client:
+        client.set_runner(LONG)
+    stopped_daemon.end(signal.SIGKILL)
+    os.kill(int(next(iter(_peers(stopped_daemon)))), signal.SIGKILL)
+    # One that is left over and speaks another protocol.
+    stopped_daemon.executor.write_text(works.replace("PYTHONPATH", "PEER_PROTOCOL=9 PYTHONPATH"))
+    stopped_daemon.start()
+    stopped_daemon.executor.write_text(works)
+    assert "speaks protocol 9" in stopped_daemon.log()
+
+
+def _peers(daemon: DaemonUnderTest) -> list[str]:
+    mark = f"{daemon.socket}.d/executors".encode()
+    return [
+        folder.name
+        for folder in Path("/proc").iterdir()
+        if folder.name.isdigit() and mark in _read(folder / "cmdline")
+    ]
+
+
+def _read(file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError:
+        return b""
+
+
+def test_a_private_rtcfd_takes_its_executors_with_it(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
+    status = client.get_status().runners[0]
+    assert status.settings.orphan_timeout_s == 2.0
+    daemon.end(signal.SIGKILL)
+    wait_for(lambda: not is_alive(status.pid), "its end")
+
+
+def test_settings_follow_as_far_as_they_differ() -> None:
+    known = defaults(runner_pb2.REALTIME_PREFERRED)
+    desired = Desired("r")
+    desired.choose(runner_pb2.RunnerSettings(priority=50))
+    found = runner_pb2.RunnerSettings()
+    found.CopyFrom(desired.complete(known))
+    found.frequency_hz += 1e-10
+    found.spin_auto, found.spin_us = True, 7
+    found.ros.whitelist = "/a"
+    assert follow_settings(desired, known, found) == [
+        "ros.whitelist '' -> /a",
+        "spin_auto false -> true",
+    ]
+    assert desired.chosen == runner_pb2.RunnerSettings(
+        priority=50, spin_auto=True, ros=runner_pb2.RosSettings(whitelist="/a")
+    )
+
+
+def test_an_equal_graph_is_not_reported() -> None:
+    spec = rtcf.component(
+        "p", "T", name="a", parameters=["kp:=1"], breaks=["y", "x"], remaps=["b:=/b", "a:=/a"]
+    )
+    desired = Desired("r")
+    desired.put("/a", spec)
+    info = graph_pb2.ComponentInfo(full_name="/a", spec=desired.components["/a"])
+    info.spec.every = 1
+    info.spec.breaks[:] = ["x", "y"]
+    info.parameters.add(
+        name="kp",
+        value=graph_pb2.ParameterValue(double_value=1.0),
+        default_value=graph_pb2.ParameterValue(double_value=0.0),
+    )
+    assert follow_components(desired, [info]) == ([], {})

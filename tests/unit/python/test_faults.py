@@ -1,0 +1,244 @@
+"""Deaths of executors: what is said, what is taken out, what goes on."""
+
+import os
+import signal
+
+import pytest
+import rtcf
+from daemon_under_test import DaemonUnderTest, wait_for
+from flight_writer import FlightWriter
+from rtcf.v1 import graph_pb2, runner_pb2
+from rtcfd.crash import judge
+from rtcfd.flight_recorder import FlightRecorder, Note
+from rtcfd.process import End
+
+
+def die(client: rtcf.Client, name: str, how: str) -> None:
+    """Let the executor die in a component's update."""
+    with pytest.raises(rtcf.RefusedError):
+        client.set_parameters(name, [rtcf.parse_parameter(f"die:={how}")])
+
+
+def recovered(daemon: DaemonUnderTest, times: int = 1) -> None:
+    wait_for(lambda: daemon.log().count("executor restarted in") >= times, "the recovery")
+
+
+@pytest.fixture
+def running(client: rtcf.Client) -> rtcf.Client:
+    client.load(rtcf.component("demo", "Fine", name="bad"))
+    client.load(rtcf.component("demo", "Fine", name="good"))
+    client.load(rtcf.component("demo", "Fine", name="extra", optional=True))
+    client.start()
+    return client
+
+
+def state(client: rtcf.Client) -> runner_pb2.RunnerStatus:
+    status: runner_pb2.RunnerStatus = client.get_status().runners[0]
+    return status
+
+
+def test_a_crash_in_an_update_is_named_and_its_component_quarantined(
+    daemon: DaemonUnderTest, running: rtcf.Client
+) -> None:
+    die(running, "/bad", "SIGSEGV")
+    recovered(daemon)
+    assert running.get_order() == ["/extra", "/good"]
+    status = state(running)
+    assert status.state == runner_pb2.RUNNER_STATE_FAULTED
+    assert "was killed by SIGSEGV" in status.status
+    assert "at address 0x10 while /bad.update was running in cycle" in status.status
+    assert "held: `rtcfctl -r rt_runner start` without /bad" in status.status
+    left_out = running.get_component("bad")
+    assert left_out.state == graph_pb2.COMPONENT_STATE_LEFT_OUT
+    assert "/bad.update" in left_out.fault
+    assert "/bad" in daemon.saved()["quarantined"]
+    assert daemon.saved()["running"] is False
+
+    assert running.start().order == ["/extra", "/good"]
+    assert state(running).state == runner_pb2.RUNNER_STATE_RUNNING
+    running.release(["bad"])
+    assert running.get_order() == ["/bad", "/extra", "/good"]
+    assert daemon.saved()["quarantined"] == {}
+    assert state(running).status == ""
+
+
+def test_a_quarantine_outlives_rtcfd(daemon: DaemonUnderTest, running: rtcf.Client) -> None:
+    die(running, "/bad", "SIGFPE")
+    recovered(daemon)
+    daemon.end()
+    daemon.start()
+    with daemon.client() as again:
+        assert again.get_order() == ["/extra", "/good"]
+        assert "/bad is left out" in state(again).status
+        again.unload(["bad"])
+        assert state(again).status == ""
+    assert daemon.saved()["quarantined"] == {}
+
+
+def test_a_quarantined_component_can_be_replaced(
+    daemon: DaemonUnderTest, running: rtcf.Client
+) -> None:
+    die(running, "/bad", "SIGSEGV")
+    recovered(daemon)
+    running.replace("bad", rtcf.component("demo", "Logs"))
+    assert running.get_order() == ["/bad", "/extra", "/good"]
+    assert running.get_component("bad").spec.type == "Logs"
+
+
+@pytest.mark.parametrize(
+    ("how", "text"),
+    [
+        ("stall", "because a cycle made no progress while /bad.update was running"),
+        ("exit", "ended with exit status 3 while /bad.update in cycle"),
+    ],
+)
+def test_what_else_a_component_does_to_its_process(
+    daemon: DaemonUnderTest, running: rtcf.Client, how: str, text: str
+) -> None:
+    die(running, "/bad", how)
+    recovered(daemon)
+    assert text in daemon.log()
+    assert running.get_order() == ["/extra", "/good"]
+
+
+def test_a_kill_from_outside_takes_nothing_out(
+    daemon: DaemonUnderTest, running: rtcf.Client
+) -> None:
+    die(running, "/bad", "SIGKILL")
+    recovered(daemon)
+    assert "was killed by SIGKILL" in daemon.log()
+    assert running.get_order() == ["/bad", "/extra", "/good"]
+    assert "with all its components" in state(running).status
+
+
+def test_an_executor_that_was_asked_to_end_is_brought_back_by_start(
+    daemon: DaemonUnderTest, running: rtcf.Client
+) -> None:
+    os.kill(daemon.executor_pid(), signal.SIGTERM)
+    wait_for(lambda: state(running).state == runner_pb2.RUNNER_STATE_DOWN, "its end")
+    assert "ended with exit status 0" in state(running).status
+    assert "no loop to stop" in running.stop().notes[0]
+    with pytest.raises(rtcf.RefusedError) as refused:
+        running.load(rtcf.component("demo", "Fine"))
+    assert refused.value.code == "UNAVAILABLE"
+    assert running.start().order == ["/bad", "/extra", "/good"]
+    assert state(running).status == ""
+
+
+def test_a_loop_goes_on_without_an_optional_culprit(
+    daemon: DaemonUnderTest, running: rtcf.Client
+) -> None:
+    running.set_runner(runner_pb2.RunnerSettings(on_crash=runner_pb2.ON_CRASH_RESUME))
+    die(running, "/extra", "SIGSEGV")
+    recovered(daemon)
+    assert running.get_order() == ["/bad", "/good"]
+    status = state(running)
+    assert status.state == runner_pb2.RUNNER_STATE_RUNNING
+    assert "its loop goes on without /extra" in status.status
+    assert daemon.saved()["running"] is True
+
+
+def test_a_loop_is_held_without_a_culprit_that_is_not_optional(
+    daemon: DaemonUnderTest, running: rtcf.Client
+) -> None:
+    running.set_runner(runner_pb2.RunnerSettings(on_crash=runner_pb2.ON_CRASH_RESUME))
+    die(running, "/bad", "SIGSEGV")
+    recovered(daemon)
+    assert state(running).state == runner_pb2.RUNNER_STATE_FAULTED
+
+
+def test_many_crashes_hold_the_loop_and_then_end_the_attempts(
+    daemon: DaemonUnderTest, running: rtcf.Client
+) -> None:
+    running.set_runner(runner_pb2.RunnerSettings(on_crash=runner_pb2.ON_CRASH_RESUME))
+    for times in range(1, 6):
+        die(running, "/extra", "SIGSEGV")
+        recovered(daemon, times)
+        expected = (
+            runner_pb2.RUNNER_STATE_RUNNING if times <= 3 else runner_pb2.RUNNER_STATE_FAULTED
+        )
+        assert state(running).state == expected, times
+        running.release(["extra"])
+        running.start()
+    die(running, "/extra", "SIGSEGV")
+    wait_for(lambda: "the last of 6 in 60 s" in daemon.log(), "the end of the attempts")
+    assert state(running).state == runner_pb2.RUNNER_STATE_DOWN
+    running.start()
+    assert running.get_order() == ["/bad", "/good"]
+
+
+@pytest.mark.parametrize(
+    ("policy", "stopped", "expected"),
+    [
+        (runner_pb2.ON_BOOT_HOLD, False, runner_pb2.RUNNER_STATE_STOPPED),
+        (runner_pb2.ON_BOOT_RESUME, False, runner_pb2.RUNNER_STATE_RUNNING),
+        (runner_pb2.ON_BOOT_RESUME, True, runner_pb2.RUNNER_STATE_STOPPED),
+    ],
+    ids=["hold", "resume", "resume what was stopped"],
+)
+def test_a_loop_after_a_restart_of_both(
+    daemon: DaemonUnderTest,
+    running: rtcf.Client,
+    policy: runner_pb2.OnBoot,
+    stopped: bool,
+    expected: int,
+) -> None:
+    running.set_runner(runner_pb2.RunnerSettings(on_boot=policy))
+    if stopped:
+        running.stop()
+    daemon.end()
+    daemon.start()
+    with daemon.client() as again:
+        assert state(again).state == expected
+
+
+def test_a_flight_recorder_is_read_through_proc_and_after_its_end() -> None:
+    writer = FlightWriter()
+    recorder = FlightRecorder(os.getpid(), writer.descriptor)
+    writer.loop(4711, True)
+    writer.update(writer.name(3, "/arm/H1"))
+    writer.hook(writer.name(4, "/x"), 2)
+    writer.crash(signal.SIGSEGV, 1, address=0xDEAD)
+    os.close(writer.descriptor)
+    assert recorder.read() == Note(
+        4711, True, "/arm/H1", "/x", "configure", signal.SIGSEGV, 1, False, 0xDEAD
+    )
+    writer.update(99)
+    assert recorder.read().updating == ""
+    recorder.close()
+
+
+def test_what_is_no_flight_recorder_is_refused() -> None:
+    writer = FlightWriter()
+    writer.put(0, 0)
+    with pytest.raises(ValueError, match="no flight recorder"):
+        FlightRecorder(os.getpid(), writer.descriptor)
+
+
+@pytest.mark.parametrize(
+    ("end", "note", "text", "culprit"),
+    [
+        (End(-11), None, "was killed by SIGSEGV", ""),
+        (End(-11), Note(updating="/a", signal=11, thread=3), "belongs to no component", ""),
+        (End(-6), Note(updating="/a", signal=6, thread=1), "/a.update was running", "/a"),
+        (End(-6), Note(signal=6, thread=1), "in its loop", ""),
+        (
+            End(-8),
+            Note(updating="/a", hooking="/b", hook="start", signal=8, thread=2),
+            "/b.start was running",
+            "/b",
+        ),
+        (End(), Note(updating="/a", signal=11, thread=1), "SIGSEGV", "/a"),
+        (End(), Note(updating="/a"), "exit status is unknown", ""),
+        (End(0), Note(hooking="/b", hook="stop"), "exit status 0 while /b.stop was running", "/b"),
+        (End(1), Note(updating="/a", hooking="/b", hook="stop"), "/a.update in cycle 0 and", ""),
+        (End(-9), Note(updating="/a"), "was killed by SIGKILL", ""),
+        (End(-9), Note(), "while no component was running", ""),
+    ],
+)  # fmt: skip
+def test_running_is_named_and_only_the_thread_that_died_is_blamed(
+    end: End, note: Note | None, text: str, culprit: str
+) -> None:
+    verdict = judge(end, note)
+    assert text in str(verdict)
+    assert verdict.culprit == culprit
