@@ -8,7 +8,8 @@ namespace {
 class PaperExample final : public rtcf::Component {
     rtcf::Input<std_msgs::Float32> in_port{this, "in_port"};
     rtcf::Output<std_msgs::Float32> out_port{this, "out_port"};
-    rtcf::Parameter<double> test_param{this, "test_param", 0.0, rtcf::Doc("shown in the log at start")};
+    rtcf::Parameter<double> test_param{this, "test_param", 0.0,
+                                       rtcf::Doc("shown in the log at start")};
 
     bool start() override {
         RTCF_INFO(this, "test_param is {}", test_param.value());

@@ -39,7 +39,8 @@ struct Options {
 constexpr const char* kUsage =
     "usage: rtcf-executor --runner NAME --socket PATH\n"
     "       rtcf-executor --describe LIBRARY --package PACKAGE\n"
-    "       rtcf-executor --check LIBRARY --package PACKAGE --type TYPE [--cycles N] [--param NAME:=VALUE]...\n"
+    "       rtcf-executor --check LIBRARY --package PACKAGE --type TYPE [--cycles N] [--param "
+    "NAME:=VALUE]...\n"
     "       rtcf-executor --version\n"
     "It is started by rtcfd(8); see rtcf-executor(8).\n";
 
@@ -47,7 +48,18 @@ constexpr int kUsageStatus = 2;
 
 // @return exit status, or -1 to go on
 int parse(int argc, char** argv, Options& options) {
-    enum Option { kRunner = 1, kSocket, kDescribe, kPackage, kCheck, kType, kCycles, kParam, kVersion, kHelp };
+    enum Option {
+        kRunner = 1,
+        kSocket,
+        kDescribe,
+        kPackage,
+        kCheck,
+        kType,
+        kCycles,
+        kParam,
+        kVersion,
+        kHelp
+    };
     const option known[] = {{"runner", required_argument, nullptr, kRunner},
                             {"socket", required_argument, nullptr, kSocket},
                             {"describe", required_argument, nullptr, kDescribe},
@@ -99,9 +111,11 @@ int parse(int argc, char** argv, Options& options) {
     }
     options.check.package = options.package;
     const bool describes = !options.describe.empty() && !options.package.empty();
-    const bool checks = !options.check.library.empty() && !options.package.empty() && !options.check.type.empty();
+    const bool checks =
+        !options.check.library.empty() && !options.package.empty() && !options.check.type.empty();
     const bool runs = isBaseName(options.runner) && !options.socket.empty();
-    if (optind == argc && int{describes} + int{checks} + int{runs} == 1) return -1;
+    const int tasks = (describes ? 1 : 0) + (checks ? 1 : 0) + (runs ? 1 : 0);
+    if (optind == argc && tasks == 1) return -1;
     std::fputs(kUsage, stderr);
     return kUsageStatus;
 }
@@ -109,13 +123,14 @@ int parse(int argc, char** argv, Options& options) {
 // Makes texts of what components log, until the executor ends.
 class LogDrain {
    public:
-    explicit LogDrain(Log& log) : thread_([this, &log] {
-        pthread_setname_np(pthread_self(), "rtcf-log");
-        while (!ending_.load(std::memory_order_acquire)) {
-            log.drain();
-            std::this_thread::sleep_for(std::chrono::milliseconds(10));
-        }
-    }) {}
+    explicit LogDrain(Log& log)
+        : thread_([this, &log] {
+              pthread_setname_np(pthread_self(), "rtcf-log");
+              while (!ending_.load(std::memory_order_acquire)) {
+                  log.drain();
+                  std::this_thread::sleep_for(std::chrono::milliseconds(10));
+              }
+          }) {}
     ~LogDrain() {
         ending_.store(true, std::memory_order_release);
         thread_.join();
@@ -138,9 +153,11 @@ int run(const Options& options) {
         const LogDrain drain(log);
         Runner runner(
             options.runner, log, [&server](const RunnerEvent& event) { server.publish(event); },
-            std::make_unique<rtcf::ros1::RosNode>(options.runner, [&server](const std::string& message) {
-                server.publish(RunnerEvent{RunnerEvent::Kind::Ros, message, {}, 0});
-            }),
+            std::make_unique<rtcf::ros1::RosNode>(
+                options.runner,
+                [&server](const std::string& message) {
+                    server.publish(RunnerEvent{RunnerEvent::Kind::Ros, message, {}, 0});
+                }),
             recorder);
         server.serve(runner, log);
     }

@@ -8,11 +8,18 @@
 
 namespace rtcf::executor {
 
-enum class RefusalKind { InvalidArgument, NotFound, AlreadyExists, FailedPrecondition, Unavailable };
+enum class RefusalKind {
+    InvalidArgument,
+    NotFound,
+    AlreadyExists,
+    FailedPrecondition,
+    Unavailable
+};
 
 class Refusal : public std::runtime_error {
    public:
-    Refusal(RefusalKind kind, const std::string& message) : std::runtime_error(message), kind_(kind) {}
+    Refusal(RefusalKind kind, const std::string& message)
+        : std::runtime_error(message), kind_(kind) {}
     RefusalKind kind() const noexcept { return kind_; }
 
    private:

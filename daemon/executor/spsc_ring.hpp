@@ -35,10 +35,13 @@ class SpscRing {
     /// The oldest element, or null. Consumer.
     const T* front() const noexcept {
         const std::size_t tail = tail_.load(std::memory_order_relaxed);
-        return head_.load(std::memory_order_acquire) == tail ? nullptr : &(*items_)[tail % Capacity];
+        return head_.load(std::memory_order_acquire) == tail ? nullptr
+                                                             : &(*items_)[tail % Capacity];
     }
     /// Removes the oldest element. Consumer.
-    void pop() noexcept { tail_.store(tail_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
+    void pop() noexcept {
+        tail_.store(tail_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
+    }
 
     /// Elements that found the ring full. Any thread.
     std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }

@@ -30,16 +30,19 @@ def follow_settings(
 
 
 def follow_components(
-    desired: Desired, components: Iterable[graph_pb2.ComponentInfo]
+    desired: Desired, components: Iterable[graph_pb2.ComponentInfo], restored: bool
 ) -> tuple[list[str], dict[str, str]]:
     """Make the desired components those of an executor.
 
     Returns a line for each that differed, and those that the executor does not
-    have, with the reason: they stay in the desired state.
+    have, with the reason: they stay in the desired state. If its graph was
+    `restored` once, those of them that were not left out then have been unloaded
+    since, by a change whose save was lost.
     """
     lines: list[str] = []
+    known_left_out = dict(desired.left_out)
     left_out = dict.fromkeys(desired.components, "its executor does not have it")
-    left_out |= desired.quarantined
+    left_out |= known_left_out | desired.quarantined
     for info in components:
         name = str(info.full_name)
         left_out.pop(name, None)
@@ -54,7 +57,13 @@ def follow_components(
         else:
             continue
         desired.put(name, present)
-    lines += [f"{name} is not in its loop" for name in left_out if name not in desired.quarantined]
+    for name in [name for name in left_out if name not in desired.quarantined]:
+        if restored and name not in known_left_out:
+            lines.append(f"{name} was unloaded")
+            desired.drop([name])
+            del left_out[name]
+        else:
+            lines.append(f"{name} is not in its loop")
     return lines, left_out
 
 

@@ -20,6 +20,7 @@ class Desired:
         self.chosen = runner_pb2.RunnerSettings()
         self.running = False  # the loop was started, and neither stopped nor ended by a fault
         self.quarantined: dict[str, str] = {}  # components that a fault took out, and why
+        self.left_out: dict[str, str] = {}  # components that are not loaded, and why
         self._components: dict[str, graph_pb2.ComponentSpec] = {}
         # The text of each component as it is saved: a change of one among
         # a thousand costs the text of one.
@@ -62,9 +63,13 @@ class Desired:
 
     def become(self, specs: Iterable[graph_pb2.ComponentSpec]) -> None:
         """Take a whole graph in the place of what was there."""
-        self.drop(list(self._components))
+        before, texts = self._components, self._texts
+        self._components, self._texts, self.quarantined = {}, {}, {}
         for spec in specs:
-            self.put(names.full_name(spec), spec)
+            name = names.full_name(spec)
+            self.put(name, spec)
+            if name in texts and before[name] == self._components[name]:
+                self._texts[name] = texts[name]
 
     def set_breaks(self, ports: Iterable[control_pb2.PortName], broken: bool) -> None:
         """Note loop breaks that were set or removed."""

@@ -43,12 +43,14 @@ async def follow(runner: "Runner") -> None:
         status.iteration,
     )  # fmt: skip
     lines = follow_settings(runner.desired, runner.defaults, status.settings)
-    more, runner.left_out = follow_components(runner.desired, listed.components.components)
+    fresh = status.state == runner_pb2.RUNNER_STATE_STOPPED and not status.iteration
+    more, runner.left_out = follow_components(
+        runner.desired, listed.components.components, restored=not fresh
+    )
     for line in lines + more:
         runner.log.warning("%s: the executor's is kept", line)
     was_running = runner.desired.running
     runner.running = status.state == runner_pb2.RUNNER_STATE_RUNNING
-    fresh = status.state == runner_pb2.RUNNER_STATE_STOPPED and not status.iteration
     runner.desired.running = runner.running or (fresh and was_running)
     if status.state == runner_pb2.RUNNER_STATE_STOPPED:
         missing = [name for name in runner.left_out if name not in runner.desired.quarantined]
@@ -73,6 +75,8 @@ async def restore(runner: "Runner") -> None:
     if runner.up:
         count = len(runner.desired.components) - len(runner.left_out)
         runner.log.info("%d of its components restored, held", count)
+    if runner.left_out:
+        await runner.save()
 
 
 async def resume(runner: "Runner") -> None:

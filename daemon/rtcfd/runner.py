@@ -54,7 +54,6 @@ class Runner:
     def __init__(self, desired: Desired, surroundings: Surroundings) -> None:
         self.name = desired.runner
         self.desired = desired
-        self.left_out: dict[str, str] = {}  # components that are not loaded, and why
         self.crashes = Crashes()
         self.held = ""  # why the loop is not started, if that was not asked for
         self.running = False  # the loop, as far as told
@@ -69,6 +68,15 @@ class Runner:
         self._closing = False
         self._settled = asyncio.Event()  # not set while an executor is being started
         self._background: set[asyncio.Task[None]] = set()
+
+    @property
+    def left_out(self) -> dict[str, str]:
+        """Components that are desired and not loaded, and why."""
+        return self.desired.left_out
+
+    @left_out.setter
+    def left_out(self, names: dict[str, str]) -> None:
+        self.desired.left_out = names
 
     # -- life ---------------------------------------------------------------
 

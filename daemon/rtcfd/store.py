@@ -60,6 +60,7 @@ class Store:
             f'  "settings": {chosen},\n'
             f'  "running": {json.dumps(desired.running)},\n'
             f'  "quarantined": {json.dumps(desired.quarantined)},\n'
+            f'  "left_out": {json.dumps(desired.left_out)},\n'
             f'  "components": [\n{components}\n  ]\n'
             "}\n"
         ).encode()
@@ -125,4 +126,7 @@ def _parse(runner: str, text: bytes) -> Desired:
     desired.running = document.get("running", False) is True
     for name, reason in document.get("quarantined", {}).items():
         desired.quarantine(name, str(reason))
+    for name, reason in document.get("left_out", {}).items():
+        if name in desired.components:
+            desired.left_out[name] = str(reason)
     return desired

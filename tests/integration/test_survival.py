@@ -206,7 +206,8 @@ def test_no_kill_of_rtcfd_stops_a_loop_or_loses_its_graph(daemon: Daemon, times:
             assert now.iteration > iteration
             iteration = now.iteration
             churn.accept(rates(client))
-            assert saved_rates(daemon) == churn.known
+            # An answer may come before what was adopted is on disk.
+            wait_for(lambda: saved_rates(daemon) == churn.known, "the saved graph")
     assert "is corrupt" not in daemon.log()
 
 

@@ -24,8 +24,8 @@ struct BridgeTable {
 /// What a bridge needs to know to find its peers.
 struct BridgeSettings {
     bool enabled = true;
-    std::string master_uri;     ///< empty: of the environment
-    std::uint32_t queue = 1000; ///< messages kept for a slow subscriber
+    std::string master_uri;      ///< empty: of the environment
+    std::uint32_t queue = 1000;  ///< messages kept for a slow subscriber
     bool operator==(const BridgeSettings& other) const {
         return enabled == other.enabled && master_uri == other.master_uri && queue == other.queue;
     }

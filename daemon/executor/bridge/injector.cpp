@@ -2,7 +2,8 @@
 
 namespace rtcf::executor {
 
-Injector::Injector(std::string topic, const TypeInfo& type) : topic_(std::move(topic)), type_(type) {
+Injector::Injector(std::string topic, const TypeInfo& type)
+    : topic_(std::move(topic)), type_(type) {
     for (auto& slot : slots_) slot = type_.make_slot(nullptr);
 }
 

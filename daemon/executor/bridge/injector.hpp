@@ -38,7 +38,8 @@ class Injector {
     /// The slot that inputs read. Loop side only.
     const SlotHeader* front() const noexcept { return slots_[front_].get(); }
 
-    /// Makes the newest delivered value the front, stamped with `clock`. Loop side only; real-time safe.
+    /// Makes the newest delivered value the front, stamped with `clock`. Loop side only; real-time
+    /// safe.
     /// @return true if there was a new one; the inputs are then to be told by InputBase::inject()
     bool adopt(const LoopClock& clock) noexcept RTCF_NONBLOCKING {
         if ((middle_.load(std::memory_order_relaxed) & kFresh) == 0) return false;
@@ -50,15 +51,16 @@ class Injector {
     }
 
    private:
-    static constexpr std::uint32_t kFresh = 4;  // set in middle_ by deliver(), beside an index 0 to 2
+    static constexpr std::uint32_t kFresh =
+        4;  // set in middle_ by deliver(), beside an index 0 to 2
 
     std::string topic_;
     const TypeInfo& type_;
     std::array<std::shared_ptr<SlotHeader>, 3> slots_;
-    std::uint32_t front_ = 0;                // loop side
-    std::uint64_t sequence_ = 0;             // loop side
+    std::uint32_t front_ = 0;     // loop side
+    std::uint64_t sequence_ = 0;  // loop side
     std::atomic<std::uint32_t> middle_{1};
-    std::uint32_t back_ = 2;                 // delivering side
+    std::uint32_t back_ = 2;  // delivering side
     std::atomic<std::uint64_t> delivered_{0};
     std::atomic<std::uint64_t> refused_{0};
 };

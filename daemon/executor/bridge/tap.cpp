@@ -5,8 +5,9 @@
 
 namespace rtcf::executor {
 
-Tap::Tap(std::string topic, const TypeInfo& type, std::shared_ptr<const SlotHeader> source, std::size_t capacity)
-    : topic_(std::move(topic)), type_(type), source_(std::move(source)), last_sequence_(0) {
+Tap::Tap(std::string topic, const TypeInfo& type, std::shared_ptr<const SlotHeader> source,
+         std::size_t capacity)
+    : topic_(std::move(topic)), type_(type), source_(std::move(source)) {
     // Of a value of its own: the loop may be writing the source's.
     const std::size_t one = kAlign + padded(type_.length(*type_.make_slot(nullptr)));
     // A power of two, so that a place in the ring is found without a division.

@@ -22,17 +22,19 @@ class Tap {
     /// @param type     of the output
     /// @param source   the output's slot, kept alive by the tap
     /// @param capacity bytes of the ring; at least one value of fixed-size types always fits
-    Tap(std::string topic, const TypeInfo& type, std::shared_ptr<const SlotHeader> source, std::size_t capacity);
+    Tap(std::string topic, const TypeInfo& type, std::shared_ptr<const SlotHeader> source,
+        std::size_t capacity);
 
     const std::string& topic() const noexcept { return topic_; }
     const TypeInfo& type() const noexcept { return type_; }
     const SlotHeader* source() const noexcept { return source_.get(); }
 
-    /// Copies the source's value if it was written since the last call. Producer only; real-time safe.
+    /// Copies the source's value if it was written since the last call. Producer only; real-time
+    /// safe.
     void push() noexcept RTCF_NONBLOCKING;
 
-    /// Gives the oldest message's bytes to `use(const std::uint8_t*, std::uint32_t)` and removes it.
-    /// Consumer only; the bytes are valid during the call. @return false if the ring is empty
+    /// Gives the oldest message's bytes to `use(const std::uint8_t*, std::uint32_t)` and removes
+    /// it. Consumer only; the bytes are valid during the call. @return false if the ring is empty
     template <typename Use>
     bool pop(Use&& use);
 
@@ -44,7 +46,9 @@ class Tap {
     static constexpr std::size_t kAlign = 8;
     static constexpr std::uint32_t kSkip = 0xffffffffU;
 
-    static constexpr std::size_t padded(std::size_t bytes) { return (bytes + kAlign - 1) / kAlign * kAlign; }
+    static constexpr std::size_t padded(std::size_t bytes) {
+        return (bytes + kAlign - 1) / kAlign * kAlign;
+    }
     std::uint32_t lengthAt(std::size_t offset) const noexcept;
 
     std::string topic_;

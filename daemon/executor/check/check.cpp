@@ -34,7 +34,8 @@ class ValueSource final : public Bridge {
         for (const auto& injector : table_->inputs) {
             const std::shared_ptr<SlotHeader> value = injector->type().make_slot(nullptr);
             std::vector<std::uint8_t> bytes(injector->type().length(*value));
-            injector->type().serialize(*value, bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+            injector->type().serialize(*value, bytes.data(),
+                                       static_cast<std::uint32_t>(bytes.size()));
             injector->deliver(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
         }
         for (const auto& tap : table_->outputs) {
@@ -51,7 +52,8 @@ ParameterValue parseValue(const std::string& text) {
     if (text == "true" || text == "false") return text == "true";
     try {
         std::size_t used = 0;
-        if (const long long number = std::stoll(text, &used); used == text.size()) return std::int64_t{number};
+        if (const long long number = std::stoll(text, &used); used == text.size())
+            return std::int64_t{number};
         if (const double number = std::stod(text, &used); used == text.size()) return number;
     } catch (const std::logic_error&) {
         // no number: a string
@@ -67,9 +69,11 @@ ComponentDefinition definitionOf(const CheckRequest& request) {
     for (const std::string& parameter : request.parameters) {
         const std::size_t at = parameter.find(":=");
         if (at == std::string::npos) {
-            throw Refusal(RefusalKind::InvalidArgument, fmt::format("'{}' is not name:=value", parameter));
+            throw Refusal(RefusalKind::InvalidArgument,
+                          fmt::format("'{}' is not name:=value", parameter));
         }
-        definition.parameters.emplace_back(parameter.substr(0, at), parseValue(parameter.substr(at + 2)));
+        definition.parameters.emplace_back(parameter.substr(0, at),
+                                           parseValue(parameter.substr(at + 2)));
     }
     return definition;
 }
@@ -96,10 +100,12 @@ void run(const CheckRequest& request, Runner& runner, ValueSource& values) {
 int checkComponent(const CheckRequest& request) {
     FlightRecorder recorder;
     installCrashHandler(recorder);
-    Log log([](LogEntry&& entry) { fmt::print(stderr, "{}: {}\n", entry.component, entry.message); });
+    Log log(
+        [](LogEntry&& entry) { fmt::print(stderr, "{}: {}\n", entry.component, entry.message); });
     auto bridge = std::make_unique<ValueSource>();
     ValueSource& values = *bridge;
-    Runner runner("check", log, [](const RunnerEvent&) {}, std::move(bridge), recorder);
+    Runner runner(
+        "check", log, [](const RunnerEvent&) {}, std::move(bridge), recorder);
     std::promise<std::string> refusal;
     runner.post([&] {
         try {

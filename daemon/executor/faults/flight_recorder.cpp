@@ -43,7 +43,8 @@ const char* hookName(Hook hook) noexcept {
 FlightRecorder::FlightRecorder() : fd_(::memfd_create("rtcf-flight-recorder", MFD_CLOEXEC)) {
     void* memory = MAP_FAILED;
     if (fd_ >= 0 && ::ftruncate(fd_, sizeof(Page)) == 0) {
-        memory = ::mmap(nullptr, sizeof(Page), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, fd_, 0);
+        memory = ::mmap(nullptr, sizeof(Page), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE,
+                        fd_, 0);
     }
     if (memory == MAP_FAILED) {
         const int error = errno;
@@ -70,7 +71,8 @@ std::uint32_t FlightRecorder::addSlot(const std::string& name) {
         ++next_;
     } else {
         throw Refusal(RefusalKind::FailedPrecondition,
-                      fmt::format("{}: a runner holds at most {} components; add another runner", name, kSlots - 1));
+                      fmt::format("{}: a runner holds at most {} components; add another runner",
+                                  name, kSlots - 1));
     }
     auto& text = page_->names[slot];
     std::strncpy(text, name.c_str(), sizeof text - 1);
@@ -83,9 +85,11 @@ void FlightRecorder::removeSlot(std::uint32_t slot) noexcept {
     free_.push_back(slot);
 }
 
-void FlightRecorder::noteCrash(int signal, ThreadRole thread, CrashReason reason, const void* address) noexcept {
+void FlightRecorder::noteCrash(int signal, ThreadRole thread, CrashReason reason,
+                               const void* address) noexcept {
     std::uint32_t none = 0;
-    if (!page_->crash_signal.compare_exchange_strong(none, static_cast<std::uint32_t>(signal))) return;
+    if (!page_->crash_signal.compare_exchange_strong(none, static_cast<std::uint32_t>(signal)))
+        return;
     page_->crash_thread.store(static_cast<std::uint32_t>(thread));
     page_->crash_reason.store(static_cast<std::uint32_t>(reason));
     page_->crash_address.store(reinterpret_cast<std::uintptr_t>(address));

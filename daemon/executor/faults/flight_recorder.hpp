@@ -18,7 +18,15 @@ namespace rtcf::executor {
 enum class ThreadRole : std::uint32_t { None = 0, Realtime = 1, Graph = 2, Other = 3 };
 
 /// Which hook the graph thread is in, in the recorder's numbers.
-enum class Hook : std::uint32_t { None = 0, Constructor = 1, Configure = 2, Start = 3, Stop = 4, Cleanup = 5, Prepare = 6 };
+enum class Hook : std::uint32_t {
+    None = 0,
+    Constructor = 1,
+    Configure = 2,
+    Start = 3,
+    Stop = 4,
+    Cleanup = 5,
+    Prepare = 6
+};
 
 const char* hookName(Hook hook) noexcept;
 
@@ -40,7 +48,8 @@ class FlightRecorder {
 
     /// @name Slots: names of components; graph thread
     /// @{
-    std::uint32_t addSlot(const std::string& name);  ///< @throws Refusal if there are too many components
+    std::uint32_t addSlot(
+        const std::string& name);  ///< @throws Refusal if there are too many components
     void removeSlot(std::uint32_t slot) noexcept;
     /// @}
 
@@ -62,7 +71,9 @@ class FlightRecorder {
     /// @}
 
     /// Slot of the component that the real-time thread runs; 0 = none.
-    std::uint32_t runningSlot() const noexcept { return page_->realtime_slot.load(std::memory_order_relaxed); }
+    std::uint32_t runningSlot() const noexcept {
+        return page_->realtime_slot.load(std::memory_order_relaxed);
+    }
 
    private:
     struct Page {
@@ -81,7 +92,8 @@ class FlightRecorder {
         std::uint64_t reserved;
         char names[kSlots][128];  // NOLINT(modernize-avoid-c-arrays): a layout in memory
     };
-    static_assert(offsetof(Page, crash_address) == 40 && offsetof(Page, names) == 64, "the layout is in executor.proto");
+    static_assert(offsetof(Page, crash_address) == 40 && offsetof(Page, names) == 64,
+                  "the layout is in executor.proto");
 
     int fd_ = -1;
     Page* page_ = nullptr;
@@ -107,6 +119,8 @@ class FlightRecorder::RealtimeNotes {
     Page* page_;
 };
 
-inline FlightRecorder::RealtimeNotes FlightRecorder::realtimeNotes() noexcept { return RealtimeNotes(page_); }
+inline FlightRecorder::RealtimeNotes FlightRecorder::realtimeNotes() noexcept {
+    return RealtimeNotes(page_);
+}
 
 }  // namespace rtcf::executor

@@ -15,18 +15,19 @@
 namespace rtcf::executor {
 
 struct ComponentDefinition {
-    std::string name;       ///< base name
-    std::string ns = "/";   ///< canonical namespace
+    std::string name;      ///< base name
+    std::string ns = "/";  ///< canonical namespace
     std::string package;
     std::string type;
     Remaps remaps;
     std::vector<std::pair<std::string, ParameterValue>> parameters;  ///< load-time values
-    bool first = false;     ///< all connections into it are loop breaks
-    std::string ignore;     ///< regular expression of connections that are loop breaks for it
+    bool first = false;  ///< all connections into it are loop breaks
+    std::string ignore;  ///< regular expression of connections that are loop breaks for it
     std::set<std::string> breaks;  ///< inputs whose connection is a loop break
     std::uint32_t every = 1;       ///< runs each n-th cycle
-    std::optional<std::uint32_t> phase;  ///< the cycle of those n it runs in; unset = chosen to spread load
-    bool optional = false;         ///< a fault takes it out, and the loop goes on
+    std::optional<std::uint32_t>
+        phase;              ///< the cycle of those n it runs in; unset = chosen to spread load
+    bool optional = false;  ///< a fault takes it out, and the loop goes on
 
     std::string fullName() const { return joinName(ns, name); }
 };

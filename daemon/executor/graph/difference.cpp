@@ -27,23 +27,27 @@ std::string replacementReason(const Instance& present, const WantedComponent& wa
     }
     if (is.remaps != shall.remaps) return "other remaps";
     if (is.first != shall.first) return shall.first ? "first" : "not first";
-    if (is.ignore != shall.ignore) return fmt::format("ignore '{}' -> '{}'", is.ignore, shall.ignore);
+    if (is.ignore != shall.ignore)
+        return fmt::format("ignore '{}' -> '{}'", is.ignore, shall.ignore);
     if (is.every != shall.every) return fmt::format("every {} -> {}", is.every, shall.every);
-    if (shall.phase && *shall.phase != present.phase()) return fmt::format("phase {} -> {}", present.phase(), *shall.phase);
+    if (shall.phase && *shall.phase != present.phase())
+        return fmt::format("phase {} -> {}", present.phase(), *shall.phase);
     if (is.optional != shall.optional) return shall.optional ? "optional" : "not optional";
     return {};
 }
 
 // Parameters whose value is not what it shall be, with the value they shall have.
-std::vector<std::pair<std::string, ParameterValue>> otherParameters(const Instance& present,
-                                                                     const ComponentDefinition& shall, std::string& detail) {
+std::vector<std::pair<std::string, ParameterValue>> otherParameters(
+    const Instance& present, const ComponentDefinition& shall, std::string& detail) {
     std::vector<std::pair<std::string, ParameterValue>> others;
     const auto& declared = present.component().parameters();
     for (const auto& [name, value] : shall.parameters) {
-        const bool known = std::any_of(declared.begin(), declared.end(), [&name = name](const ParameterBase* parameter) {
-            return parameter->declaration().name == name;
-        });
-        if (!known) others.emplace_back(name, value);  // to be refused with the list of those there are
+        const bool known = std::any_of(declared.begin(), declared.end(),
+                                       [&name = name](const ParameterBase* parameter) {
+                                           return parameter->declaration().name == name;
+                                       });
+        if (!known)
+            others.emplace_back(name, value);  // to be refused with the list of those there are
     }
     for (std::size_t i = 0; i < declared.size(); ++i) {
         const std::string& name = declared[i]->declaration().name;
@@ -54,7 +58,8 @@ std::vector<std::pair<std::string, ParameterValue>> otherParameters(const Instan
         ParameterValue checked = value;
         const bool bad = !declared[i]->check(checked).empty();
         if (!bad && checked == present.parameterValues()[i]) continue;
-        detail += fmt::format("{}{} {} -> {}", detail.empty() ? "" : ", ", name, text(present.parameterValues()[i]), text(value));
+        detail += fmt::format("{}{} {} -> {}", detail.empty() ? "" : ", ", name,
+                              text(present.parameterValues()[i]), text(value));
         others.emplace_back(name, value);
     }
     return others;
@@ -72,27 +77,32 @@ std::vector<Difference> compare(const Graph& graph, const std::vector<WantedComp
     std::vector<Difference> differences;
     for (const GraphNode& node : graph.nodes()) {
         const std::string& name = node.instance->fullName();
-        if (names.count(name) == 0) differences.push_back({Difference::Kind::Unload, name, {}, nullptr, {}});
+        if (names.count(name) == 0)
+            differences.push_back({Difference::Kind::Unload, name, {}, nullptr, {}});
     }
     for (const WantedComponent& component : wanted) {
         const ComponentDefinition& shall = component.definition;
         const std::string name = shall.fullName();
         const GraphNode* node = graph.find(name);
         if (node == nullptr) {
-            differences.push_back({Difference::Kind::Load, name, shall.package + "/" + shall.type, &component, {}});
+            differences.push_back(
+                {Difference::Kind::Load, name, shall.package + "/" + shall.type, &component, {}});
             continue;
         }
-        if (const std::string reason = replacementReason(*node->instance, component); !reason.empty()) {
+        if (const std::string reason = replacementReason(*node->instance, component);
+            !reason.empty()) {
             differences.push_back({Difference::Kind::Replace, name, reason, &component, {}});
             continue;
         }
         if (node->breaks != shall.breaks) {
-            differences.push_back({Difference::Kind::Breaks, name, "other loop breaks", &component, {}});
+            differences.push_back(
+                {Difference::Kind::Breaks, name, "other loop breaks", &component, {}});
         }
         std::string detail;
         auto parameters = otherParameters(*node->instance, shall, detail);
         if (!parameters.empty()) {
-            differences.push_back({Difference::Kind::Parameters, name, detail, &component, std::move(parameters)});
+            differences.push_back(
+                {Difference::Kind::Parameters, name, detail, &component, std::move(parameters)});
         }
     }
     return differences;

@@ -22,10 +22,10 @@ struct WantedComponent {
 struct Difference {
     enum class Kind { Load, Unload, Replace, Breaks, Parameters };
     Kind kind;
-    std::string component;  ///< full name
-    std::string detail;     ///< one line
-    const WantedComponent* wanted = nullptr;                        ///< null for Unload
-    std::vector<std::pair<std::string, ParameterValue>> parameters; ///< of Parameters: new values
+    std::string component;                                           ///< full name
+    std::string detail;                                              ///< one line
+    const WantedComponent* wanted = nullptr;                         ///< null for Unload
+    std::vector<std::pair<std::string, ParameterValue>> parameters;  ///< of Parameters: new values
 };
 
 /// Compares a graph with what it shall be: first what leaves, then the rest in the order given.

@@ -16,25 +16,30 @@ const GraphNode* Graph::find(const std::string& full_name) const noexcept {
 }
 
 std::size_t Graph::indexOf(const std::string& full_name) const {
-    if (const GraphNode* node = find(full_name)) return static_cast<std::size_t>(node - nodes_.data());
+    if (const GraphNode* node = find(full_name))
+        return static_cast<std::size_t>(node - nodes_.data());
     constexpr std::size_t kListed = 20;
     std::string names;
     for (std::size_t i = 0; i < nodes_.size() && i < kListed; ++i) {
         names += (i == 0 ? "" : ", ") + nodes_[i].instance->fullName();
     }
     if (nodes_.size() > kListed) names += fmt::format(" and {} more", nodes_.size() - kListed);
-    throw Refusal(RefusalKind::NotFound, fmt::format("no component {} in this runner; loaded: {}", full_name,
-                                                     names.empty() ? "none" : names));
+    throw Refusal(RefusalKind::NotFound, fmt::format("no component {} in this runner; loaded: {}",
+                                                     full_name, names.empty() ? "none" : names));
 }
 
-const GraphNode& Graph::get(const std::string& full_name) const { return nodes_[indexOf(full_name)]; }
+const GraphNode& Graph::get(const std::string& full_name) const {
+    return nodes_[indexOf(full_name)];
+}
 
 void Graph::requireFree(const std::string& full_name) const {
     if (const GraphNode* node = find(full_name)) {
         const ComponentDefinition& present = node->instance->definition();
-        throw Refusal(RefusalKind::AlreadyExists,
-                      fmt::format("{} is loaded already ({}/{}): give another --name, or use rtcfctl replace {}",
-                                  full_name, present.package, present.type, full_name));
+        throw Refusal(
+            RefusalKind::AlreadyExists,
+            fmt::format(
+                "{} is loaded already ({}/{}): give another --name, or use rtcfctl replace {}",
+                full_name, present.package, present.type, full_name));
     }
 }
 
@@ -65,8 +70,8 @@ void Graph::setBreak(const std::string& full_name, const std::string& port, bool
         for (const InputBase* input : node.instance->component().inputs()) {
             names += (names.empty() ? "" : ", ") + input->name();
         }
-        throw Refusal(RefusalKind::NotFound, fmt::format("{} has no input {}; it has {}", full_name, port,
-                                                         names.empty() ? "none" : names));
+        throw Refusal(RefusalKind::NotFound, fmt::format("{} has no input {}; it has {}", full_name,
+                                                         port, names.empty() ? "none" : names));
     }
     if (broken) {
         node.breaks.insert(port);

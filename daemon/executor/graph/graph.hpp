@@ -15,7 +15,8 @@ namespace rtcf::executor {
 
 struct GraphNode {
     std::shared_ptr<Instance> instance;
-    std::set<std::string> breaks;  ///< inputs whose connection is a loop break, set at load or since
+    std::set<std::string>
+        breaks;  ///< inputs whose connection is a loop break, set at load or since
 };
 
 class Graph {
@@ -29,11 +30,12 @@ class Graph {
 
     /// @name Changes; each throws Refusal and changes nothing
     /// @{
-    void add(GraphNode node);                     ///< the name must be free
+    void add(GraphNode node);  ///< the name must be free
     void remove(const std::string& full_name);
     void replace(const std::string& full_name, GraphNode node);
     void setBreak(const std::string& full_name, const std::string& port, bool broken);
-    void setBreaks(const std::string& full_name, const std::set<std::string>& ports);  ///< and no others
+    void setBreaks(const std::string& full_name,
+                   const std::set<std::string>& ports);  ///< and no others
     /// @}
 
     /// Refuses a name that is taken. For before a component is constructed.

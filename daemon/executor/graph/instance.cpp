@@ -14,9 +14,11 @@ namespace {
 const ComponentRecord& findRecord(const Library& library, const ComponentDefinition& definition) {
     if (const ComponentRecord* record = library.find(definition.type)) return *record;
     std::string names;
-    for (const ComponentRecord* record : library.types()) names += (names.empty() ? "" : ", ") + std::string(record->type);
-    throw Refusal(RefusalKind::NotFound, fmt::format("{} has no component type {}; it has {}", library.path(),
-                                                     definition.type, names.empty() ? "none" : names));
+    for (const ComponentRecord* record : library.types())
+        names += (names.empty() ? "" : ", ") + std::string(record->type);
+    throw Refusal(RefusalKind::NotFound,
+                  fmt::format("{} has no component type {}; it has {}", library.path(),
+                              definition.type, names.empty() ? "none" : names));
 }
 
 std::string parameterNames(const Component& component) {
@@ -43,8 +45,9 @@ class HookNote {
 
 }  // namespace
 
-Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library> library, const std::string& runner,
-                   const LoopClock& clock, Log& log, FlightRecorder& recorder)
+Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library> library,
+                   const std::string& runner, const LoopClock& clock, Log& log,
+                   FlightRecorder& recorder)
     : definition_(std::move(definition)),
       library_(std::move(library)),
       record_(&findRecord(*library_, definition_)),
@@ -92,7 +95,8 @@ void Instance::callHook(Hook hook, const std::function<bool()>& call) {
     std::string why;
     try {
         if (call()) return;
-        why = component_->failure().empty() ? "it returned false and did not say why" : component_->failure();
+        why = component_->failure().empty() ? "it returned false and did not say why"
+                                            : component_->failure();
     } catch (const Refusal&) {
         throw;
     } catch (const std::exception& error) {
@@ -101,8 +105,8 @@ void Instance::callHook(Hook hook, const std::function<bool()>& call) {
         why = "it threw an exception of unknown type";
     }
     throw Refusal(RefusalKind::FailedPrecondition,
-                  fmt::format("{} ({}/{}): {} failed: {}", context_.full_name, definition_.package, definition_.type,
-                              hookName(hook), why));
+                  fmt::format("{} ({}/{}): {} failed: {}", context_.full_name, definition_.package,
+                              definition_.type, hookName(hook), why));
 }
 
 void Instance::configure() {
@@ -123,14 +127,16 @@ void Instance::freezePorts() {
     const auto mapped = [this](const std::string& port) {
         return mappedName(port, definition_.ns, context_.full_name, definition_.remaps);
     };
-    for (const InputBase* input : component_->inputs()) input_names_.push_back(mapped(input->name()));
+    for (const InputBase* input : component_->inputs())
+        input_names_.push_back(mapped(input->name()));
     for (const OutputBase* output : component_->outputs()) {
         output_names_.push_back(mapped(output->name()));
         samples_.push_back(output->type().make_slot(output->slot().get()));
     }
     for (const std::string& port : definition_.breaks) {
         if (findInput(port) != nullptr) continue;
-        throw Refusal(RefusalKind::NotFound, fmt::format("{} has no input {} to break", context_.full_name, port));
+        throw Refusal(RefusalKind::NotFound,
+                      fmt::format("{} has no input {} to break", context_.full_name, port));
     }
 }
 
@@ -148,7 +154,8 @@ void Instance::stop() noexcept {
         component_->stop();
     } catch (...) {
         // There is nobody left to refuse to: the component is on its way out.
-        if (component_->logs(LogLevel::Error)) RTCF_ERROR(component_.get(), "stop() threw an exception");
+        if (component_->logs(LogLevel::Error))
+            RTCF_ERROR(component_.get(), "stop() threw an exception");
     }
 }
 
@@ -159,7 +166,8 @@ void Instance::cleanup() noexcept {
     try {
         component_->cleanup();
     } catch (...) {
-        if (component_->logs(LogLevel::Error)) RTCF_ERROR(component_.get(), "cleanup() threw an exception");
+        if (component_->logs(LogLevel::Error))
+            RTCF_ERROR(component_.get(), "cleanup() threw an exception");
     }
 }
 
@@ -172,7 +180,8 @@ std::vector<std::string> Instance::uselessRemaps() const {
         };
         const auto& inputs = component_->inputs();
         const auto& outputs = component_->outputs();
-        if (std::none_of(inputs.begin(), inputs.end(), is_port) && std::none_of(outputs.begin(), outputs.end(), is_port)) {
+        if (std::none_of(inputs.begin(), inputs.end(), is_port) &&
+            std::none_of(outputs.begin(), outputs.end(), is_port)) {
             useless.push_back(from + ":=" + to);
         }
     }
@@ -196,20 +205,24 @@ void Instance::releaseStaged() noexcept {
     for (DerivedBase* derived : component_->derived()) derived->release();
 }
 
-std::vector<StagedValue*> Instance::stageParameters(const std::vector<std::pair<std::string, ParameterValue>>& batch) {
+std::vector<StagedValue*> Instance::stageParameters(
+    const std::vector<std::pair<std::string, ParameterValue>>& batch) {
     const auto& declared = component_->parameters();
     std::vector<std::pair<std::size_t, ParameterValue>> checked;
     for (const auto& [name, given] : batch) {
-        const auto found = std::find_if(declared.begin(), declared.end(), [&name = name](const ParameterBase* parameter) {
-            return parameter->declaration().name == name;
-        });
+        const auto found = std::find_if(declared.begin(), declared.end(),
+                                        [&name = name](const ParameterBase* parameter) {
+                                            return parameter->declaration().name == name;
+                                        });
         if (found == declared.end()) {
-            throw Refusal(RefusalKind::NotFound, fmt::format("{} has no parameter {}; it has {}", context_.full_name,
-                                                             name, parameterNames(*component_)));
+            throw Refusal(RefusalKind::NotFound,
+                          fmt::format("{} has no parameter {}; it has {}", context_.full_name, name,
+                                      parameterNames(*component_)));
         }
         ParameterValue value = given;
         if (const std::string why = (*found)->check(value); !why.empty()) {
-            throw Refusal(RefusalKind::InvalidArgument, fmt::format("{}: {}", context_.full_name, why));
+            throw Refusal(RefusalKind::InvalidArgument,
+                          fmt::format("{}: {}", context_.full_name, why));
         }
         checked.emplace_back(found - declared.begin(), std::move(value));
     }

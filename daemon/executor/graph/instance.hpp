@@ -23,9 +23,10 @@ class Instance {
    public:
     /// Constructs the component and checks and sets its load-time parameters.
     /// @throws Refusal and leaves nothing behind
-    Instance(ComponentDefinition definition, std::shared_ptr<const Library> library, const std::string& runner,
-             const LoopClock& clock, Log& log, FlightRecorder& recorder);
-    /// Stops and cleans up what still is started and configured, and drains the log of what it said.
+    Instance(ComponentDefinition definition, std::shared_ptr<const Library> library,
+             const std::string& runner, const LoopClock& clock, Log& log, FlightRecorder& recorder);
+    /// Stops and cleans up what still is started and configured, and drains the log of what it
+    /// said.
     ~Instance();
     Instance(const Instance&) = delete;
     Instance& operator=(const Instance&) = delete;
@@ -35,7 +36,7 @@ class Instance {
     void configure();  ///< then freezes the ports. @throws Refusal, after cleanup()
     /// Freezes and resolves the ports without configure(), for a look at how it would be wired.
     void freezePorts();
-    void start();      ///< @throws Refusal
+    void start();  ///< @throws Refusal
     void stop() noexcept;
     void cleanup() noexcept;
     /// @}
@@ -58,7 +59,8 @@ class Instance {
     std::vector<std::string> uselessRemaps() const;
     /// Its place in the flight recorder.
     std::uint32_t slot() const noexcept { return slot_; }
-    /// The cycle of its every() in which it runs; chosen once, so that a change of others does not move it.
+    /// The cycle of its every() in which it runs; chosen once, so that a change of others does not
+    /// move it.
     std::uint32_t phase() const noexcept { return phase_.value_or(0); }
     bool hasPhase() const noexcept { return phase_.has_value(); }
     void setPhase(std::uint32_t phase) noexcept { phase_ = phase; }
@@ -69,12 +71,15 @@ class Instance {
     InputBase* findInput(const std::string& port) const noexcept;
 
     /// The parameters' values as last staged, in the order of declaration.
-    const std::vector<ParameterValue>& parameterValues() const noexcept { return parameter_values_; }
+    const std::vector<ParameterValue>& parameterValues() const noexcept {
+        return parameter_values_;
+    }
     /// Takes back a batch that the loop did not adopt.
     void restoreParameterValues(std::vector<ParameterValue> values);
-    /// Checks a batch, stages it and lets the component prepare for it. @return what to commit at the
-    /// boundary @throws Refusal naming the first bad one; nothing is staged then
-    std::vector<StagedValue*> stageParameters(const std::vector<std::pair<std::string, ParameterValue>>& batch);
+    /// Checks a batch, stages it and lets the component prepare for it. @return what to commit at
+    /// the boundary @throws Refusal naming the first bad one; nothing is staged then
+    std::vector<StagedValue*> stageParameters(
+        const std::vector<std::pair<std::string, ParameterValue>>& batch);
 
     /// What it threw out of update(); empty = nothing.
     const std::string& faultText() const noexcept { return fault_; }

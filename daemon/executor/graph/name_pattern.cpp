@@ -16,7 +16,8 @@ bool repeatsNothing(const std::string& expression) {
     char before = '|';
     for (const char c : expression) {
         const bool group = before == '(' && c == '?';  // (?: and the like
-        if (std::strchr("*+?", c) != nullptr && std::strchr(kBegin, before) != nullptr && !group) return true;
+        if (std::strchr("*+?", c) != nullptr && std::strchr(kBegin, before) != nullptr && !group)
+            return true;
         before = c;
     }
     return false;
@@ -32,7 +33,8 @@ const char* reason(std::regex_constants::error_type code, const std::string& exp
     if (code == error_brace || code == error_badbrace) return "a { } is not complete";
     if (code == error_escape) return "a \\ stands before what cannot be escaped";
     if (code == error_range) return "a range in [ ] is the wrong way round";
-    if (code == error_complexity || code == error_stack || code == error_space) return "it is too complex";
+    if (code == error_complexity || code == error_stack || code == error_space)
+        return "it is too complex";
     return "it is not an ECMAScript expression";
 }
 
@@ -44,7 +46,8 @@ NamePattern::NamePattern(const std::string& what, const std::string& expression)
         regex_.emplace(expression, std::regex::ECMAScript | std::regex::optimize);
     } catch (const std::regex_error& error) {
         throw Refusal(RefusalKind::InvalidArgument,
-                      fmt::format("{}: bad regular expression '{}': {}", what, expression, reason(error.code(), expression)));
+                      fmt::format("{}: bad regular expression '{}': {}", what, expression,
+                                  reason(error.code(), expression)));
     }
 }
 
@@ -53,7 +56,8 @@ bool NamePattern::matches(const std::string& name) const {
         return regex_ && std::regex_match(name, *regex_);
     } catch (const std::regex_error& error) {
         throw Refusal(RefusalKind::InvalidArgument,
-                      fmt::format("a regular expression takes too long on '{}': {}", name, reason(error.code())));
+                      fmt::format("a regular expression takes too long on '{}': {}", name,
+                                  reason(error.code())));
     }
 }
 

@@ -9,7 +9,9 @@ namespace rtcf::executor {
 
 namespace {
 
-bool isWordCharacter(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
+bool isWordCharacter(char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
+}
 bool isLetter(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; }
 
 // Removes doubled and trailing slashes.
@@ -25,20 +27,23 @@ std::string cleaned(const std::string& name) {
 }  // namespace
 
 bool isBaseName(const std::string& name) {
-    return !name.empty() && isLetter(name[0]) && std::all_of(name.begin(), name.end(), isWordCharacter);
+    return !name.empty() && isLetter(name[0]) &&
+           std::all_of(name.begin(), name.end(), isWordCharacter);
 }
 
 bool isGraphName(const std::string& name) {
     if (name.empty() || !(isLetter(name[0]) || name[0] == '/' || name[0] == '~')) return false;
-    return std::all_of(name.begin() + 1, name.end(), [](char c) { return isWordCharacter(c) || c == '/'; });
+    return std::all_of(name.begin() + 1, name.end(),
+                       [](char c) { return isWordCharacter(c) || c == '/'; });
 }
 
 std::string canonicalNamespace(const std::string& ns) {
     if (ns.empty()) return "/";
     const std::string absolute = cleaned(ns[0] == '/' ? ns : "/" + ns);
     if (!isGraphName(absolute)) {
-        throw Refusal(RefusalKind::InvalidArgument,
-                      "namespace '" + ns + "' is not a legal ROS name: letters, digits, _ and / only");
+        throw Refusal(
+            RefusalKind::InvalidArgument,
+            "namespace '" + ns + "' is not a legal ROS name: letters, digits, _ and / only");
     }
     return absolute;
 }
@@ -47,7 +52,8 @@ std::string joinName(const std::string& ns, const std::string& name) {
     return ns == "/" ? "/" + name : ns + "/" + name;
 }
 
-std::string resolveName(const std::string& name, const std::string& ns, const std::string& full_name) {
+std::string resolveName(const std::string& name, const std::string& ns,
+                        const std::string& full_name) {
     if (name[0] == '/') return cleaned(name);
     if (name[0] == '~') return cleaned(full_name + "/" + name.substr(1));
     return cleaned(joinName(ns, name));
@@ -58,7 +64,8 @@ std::string mappedName(const std::string& port, const std::string& ns, const std
     const std::string resolved = resolveName(port, ns, full_name);
     // Of two remaps of one name the later counts, as on a ROS command line.
     for (auto remap = remaps.rbegin(); remap != remaps.rend(); ++remap) {
-        if (resolveName(remap->first, ns, full_name) == resolved) return resolveName(remap->second, ns, full_name);
+        if (resolveName(remap->first, ns, full_name) == resolved)
+            return resolveName(remap->second, ns, full_name);
     }
     return resolved;
 }

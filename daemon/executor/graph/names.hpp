@@ -25,13 +25,15 @@ std::string canonicalNamespace(const std::string& ns);
 std::string joinName(const std::string& ns, const std::string& name);
 
 /// Resolves a name as a ROS node of namespace `ns` and full name `full_name` would.
-std::string resolveName(const std::string& name, const std::string& ns, const std::string& full_name);
+std::string resolveName(const std::string& name, const std::string& ns,
+                        const std::string& full_name);
 
 /// The mapped name of a port: resolved, remapped, resolved again, as ROS does for topics.
 std::string mappedName(const std::string& port, const std::string& ns, const std::string& full_name,
                        const Remaps& remaps);
 
-/// A component's name as a person gives it ("H1", "/arm/H1") as full name; relative ones are taken in "/".
+/// A component's name as a person gives it ("H1", "/arm/H1") as full name; relative ones are taken
+/// in "/".
 std::string fullNameOf(const std::string& given);
 
 }  // namespace rtcf::executor

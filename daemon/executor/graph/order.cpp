@@ -69,7 +69,8 @@ std::vector<Edge> findLoop(const OrderProblem& problem, const std::vector<Edge>&
 bool sameInput(const Edge& a, const Edge& b) { return a.to == b.to && a.to_port == b.to_port; }
 
 void removeInput(std::vector<Edge>& edges, const Edge& input) {
-    edges.erase(std::remove_if(edges.begin(), edges.end(), [&](const Edge& e) { return sameInput(e, input); }),
+    edges.erase(std::remove_if(edges.begin(), edges.end(),
+                               [&](const Edge& e) { return sameInput(e, input); }),
                 edges.end());
 }
 

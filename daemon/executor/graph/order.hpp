@@ -12,8 +12,8 @@ namespace rtcf::executor {
 
 /// A connection from an output to one input that the order has to respect.
 struct Edge {
-    std::size_t from;       ///< index of the writing component
-    std::size_t to;         ///< index of the reading component
+    std::size_t from;  ///< index of the writing component
+    std::size_t to;    ///< index of the reading component
     std::string from_port;
     std::string to_port;
 };
@@ -27,9 +27,10 @@ struct OrderProblem {
 
 /// An order, or why there is none.
 struct OrderResult {
-    std::vector<std::size_t> order;        ///< all components, if orderable
-    std::vector<Edge> loop;                ///< else a loop: each edge ends where the next begins
-    std::vector<std::vector<Edge>> cuts;   ///< for each edge of the loop, breaks with which there is an order
+    std::vector<std::size_t> order;  ///< all components, if orderable
+    std::vector<Edge> loop;          ///< else a loop: each edge ends where the next begins
+    std::vector<std::vector<Edge>>
+        cuts;  ///< for each edge of the loop, breaks with which there is an order
     bool orderable() const { return loop.empty(); }
 };
 

@@ -25,8 +25,10 @@ class Builder {
     void build() {
         plan_.schedule.generation = previous_.schedule.generation + 1;
         positions_.resize(plan_.graph.nodes().size());
-        for (std::size_t i = 0; i < plan_.wiring.order.size(); ++i) positions_[plan_.wiring.order[i]] = i;
-        for (const auto& [name, connection] : plan_.wiring.connections) addConnection(name, connection);
+        for (std::size_t i = 0; i < plan_.wiring.order.size(); ++i)
+            positions_[plan_.wiring.order[i]] = i;
+        for (const auto& [name, connection] : plan_.wiring.connections)
+            addConnection(name, connection);
         addSteps();
         adoption_.schedule = &plan_.schedule;
     }
@@ -50,7 +52,8 @@ class Builder {
             found != previous_.taps.end() && found->second->source() == output.slot().get()) {
             tap = found->second;
         } else {
-            tap = std::make_shared<Tap>(name, output.type(), output.slot(), tapCapacity(output.type(), frequency_hz_));
+            tap = std::make_shared<Tap>(name, output.type(), output.slot(),
+                                        tapCapacity(output.type(), frequency_hz_));
         }
         plan_.schedule.taps.push_back(tap.get());
         plan_.taps.emplace(name, std::move(tap));
@@ -59,7 +62,8 @@ class Builder {
     void addFeed(const std::string& name, const ConnectionPlan& connection) {
         std::shared_ptr<Injector> injector;
         if (const auto found = previous_.injectors.find(name);
-            found != previous_.injectors.end() && sameType(found->second->type(), *connection.type)) {
+            found != previous_.injectors.end() &&
+            sameType(found->second->type(), *connection.type)) {
             injector = found->second;
         } else {
             injector = std::make_shared<Injector>(name, *connection.type);
@@ -83,11 +87,14 @@ class Builder {
     void bindToWriter(const ConnectionPlan& connection, const Reader& reader) {
         const std::shared_ptr<SlotHeader>& slot = connection.writer->output->slot();
         // A loop break means the previous cycle, also where the writer runs earlier in this one.
-        const bool latched = reader.broken && positions_[connection.writer->node] <= positions_[reader.node];
-        const std::shared_ptr<SlotHeader> source = latched ? latchOf(*connection.writer, slot) : slot;
+        const bool latched =
+            reader.broken && positions_[connection.writer->node] <= positions_[reader.node];
+        const std::shared_ptr<SlotHeader> source =
+            latched ? latchOf(*connection.writer, slot) : slot;
         Binding binding = present(reader.input);
         if (binding.writer != slot.get() || binding.source != source.get()) {
-            adoption_.rewires.push_back({reader.input, source.get(), nullptr, binding.writer == slot.get()});
+            adoption_.rewires.push_back(
+                {reader.input, source.get(), nullptr, binding.writer == slot.get()});
             binding.writer = slot.get();
             binding.source = source.get();
             binding.source_owner = source;
@@ -95,14 +102,17 @@ class Builder {
         plan_.bindings.emplace(reader.input, std::move(binding));
     }
 
-    std::shared_ptr<SlotHeader> latchOf(const Writer& writer, const std::shared_ptr<SlotHeader>& slot) {
+    std::shared_ptr<SlotHeader> latchOf(const Writer& writer,
+                                        const std::shared_ptr<SlotHeader>& slot) {
         std::shared_ptr<SlotHeader>& latch = plan_.latches[slot.get()];
         if (!latch) {
             const TypeInfo& type = writer.output->type();
             const auto found = previous_.latches.find(slot.get());
             const bool is_new = found == previous_.latches.end();
-            latch = is_new ? type.make_slot(plan_.graph.nodes()[writer.node].instance->sample(writer.port))
-                           : found->second;
+            latch =
+                is_new
+                    ? type.make_slot(plan_.graph.nodes()[writer.node].instance->sample(writer.port))
+                    : found->second;
             plan_.schedule.latches.push_back({&type, latch.get(), slot.get()});
             if (is_new) adoption_.new_latches.push_back(plan_.schedule.latches.back());
         }
@@ -112,7 +122,8 @@ class Builder {
     void unbind(InputBase* input) {
         Binding binding = present(input);
         if (binding.source_owner == nullptr) return;  // never had a writer
-        if (binding.writer != nullptr) adoption_.rewires.push_back({input, nullptr, nullptr, false});
+        if (binding.writer != nullptr)
+            adoption_.rewires.push_back({input, nullptr, nullptr, false});
         binding.writer = nullptr;
         plan_.bindings.emplace(input, std::move(binding));
     }
@@ -126,10 +137,13 @@ class Builder {
         for (const std::size_t index : plan_.wiring.order) {
             Instance& instance = *plan_.graph.nodes()[index].instance;
             const ComponentDefinition& definition = instance.definition();
-            plan_.schedule.steps.push_back({&instance.component(), &instance.context(), instance.figures().get(),
-                                            instance.slot(), definition.every, instance.phase(), definition.optional});
-            if (Source* source = instance.source(); source != nullptr) plan_.schedule.source = source;
-            if (definition.every != 1 || !instance.component().finiteOutputs().empty()) plan_.schedule.plain = false;
+            plan_.schedule.steps.push_back(
+                {&instance.component(), &instance.context(), instance.figures().get(),
+                 instance.slot(), definition.every, instance.phase(), definition.optional});
+            if (Source* source = instance.source(); source != nullptr)
+                plan_.schedule.source = source;
+            if (definition.every != 1 || !instance.component().finiteOutputs().empty())
+                plan_.schedule.plain = false;
         }
     }
 
@@ -148,7 +162,8 @@ void Plan::noteKept(const Adoption& adoption, const Plan& previous) {
         if (found == bindings.end()) continue;
         Binding& binding = found->second;
         const auto before = previous.bindings.find(rewire.input);
-        const bool nothing_kept = before == previous.bindings.end() || rewire.kept == binding.source;
+        const bool nothing_kept =
+            before == previous.bindings.end() || rewire.kept == binding.source;
         if (nothing_kept) {
             binding.kept = nullptr;
             binding.kept_owner = nullptr;
@@ -166,8 +181,8 @@ BridgeTable Plan::bridgeTable() const {
     return table;
 }
 
-std::unique_ptr<Plan> buildPlan(Graph graph, Wiring wiring, const Plan& previous, double frequency_hz,
-                                Adoption& adoption) {
+std::unique_ptr<Plan> buildPlan(Graph graph, Wiring wiring, const Plan& previous,
+                                double frequency_hz, Adoption& adoption) {
     auto plan = std::make_unique<Plan>();
     plan->graph = std::move(graph);
     plan->wiring = std::move(wiring);

@@ -18,10 +18,10 @@ namespace rtcf::executor {
 
 /// Where an input reads, and who keeps that place alive.
 struct Binding {
-    const void* writer = nullptr;               ///< the output's slot or the injector; null = none any more
-    const SlotHeader* source = nullptr;         ///< null with an injector
+    const void* writer = nullptr;  ///< the output's slot or the injector; null = none any more
+    const SlotHeader* source = nullptr;  ///< null with an injector
     std::shared_ptr<const void> source_owner;
-    const SlotHeader* kept = nullptr;           ///< of an earlier writer, as long as it may be read
+    const SlotHeader* kept = nullptr;  ///< of an earlier writer, as long as it may be read
     std::shared_ptr<const void> kept_owner;
 };
 
@@ -44,7 +44,7 @@ struct Plan {
 /// @param previous the plan that the loop executes
 /// @param frequency_hz of the loop; sizes the taps' rings
 /// @param adoption gets the schedule and the inputs to rewire
-std::unique_ptr<Plan> buildPlan(Graph graph, Wiring wiring, const Plan& previous, double frequency_hz,
-                                Adoption& adoption);
+std::unique_ptr<Plan> buildPlan(Graph graph, Wiring wiring, const Plan& previous,
+                                double frequency_hz, Adoption& adoption);
 
 }  // namespace rtcf::executor

@@ -17,7 +17,8 @@ bool harmonic(std::uint32_t a, std::uint32_t b) { return a % b == 0 || b % a == 
 // The values next to `every`, below and above, that go with all of `rates`.
 std::string nearestRates(std::uint32_t every, const std::vector<std::uint32_t>& rates) {
     const auto works = [&](std::uint32_t candidate) {
-        return std::all_of(rates.begin(), rates.end(), [&](std::uint32_t rate) { return harmonic(candidate, rate); });
+        return std::all_of(rates.begin(), rates.end(),
+                           [&](std::uint32_t rate) { return harmonic(candidate, rate); });
     };
     std::uint32_t below = every;
     while (!works(below)) --below;  // 1 always works
@@ -27,7 +28,9 @@ std::string nearestRates(std::uint32_t every, const std::vector<std::uint32_t>& 
     return works(above) ? fmt::format("{} or {}", below, above) : std::to_string(below);
 }
 
-std::string suffix(std::uint32_t every) { return every == 1 ? "every cycle" : fmt::format("every {} cycles", every); }
+std::string suffix(std::uint32_t every) {
+    return every == 1 ? "every cycle" : fmt::format("every {} cycles", every);
+}
 
 }  // namespace
 
@@ -38,19 +41,24 @@ void assignPhases(const Graph& graph) {
         const ComponentDefinition& definition = node.instance->definition();
         for (const auto& [rate, other] : first_of_rate) {
             if (harmonic(rate, definition.every)) continue;
-            throw Refusal(RefusalKind::InvalidArgument,
-                          fmt::format("{} runs {}, which does not go with {} {}: one must divide the other; try --every {}",
-                                      node.instance->fullName(), suffix(definition.every), other->fullName(),
-                                      suffix(rate), nearestRates(definition.every, rates)));
+            throw Refusal(
+                RefusalKind::InvalidArgument,
+                fmt::format("{} runs {}, which does not go with {} {}: one must divide the other; "
+                            "try --every {}",
+                            node.instance->fullName(), suffix(definition.every), other->fullName(),
+                            suffix(rate), nearestRates(definition.every, rates)));
         }
-        if (first_of_rate.emplace(definition.every, node.instance.get()).second) rates.push_back(definition.every);
+        if (first_of_rate.emplace(definition.every, node.instance.get()).second)
+            rates.push_back(definition.every);
     }
     const std::uint32_t slowest = rates.empty() ? 1 : *std::max_element(rates.begin(), rates.end());
     if (slowest == 1) return;
     // How many slower components run in each cycle of the slowest rate.
     std::vector<std::uint32_t> load(slowest, 0);
     const auto occupy = [&](const Instance& instance) {
-        for (std::uint32_t cycle = instance.phase(); cycle < slowest; cycle += instance.definition().every) ++load[cycle];
+        for (std::uint32_t cycle = instance.phase(); cycle < slowest;
+             cycle += instance.definition().every)
+            ++load[cycle];
     };
     std::vector<Instance*> open;
     for (const GraphNode& node : graph.nodes()) {
@@ -66,7 +74,8 @@ void assignPhases(const Graph& graph) {
         const std::uint32_t every = instance->definition().every;
         const auto heaviest = [&](std::uint32_t phase) {
             std::uint32_t most = 0;
-            for (std::uint32_t cycle = phase; cycle < slowest; cycle += every) most = std::max(most, load[cycle]);
+            for (std::uint32_t cycle = phase; cycle < slowest; cycle += every)
+                most = std::max(most, load[cycle]);
             return most;
         };
         std::uint32_t best = 0;

@@ -25,11 +25,14 @@ std::string describe(const TypeInfo& type, const TypeInfo& other) {
     return fmt::format("{} (md5 {}, {} bytes)", type.name, type.md5, type.size);
 }
 
-[[noreturn]] void refuseTypes(const std::string& name, const std::string& present, const TypeInfo& present_type,
-                              const std::string& added, const TypeInfo& added_type) {
-    throw Refusal(RefusalKind::FailedPrecondition,
-                  fmt::format("types differ on {}: {} is {}, {} is {}; remap one of them to another name", name,
-                              present, describe(present_type, added_type), added, describe(added_type, present_type)));
+[[noreturn]] void refuseTypes(const std::string& name, const std::string& present,
+                              const TypeInfo& present_type, const std::string& added,
+                              const TypeInfo& added_type) {
+    throw Refusal(
+        RefusalKind::FailedPrecondition,
+        fmt::format("types differ on {}: {} is {}, {} is {}; remap one of them to another name",
+                    name, present, describe(present_type, added_type), added,
+                    describe(added_type, present_type)));
 }
 
 class Collector {
@@ -41,36 +44,44 @@ class Collector {
         const GraphNode& node = graph_.nodes()[index];
         const Instance& instance = *node.instance;
         const auto& outputs = instance.component().outputs();
-        for (std::size_t i = 0; i < outputs.size(); ++i) addOutput(index, i, outputs[i], instance.outputNames()[i]);
+        for (std::size_t i = 0; i < outputs.size(); ++i)
+            addOutput(index, i, outputs[i], instance.outputNames()[i]);
         const auto& inputs = instance.component().inputs();
-        for (std::size_t i = 0; i < inputs.size(); ++i) addInput(index, node, inputs[i], instance.inputNames()[i]);
+        for (std::size_t i = 0; i < inputs.size(); ++i)
+            addInput(index, node, inputs[i], instance.inputNames()[i]);
     }
 
    private:
-    ConnectionPlan& planFor(const std::string& name, std::size_t index, const std::string& port, const TypeInfo& type) {
+    ConnectionPlan& planFor(const std::string& name, std::size_t index, const std::string& port,
+                            const TypeInfo& type) {
         ConnectionPlan& plan = connections_[name];
         if (plan.type == nullptr) {
             plan.type = &type;
         } else if (!sameType(*plan.type, type)) {
-            const std::string present = plan.writer ? portName(graph_, plan.writer->node, plan.writer->output->name())
-                                                    : portName(graph_, plan.readers[0].node, plan.readers[0].input->name());
+            const std::string present =
+                plan.writer ? portName(graph_, plan.writer->node, plan.writer->output->name())
+                            : portName(graph_, plan.readers[0].node, plan.readers[0].input->name());
             refuseTypes(name, present, *plan.type, portName(graph_, index, port), type);
         }
         return plan;
     }
 
-    void addOutput(std::size_t index, std::size_t port, OutputBase* output, const std::string& name) {
+    void addOutput(std::size_t index, std::size_t port, OutputBase* output,
+                   const std::string& name) {
         ConnectionPlan& plan = planFor(name, index, output->name(), output->type());
         if (plan.writer) {
-            throw Refusal(RefusalKind::FailedPrecondition,
-                          fmt::format("{} has two writers: {} and {}; remap one of them, e.g. --remap {}:=~{}", name,
-                                      portName(graph_, plan.writer->node, plan.writer->output->name()),
-                                      portName(graph_, index, output->name()), output->name(), output->name()));
+            throw Refusal(
+                RefusalKind::FailedPrecondition,
+                fmt::format(
+                    "{} has two writers: {} and {}; remap one of them, e.g. --remap {}:=~{}", name,
+                    portName(graph_, plan.writer->node, plan.writer->output->name()),
+                    portName(graph_, index, output->name()), output->name(), output->name()));
         }
         plan.writer = Writer{index, port, output};
     }
 
-    void addInput(std::size_t index, const GraphNode& node, InputBase* input, const std::string& name) {
+    void addInput(std::size_t index, const GraphNode& node, InputBase* input,
+                  const std::string& name) {
         const Instance& instance = *node.instance;
         ConnectionPlan& plan = planFor(name, index, input->name(), input->type());
         const bool broken = instance.definition().first || node.breaks.count(input->name()) != 0 ||
@@ -82,7 +93,8 @@ class Collector {
     std::map<std::string, ConnectionPlan>& connections_;
 };
 
-std::string breakCommand(const Graph& graph, const std::vector<Edge>& cut, const std::string& loading) {
+std::string breakCommand(const Graph& graph, const std::vector<Edge>& cut,
+                         const std::string& loading) {
     std::string command;
     std::string options;
     for (const Edge& edge : cut) {
@@ -96,13 +108,14 @@ std::string breakCommand(const Graph& graph, const std::vector<Edge>& cut, const
     std::string advice;
     if (!command.empty()) advice = fmt::format("`rtcfctl break{}`", command);
     if (!options.empty()) {
-        advice += fmt::format("{}loading {} with `{}`", advice.empty() ? "" : " and ", shortName(loading),
-                              options.substr(1));
+        advice += fmt::format("{}loading {} with `{}`", advice.empty() ? "" : " and ",
+                              shortName(loading), options.substr(1));
     }
     return advice;
 }
 
-[[noreturn]] void refuseLoop(const Graph& graph, const OrderResult& result, const std::string& loading) {
+[[noreturn]] void refuseLoop(const Graph& graph, const OrderResult& result,
+                             const std::string& loading) {
     // Of a loop that nobody could read, both ends.
     constexpr std::size_t kListedAtEachEnd = 10;
     constexpr std::size_t kListedCuts = 5;
@@ -114,7 +127,8 @@ std::string breakCommand(const Graph& graph, const std::vector<Edge>& cut, const
             loop += fmt::format(" → … {} more connections …", length - 2 * kListedAtEachEnd);
         }
         const Edge& edge = result.loop[i];
-        loop += fmt::format("{}{} → {}", loop.empty() ? "" : " → ", portName(graph, edge.from, edge.from_port),
+        loop += fmt::format("{}{} → {}", loop.empty() ? "" : " → ",
+                            portName(graph, edge.from, edge.from_port),
                             portName(graph, edge.to, edge.to_port));
     }
     std::string advice;
@@ -122,8 +136,10 @@ std::string breakCommand(const Graph& graph, const std::vector<Edge>& cut, const
         advice += (advice.empty() ? "" : ", or ") + breakCommand(graph, result.cuts[i], loading);
     }
     if (result.cuts.size() > kListedCuts) advice += ", or elsewhere in the loop";
-    throw Refusal(RefusalKind::FailedPrecondition,
-                  fmt::format("the connections form a loop: {}; let one input read the previous cycle: {}", loop, advice));
+    throw Refusal(
+        RefusalKind::FailedPrecondition,
+        fmt::format("the connections form a loop: {}; let one input read the previous cycle: {}",
+                    loop, advice));
 }
 
 OrderProblem orderProblem(const Graph& graph, const Wiring& wiring) {
@@ -136,7 +152,8 @@ OrderProblem orderProblem(const Graph& graph, const Wiring& wiring) {
         if (!plan.writer) continue;
         for (const Reader& reader : plan.readers) {
             if (!reader.broken) {
-                problem.edges.push_back({plan.writer->node, reader.node, plan.writer->output->name(), reader.input->name()});
+                problem.edges.push_back({plan.writer->node, reader.node,
+                                         plan.writer->output->name(), reader.input->name()});
             }
         }
     }
@@ -149,9 +166,10 @@ void requireOneSource(const Graph& graph) {
     for (const GraphNode& node : graph.nodes()) {
         if (node.instance->source() == nullptr) continue;
         if (present != nullptr) {
-            throw Refusal(RefusalKind::FailedPrecondition,
-                          fmt::format("{} and {} both pace the loop: put one of them into another runner",
-                                      present->fullName(), node.instance->fullName()));
+            throw Refusal(
+                RefusalKind::FailedPrecondition,
+                fmt::format("{} and {} both pace the loop: put one of them into another runner",
+                            present->fullName(), node.instance->fullName()));
         }
         present = node.instance.get();
     }

@@ -18,20 +18,22 @@ namespace rtcf::executor {
 struct MappingFilter {
     NamePattern whitelist;
     NamePattern blacklist;
-    bool matches(const std::string& name) const { return whitelist.matches(name) && !blacklist.matches(name); }
+    bool matches(const std::string& name) const {
+        return whitelist.matches(name) && !blacklist.matches(name);
+    }
 };
 
 /// An input within a graph.
 struct Reader {
-    std::size_t node;   ///< index into Graph::nodes()
+    std::size_t node;  ///< index into Graph::nodes()
     InputBase* input;
-    bool broken;        ///< its connection is a loop break
+    bool broken;  ///< its connection is a loop break
 };
 
 /// An output within a graph.
 struct Writer {
     std::size_t node;
-    std::size_t port;    ///< index into the component's outputs()
+    std::size_t port;  ///< index into the component's outputs()
     OutputBase* output;
 };
 

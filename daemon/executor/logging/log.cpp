@@ -60,7 +60,8 @@ void Log::drain() {
         const LogRecord* other = others_.front();
         const LogRecord* realtime = realtime_.front();
         if (other == nullptr && realtime == nullptr) break;
-        const bool is_realtime = other == nullptr || (realtime != nullptr && realtime->time_ns < other->time_ns);
+        const bool is_realtime =
+            other == nullptr || (realtime != nullptr && realtime->time_ns < other->time_ns);
         drainOne(is_realtime ? realtime_ : others_);
     }
     reportDrops();
@@ -80,7 +81,8 @@ void Log::drainOne(Ring& ring) {
     try {
         record->render(*record, entry.message);
     } catch (const std::exception& error) {
-        entry.message = fmt::format("{} (cannot be formatted: {})", record->site->format, error.what());
+        entry.message =
+            fmt::format("{} (cannot be formatted: {})", record->site->format, error.what());
     }
     ring.pop();
     consumer_(std::move(entry));

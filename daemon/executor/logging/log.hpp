@@ -20,7 +20,7 @@ struct LogEntry {
     LogLevel level = LogLevel::Info;
     std::int64_t time_ns = 0;  ///< CLOCK_REALTIME, ns since 1970
     std::uint64_t iteration = 0;
-    std::string component;     ///< full name; empty = the executor
+    std::string component;  ///< full name; empty = the executor
     std::string message;
     std::string file;
     std::uint32_t line = 0;
@@ -52,7 +52,9 @@ class Log final : public LogSink {
     /// Marks the calling thread as the one real-time thread (or not any more).
     /// @param iteration the loop's counter, read at each claim of any thread
     static void setRealtimeThread(bool realtime) noexcept;
-    void setIteration(const std::atomic<std::uint64_t>* iteration) noexcept { iteration_ = iteration; }
+    void setIteration(const std::atomic<std::uint64_t>* iteration) noexcept {
+        iteration_ = iteration;
+    }
 
    private:
     static constexpr std::size_t kCapacity = 1024;
@@ -64,7 +66,7 @@ class Log final : public LogSink {
     Consumer consumer_;
     Ring realtime_;
     Ring others_;
-    std::mutex others_mutex_;   // held from claim() to commit() by threads that are not real-time
+    std::mutex others_mutex_;  // held from claim() to commit() by threads that are not real-time
     std::mutex drain_mutex_;
     std::uint64_t reported_drops_ = 0;
     const std::atomic<std::uint64_t>* iteration_ = nullptr;

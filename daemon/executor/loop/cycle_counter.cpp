@@ -1,6 +1,5 @@
 #include "loop/cycle_counter.hpp"
 
-
 namespace rtcf::executor {
 
 namespace {
@@ -34,7 +33,8 @@ CycleCounter CycleCounter::calibrate() {
     nanosleep(&pause, nullptr);
     const Pair end = readBoth();
     CycleCounter counter;
-    counter.ns_per_tick_ = static_cast<double>(end.ns - begin.ns) / static_cast<double>(end.ticks - begin.ticks);
+    counter.ns_per_tick_ =
+        static_cast<double>(end.ns - begin.ns) / static_cast<double>(end.ticks - begin.ticks);
     const auto one = static_cast<double>(std::int64_t{1} << kShift);
     counter.multiplier_ = static_cast<std::int64_t>(counter.ns_per_tick_ * one);
     counter.inverse_ = static_cast<std::int64_t>(one / counter.ns_per_tick_);

@@ -35,7 +35,11 @@ void bump(std::atomic<std::uint64_t>& counter, std::uint64_t by = 1) {
 }  // namespace
 
 Loop::Loop(Log& log, FlightRecorder& recorder)
-    : log_(log), recorder_(recorder), notes_(recorder.realtimeNotes()), counter_(CycleCounter::calibrate()), schedule_(&empty_) {
+    : schedule_(&empty_),
+      notes_(recorder.realtimeNotes()),
+      log_(log),
+      recorder_(recorder),
+      counter_(CycleCounter::calibrate()) {
     log_.setIteration(&figures_.iteration);
 }
 
@@ -75,7 +79,8 @@ void Loop::beginStepping(const LoopSettings& settings) {
 
 std::uint64_t Loop::step(std::uint64_t cycles) noexcept {
     for (std::uint64_t done = 0; done < cycles; ++done) {
-        if (stop_requested_.load(std::memory_order_acquire) || fault_.kind != LoopFault::Kind::None) return done;
+        if (stop_requested_.load(std::memory_order_acquire) || fault_.kind != LoopFault::Kind::None)
+            return done;
         const std::int64_t period = clock_.period_ns;
         const std::int64_t now = clock_.time_ns + (clock_.iteration == 0 ? 0 : period);
         cycle(now, now);
@@ -94,13 +99,15 @@ RealtimeProblems Loop::start(const LoopSettings& settings) {
     running_.store(true, std::memory_order_release);
     joinable_.store(true, std::memory_order_release);
     const RealtimeAttributes attributes(settings.realtime);
-    if (const int error = pthread_create(&thread_, attributes.get(), &Loop::threadMain, this); error != 0) {
+    if (const int error = pthread_create(&thread_, attributes.get(), &Loop::threadMain, this);
+        error != 0) {
         running_.store(false, std::memory_order_release);
         joinable_.store(false, std::memory_order_release);
         idle_guard_.reset();
-        throw Refusal(RefusalKind::FailedPrecondition,
-                      fmt::format("no real-time thread: {} (CPU {}, priority {})", std::strerror(error),
-                                  chooseCpu(settings.realtime), settings.realtime.priority));
+        throw Refusal(
+            RefusalKind::FailedPrecondition,
+            fmt::format("no real-time thread: {} (CPU {}, priority {})", std::strerror(error),
+                        chooseCpu(settings.realtime), settings.realtime.priority));
     }
     return problems;
 }
@@ -139,7 +146,8 @@ bool Loop::adopt(Adoption& adoption, std::int64_t timeout_ns) {
         nanosleep(&pause, nullptr);
     }
     Adoption* expected = &adoption;
-    if (pending_.compare_exchange_strong(expected, nullptr, std::memory_order_acq_rel)) return false;
+    if (pending_.compare_exchange_strong(expected, nullptr, std::memory_order_acq_rel))
+        return false;
     // The loop has got to it after all: it is done in a moment.
     while (pending_.load(std::memory_order_acquire) != nullptr) sched_yield();
     return true;
@@ -157,7 +165,8 @@ RealtimeProblems Loop::retune(const LoopSettings& settings) {
 }
 
 void Loop::refreshWallClock() noexcept {
-    stamp_offset_ns_.store(clockNow(CLOCK_REALTIME) - clockNow(CLOCK_MONOTONIC), std::memory_order_relaxed);
+    stamp_offset_ns_.store(clockNow(CLOCK_REALTIME) - clockNow(CLOCK_MONOTONIC),
+                           std::memory_order_relaxed);
 }
 
 bool Loop::popRecord(CycleRecord& record) {
@@ -189,7 +198,8 @@ void Loop::run() noexcept {
     prefaultStack(stack_bytes_);
     recorder_.setRunning(true);
     std::int64_t deadline = clockNow(CLOCK_MONOTONIC) + clock_.period_ns;
-    while (!stop_requested_.load(std::memory_order_acquire) && fault_.kind == LoopFault::Kind::None) {
+    while (!stop_requested_.load(std::memory_order_acquire) &&
+           fault_.kind == LoopFault::Kind::None) {
         std::int64_t wake = 0;
         if (Source* source = schedule_->source; source != nullptr) {
             wake = waitForSource(*source);
@@ -253,8 +263,8 @@ void Loop::cycle(std::int64_t deadline_ns, std::int64_t wake_ns) noexcept RTCF_N
     }
     const std::uint64_t iteration = clock_.iteration;
     notes.setIteration(iteration);
-    const bool complete =
-        iteration >= plain_from_ ? update<true>(schedule, notes, begin) : updateSelected(schedule, begin);
+    const bool complete = iteration >= plain_from_ ? update<true>(schedule, notes, begin)
+                                                   : updateSelected(schedule, begin);
     notes.leaveComponents();
     if (exchanges_ && complete) {
         for (Tap* tap : schedule.taps) tap->push();
@@ -275,8 +285,9 @@ void Loop::cycle(std::int64_t deadline_ns, std::int64_t wake_ns) noexcept RTCF_N
 // The one frame that catches: a component may throw, the loop may not. `Plain` leaves out what
 // most graphs do not have, so that it costs them nothing.
 template <bool Plain>
-[[gnu::always_inline]] inline bool Loop::update(const Schedule& schedule, FlightRecorder::RealtimeNotes notes,
-                                                 std::int64_t begin_ticks) noexcept {
+[[gnu::always_inline]] inline bool Loop::update(const Schedule& schedule,
+                                                FlightRecorder::RealtimeNotes notes,
+                                                std::int64_t begin_ticks) noexcept {
     std::int64_t before = begin_ticks;
     const Step* running = nullptr;
     try {
@@ -301,18 +312,21 @@ template <bool Plain>
     return false;
 }
 
-// Cycles in which not all is plain; a function of its own, as it needs registers that the others do not.
-[[gnu::noinline]] bool Loop::updateSelected(const Schedule& schedule, std::int64_t begin_ticks) noexcept {
+// Cycles in which not all is plain; a function of its own, as it needs registers that the others do
+// not.
+[[gnu::noinline]] bool Loop::updateSelected(const Schedule& schedule,
+                                            std::int64_t begin_ticks) noexcept {
     total_elapsed_ns_ += elapsed_ns_;
     return update<false>(schedule, notes_, begin_ticks);
 }
 
 // Whether a component runs in this cycle; then its clock is set.
-bool Loop::due(const Step& step) noexcept RTCF_NONBLOCKING {
+bool Loop::due(const Step& step) const noexcept RTCF_NONBLOCKING {
     ComponentContext& context = *step.context;
     if (context.disabled || clock_.iteration % step.every != step.phase) return false;
     const bool again = context.updated_ns >= 0 && step.every != 1;
-    context.elapsed_ns = again ? total_elapsed_ns_ - context.updated_ns : std::max(elapsed_ns_, context.period_ns);
+    context.elapsed_ns =
+        again ? total_elapsed_ns_ - context.updated_ns : std::max(elapsed_ns_, context.period_ns);
     context.updated_ns = total_elapsed_ns_;
     return true;
 }
@@ -339,7 +353,8 @@ void Loop::componentFailed(LoopFault::Kind kind, const Step& step, const char* t
     reportFault(kind, step.component, text);
 }
 
-void Loop::reportFault(LoopFault::Kind kind, const Component* component, const char* text) noexcept {
+void Loop::reportFault(LoopFault::Kind kind, const Component* component,
+                       const char* text) noexcept {
     ComponentFault* fault = faults_.claim();
     if (fault == nullptr) return;  // there are many of them already
     *fault = {};
@@ -354,7 +369,8 @@ void Loop::noteFault(LoopFault::Kind kind, const Component* component, const cha
     fault_.kind = kind;
     fault_.component = component;
     if (component != nullptr) {
-        std::strncpy(fault_.component_name.data(), component->fullName().c_str(), fault_.component_name.size() - 1);
+        std::strncpy(fault_.component_name.data(), component->fullName().c_str(),
+                     fault_.component_name.size() - 1);
     }
     fault_.iteration = clock_.iteration;
     std::strncpy(fault_.text.data(), text, fault_.text.size() - 1);
@@ -371,7 +387,8 @@ void Loop::takeAdoption() noexcept RTCF_NONBLOCKING {
         clock_.period_ns = adoption->period_ns;
         elapsed_ns_ = adoption->period_ns;
     }
-    for (const Step& step : schedule_->steps) step.context->period_ns = clock_.period_ns * step.every;
+    for (const Step& step : schedule_->steps)
+        step.context->period_ns = clock_.period_ns * step.every;
     noteSchedule();
     pending_.store(nullptr, std::memory_order_release);
 }
@@ -380,7 +397,8 @@ void Loop::takeAdoption() noexcept RTCF_NONBLOCKING {
 void Loop::noteSchedule() noexcept RTCF_NONBLOCKING {
     plain_from_ = schedule_->plain && !any_disabled_ ? warmup_cycles_ : UINT64_MAX;
     for (const Step& step : schedule_->steps) step.context->elapsed_ns = elapsed_ns_;
-    exchanges_ = !schedule_->feeds.empty() || !schedule_->latches.empty() || !schedule_->taps.empty();
+    exchanges_ =
+        !schedule_->feeds.empty() || !schedule_->latches.empty() || !schedule_->taps.empty();
 }
 
 // Components learn of it when it changes: after an overrun, and in the cycle after that.
@@ -397,7 +415,8 @@ bool Loop::probe(Probe& probe, std::int64_t timeout_ns) {
     }
     probe_.store(&probe, std::memory_order_release);
     const std::int64_t until = clockNow(CLOCK_MONOTONIC) + timeout_ns;
-    while (probe_.load(std::memory_order_acquire) != nullptr && running() && clockNow(CLOCK_MONOTONIC) < until) {
+    while (probe_.load(std::memory_order_acquire) != nullptr && running() &&
+           clockNow(CLOCK_MONOTONIC) < until) {
         const timespec pause{0, 100'000};
         nanosleep(&pause, nullptr);
     }
@@ -429,15 +448,18 @@ void Loop::feed() noexcept RTCF_NONBLOCKING {
 }
 
 // Counts an overrun for the component that was running when the next cycle should have begun.
-void Loop::blameOverrun(std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept RTCF_NONBLOCKING {
+void Loop::blameOverrun(std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept
+    RTCF_NONBLOCKING {
     for (const Step& step : schedule_->steps) {
-        if (step.ended_ticks < begin_ticks || step.ended_ticks <= limit_ticks) continue;  // not now, or in time
+        if (step.ended_ticks < begin_ticks || step.ended_ticks <= limit_ticks)
+            continue;  // not now, or in time
         bump(step.figures->overruns);
         return;
     }
 }
 
-std::int64_t Loop::nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) noexcept RTCF_NONBLOCKING {
+std::int64_t Loop::nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) noexcept
+    RTCF_NONBLOCKING {
     const std::int64_t period = clock_.period_ns;
     const std::int64_t next = deadline_ns + period;
     if (end_ns < next) {

@@ -30,10 +30,10 @@ enum class OverrunPolicy { Skip, CatchUp, Relative };
 
 struct LoopSettings {
     std::int64_t period_ns = 1'000'000;
-    std::int64_t spin_ns = 0;             ///< busy wait before each deadline
+    std::int64_t spin_ns = 0;  ///< busy wait before each deadline
     OverrunPolicy overrun = OverrunPolicy::Skip;
-    std::uint32_t max_overruns = 0;       ///< leaky bucket; 0 = never stop for overruns
-    std::uint64_t warmup_cycles = 10;     ///< first cycles, kept out of the figures
+    std::uint32_t max_overruns = 0;    ///< leaky bucket; 0 = never stop for overruns
+    std::uint64_t warmup_cycles = 10;  ///< first cycles, kept out of the figures
     RealtimeSettings realtime;
 };
 
@@ -49,10 +49,11 @@ struct CycleRecord {
 struct LoopFault {
     enum class Kind { None, Exception, NotFinite, Overruns };
     Kind kind = Kind::None;
-    const Component* component = nullptr;  ///< the culprit, if it is one component; for comparison only
+    const Component* component =
+        nullptr;  ///< the culprit, if it is one component; for comparison only
     std::array<char, 240> component_name{};  ///< its full name, as it may be gone when this is read
     std::uint64_t iteration = 0;
-    std::array<char, 240> text{};          ///< what the exception said
+    std::array<char, 240> text{};  ///< what the exception said
 };
 
 /// A component that failed while the loop goes on.
@@ -91,8 +92,8 @@ class Loop {
     /// Waits for the end of a loop that was asked to end or ended by itself, at most `timeout_ns`.
     /// @return false if it goes on
     bool join(std::int64_t timeout_ns);
-    /// Executes cycles back to back on a simulated clock that begins at 0 with beginStepping(); while
-    /// the loop does not run. The same graph and inputs give the same values, bit by bit.
+    /// Executes cycles back to back on a simulated clock that begins at 0 with beginStepping();
+    /// while the loop does not run. The same graph and inputs give the same values, bit by bit.
     /// @return cycles done; fewer if a component failed, or after requestStop()
     std::uint64_t step(std::uint64_t cycles) noexcept;
     /// Sets counters and clock as start() does, for step().
@@ -108,14 +109,18 @@ class Loop {
     bool probe(Probe& probe, std::int64_t timeout_ns);
     /// Follows the wall clock for stamp(); to be called now and then.
     void refreshWallClock() noexcept;
-    void setSpin(std::int64_t spin_ns) noexcept { spin_ns_.store(spin_ns, std::memory_order_relaxed); }
-    /// New settings for a running loop (CPU, priority, spin, overrun policy); the period goes by adopt().
+    void setSpin(std::int64_t spin_ns) noexcept {
+        spin_ns_.store(spin_ns, std::memory_order_relaxed);
+    }
+    /// New settings for a running loop (CPU, priority, spin, overrun policy); the period goes by
+    /// adopt().
     RealtimeProblems retune(const LoopSettings& settings);
     /// After join().
     const LoopFault& fault() const noexcept { return fault_; }
     /// Takes the oldest cycle record. @return false if there is none
     bool popRecord(CycleRecord& record);
-    /// Takes the oldest report of a component that failed without ending the loop. @return false if there is none
+    /// Takes the oldest report of a component that failed without ending the loop. @return false if
+    /// there is none
     bool popFault(ComponentFault& fault);
     /// @}
 
@@ -145,10 +150,11 @@ class Loop {
     void run() noexcept;
     void cycle(std::int64_t deadline_ns, std::int64_t wake_ns) noexcept RTCF_NONBLOCKING;
     template <bool Plain>
-    bool update(const Schedule& schedule, FlightRecorder::RealtimeNotes notes, std::int64_t begin_ticks) noexcept;
+    bool update(const Schedule& schedule, FlightRecorder::RealtimeNotes notes,
+                std::int64_t begin_ticks) noexcept;
     bool updateSelected(const Schedule& schedule, std::int64_t begin_ticks) noexcept;
     bool requested() const noexcept RTCF_NONBLOCKING;
-    bool due(const Step& step) noexcept RTCF_NONBLOCKING;
+    bool due(const Step& step) const noexcept RTCF_NONBLOCKING;
     void commitFinite(const Step& step) noexcept RTCF_NONBLOCKING;
     void componentFailed(LoopFault::Kind kind, const Step& step, const char* text) noexcept;
     void reportFault(LoopFault::Kind kind, const Component* component, const char* text) noexcept;
@@ -159,38 +165,43 @@ class Loop {
     void noteSchedule() noexcept RTCF_NONBLOCKING;
     void setElapsed(std::int64_t elapsed_ns) noexcept RTCF_NONBLOCKING;
     void blameOverrun(std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept RTCF_NONBLOCKING;
-    std::int64_t nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) noexcept RTCF_NONBLOCKING;
+    std::int64_t nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) noexcept
+        RTCF_NONBLOCKING;
     std::int64_t waitFor(std::int64_t deadline_ns) noexcept;
     std::int64_t waitForSource(Source& source) noexcept;
     void makeSafe() noexcept;
 
+    // What every cycle touches, in two cache lines: after a sleep, memory costs more than work.
+    // Owned by whoever runs cycles: the thread, or the graph thread while there is none.
+    alignas(64) const Schedule* schedule_;
+    const FlightRecorder::RealtimeNotes notes_;
+    LoopClock clock_;
+    std::uint64_t plain_from_ = UINT64_MAX;  // first iteration in which all is plain, see update()
+    std::uint64_t warmup_cycles_ = 0;
+    bool exchanges_ = false;  // the schedule has feeds, latches or taps
+    // Shared.
+    std::atomic<std::int64_t> stamp_offset_ns_{0};  // CLOCK_REALTIME minus CLOCK_MONOTONIC
+    std::atomic<Probe*> probe_{nullptr};
+    std::atomic<Adoption*> pending_{nullptr};
+    std::atomic<bool> stop_requested_{false};
+
     Log& log_;
     FlightRecorder& recorder_;
-    const FlightRecorder::RealtimeNotes notes_;
     CycleCounter counter_;
     pthread_t thread_{};
     std::unique_ptr<IdleStateGuard> idle_guard_;
 
-    // Owned by whoever runs cycles: the thread, or the graph thread while there is none.
-    const Schedule* schedule_;
-    LoopClock clock_;
+    // As above: of whoever runs cycles.
     std::int64_t elapsed_ns_ = 0;        // whole periods since the last cycle
     std::int64_t total_elapsed_ns_ = 0;  // loop time in whole periods
-    std::uint64_t warmup_cycles_ = 0;
     bool any_disabled_ = false;
-    std::uint64_t plain_from_ = UINT64_MAX;    // first iteration in which all is plain, see update()
-    bool exchanges_ = false;                   // the schedule has feeds, latches or taps
     std::uint32_t bucket_ = 0;
     std::uint64_t cycles_on_time_ = 0;
     LoopFault fault_;
 
     // Shared.
-    std::atomic<std::int64_t> stamp_offset_ns_{0};  // CLOCK_REALTIME minus CLOCK_MONOTONIC
-    std::atomic<Probe*> probe_{nullptr};
-    Probe claimed_probe_;       // stands in probe_ while a probe is taken
-    Adoption claimed_;          // stands in pending_ while an adoption is applied
-    std::atomic<Adoption*> pending_{nullptr};
-    std::atomic<bool> stop_requested_{false};
+    Probe claimed_probe_;  // stands in probe_ while a probe is taken
+    Adoption claimed_;     // stands in pending_ while an adoption is applied
     std::atomic<bool> running_{false};
     std::atomic<bool> joinable_{false};
     std::atomic<int> thread_id_{0};

@@ -17,10 +17,10 @@ class Probe {
    public:
     /// What was found at one port.
     struct Value {
-        std::uint64_t sequence = 0;        ///< writes so far; 0 = there is no value
-        std::uint64_t seen = 0;            ///< input: writes its component has read
-        std::int64_t age_ns = 0;           ///< loop time since the write, ns
-        std::optional<std::string> text;   ///< unset without a value, or if it is too large to copy
+        std::uint64_t sequence = 0;       ///< writes so far; 0 = there is no value
+        std::uint64_t seen = 0;           ///< input: writes its component has read
+        std::int64_t age_ns = 0;          ///< loop time since the write, ns
+        std::optional<std::string> text;  ///< unset without a value, or if it is too large to copy
     };
 
     /// Adds a port. @return its index for value()
@@ -37,7 +37,7 @@ class Probe {
     static constexpr std::size_t kLargest = 16384;  // bytes of a value that is copied
 
     struct Item {
-        const InputBase* input;    // one of the two is set
+        const InputBase* input;  // one of the two is set
         const OutputBase* output;
         const TypeInfo* type;
         SlotHeader header;

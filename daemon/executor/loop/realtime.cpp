@@ -21,7 +21,8 @@ namespace {
 
 constexpr std::size_t kThreadStack = 512 * 1024;  // for threads that are not real-time
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-constexpr std::size_t kStackReserve = 2048 * 1024;  // a sanitizer keeps much of its own in each stack
+constexpr std::size_t kStackReserve =
+    2048 * 1024;  // a sanitizer keeps much of its own in each stack
 #else
 constexpr std::size_t kStackReserve = 64 * 1024;  // for libc and the loop itself
 #endif
@@ -38,11 +39,12 @@ void prefaultHeap(std::size_t bytes) {
 }
 
 std::string fifoProblem(const RealtimeSettings& settings, int error) {
-    return fmt::format("no SCHED_FIFO priority {}: {} (needs CAP_SYS_NICE or LimitRTPRIO)", settings.priority,
-                       systemError(error));
+    return fmt::format("no SCHED_FIFO priority {}: {} (needs CAP_SYS_NICE or LimitRTPRIO)",
+                       settings.priority, systemError(error));
 }
 
-// Asks the kernel with the calling thread, which then goes back to what it was. @return errno, 0 = allowed
+// Asks the kernel with the calling thread, which then goes back to what it was. @return errno, 0 =
+// allowed
 int tryFifo(unsigned priority) {
     sched_param present{};
     int policy = 0;
@@ -73,9 +75,11 @@ RealtimeProblems lockMemory(const RealtimeSettings& settings) {
     RealtimeProblems problems;
     if (settings.lock_memory) {
         if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
-            problems.push_back({fmt::format("memory is not locked: {} (needs CAP_IPC_LOCK or LimitMEMLOCK=infinity)",
-                                            systemError(errno)),
-                                true});
+            problems.push_back(
+                {fmt::format(
+                     "memory is not locked: {} (needs CAP_IPC_LOCK or LimitMEMLOCK=infinity)",
+                     systemError(errno)),
+                 true});
         }
     } else {
         munlockall();
@@ -104,7 +108,9 @@ RealtimeProblems checkScheduling(const RealtimeSettings& settings) {
     }
     std::ifstream realtime_kernel("/sys/kernel/realtime");
     if (realtime_kernel.get() != '1') {
-        problems.push_back({"the kernel is not PREEMPT_RT: latency is not bounded (Debian: linux-image-rt-amd64)", false});
+        problems.push_back(
+            {"the kernel is not PREEMPT_RT: latency is not bounded (Debian: linux-image-rt-amd64)",
+             false});
     }
     return problems;
 }
@@ -136,7 +142,8 @@ RealtimeProblems applyToThread(pthread_t thread, const RealtimeSettings& setting
     CPU_ZERO(&cpus);
     CPU_SET(chooseCpu(settings), &cpus);
     if (const int error = pthread_setaffinity_np(thread, sizeof cpus, &cpus); error != 0) {
-        problems.push_back({fmt::format("not on CPU {}: {}", chooseCpu(settings), systemError(error)), true});
+        problems.push_back(
+            {fmt::format("not on CPU {}: {}", chooseCpu(settings), systemError(error)), true});
     }
     return problems;
 }
@@ -153,7 +160,8 @@ __attribute__((noinline)) void prefaultStack(std::size_t bytes) {
 IdleStateGuard::IdleStateGuard() : fd_(::open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC)) {
     const std::int32_t microseconds = 0;
     if (fd_ < 0 || ::write(fd_, &microseconds, sizeof microseconds) != sizeof microseconds) {
-        problem_ = fmt::format("idle states are not limited: /dev/cpu_dma_latency: {}", systemError(errno));
+        problem_ = fmt::format("idle states are not limited: /dev/cpu_dma_latency: {}",
+                               systemError(errno));
     }
 }
 

@@ -22,8 +22,8 @@ using RealtimeProblems = std::vector<RealtimeProblem>;
 
 /// What a loop wants of the machine.
 struct RealtimeSettings {
-    int cpu = -1;                  ///< -1 = the last one this process may use
-    unsigned priority = 80;        ///< SCHED_FIFO, 1 to 98
+    int cpu = -1;            ///< -1 = the last one this process may use
+    unsigned priority = 80;  ///< SCHED_FIFO, 1 to 98
     bool lock_memory = true;
     std::size_t heap_bytes = 8192 * 1024;
     std::size_t stack_bytes = 256 * 1024;
@@ -36,7 +36,8 @@ void prepareProcess();
 /// Locks all memory, present and future, and touches the heap.
 RealtimeProblems lockMemory(const RealtimeSettings& settings);
 
-/// Whether threads may have the settings' SCHED_FIFO priority, and whether the kernel is one for real time.
+/// Whether threads may have the settings' SCHED_FIFO priority, and whether the kernel is one for
+/// real time.
 RealtimeProblems checkScheduling(const RealtimeSettings& settings);
 
 /// The CPU that the settings mean.

@@ -17,8 +17,9 @@ namespace rtcf::executor {
 
 /// What the loop measures of one component. Outlives the schedules it is in.
 struct ComponentFigures {
-    Histogram duration;                      ///< of update(), in ticks of the cycle counter
-    std::atomic<std::uint64_t> overruns{0};  ///< cycles that passed the next deadline during its update
+    Histogram duration;  ///< of update(), in ticks of the cycle counter
+    std::atomic<std::uint64_t> overruns{
+        0};  ///< cycles that passed the next deadline during its update
 };
 
 /// One component's turn.
@@ -26,11 +27,12 @@ struct Step {
     Component* component;
     ComponentContext* context;
     ComponentFigures* figures;
-    std::uint32_t slot;         ///< in the flight recorder
-    std::uint32_t every = 1;    ///< runs in each n-th cycle,
-    std::uint32_t phase = 0;    ///< in which the iteration modulo n is this
-    bool optional = false;      ///< a fault takes it out, and the loop goes on
-    /// When its last update() ended. Noted here by whoever runs the cycle, as this memory is at hand then.
+    std::uint32_t slot;       ///< in the flight recorder
+    std::uint32_t every = 1;  ///< runs in each n-th cycle,
+    std::uint32_t phase = 0;  ///< in which the iteration modulo n is this
+    bool optional = false;    ///< a fault takes it out, and the loop goes on
+    /// When its last update() ended. Noted here by whoever runs the cycle, as this memory is at
+    /// hand then.
     mutable std::int64_t ended_ticks = 0;
 };
 
@@ -92,19 +94,20 @@ struct HandOver {
 /// Everything that changes at one cycle boundary. Owned by the graph thread,
 /// which waits until it is applied.
 struct Adoption {
-    const Schedule* schedule = nullptr;        ///< the next one; null = stays
-    std::vector<Latch> new_latches;            ///< to be filled before inputs read them
+    const Schedule* schedule = nullptr;  ///< the next one; null = stays
+    std::vector<Latch> new_latches;      ///< to be filled before inputs read them
     std::vector<Rewire> rewires;
     std::vector<HandOver> hand_overs;
-    std::vector<StagedValue*> values;          ///< parameters, and what derives from them
-    std::int64_t period_ns = 0;                ///< the loop's new period; 0 = stays
+    std::vector<StagedValue*> values;  ///< parameters, and what derives from them
+    std::int64_t period_ns = 0;        ///< the loop's new period; 0 = stays
 
     /// Makes the change. By whoever runs the cycle; real-time safe.
     void apply() noexcept {
         for (const Latch& latch : new_latches) latch.copy();
         for (Rewire& rewire : rewires) rewire.apply();
         for (StagedValue* value : values) value->commit();
-        for (const HandOver& hand_over : hand_overs) hand_over.successor->takeOver(*hand_over.previous);
+        for (const HandOver& hand_over : hand_overs)
+            hand_over.successor->takeOver(*hand_over.previous);
     }
 };
 

@@ -45,12 +45,14 @@ int privateCopy(const std::string& path) {
     const FileDescriptor source(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
     if (source.get() < 0) refuse(path, systemError());
     struct stat status {};
-    if (::fstat(source.get(), &status) != 0 || !S_ISREG(status.st_mode)) refuse(path, "not a regular file");
+    if (::fstat(source.get(), &status) != 0 || !S_ISREG(status.st_mode))
+        refuse(path, "not a regular file");
     const std::string name = std::filesystem::path(path).filename();
     FileDescriptor copy(::memfd_create(name.c_str(), MFD_CLOEXEC));
     if (copy.get() < 0) refuse(path, "no memory for a copy: " + systemError());
     for (off_t left = status.st_size; left > 0;) {
-        const ssize_t moved = ::sendfile(copy.get(), source.get(), nullptr, static_cast<std::size_t>(left));
+        const ssize_t moved =
+            ::sendfile(copy.get(), source.get(), nullptr, static_cast<std::size_t>(left));
         if (moved <= 0) refuse(path, moved == 0 ? "it changed while it was read" : systemError());
         left -= moved;
     }
@@ -66,7 +68,8 @@ void* openCopy(const std::string& path) {
     if (handle == nullptr) {
         std::string why = ::dlerror();
         ::close(copy);
-        for (std::size_t at = why.find(copy_path); at != std::string::npos; at = why.find(copy_path)) {
+        for (std::size_t at = why.find(copy_path); at != std::string::npos;
+             at = why.find(copy_path)) {
             why.replace(at, copy_path.size(), std::filesystem::path(path).filename());
         }
         refuse(path, "does not load: " + why + "; build it again, with what it needs linked in");
@@ -86,11 +89,14 @@ Library::Library(const std::string& path) : path_(path) {
     }
     const PluginDescriptor* descriptor = entry();
     if (descriptor->abi_version != RTCF_ABI_VERSION) {
-        refuse(path, fmt::format("was built for component ABI {}, this executor has {}: build it again with "
-                                 "librtcf-dev {}",
-                                 descriptor->abi_version, RTCF_ABI_VERSION, RTCF_VERSION));
+        refuse(
+            path,
+            fmt::format("was built for component ABI {}, this executor has {}: build it again with "
+                        "librtcf-dev {}",
+                        descriptor->abi_version, RTCF_ABI_VERSION, RTCF_VERSION));
     }
-    for (const ComponentRecord* record = descriptor->components; record != nullptr; record = record->next) {
+    for (const ComponentRecord* record = descriptor->components; record != nullptr;
+         record = record->next) {
         types_.push_back(record);
     }
     std::sort(types_.begin(), types_.end(),
@@ -107,8 +113,9 @@ const ComponentRecord* Library::find(const std::string& type) const noexcept {
 std::shared_ptr<const Library> LibraryStore::open(const std::string& path) {
     struct stat status {};
     if (::stat(path.c_str(), &status) != 0) refuse(path, systemError());
-    const std::string identity = fmt::format("{} {} {} {}.{:09} {}", path, status.st_dev, status.st_ino,
-                                             status.st_mtim.tv_sec, status.st_mtim.tv_nsec, status.st_size);
+    const std::string identity =
+        fmt::format("{} {} {} {}.{:09} {}", path, status.st_dev, status.st_ino,
+                    status.st_mtim.tv_sec, status.st_mtim.tv_nsec, status.st_size);
     for (const Entry& entry : entries_) {
         if (entry.identity == identity) return entry.library;
     }

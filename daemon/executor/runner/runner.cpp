@@ -116,15 +116,16 @@ void Runner::noteLoopFault() {
     if (state_ == RunnerState::Faulted) {
         RunnerEvent event{RunnerEvent::Kind::LoopEnded, {}, {}, fault.iteration};
         if (fault.kind == LoopFault::Kind::Overruns) {
-            event.message = fmt::format("loop stopped in iteration {}: more than {} overruns", fault.iteration,
-                                        settings_.loop.max_overruns);
+            event.message = fmt::format("loop stopped in iteration {}: more than {} overruns",
+                                        fault.iteration, settings_.loop.max_overruns);
         }
         if (fault.component != nullptr) {
             event.component = fault.component_name.data();
             const std::string what = fault.kind == LoopFault::Kind::NotFinite
                                          ? fmt::format("output {} is not finite", fault.text.data())
                                          : fmt::format("update() threw: {}", fault.text.data());
-            event.message = fmt::format("loop stopped in iteration {}: {}: {}", fault.iteration, event.component, what);
+            event.message = fmt::format("loop stopped in iteration {}: {}: {}", fault.iteration,
+                                        event.component, what);
             // It may have been unloaded at the boundary at which the loop ended.
             if (const GraphNode* node = nodeOf(fault.component); node != nullptr) {
                 node->instance->setFault(fmt::format("iteration {}: {}", fault.iteration, what));
@@ -151,16 +152,19 @@ void Runner::noteComponentFaults() {
         const std::string& name = node->instance->fullName();
         const std::string what =
             fault.kind == LoopFault::Kind::NotFinite
-                ? fmt::format("output {} is not finite: readers keep its last value", fault.text.data())
+                ? fmt::format("output {} is not finite: readers keep its last value",
+                              fault.text.data())
                 : fmt::format("update() threw: {}; taken out, the loop goes on", fault.text.data());
         node->instance->setFault(fmt::format("iteration {}: {}", fault.iteration, what));
-        events_({RunnerEvent::Kind::ComponentFailed, fmt::format("{}: iteration {}: {}", name, fault.iteration, what),
-                 name, fault.iteration});
+        events_({RunnerEvent::Kind::ComponentFailed,
+                 fmt::format("{}: iteration {}: {}", name, fault.iteration, what), name,
+                 fault.iteration});
         publish({name});
     }
 }
 
-// spin = auto: as long as 99 of 100 wake-ups of the last second were late, at most a tenth of the period.
+// spin = auto: as long as 99 of 100 wake-ups of the last second were late, at most a tenth of the
+// period.
 void Runner::tuneSpin() {
     if (!settings_.spin_auto || monotonicNow() - tuned_at_ns_ < kSecond) return;
     const HistogramSnapshot now = loop_.figures().wake_up.snapshot();
@@ -168,15 +172,19 @@ void Runner::tuneSpin() {
     tuned_from_ = now;
     tuned_at_ns_ = monotonicNow();
     if (late.count == 0) return;
-    settings_.loop.spin_ns = std::min(static_cast<std::int64_t>(late.p99), settings_.loop.period_ns / 10);
+    settings_.loop.spin_ns =
+        std::min(static_cast<std::int64_t>(late.p99), settings_.loop.period_ns / 10);
     loop_.setSpin(settings_.loop.spin_ns);
 }
 
 MappingFilter Runner::filter() const {
-    return {NamePattern("whitelist", settings_.whitelist), NamePattern("blacklist", settings_.blacklist)};
+    return {NamePattern("whitelist", settings_.whitelist),
+            NamePattern("blacklist", settings_.blacklist)};
 }
 
-std::int64_t Runner::adoptionTimeout() const noexcept { return kSecond + 10 * settings_.loop.period_ns; }
+std::int64_t Runner::adoptionTimeout() const noexcept {
+    return kSecond + 10 * settings_.loop.period_ns;
+}
 
 void Runner::configure(RunnerSettings settings) {
     validate(settings);
@@ -184,7 +192,8 @@ void Runner::configure(RunnerSettings settings) {
     try {
         Change change;
         change.graph = plan_->graph;
-        if (settings_.loop.period_ns != previous.loop.period_ns) change.period_ns = settings_.loop.period_ns;
+        if (settings_.loop.period_ns != previous.loop.period_ns)
+            change.period_ns = settings_.loop.period_ns;
         adopt(std::move(change), [](const std::string&) {});
     } catch (const Refusal&) {
         settings_ = previous;
@@ -208,7 +217,8 @@ ChangeOutcome Runner::start(const Progress& progress) {
     try {
         progress("starting the loop");
         degraded_.clear();
-        for (RealtimeProblem& problem : lockAndStart()) degraded_.push_back(std::move(problem.text));
+        for (RealtimeProblem& problem : lockAndStart())
+            degraded_.push_back(std::move(problem.text));
     } catch (const Refusal&) {
         stopAll();
         throw;
@@ -220,20 +230,24 @@ ChangeOutcome Runner::start(const Progress& progress) {
         events_({RunnerEvent::Kind::Degraded, "degraded real time: " + problem, {}, 0});
     }
     ChangeOutcome result = outcome();
-    for (const std::string& problem : degraded_) result.notes.push_back("degraded real time: " + problem);
+    for (const std::string& problem : degraded_)
+        result.notes.push_back("degraded real time: " + problem);
     return result;
 }
 
 RealtimeProblems Runner::lockAndStart() {
     RealtimeProblems problems = lockMemory(settings_.loop.realtime);
-    for (RealtimeProblem& problem : checkScheduling(settings_.loop.realtime)) problems.push_back(std::move(problem));
+    for (RealtimeProblem& problem : checkScheduling(settings_.loop.realtime))
+        problems.push_back(std::move(problem));
     for (const RealtimeProblem& problem : problems) {
         if (!settings_.realtime_required || !problem.essential) continue;
         throw Refusal(RefusalKind::FailedPrecondition,
-                      fmt::format("no real time: {}; or let it run degraded: rtcfctl runner set {} --realtime preferred",
+                      fmt::format("no real time: {}; or let it run degraded: rtcfctl runner set {} "
+                                  "--realtime preferred",
                                   problem.text, name_));
     }
-    for (RealtimeProblem& problem : loop_.start(settings_.loop)) problems.push_back(std::move(problem));
+    for (RealtimeProblem& problem : loop_.start(settings_.loop))
+        problems.push_back(std::move(problem));
     return problems;
 }
 
@@ -242,10 +256,12 @@ ChangeOutcome Runner::stop(const Progress& progress) {
         progress("stopping the loop");
         loop_.requestStop();
         if (!loop_.join(adoptionTimeout())) {
-            throw Refusal(RefusalKind::Unavailable,
-                          fmt::format("the loop of {} does not reach the end of its cycle: a component does not "
-                                      "return from update()",
-                                      name_));
+            throw Refusal(
+                RefusalKind::Unavailable,
+                fmt::format(
+                    "the loop of {} does not reach the end of its cycle: a component does not "
+                    "return from update()",
+                    name_));
         }
         loopEnded();
     } else if (state_ == RunnerState::Stepping) {
@@ -258,8 +274,10 @@ ChangeOutcome Runner::step(std::uint64_t cycles, const Progress& progress) {
     constexpr std::uint64_t kChunk = 10000;  // cycles between reports
     noticeEnd();
     if (loop_.joinable()) {
-        throw Refusal(RefusalKind::FailedPrecondition,
-                      fmt::format("the loop of {0} runs in real time: stop it first: rtcfctl -r {0} stop", name_));
+        throw Refusal(
+            RefusalKind::FailedPrecondition,
+            fmt::format("the loop of {0} runs in real time: stop it first: rtcfctl -r {0} stop",
+                        name_));
     }
     if (state_ != RunnerState::Stepping) {
         startAll(progress);
@@ -300,7 +318,8 @@ void Runner::startAll(const Progress& progress) {
             instance.start();
         }
     } catch (const Refusal&) {
-        for (auto instance = started.rbegin(); instance != started.rend(); ++instance) (*instance)->stop();
+        for (auto instance = started.rbegin(); instance != started.rend(); ++instance)
+            (*instance)->stop();
         throw;
     }
 }
@@ -314,13 +333,15 @@ void Runner::stopAll() noexcept {
     }
 }
 
-std::shared_ptr<Instance> Runner::makeInstance(ComponentDefinition definition, const std::string& library,
-                                               const Progress& progress, bool configure) {
+std::shared_ptr<Instance> Runner::makeInstance(ComponentDefinition definition,
+                                               const std::string& library, const Progress& progress,
+                                               bool configure) {
     const std::string full_name = definition.fullName();
     progress("loading " + full_name);
     note(full_name + ".constructor");
     const std::shared_ptr<const Library> code = libraries_.open(library);
-    auto instance = std::make_shared<Instance>(std::move(definition), code, name_, loop_.clock(), log_, recorder_);
+    auto instance = std::make_shared<Instance>(std::move(definition), code, name_, loop_.clock(),
+                                               log_, recorder_);
     if (!configure) {
         instance->freezePorts();
         return instance;
@@ -336,7 +357,8 @@ void Runner::adopt(Change change, const Progress& progress) {
     const Graph graph = change.graph;
     Wiring wiring = wire(graph, filter(), change.loading);
     Adoption adoption;
-    std::unique_ptr<Plan> plan = buildPlan(graph, std::move(wiring), *plan_, settings_.frequency_hz, adoption);
+    std::unique_ptr<Plan> plan =
+        buildPlan(graph, std::move(wiring), *plan_, settings_.frequency_hz, adoption);
     adoption.values = std::move(change.values);
     adoption.hand_overs = std::move(change.hand_overs);
     adoption.period_ns = change.period_ns;
@@ -348,9 +370,11 @@ void Runner::adopt(Change change, const Progress& progress) {
         }
     }
     note({});
+    progress("adopting the change");
     if (!loop_.adopt(adoption, adoptionTimeout())) {
         throw Refusal(RefusalKind::Unavailable,
-                      fmt::format("the loop of {} reaches no cycle boundary: a component does not return from update(); "
+                      fmt::format("the loop of {} reaches no cycle boundary: a component does not "
+                                  "return from update(); "
                                   "nothing has changed",
                                   name_));
     }
@@ -371,10 +395,12 @@ void Runner::adopt(Change change, const Progress& progress) {
     noticeEnd();
 }
 
-ChangeOutcome Runner::load(ComponentDefinition definition, const std::string& library, const Progress& progress) {
+ChangeOutcome Runner::load(ComponentDefinition definition, const std::string& library,
+                           const Progress& progress) {
     plan_->graph.requireFree(definition.fullName());
     const std::set<std::string> breaks = definition.breaks;
-    const std::shared_ptr<Instance> instance = makeInstance(std::move(definition), library, progress);
+    const std::shared_ptr<Instance> instance =
+        makeInstance(std::move(definition), library, progress);
     Change change;
     change.graph = plan_->graph;
     change.graph.add({instance, breaks});
@@ -383,13 +409,15 @@ ChangeOutcome Runner::load(ComponentDefinition definition, const std::string& li
     adopt(std::move(change), progress);
     ChangeOutcome result = outcome(instance->fullName());
     for (const std::string& remap : instance->uselessRemaps()) {
-        result.notes.push_back(fmt::format("remap {} names no port of {}", remap, instance->fullName()));
+        result.notes.push_back(
+            fmt::format("remap {} names no port of {}", remap, instance->fullName()));
     }
     return result;
 }
 
 ChangeOutcome Runner::unload(const std::vector<std::string>& names, const Progress& progress) {
-    if (names.empty()) throw Refusal(RefusalKind::InvalidArgument, "no component to unload is named");
+    if (names.empty())
+        throw Refusal(RefusalKind::InvalidArgument, "no component to unload is named");
     Change change;
     change.graph = plan_->graph;
     for (const std::string& name : names) {
@@ -401,12 +429,13 @@ ChangeOutcome Runner::unload(const std::vector<std::string>& names, const Progre
     return outcome(names.size() == 1 ? names[0] : "");
 }
 
-ChangeOutcome Runner::replace(const std::string& name, ComponentDefinition definition, const std::string& library,
-                              const Progress& progress) {
+ChangeOutcome Runner::replace(const std::string& name, ComponentDefinition definition,
+                              const std::string& library, const Progress& progress) {
     const GraphNode old = plan_->graph.get(name);
     if (definition.fullName() != name) plan_->graph.requireFree(definition.fullName());
     const std::set<std::string> breaks = definition.breaks;
-    const std::shared_ptr<Instance> instance = makeInstance(std::move(definition), library, progress);
+    const std::shared_ptr<Instance> instance =
+        makeInstance(std::move(definition), library, progress);
     Change change;
     change.graph = plan_->graph;
     change.graph.replace(name, {instance, breaks});
@@ -418,7 +447,8 @@ ChangeOutcome Runner::replace(const std::string& name, ComponentDefinition defin
     return outcome(instance->fullName());
 }
 
-ChangeOutcome Runner::apply(const std::vector<WantedComponent>& wanted, bool dry_run, const Progress& progress) {
+ChangeOutcome Runner::apply(const std::vector<WantedComponent>& wanted, bool dry_run,
+                            const Progress& progress) {
     std::vector<Difference> differences = compare(plan_->graph, wanted);
     std::vector<std::pair<std::shared_ptr<Instance>, std::vector<ParameterValue>>> previous;
     for (const GraphNode& node : plan_->graph.nodes()) {
@@ -430,7 +460,8 @@ ChangeOutcome Runner::apply(const std::vector<WantedComponent>& wanted, bool dry
     try {
         Change change;
         change.graph = plan_->graph;
-        for (const Difference& difference : differences) addDifference(change, difference, progress, dry_run);
+        for (const Difference& difference : differences)
+            addDifference(change, difference, progress, dry_run);
         if (dry_run) {
             (void)wire(change.graph, filter(), {});
             restoreParameters();
@@ -447,7 +478,8 @@ ChangeOutcome Runner::apply(const std::vector<WantedComponent>& wanted, bool dry
     return result;
 }
 
-void Runner::addDifference(Change& change, const Difference& difference, const Progress& progress, bool look) {
+void Runner::addDifference(Change& change, const Difference& difference, const Progress& progress,
+                           bool look) {
     const std::string& name = difference.component;
     switch (difference.kind) {
         case Difference::Kind::Unload:
@@ -458,7 +490,8 @@ void Runner::addDifference(Change& change, const Difference& difference, const P
             change.graph.setBreaks(name, difference.wanted->definition.breaks);
             return;
         case Difference::Kind::Parameters: {
-            const auto staged = change.graph.get(name).instance->stageParameters(difference.parameters);
+            const auto staged =
+                change.graph.get(name).instance->stageParameters(difference.parameters);
             change.values.insert(change.values.end(), staged.begin(), staged.end());
             change.changed.insert(name);
             return;
@@ -468,7 +501,8 @@ void Runner::addDifference(Change& change, const Difference& difference, const P
             break;
     }
     const ComponentDefinition& definition = difference.wanted->definition;
-    const std::shared_ptr<Instance> instance = makeInstance(definition, difference.wanted->library, progress, !look);
+    const std::shared_ptr<Instance> instance =
+        makeInstance(definition, difference.wanted->library, progress, !look);
     change.arriving.push_back(instance);
     if (difference.kind == Difference::Kind::Load) {
         change.graph.add({instance, definition.breaks});
@@ -480,7 +514,8 @@ void Runner::addDifference(Change& change, const Difference& difference, const P
     change.hand_overs.push_back({&instance->component(), &old->component()});
 }
 
-ChangeOutcome Runner::setBreaks(const std::vector<std::pair<std::string, std::string>>& ports, bool broken) {
+ChangeOutcome Runner::setBreaks(const std::vector<std::pair<std::string, std::string>>& ports,
+                                bool broken) {
     if (ports.empty()) throw Refusal(RefusalKind::InvalidArgument, "no input is named");
     Change change;
     change.graph = plan_->graph;
@@ -489,8 +524,8 @@ ChangeOutcome Runner::setBreaks(const std::vector<std::pair<std::string, std::st
     return outcome(ports[0].first);
 }
 
-ChangeOutcome Runner::setParameters(const std::string& name,
-                                    const std::vector<std::pair<std::string, ParameterValue>>& batch) {
+ChangeOutcome Runner::setParameters(
+    const std::string& name, const std::vector<std::pair<std::string, ParameterValue>>& batch) {
     Instance& instance = *plan_->graph.get(name).instance;
     const std::vector<ParameterValue> previous = instance.parameterValues();
     Change change;
@@ -539,7 +574,8 @@ void Runner::publish(const std::set<std::string>& changed) {
 }
 
 void Runner::publishPicture() {
-    RunnerPicture next{state_, settings_, degraded_, status_, bridge_ ? bridge_->status() : BridgeStatus{}};
+    RunnerPicture next{state_, settings_, degraded_, status_,
+                       bridge_ ? bridge_->status() : BridgeStatus{}};
     const std::lock_guard<std::mutex> lock(published_mutex_);
     picture_ = std::move(next);
 }

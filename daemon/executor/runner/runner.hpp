@@ -70,7 +70,8 @@ class Runner {
     /// @param events called from the graph thread
     /// @param bridge the link to the outside; null = none
     /// @param recorder outlives the runner
-    Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr<Bridge> bridge, FlightRecorder& recorder);
+    Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr<Bridge> bridge,
+           FlightRecorder& recorder);
     /// Stops the loop and lets all components go, in order.
     ~Runner();
     Runner(const Runner&) = delete;
@@ -89,13 +90,16 @@ class Runner {
     ChangeOutcome stop(const Progress& progress);
     /// Runs cycles without real time on a simulated clock, as fast as they go; then pauses.
     ChangeOutcome step(std::uint64_t cycles, const Progress& progress);
-    ChangeOutcome load(ComponentDefinition definition, const std::string& library, const Progress& progress);
+    ChangeOutcome load(ComponentDefinition definition, const std::string& library,
+                       const Progress& progress);
     ChangeOutcome unload(const std::vector<std::string>& names, const Progress& progress);
-    ChangeOutcome replace(const std::string& name, ComponentDefinition definition, const std::string& library,
-                          const Progress& progress);
+    ChangeOutcome replace(const std::string& name, ComponentDefinition definition,
+                          const std::string& library, const Progress& progress);
     /// Makes the graph what is wanted, in one transaction; or only tells what it would take.
-    ChangeOutcome apply(const std::vector<WantedComponent>& wanted, bool dry_run, const Progress& progress);
-    ChangeOutcome setBreaks(const std::vector<std::pair<std::string, std::string>>& ports, bool broken);
+    ChangeOutcome apply(const std::vector<WantedComponent>& wanted, bool dry_run,
+                        const Progress& progress);
+    ChangeOutcome setBreaks(const std::vector<std::pair<std::string, std::string>>& ports,
+                            bool broken);
     ChangeOutcome setParameters(const std::string& name,
                                 const std::vector<std::pair<std::string, ParameterValue>>& batch);
     /// Values of a component's ports, inputs first. Empty if the loop reaches no boundary in time.
@@ -118,8 +122,8 @@ class Runner {
    private:
     struct Change {
         Graph graph;
-        std::string loading;                        // new component, for advice on loops
-        std::set<std::string> changed;              // components to picture anew
+        std::string loading;            // new component, for advice on loops
+        std::set<std::string> changed;  // components to picture anew
         std::vector<std::shared_ptr<Instance>> arriving;
         std::vector<std::shared_ptr<Instance>> leaving;
         std::vector<StagedValue*> values;
@@ -136,10 +140,12 @@ class Runner {
     void tuneSpin();
     const GraphNode* nodeOf(const Component* component) const noexcept;
     void endStepping();
-    std::shared_ptr<Instance> makeInstance(ComponentDefinition definition, const std::string& library,
-                                           const Progress& progress, bool configure = true);
+    std::shared_ptr<Instance> makeInstance(ComponentDefinition definition,
+                                           const std::string& library, const Progress& progress,
+                                           bool configure = true);
     /// Works a difference into a change. @param look without configuring what is new
-    void addDifference(Change& change, const Difference& difference, const Progress& progress, bool look);
+    void addDifference(Change& change, const Difference& difference, const Progress& progress,
+                       bool look);
     /// Wires, starts, adopts; then stops and cleans up what left.
     void adopt(Change change, const Progress& progress);
     void startAll(const Progress& progress);
@@ -167,7 +173,7 @@ class Runner {
     RunnerState state_ = RunnerState::Stopped;
     std::vector<std::string> degraded_;
     std::string status_;
-    HistogramSnapshot tuned_from_;      // wake-up latency at the last tuneSpin()
+    HistogramSnapshot tuned_from_;  // wake-up latency at the last tuneSpin()
     std::int64_t tuned_at_ns_ = 0;
 
     // Published for queries.

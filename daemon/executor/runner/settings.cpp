@@ -12,13 +12,16 @@ namespace rtcf::executor {
 
 namespace {
 
-[[noreturn]] void refuse(const std::string& message) { throw Refusal(RefusalKind::InvalidArgument, message); }
+[[noreturn]] void refuse(const std::string& message) {
+    throw Refusal(RefusalKind::InvalidArgument, message);
+}
 
 template <typename T>
 void requireRange(const char* name, T value, T lowest, T highest, const char* unit) {
     // Written so that NaN is out of range.
     if (value >= lowest && value <= highest) return;
-    refuse(fmt::format("{} {} {} is out of range: {} to {} {}", name, value, unit, lowest, highest, unit));
+    refuse(fmt::format("{} {} {} is out of range: {} to {} {}", name, value, unit, lowest, highest,
+                       unit));
 }
 
 void requireCpu(int cpu) {
@@ -31,7 +34,8 @@ void requireCpu(int cpu) {
     for (int i = 0; i < CPU_SETSIZE; ++i) {
         if (CPU_ISSET(i, &allowed)) names += (names.empty() ? "" : ", ") + std::to_string(i);
     }
-    refuse(fmt::format("cpu {} is none that this daemon may use: {}, or -1 for the last of them", cpu, names));
+    refuse(fmt::format("cpu {} is none that this daemon may use: {}, or -1 for the last of them",
+                       cpu, names));
 }
 
 }  // namespace
@@ -44,11 +48,16 @@ void validate(RunnerSettings& settings) {
     settings.loop.period_ns = std::llround(1e9 / settings.frequency_hz);
     requireCpu(settings.loop.realtime.cpu);
     requireRange("priority", settings.loop.realtime.priority, 1U, 98U, "(SCHED_FIFO)");
-    requireRange("spin", settings.loop.spin_ns / 1000, std::int64_t{0}, settings.loop.period_ns / 2000, "µs");
-    requireRange("heap", settings.loop.realtime.heap_bytes / kKilo, std::size_t{0}, 1024 * kKilo, "KiB");
-    requireRange("stack", settings.loop.realtime.stack_bytes / kKilo, std::size_t{16}, 64 * kKilo, "KiB");
-    requireRange("stall timeout", settings.stall_timeout_ns / 1'000'000, std::int64_t{0}, std::int64_t{3'600'000}, "ms");
-    requireRange("orphan timeout", static_cast<double>(settings.orphan_timeout_ns) / 1e9, 0.0, 1e6, "s");
+    requireRange("spin", settings.loop.spin_ns / 1000, std::int64_t{0},
+                 settings.loop.period_ns / 2000, "µs");
+    requireRange("heap", settings.loop.realtime.heap_bytes / kKilo, std::size_t{0}, 1024 * kKilo,
+                 "KiB");
+    requireRange("stack", settings.loop.realtime.stack_bytes / kKilo, std::size_t{16}, 64 * kKilo,
+                 "KiB");
+    requireRange("stall timeout", settings.stall_timeout_ns / 1'000'000, std::int64_t{0},
+                 std::int64_t{3'600'000}, "ms");
+    requireRange("orphan timeout", static_cast<double>(settings.orphan_timeout_ns) / 1e9, 0.0, 1e6,
+                 "s");
     requireRange("queue", settings.bridge.queue, 1U, 1'000'000U, "messages");
     (void)NamePattern("whitelist", settings.whitelist);
     (void)NamePattern("blacklist", settings.blacklist);

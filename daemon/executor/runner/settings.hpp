@@ -11,15 +11,15 @@ namespace rtcf::executor {
 
 struct RunnerSettings {
     double frequency_hz = 1000.0;
-    LoopSettings loop;             ///< its period follows frequency_hz
+    LoopSettings loop;  ///< its period follows frequency_hz
     bool realtime_required = false;
-    bool spin_auto = false;                          ///< loop.spin_ns follows the observed wake-up latency
-    std::int64_t stall_timeout_ns = 2'000'000'000;   ///< a component that does not return; 0 = never
-    std::int64_t orphan_timeout_ns = 60'000'000'000; ///< without a daemon; 0 = at once
-    int on_boot = 0;                                 ///< rtcfd's, kept for it
-    int on_crash = 0;                                ///< rtcfd's, kept for it
+    bool spin_auto = false;  ///< loop.spin_ns follows the observed wake-up latency
+    std::int64_t stall_timeout_ns = 2'000'000'000;  ///< a component that does not return; 0 = never
+    std::int64_t orphan_timeout_ns = 60'000'000'000;  ///< without a daemon; 0 = at once
+    int on_boot = 0;                                  ///< rtcfd's, kept for it
+    int on_crash = 0;                                 ///< rtcfd's, kept for it
     BridgeSettings bridge;
-    std::string whitelist;         ///< regular expressions over mapped names
+    std::string whitelist;  ///< regular expressions over mapped names
     std::string blacklist;
 };
 

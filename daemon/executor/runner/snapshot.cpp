@@ -20,12 +20,13 @@ std::shared_ptr<const ComponentSnapshot> picture(const GraphNode& node) {
     result->doc = instance.record().doc;
     const auto& inputs = instance.component().inputs();
     for (std::size_t i = 0; i < inputs.size(); ++i) {
-        result->ports.push_back({inputs[i]->name(), false, instance.inputNames()[i], &inputs[i]->type(), {}});
+        result->ports.push_back(
+            {inputs[i]->name(), false, instance.inputNames()[i], &inputs[i]->type(), {}});
     }
     const auto& outputs = instance.component().outputs();
     for (std::size_t i = 0; i < outputs.size(); ++i) {
-        result->ports.push_back(
-            {outputs[i]->name(), true, instance.outputNames()[i], &outputs[i]->type(), outputs[i]->unit()});
+        result->ports.push_back({outputs[i]->name(), true, instance.outputNames()[i],
+                                 &outputs[i]->type(), outputs[i]->unit()});
     }
     const auto& parameters = instance.component().parameters();
     for (std::size_t i = 0; i < parameters.size(); ++i) {
@@ -36,9 +37,12 @@ std::shared_ptr<const ComponentSnapshot> picture(const GraphNode& node) {
 }
 
 ConnectionSnapshot picture(const Graph& graph, const ConnectionPlan& plan) {
-    const auto component = [&](std::size_t node) { return graph.nodes()[node].instance->fullName(); };
+    const auto component = [&](std::size_t node) {
+        return graph.nodes()[node].instance->fullName();
+    };
     ConnectionSnapshot result{plan.type->name, {}, {}, plan.published, plan.subscribed};
-    if (plan.writer) result.writer = {component(plan.writer->node), plan.writer->output->name(), false};
+    if (plan.writer)
+        result.writer = {component(plan.writer->node), plan.writer->output->name(), false};
     for (const Reader& reader : plan.readers) {
         result.readers.push_back({component(reader.node), reader.input->name(), reader.broken});
     }
@@ -63,7 +67,8 @@ std::shared_ptr<const GraphSnapshot> takeSnapshot(const Plan& plan, const GraphS
     for (const std::size_t index : plan.wiring.order) {
         const GraphNode& node = plan.graph.nodes()[index];
         const auto found = known.find(node.instance.get());
-        const bool same = found != known.end() && found->second->full_name == node.instance->fullName() &&
+        const bool same = found != known.end() &&
+                          found->second->full_name == node.instance->fullName() &&
                           found->second->figures == node.instance->figures() &&
                           found->second->definition.breaks == node.breaks &&
                           found->second->fault == node.instance->faultText() &&

@@ -37,7 +37,8 @@ bool Connection::receive(std::vector<v1::Request>& requests) {
         if (length > kLargestFrame) return false;
         if (in_.size() - at - kHeader < length) break;
         v1::Request request;
-        if (!request.ParseFromArray(in_.data() + at + kHeader, static_cast<int>(length))) return false;
+        if (!request.ParseFromArray(in_.data() + at + kHeader, static_cast<int>(length)))
+            return false;
         requests.push_back(std::move(request));
         at += kHeader + length;
     }
@@ -48,14 +49,16 @@ bool Connection::receive(std::vector<v1::Request>& requests) {
 bool Connection::send(const v1::Response& response) {
     const std::string body = response.SerializeAsString();
     if (out_.size() - written_ > kLargestBacklog) return false;
-    for (std::size_t i = 0; i < kHeader; ++i) out_ += static_cast<char>((body.size() >> (8 * i)) & 0xff);
+    for (std::size_t i = 0; i < kHeader; ++i)
+        out_ += static_cast<char>((body.size() >> (8 * i)) & 0xff);
     out_ += body;
     return flush();
 }
 
 bool Connection::flush() {
     while (wantsWrite()) {
-        const ssize_t count = ::send(fd_, out_.data() + written_, out_.size() - written_, MSG_NOSIGNAL);
+        const ssize_t count =
+            ::send(fd_, out_.data() + written_, out_.size() - written_, MSG_NOSIGNAL);
         if (count < 0) return errno == EAGAIN || errno == EINTR;
         written_ += static_cast<std::size_t>(count);
     }

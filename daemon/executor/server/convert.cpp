@@ -45,7 +45,8 @@ pb::ParameterValue valueTo(const ParameterValue& value) {
     return message;
 }
 
-pb::ParameterInfo parameterTo(const ParameterDeclaration& declaration, const ParameterValue& value) {
+pb::ParameterInfo parameterTo(const ParameterDeclaration& declaration,
+                              const ParameterValue& value) {
     pb::ParameterInfo info;
     info.set_name(declaration.name);
     *info.mutable_value() = valueTo(value);
@@ -126,7 +127,8 @@ ComponentDefinition definitionFrom(const pb::ComponentSpec& spec) {
     definition.name = spec.name().empty() ? spec.type() : spec.name();
     if (!isBaseName(definition.name)) {
         throw Refusal(RefusalKind::InvalidArgument,
-                      fmt::format("'{}' is not a legal component name: a letter, then letters, digits and _; give the "
+                      fmt::format("'{}' is not a legal component name: a letter, then letters, "
+                                  "digits and _; give the "
                                   "namespace by --ns",
                                   definition.name));
     }
@@ -136,8 +138,9 @@ ComponentDefinition definitionFrom(const pb::ComponentSpec& spec) {
     for (const auto& remap : spec.remaps()) {
         for (const std::string& name : {remap.from(), remap.to()}) {
             if (isGraphName(name)) continue;
-            throw Refusal(RefusalKind::InvalidArgument, fmt::format("remap {}:={}: '{}' is not a legal ROS name",
-                                                                    remap.from(), remap.to(), name));
+            throw Refusal(RefusalKind::InvalidArgument,
+                          fmt::format("remap {}:={}: '{}' is not a legal ROS name", remap.from(),
+                                      remap.to(), name));
         }
         definition.remaps.emplace_back(remap.from(), remap.to());
     }
@@ -150,14 +153,15 @@ ComponentDefinition definitionFrom(const pb::ComponentSpec& spec) {
     constexpr std::uint32_t kSlowest = 100000;
     if (definition.every > kSlowest) {
         throw Refusal(RefusalKind::InvalidArgument,
-                      fmt::format("{}: every {} cycles is out of range: 1 to {}", definition.fullName(),
-                                  definition.every, kSlowest));
+                      fmt::format("{}: every {} cycles is out of range: 1 to {}",
+                                  definition.fullName(), definition.every, kSlowest));
     }
     if (spec.has_phase()) {
         if (spec.phase() >= definition.every) {
             throw Refusal(RefusalKind::InvalidArgument,
-                          fmt::format("{}: phase {} is out of range: 0 to {} with --every {}", definition.fullName(),
-                                      spec.phase(), definition.every - 1, definition.every));
+                          fmt::format("{}: phase {} is out of range: 0 to {} with --every {}",
+                                      definition.fullName(), spec.phase(), definition.every - 1,
+                                      definition.every));
         }
         definition.phase = spec.phase();
     }
@@ -196,7 +200,8 @@ RunnerSettings settingsFrom(const pb::RunnerSettings& message, RunnerSettings ba
     if (message.has_heap_kb()) realtime.heap_bytes = std::size_t{message.heap_kb()} * kKilo;
     if (message.has_stack_kb()) realtime.stack_bytes = std::size_t{message.stack_kb()} * kKilo;
     if (message.has_warmup_cycles()) base.loop.warmup_cycles = message.warmup_cycles();
-    if (message.has_stall_timeout_ms()) base.stall_timeout_ns = std::int64_t{message.stall_timeout_ms()} * 1'000'000;
+    if (message.has_stall_timeout_ms())
+        base.stall_timeout_ns = std::int64_t{message.stall_timeout_ms()} * 1'000'000;
     if (message.has_orphan_timeout_s()) {
         base.orphan_timeout_ns = static_cast<std::int64_t>(message.orphan_timeout_s() * 1e9);
     }
@@ -218,7 +223,8 @@ pb::RunnerSettings settingsTo(const RunnerSettings& settings) {
     message.set_cpu(settings.loop.realtime.cpu);
     message.set_priority(settings.loop.realtime.priority);
     message.set_spin_us(static_cast<std::uint32_t>(settings.loop.spin_ns / 1000));
-    message.set_realtime(settings.realtime_required ? pb::REALTIME_REQUIRED : pb::REALTIME_PREFERRED);
+    message.set_realtime(settings.realtime_required ? pb::REALTIME_REQUIRED
+                                                    : pb::REALTIME_PREFERRED);
     message.set_overrun(overrunTo(settings.loop.overrun));
     message.set_max_overruns(settings.loop.max_overruns);
     message.set_lock_memory(settings.loop.realtime.lock_memory);
@@ -322,7 +328,8 @@ v1::Event eventTo(const RunnerEvent& event) {
     return message;
 }
 
-pb::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t position, RunnerState state) {
+pb::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t position,
+                              RunnerState state) {
     const ComponentSnapshot& component = *snapshot.components[position];
     pb::ComponentInfo info;
     info.set_full_name(component.full_name);
@@ -331,9 +338,9 @@ pb::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t positio
     info.set_library(component.library);
     info.set_doc(component.doc);
     info.set_fault(component.fault);
-    info.set_state(!component.fault.empty()            ? pb::COMPONENT_STATE_FAULTED
-                   : state == RunnerState::Running     ? pb::COMPONENT_STATE_RUNNING
-                                                       : pb::COMPONENT_STATE_CONFIGURED);
+    info.set_state(!component.fault.empty()        ? pb::COMPONENT_STATE_FAULTED
+                   : state == RunnerState::Running ? pb::COMPONENT_STATE_RUNNING
+                                                   : pb::COMPONENT_STATE_CONFIGURED);
     for (const PortSnapshot& port : component.ports) {
         pb::PortInfo& message = *info.add_ports();
         setPortType(message, port.name, port.output, *port.type);
@@ -343,7 +350,8 @@ pb::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t positio
         message.set_connected(connection.writer.has_value() && !connection.readers.empty());
         message.set_mapped(port.output ? connection.published : connection.subscribed);
         for (const EndpointSnapshot& reader : connection.readers) {
-            if (!port.output && reader.component == component.full_name && reader.port == port.name) {
+            if (!port.output && reader.component == component.full_name &&
+                reader.port == port.name) {
                 message.set_broken(reader.broken);
             }
         }
@@ -355,9 +363,11 @@ pb::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t positio
 }
 
 void addValues(pb::ComponentInfo& info, const std::vector<Probe::Value>& values) {
-    for (std::size_t i = 0; i < values.size() && i < static_cast<std::size_t>(info.ports_size()); ++i) {
+    for (std::size_t i = 0; i < values.size() && i < static_cast<std::size_t>(info.ports_size());
+         ++i) {
         pb::PortInfo& port = *info.mutable_ports(static_cast<int>(i));
-        port.set_count(port.direction() == pb::DIRECTION_OUTPUT ? values[i].sequence : values[i].seen);
+        port.set_count(port.direction() == pb::DIRECTION_OUTPUT ? values[i].sequence
+                                                                : values[i].seen);
         if (values[i].sequence == 0) continue;
         port.set_value(values[i].text.value_or("(too large to show)"));
         port.set_age_ns(values[i].age_ns);
@@ -376,15 +386,16 @@ v1::ListConnectionsResult connectionsTo(const GraphSnapshot& snapshot) {
         message.set_name(name);
         message.set_type(connection.type);
         if (connection.writer) set(*message.mutable_writer(), *connection.writer);
-        for (const EndpointSnapshot& reader : connection.readers) set(*message.add_readers(), reader);
+        for (const EndpointSnapshot& reader : connection.readers)
+            set(*message.add_readers(), reader);
         message.set_published(connection.published);
         message.set_subscribed(connection.subscribed);
     }
     return result;
 }
 
-pb::ComponentType typeTo(const std::string& package, const std::string& library, const ComponentRecord& record,
-                         const Component& component) {
+pb::ComponentType typeTo(const std::string& package, const std::string& library,
+                         const ComponentRecord& record, const Component& component) {
     pb::ComponentType type;
     type.set_package(package);
     type.set_type(record.type);
@@ -399,7 +410,8 @@ pb::ComponentType typeTo(const std::string& package, const std::string& library,
         port.set_unit(output->unit());
     }
     for (const ParameterBase* parameter : component.parameters()) {
-        *type.add_parameters() = parameterTo(parameter->declaration(), parameter->declaration().default_value);
+        *type.add_parameters() =
+            parameterTo(parameter->declaration(), parameter->declaration().default_value);
     }
     return type;
 }

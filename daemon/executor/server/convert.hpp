@@ -17,7 +17,8 @@ namespace rtcf::executor {
 /// @{
 ComponentDefinition definitionFrom(const ::rtcf::v1::ComponentSpec& spec);
 /// What is empty in a replacement is that of the component it replaces.
-ComponentDefinition replacementFrom(const ::rtcf::v1::ComponentSpec& spec, const ComponentDefinition& old);
+ComponentDefinition replacementFrom(const ::rtcf::v1::ComponentSpec& spec,
+                                    const ComponentDefinition& old);
 /// `base` with what the message sets.
 RunnerSettings settingsFrom(const ::rtcf::v1::RunnerSettings& message, RunnerSettings base);
 std::vector<std::pair<std::string, ParameterValue>> parametersFrom(
@@ -30,13 +31,14 @@ v1::Error errorTo(RefusalKind kind, const std::string& message);
 ::rtcf::v1::ChangeResult outcomeTo(const ChangeOutcome& outcome);
 v1::LogRecord logTo(const LogEntry& entry);
 v1::Event eventTo(const RunnerEvent& event);
-::rtcf::v1::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t position, RunnerState state);
+::rtcf::v1::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t position,
+                                      RunnerState state);
 /// Adds what probe() found, inputs first.
 void addValues(::rtcf::v1::ComponentInfo& info, const std::vector<Probe::Value>& values);
 v1::ListConnectionsResult connectionsTo(const GraphSnapshot& snapshot);
 /// Of a component that is not loaded: its ports have no mapped names.
-::rtcf::v1::ComponentType typeTo(const std::string& package, const std::string& library, const ComponentRecord& record,
-                                 const Component& component);
+::rtcf::v1::ComponentType typeTo(const std::string& package, const std::string& library,
+                                 const ComponentRecord& record, const Component& component);
 ::rtcf::v1::RunnerSettings settingsTo(const RunnerSettings& settings);
 /// @}
 

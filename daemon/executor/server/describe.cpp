@@ -21,8 +21,8 @@ int describeLibrary(const std::string& library, const std::string& package) {
                 const std::unique_ptr<Component> component(record->create());
                 *description.add_types() = typeTo(package, library, *record, *component);
             } catch (const std::exception& error) {
-                description.set_problem(
-                    fmt::format("library {}: constructor of {} threw: {}", library, record->type, error.what()));
+                description.set_problem(fmt::format("library {}: constructor of {} threw: {}",
+                                                    library, record->type, error.what()));
             }
         }
     } catch (const std::exception& error) {

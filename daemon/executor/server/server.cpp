@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstring>
 #include <system_error>
@@ -32,7 +33,9 @@ constexpr std::int64_t kProbeTimeout = kSecond / 2;
 constexpr std::size_t kLargestOutbox = 10000;  // messages kept while no daemon is connected
 constexpr std::size_t kLargestConnections = 8;
 
-[[noreturn]] void fail(const std::string& what) { throw std::system_error(errno, std::generic_category(), what); }
+[[noreturn]] void fail(const std::string& what) {
+    throw std::system_error(errno, std::generic_category(), what);
+}
 
 int listenOn(const std::string& path) {
     sockaddr_un address{};
@@ -45,7 +48,8 @@ int listenOn(const std::string& path) {
     const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (fd < 0) fail("socket");
     ::unlink(path.c_str());  // of an executor that was killed
-    if (::bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0) fail("socket " + path);
+    if (::bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0)
+        fail("socket " + path);
     if (::listen(fd, 8) != 0) fail("socket " + path);
     return fd;
 }
@@ -65,13 +69,25 @@ int takeSignals() {
 bool trusted(int fd) {
     ucred peer{};
     socklen_t size = sizeof peer;
-    return ::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 && (peer.uid == ::geteuid() || peer.uid == 0);
+    return ::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 &&
+           (peer.uid == ::geteuid() || peer.uid == 0);
 }
 
 v1::Response errorResponse(std::uint64_t id, RefusalKind kind, const std::string& message) {
     v1::Response response;
     response.set_id(id);
     *response.mutable_error() = errorTo(kind, message);
+    return response;
+}
+
+v1::Response lostRecords(std::uint64_t count) {
+    LogEntry entry;
+    entry.level = LogLevel::Warn;
+    entry.time_ns =
+        std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
+    entry.message = fmt::format("{} log records were lost: no daemon took them in time", count);
+    v1::Response response;
+    *response.mutable_log() = logTo(entry);
     return response;
 }
 
@@ -104,7 +120,10 @@ pb::RunnerState stateTo(RunnerState state) {
 }  // namespace
 
 Server::Server(const std::string& socket_path)
-    : path_(socket_path), listener_(listenOn(socket_path)), signals_(takeSignals()), wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+    : path_(socket_path),
+      listener_(listenOn(socket_path)),
+      signals_(takeSignals()),
+      wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
     if (wake_ < 0) fail("eventfd");
 }
 
@@ -119,7 +138,11 @@ Server::~Server() {
 void Server::post(std::uint64_t connection, v1::Response response, bool last) {
     {
         const std::lock_guard<std::mutex> lock(outbox_mutex_);
-        if (outbox_.size() >= kLargestOutbox) outbox_.pop_front();
+        // Answers and events always have room: there are few of them.
+        if (response.has_log() && outbox_.size() >= kLargestOutbox) {
+            ++lost_records_;
+            return;
+        }
         outbox_.push_back({connection, std::move(response), last});
     }
     const std::uint64_t one = 1;
@@ -143,7 +166,8 @@ void Server::serve(Runner& runner, Log& log) {
     runner_ = &runner;
     log_ = &log;
     while (!exiting_) {
-        std::vector<pollfd> polled{{listener_, POLLIN, 0}, {signals_, POLLIN, 0}, {wake_, POLLIN, 0}};
+        std::vector<pollfd> polled{
+            {listener_, POLLIN, 0}, {signals_, POLLIN, 0}, {wake_, POLLIN, 0}};
         std::vector<std::uint64_t> ids;
         for (const auto& [id, connection] : connections_) {
             const short events = connection->wantsWrite() ? POLLIN | POLLOUT : POLLIN;
@@ -210,10 +234,11 @@ void Server::receive(Connection& connection) {
 
 void Server::drop(std::uint64_t id) {
     connections_.erase(id);
-    for (auto it = waiting_.begin(); it != waiting_.end();) it = it->first.first == id ? waiting_.erase(it) : std::next(it);
+    for (auto it = waiting_.begin(); it != waiting_.end();)
+        it = it->first.first == id ? waiting_.erase(it) : std::next(it);
 }
 
-void Server::respond(std::uint64_t connection, v1::Response response) {
+void Server::respond(std::uint64_t connection, const v1::Response& response) {
     const auto found = connections_.find(connection);
     if (found != connections_.end() && !found->second->send(response)) drop(connection);
 }
@@ -227,6 +252,8 @@ void Server::deliver() {
         const std::lock_guard<std::mutex> lock(outbox_mutex_);
         if (anybody) {
             outgoing.swap(outbox_);
+            if (lost_records_ != 0) outgoing.push_back({0, lostRecords(lost_records_), false});
+            lost_records_ = 0;
         } else {
             while (!outbox_.empty() && outbox_.front().connection != 0) {
                 outgoing.push_back(std::move(outbox_.front()));
@@ -239,7 +266,7 @@ void Server::deliver() {
             const auto request = std::make_pair(message.connection, message.response.id());
             if (waiting_.count(request) == 0) continue;  // given up on, or its daemon has gone
             if (message.last) waiting_.erase(request);
-            respond(message.connection, std::move(message.response));
+            respond(message.connection, message.response);
             continue;
         }
         std::vector<std::uint64_t> ids;
@@ -253,14 +280,17 @@ void Server::deliver() {
 void Server::expire() {
     const std::int64_t now = monotonicNow();
     for (auto it = waiting_.begin(); it != waiting_.end();) {
-        if (now < it->second.until_ns) {
+        // A change that is slow is waited for; it is given up if a hook hangs.
+        const bool change = it->second.given_up != nullptr;
+        if (now < it->second.until_ns || (change && stuck().empty())) {
             ++it;
             continue;
         }
+        if (change) it->second.given_up->store(true);
         const std::uint64_t connection = it->first.first;
         v1::Response response = it->second.otherwise();
         it = waiting_.erase(it);
-        respond(connection, std::move(response));
+        respond(connection, response);
         if (connections_.count(connection) == 0) return;  // drop() has changed waiting_
     }
 }
@@ -282,11 +312,12 @@ void Server::handle(Connection& connection, const v1::Request& request) {
         hello.set_pid(::getpid());
         hello.set_flight_recorder_fd(runner_->recorder().fd());
         connection.setGreeted();
-        respond(id, std::move(response));
+        respond(id, response);
         return;
     }
     if (!connection.greeted()) {
-        respond(id, errorResponse(request.id(), RefusalKind::FailedPrecondition, "the first request must be hello"));
+        respond(id, errorResponse(request.id(), RefusalKind::FailedPrecondition,
+                                  "the first request must be hello"));
         return;
     }
     try {
@@ -334,7 +365,7 @@ bool Server::answerQuery(std::uint64_t connection, const v1::Request& request) {
         default:
             return false;
     }
-    respond(connection, std::move(response));
+    respond(connection, response);
     return true;
 }
 
@@ -342,26 +373,38 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
     const std::uint64_t id = request.id();
     // Stop never queues behind a hook.
     if (request.kind_case() == v1::Request::kStop) runner_->requestStop();
-    if (const std::string where = stuck(); !where.empty() && request.kind_case() != v1::Request::kStop) {
+    if (const std::string where = stuck();
+        !where.empty() && request.kind_case() != v1::Request::kStop) {
         throw Refusal(RefusalKind::Unavailable,
-                      fmt::format("runner {} is stuck in {}(): only stop and restart it", runner_->name(), where));
+                      fmt::format("runner {} is stuck in {}(): only stop and restart it",
+                                  runner_->name(), where));
     }
     // Statistics are of one run of the loop, which has not begun yet.
     const bool begins = request.kind_case() == v1::Request::kStart ||
-                        (request.kind_case() == v1::Request::kStep && runner_->picture().state != RunnerState::Stepping);
+                        (request.kind_case() == v1::Request::kStep &&
+                         runner_->picture().state != RunnerState::Stepping);
     if (begins && !runner_->loop().running()) resetStatistics();
     // Steps take as long as they take; they report progress.
     const bool endless = request.kind_case() == v1::Request::kStep;
-    waiting_[{connection, id}] = {endless ? INT64_MAX : monotonicNow() + kHookTimeout, [this, id] {
-                                      return errorResponse(id, RefusalKind::Unavailable,
-                                                           fmt::format("runner {} is stuck in {}()", runner_->name(),
-                                                                       runner_->activity().first));
-                                  }};
-    runner_->post([this, connection, id, request] {
+    const auto given_up = std::make_shared<std::atomic<bool>>(false);
+    const auto otherwise = [this, id] {
+        return errorResponse(id, RefusalKind::Unavailable,
+                             fmt::format("runner {} is stuck in {}()", runner_->name(), stuck()));
+    };
+    waiting_[{connection, id}] = {endless ? INT64_MAX : monotonicNow() + kHookTimeout, otherwise,
+                                  given_up};
+    runner_->post([this, connection, id, request, given_up] {
         v1::Response response;
         response.set_id(id);
+        // Whoever asked has been told that it did not happen. Stop is another matter.
+        const auto require_wanted = [&] {
+            if (!given_up->load() || request.kind_case() == v1::Request::kStop) return;
+            throw Refusal(RefusalKind::Unavailable, "given up: a hook took too long");
+        };
         try {
-            const auto progress = [this, connection, id](const std::string& line) {
+            require_wanted();
+            const auto progress = [this, connection, id, &require_wanted](const std::string& line) {
+                require_wanted();
                 v1::Response step;
                 step.set_id(id);
                 step.set_progress(line);
@@ -390,21 +433,25 @@ ChangeOutcome Server::change(const v1::Request& request, const Runner::Progress&
         case v1::Request::kStop:
             return runner_->stop(progress);
         case v1::Request::kStep:
-            if (request.step().cycles() == 0) throw Refusal(RefusalKind::InvalidArgument, "0 cycles to step: name a number");
+            if (request.step().cycles() == 0)
+                throw Refusal(RefusalKind::InvalidArgument, "0 cycles to step: name a number");
             return runner_->step(request.step().cycles(), progress);
         case v1::Request::kLoad:
-            return runner_->load(definitionFrom(request.load().component()), request.load().library(), progress);
+            return runner_->load(definitionFrom(request.load().component()),
+                                 request.load().library(), progress);
         case v1::Request::kUnload: {
             std::vector<std::string> names;
-            for (const std::string& name : request.unload().components()) names.push_back(fullNameOf(name));
+            for (const std::string& name : request.unload().components())
+                names.push_back(fullNameOf(name));
             return runner_->unload(names, progress);
         }
         case v1::Request::kReplace: {
             const std::string name = fullNameOf(request.replace().component());
             for (const auto& component : runner_->snapshot()->components) {
                 if (component->full_name != name) continue;
-                return runner_->replace(name, replacementFrom(request.replace().replacement(), component->definition),
-                                        request.replace().library(), progress);
+                return runner_->replace(
+                    name, replacementFrom(request.replace().replacement(), component->definition),
+                    request.replace().library(), progress);
             }
             throw Refusal(RefusalKind::NotFound, fmt::format("no component {} to replace", name));
         }
@@ -426,7 +473,8 @@ ChangeOutcome Server::change(const v1::Request& request, const Runner::Progress&
             return runner_->setParameters(fullNameOf(request.set_parameters().component()),
                                           parametersFrom(request.set_parameters().parameters()));
         default:
-            throw Refusal(RefusalKind::InvalidArgument, "a request of unknown kind: is rtcfd newer than its executor?");
+            throw Refusal(RefusalKind::InvalidArgument,
+                          "a request of unknown kind: is rtcfd newer than its executor?");
     }
 }
 
@@ -437,15 +485,18 @@ void Server::submitProbe(std::uint64_t connection, const v1::Request& request) {
     const std::uint64_t id = request.id();
     const std::shared_ptr<const GraphSnapshot> graph = runner_->snapshot();
     const RunnerState state = runner_->picture().state;
-    const auto found = std::find_if(graph->components.begin(), graph->components.end(),
-                                    [&](const auto& component) { return component->full_name == name; });
+    const auto found =
+        std::find_if(graph->components.begin(), graph->components.end(),
+                     [&](const auto& component) { return component->full_name == name; });
     if (found == graph->components.end()) {
         (void)graph->get(name);  // refuses
     }
     v1::Response response;
     response.set_id(id);
-    *response.mutable_component() = componentTo(*graph, static_cast<std::size_t>(found - graph->components.begin()), state);
-    waiting_[{connection, id}] = {monotonicNow() + kProbeTimeout, [response] { return response; }};
+    *response.mutable_component() =
+        componentTo(*graph, static_cast<std::size_t>(found - graph->components.begin()), state);
+    waiting_[{connection, id}] = {monotonicNow() + kProbeTimeout, [response] { return response; },
+                                  nullptr};
     runner_->post([this, connection, name, response]() mutable {
         try {
             addValues(*response.mutable_component(), runner_->probe(name));
@@ -498,19 +549,23 @@ pb::RunnerStatistics Server::statistics() const {
     const double ns_per_tick = loop.counter().nsPerTick();
     pb::RunnerStatistics message;
     message.set_runner(runner_->name());
-    const HistogramSnapshot duration = difference(loop.figures().duration.snapshot(), baseline_.duration);
+    const HistogramSnapshot duration =
+        difference(loop.figures().duration.snapshot(), baseline_.duration);
     message.set_iterations(duration.count);
     setDistribution(*message.mutable_duration(), summarize(duration, ns_per_tick));
-    setDistribution(*message.mutable_latency(),
-                    summarize(difference(loop.figures().latency.snapshot(), baseline_.latency), 1.0));
-    message.set_overruns(loop.figures().overruns.load(std::memory_order_relaxed) - baseline_.overruns);
+    setDistribution(
+        *message.mutable_latency(),
+        summarize(difference(loop.figures().latency.snapshot(), baseline_.latency), 1.0));
+    message.set_overruns(loop.figures().overruns.load(std::memory_order_relaxed) -
+                         baseline_.overruns);
     message.set_missed(loop.figures().missed.load(std::memory_order_relaxed) - baseline_.missed);
     for (const auto& component : graph->components) {
         pb::ComponentStatistics& statistics = *message.add_components();
         statistics.set_component(component->full_name);
         HistogramSnapshot present = component->figures->duration.snapshot();
         std::uint64_t overruns = component->figures->overruns.load(std::memory_order_relaxed);
-        if (const auto found = baseline_.components.find(component->figures); found != baseline_.components.end()) {
+        if (const auto found = baseline_.components.find(component->figures);
+            found != baseline_.components.end()) {
             present = difference(present, found->second.first);
             overruns -= found->second.second;
         }
@@ -532,8 +587,9 @@ void Server::resetStatistics() {
     const Loop& loop = runner_->loop();
     baseline_.components.clear();
     for (const auto& component : runner_->snapshot()->components) {
-        baseline_.components[component->figures] = {component->figures->duration.snapshot(),
-                                                          component->figures->overruns.load(std::memory_order_relaxed)};
+        baseline_.components[component->figures] = {
+            component->figures->duration.snapshot(),
+            component->figures->overruns.load(std::memory_order_relaxed)};
     }
     baseline_.duration = loop.figures().duration.snapshot();
     baseline_.latency = loop.figures().latency.snapshot();

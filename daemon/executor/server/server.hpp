@@ -5,6 +5,7 @@
 /// changes, never a query.
 #pragma once
 
+#include <atomic>
 #include <deque>
 #include <functional>
 #include <map>
@@ -43,11 +44,13 @@ class Server {
     struct Outgoing {
         std::uint64_t connection;  // 0 = all
         v1::Response response;
-        bool last;                 // ends its request
+        bool last;  // ends its request
     };
     struct Baseline {  // what statistics count from
         // Held, as another component's figures could come to the same address.
-        std::map<std::shared_ptr<const ComponentFigures>, std::pair<HistogramSnapshot, std::uint64_t>> components;
+        std::map<std::shared_ptr<const ComponentFigures>,
+                 std::pair<HistogramSnapshot, std::uint64_t>>
+            components;
         HistogramSnapshot duration;
         HistogramSnapshot latency;
         std::uint64_t overruns = 0;
@@ -58,7 +61,7 @@ class Server {
     void accept();
     void receive(Connection& connection);
     void drop(std::uint64_t id);
-    void respond(std::uint64_t connection, v1::Response response);
+    void respond(std::uint64_t connection, const v1::Response& response);
     void handle(Connection& connection, const v1::Request& request);
     bool answerQuery(std::uint64_t connection, const v1::Request& request);
     void submitChange(std::uint64_t connection, const v1::Request& request);
@@ -88,11 +91,13 @@ class Server {
     struct Waiting {
         std::int64_t until_ns;
         std::function<v1::Response()> otherwise;
+        std::shared_ptr<std::atomic<bool>> given_up;  // of a change, which then does not happen
     };
     std::map<std::pair<std::uint64_t, std::uint64_t>, Waiting> waiting_;
 
     std::mutex outbox_mutex_;
     std::deque<Outgoing> outbox_;
+    std::uint64_t lost_records_ = 0;  // log records that found the outbox full
 };
 
 }  // namespace rtcf::executor

@@ -23,7 +23,8 @@ ThreadUsage readThreadUsage(int thread_id) {
     std::ifstream status(folder + "/status");
     const std::string key = "nonvoluntary_ctxt_switches:";
     while (std::getline(status, line)) {
-        if (line.rfind(key, 0) == 0) usage.involuntary_switches = std::stoull(line.substr(key.size()));
+        if (line.rfind(key, 0) == 0)
+            usage.involuntary_switches = std::stoull(line.substr(key.size()));
     }
     return usage;
 }

@@ -114,9 +114,8 @@ int main(int argc, char** argv) try {
     }
     const double read_ns = median(reads) * scale;
     const double budget_ns = read_ns + kBudgetAboveReadNs;
-    fmt::print(
-        "{{\"counter_read_ns\": {:.2f}, \"budget_ns\": {:.2f}, \"rounds\": {}, \"chains\": [",
-        read_ns, budget_ns, rounds);
+    fmt::print(R"({{"counter_read_ns": {:.2f}, "budget_ns": {:.2f}, "rounds": {}, "chains": [)",
+               read_ns, budget_ns, rounds);
     const double first = rows[0].framework_ns;
     for (const Row& row : rows) {
         // A cycle costs something by itself, which the chain of one shows; what each further

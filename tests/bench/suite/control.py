@@ -6,12 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import rtcf
-from daemon import Daemon
 from figures import median
 from graphs import chain, paper
 from result import Budget, Result
 from rtcf.v1 import runner_pb2
 from setting import FREQUENCY_HZ, Setting
+
+from daemon import Daemon
 
 _CALLS = 11
 _LONG_CHAIN = 200

@@ -4,11 +4,12 @@ import time
 from pathlib import Path
 
 import rtcf
-from daemon import Daemon
 from graphs import paper
 from result import Budget, Result
 from rtcf.v1 import control_pb2, runner_pb2
 from setting import FREQUENCY_HZ, Setting
+
+from daemon import Daemon
 
 _CHANGES = 1000
 _WARM_UP = 50

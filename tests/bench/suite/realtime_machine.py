@@ -78,7 +78,9 @@ def _report(found: dict[str, list[float]], boots: int, with_hal: bool) -> Result
         result.budgets += [
             Budget(f"wake-up p99.9, {kind}, cyclictest's + 2 µs", ours[2], theirs[2] + 2, "µs"),
             Budget(f"wake-up maximum, {kind}, cyclictest's + 3 µs", ours[3], theirs[3] + 3, "µs"),
-            Budget(f"wake-up p99 with spin, {kind}", found[f"rtcf-spin.latency.{kind}"][1], 0.2, "µs"),
+            Budget(
+                f"wake-up p99 with spin, {kind}", found[f"rtcf-spin.latency.{kind}"][1], 0.2, "µs"
+            ),
         ]
     return result
 
@@ -132,7 +134,5 @@ def _fill(payload: Path, setting: Setting) -> bool:
         folder = setting.output / "hal"
         names = [f"{name}.so" for name in ("rtcf_mimo", "rtcf_record")]
         place = "--transform=s,^,usr/lib/linuxcnc/modules/,"
-        output_of(
-            ["tar", "-rf", str(payload / "files.tar"), place, "-C", str(folder), *names]
-        )
+        output_of(["tar", "-rf", str(payload / "files.tar"), place, "-C", str(folder), *names])
     return with_hal

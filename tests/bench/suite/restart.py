@@ -4,11 +4,12 @@ import os
 import signal
 import time
 
-from daemon import Daemon
 from figures import median
 from graphs import paper
 from result import Budget, Result
 from setting import Setting
+
+from daemon import Daemon
 
 _ROUNDS = 3  # more within a minute would make rtcfd hold the runner
 _DEADLINE_S = 30.0

@@ -30,5 +30,5 @@ class Setting:
 
     @property
     def cpu(self) -> int:
-        """Return the CPU that real-time threads are put on: the last one, as rtcf and HAL choose."""
+        """Return the CPU of real-time threads: the last one, as rtcf and HAL choose."""
         return max(os.sched_getaffinity(0))

@@ -33,8 +33,7 @@ def run(setting: Setting) -> Result:
     """Compare in interleaved runs. Budgets on it are `make bench-rt`'s."""
     result = Result(
         "wake_up",
-        f"wake-up latency at {FREQUENCY_HZ} Hz, SCHED_FIFO {PRIORITY}: "
-        "rtcf and cyclictest in turn",
+        f"wake-up latency at {FREQUENCY_HZ} Hz, SCHED_FIFO {PRIORITY}: rtcf and cyclictest in turn",
         ["µs", "p50", "p99", "p99.9", "max", "missed"],
     )
     result.skipped = missing("cyclictest", "stress-ng")

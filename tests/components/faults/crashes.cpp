@@ -23,7 +23,7 @@ class DivisionByZero final : public Faulty {
 };
 
 class StackOverflow final : public Faulty {
-    static int deeper(volatile char* above) {
+    static int deeper(const volatile char* above) {
         std::array<volatile char, 4096> frame{};
         frame[0] = *above;
         return deeper(frame.data()) + frame[0];

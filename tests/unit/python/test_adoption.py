@@ -213,4 +213,23 @@ def test_an_equal_graph_is_not_reported() -> None:
         value=graph_pb2.ParameterValue(double_value=1.0),
         default_value=graph_pb2.ParameterValue(double_value=0.0),
     )
-    assert follow_components(desired, [info]) == ([], {})
+    assert follow_components(desired, [info], restored=True) == ([], {})
+
+
+def test_an_unload_whose_save_was_lost_is_followed() -> None:
+    desired = Desired("r")
+    for name in ("gone", "absent"):
+        desired.put(f"/{name}", rtcf.component("p", "T", name=name))
+    desired.left_out["/absent"] = "no such library"
+    lines, left_out = follow_components(desired, [], restored=True)
+    assert lines == ["/gone was unloaded", "/absent is not in its loop"]
+    assert left_out == {"/absent": "no such library"}
+    assert list(desired.components) == ["/absent"]
+
+
+def test_what_a_restore_did_not_get_to_stays_desired() -> None:
+    desired = Desired("r")
+    desired.put("/a", rtcf.component("p", "T", name="a"))
+    lines, left_out = follow_components(desired, [], restored=False)
+    assert lines == ["/a is not in its loop"]
+    assert left_out == {"/a": "its executor does not have it"}

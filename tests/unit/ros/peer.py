@@ -7,6 +7,7 @@ peer.py node NAME           only has that name; ends when its master says so
 peer.py loggers NODE        does what rqt_logger_level does to a node, prints `done` and ends
 """
 
+import contextlib
 import os
 import sys
 from typing import Any
@@ -23,10 +24,8 @@ def show(message: Any) -> None:
 
 def look_at_loggers(node: str) -> None:
     """Asks for the loggers of a node and sets the level of one."""
-    try:
+    with contextlib.suppress(rospy.ServiceException):  # it may refuse
         rospy.ServiceProxy(f"{node}/get_loggers", roscpp.srv.GetLoggers)()
-    except rospy.ServiceException:
-        pass  # it may refuse
     rospy.ServiceProxy(f"{node}/set_logger_level", roscpp.srv.SetLoggerLevel)("ros", "debug")
     print("done", flush=True)
 

@@ -36,15 +36,15 @@ struct ArithmeticConversion {
 }  // namespace detail
 
 /// Declares an arithmetic type as a port type; ends at the end of this file.
-#define RTCF_ARITHMETIC_TYPE(TYPE, NAME, MESSAGE)                                     \
-    namespace detail {                                                                \
-    template <>                                                                       \
-    struct ArithmeticName<TYPE> {                                                     \
-        static constexpr const char* value = NAME;                                    \
-    };                                                                                \
-    }                                                                                 \
-    template <>                                                                       \
-    struct PortType<TYPE>                                                             \
+#define RTCF_ARITHMETIC_TYPE(TYPE, NAME, MESSAGE)  \
+    namespace detail {                             \
+    template <>                                    \
+    struct ArithmeticName<TYPE> {                  \
+        static constexpr const char* value = NAME; \
+    };                                             \
+    }                                              \
+    template <>                                    \
+    struct PortType<TYPE>                          \
         : detail::MappedPortType<TYPE, MESSAGE, detail::ArithmeticConversion<TYPE, MESSAGE>> {}
 
 RTCF_ARITHMETIC_TYPE(bool, "bool", std_msgs::Bool);

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -33,11 +34,12 @@ struct ComponentContext {
     const LoopClock* clock = nullptr;  ///< the loop's clock
     std::int64_t period_ns = 0;        ///< of this component, ns
     std::int64_t elapsed_ns = 0;       ///< whole periods since its last update, ns
-    std::int64_t updated_ns = -1;      ///< loop time in whole periods at its last update, ns; -1 = not yet
-    bool disabled = false;             ///< taken out after a fault; written by the loop
-    std::atomic<std::uint64_t> device_calls{0};    ///< scopes of RTCF_DEVICE_IO so far
-    std::atomic<std::int64_t> device_time_ns{0};   ///< time spent in them, ns
-    LogSink* log = nullptr;            ///< never null once attached
+    std::int64_t updated_ns =
+        -1;                 ///< loop time in whole periods at its last update, ns; -1 = not yet
+    bool disabled = false;  ///< taken out after a fault; written by the loop
+    std::atomic<std::uint64_t> device_calls{0};       ///< scopes of RTCF_DEVICE_IO so far
+    std::atomic<std::int64_t> device_time_ns{0};      ///< time spent in them, ns
+    LogSink* log = nullptr;                           ///< never null once attached
     std::atomic<LogLevel> log_level{LogLevel::Info};  ///< calls below it are not logged
 };
 
@@ -72,15 +74,21 @@ class Component {
 
     /// @name Identity; valid from configure() on
     /// @{
-    const std::string& name() const noexcept { return context_->name; }          ///< e.g. "H1"
-    const std::string& fullName() const noexcept { return context_->full_name; } ///< e.g. "/arm/H1"
-    const std::string& runner() const noexcept { return context_->runner; }      ///< e.g. "rt_runner"
+    const std::string& name() const noexcept { return context_->name; }  ///< e.g. "H1"
+    const std::string& fullName() const noexcept {
+        return context_->full_name;
+    }                                                                        ///< e.g. "/arm/H1"
+    const std::string& runner() const noexcept { return context_->runner; }  ///< e.g. "rt_runner"
     /// @}
 
     /// @name Time; real-time safe. There is no other clock in a loop.
     /// @{
-    std::int64_t time() const noexcept RTCF_NONBLOCKING { return context_->clock->time_ns; }   ///< Monotonic, ns.
-    std::int64_t stamp() const noexcept RTCF_NONBLOCKING { return context_->clock->stamp_ns; } ///< ROS time, ns.
+    std::int64_t time() const noexcept RTCF_NONBLOCKING {
+        return context_->clock->time_ns;
+    }  ///< Monotonic, ns.
+    std::int64_t stamp() const noexcept RTCF_NONBLOCKING {
+        return context_->clock->stamp_ns;
+    }  ///< ROS time, ns.
     std::uint64_t iteration() const noexcept RTCF_NONBLOCKING { return context_->clock->iteration; }
     /// This component's nominal period, ns.
     std::int64_t period() const noexcept RTCF_NONBLOCKING { return context_->period_ns; }
@@ -95,7 +103,8 @@ class Component {
     /// @name For the logging macros; real-time safe
     /// @{
     bool logs(LogLevel level) const noexcept RTCF_NONBLOCKING {
-        return context_->log != nullptr && level >= context_->log_level.load(std::memory_order_relaxed);
+        return context_->log != nullptr &&
+               level >= context_->log_level.load(std::memory_order_relaxed);
     }
     LogSink& logSink() const noexcept RTCF_NONBLOCKING { return *context_->log; }
     /// @}
@@ -104,30 +113,30 @@ class Component {
     /// @{
     void attach(ComponentContext& context) noexcept {
         context_ = &context;
-        for (OutputBase* output : outputs_) output->setClock(clock());
+        for (OutputBase* output : rest_->outputs) output->setClock(clock());
     }
     /// Nothing can be declared from here on.
-    void freeze() noexcept { frozen_ = true; }
-    const std::vector<InputBase*>& inputs() const noexcept { return inputs_; }
-    const std::vector<OutputBase*>& outputs() const noexcept { return outputs_; }
-    const std::vector<ParameterBase*>& parameters() const noexcept { return parameters_; }
-    const std::vector<DerivedBase*>& derived() const noexcept { return derived_; }
+    void freeze() noexcept { rest_->frozen = true; }
+    const std::vector<InputBase*>& inputs() const noexcept { return rest_->inputs; }
+    const std::vector<OutputBase*>& outputs() const noexcept { return rest_->outputs; }
+    const std::vector<ParameterBase*>& parameters() const noexcept { return rest_->parameters; }
+    const std::vector<DerivedBase*>& derived() const noexcept { return rest_->derived; }
     /// Outputs whose values are checked before anybody reads them.
-    const std::vector<OutputBase*>& finiteOutputs() const noexcept { return finite_outputs_; }
+    const std::vector<OutputBase*>& finiteOutputs() const noexcept { return rest_->finite_outputs; }
     ComponentContext& context() const noexcept { return *context_; }
-    const std::string& failure() const noexcept { return failure_; }
+    const std::string& failure() const noexcept { return rest_->failure; }
     const LoopClock& clock() const noexcept RTCF_NONBLOCKING { return *context_->clock; }
     /// @}
 
     /// @name Called by the members' constructors
     /// Throw std::logic_error on a name that is taken or not a ROS base name, and after freeze().
     /// @{
-    void declare(InputBase* input) { declareIn(inputs_, input, input->name(), "port"); }
-    void declare(OutputBase* output) { declareIn(outputs_, output, output->name(), "port"); }
-    void declare(DerivedBase* derived) { derived_.push_back(derived); }
-    void declareFinite(OutputBase* output) { finite_outputs_.push_back(output); }
+    void declare(InputBase* input) { declareIn(rest_->inputs, input, input->name(), "port"); }
+    void declare(OutputBase* output) { declareIn(rest_->outputs, output, output->name(), "port"); }
+    void declare(DerivedBase* derived) { rest_->derived.push_back(derived); }
+    void declareFinite(OutputBase* output) { rest_->finite_outputs.push_back(output); }
     void declare(ParameterBase* parameter) {
-        declareIn(parameters_, parameter, parameter->declaration().name, "parameter");
+        declareIn(rest_->parameters, parameter, parameter->declaration().name, "parameter");
     }
     /// @}
 
@@ -135,7 +144,7 @@ class Component {
     /// Says why a hook fails: `return fail("no reply from {}", device);`. @return false
     template <typename... Arguments>
     bool fail(std::string_view text, const Arguments&... arguments) {
-        failure_ = fmt::vformat(text, fmt::make_format_args(arguments...));
+        rest_->failure = fmt::vformat(text, fmt::make_format_args(arguments...));
         return false;
     }
 
@@ -150,23 +159,32 @@ class Component {
     }
 
     ComponentContext* context_ = &detached();
-    bool frozen_ = false;
-    std::vector<InputBase*> inputs_;
-    std::vector<OutputBase*> outputs_;
-    std::vector<ParameterBase*> parameters_;
-    std::vector<DerivedBase*> derived_;
-    std::vector<OutputBase*> finite_outputs_;
-    std::string failure_;
+    // What the cycle does not touch, apart from what it does: the derived class's ports.
+    struct Rest {
+        bool frozen = false;
+        std::vector<InputBase*> inputs;
+        std::vector<OutputBase*> outputs;
+        std::vector<ParameterBase*> parameters;
+        std::vector<DerivedBase*> derived;
+        std::vector<OutputBase*> finite_outputs;
+        std::string failure;
+    };
+    std::unique_ptr<Rest> rest_ = std::make_unique<Rest>();
 };
 
 template <typename T>
-void Component::declareIn(std::vector<T*>& members, T* member, const std::string& name, const char* what) {
-    const auto legal = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; };
+void Component::declareIn(std::vector<T*>& members, T* member, const std::string& name,
+                          const char* what) {
+    const auto legal = [](char c) {
+        return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
+    };
     if (name.empty() || std::isalpha(static_cast<unsigned char>(name[0])) == 0 ||
         !std::all_of(name.begin(), name.end(), legal)) {
-        throw std::logic_error(fmt::format("{} '{}': not a legal name (a letter, then letters, digits and _)", what, name));
+        throw std::logic_error(fmt::format(
+            "{} '{}': not a legal name (a letter, then letters, digits and _)", what, name));
     }
-    if (frozen_) throw std::logic_error(fmt::format("{} '{}' declared after configure()", what, name));
+    if (rest_->frozen)
+        throw std::logic_error(fmt::format("{} '{}' declared after configure()", what, name));
     const auto taken = [&](const auto& list) {
         return std::any_of(list.begin(), list.end(), [&](const auto* other) {
             if constexpr (std::is_same_v<T, ParameterBase>) {
@@ -178,28 +196,34 @@ void Component::declareIn(std::vector<T*>& members, T* member, const std::string
     };
     bool duplicate = false;
     if constexpr (std::is_same_v<T, ParameterBase>) {
-        duplicate = taken(parameters_);
+        duplicate = taken(rest_->parameters);
     } else {
-        duplicate = taken(inputs_) || taken(outputs_);
+        duplicate = taken(rest_->inputs) || taken(rest_->outputs);
     }
     if (duplicate) throw std::logic_error(fmt::format("{} '{}' is declared twice", what, name));
     members.push_back(member);
 }
 
-inline InputBase::InputBase(Component* owner, std::string name, const TypeInfo& type, const SlotHeader& empty)
-    : source_(&empty), current_(&empty), identity_(new PortIdentity{owner, std::move(name), {}, type}) {
+inline InputBase::InputBase(Component* owner, std::string name, const TypeInfo& type,
+                            const SlotHeader& empty)
+    : source_(&empty),
+      current_(&empty),
+      identity_(new PortIdentity{owner, std::move(name), {}, type}) {
     owner->declare(this);
 }
 
 inline std::int64_t InputBase::age() const noexcept RTCF_NONBLOCKING {
     // The loop's time goes back when a simulated clock begins anew.
-    return current_->sequence == 0 ? -1 : std::max<std::int64_t>(0, identity_->owner->time() - current_->time_ns);
+    return current_->sequence == 0
+               ? -1
+               : std::max<std::int64_t>(0, identity_->owner->time() - current_->time_ns);
 }
 
-inline OutputBase::OutputBase(Component* owner, std::string name, std::string unit, const TypeInfo& type,
-                              const Finite* finite)
+inline OutputBase::OutputBase(Component* owner, std::string name, std::string unit,
+                              const TypeInfo& type, const Finite* finite)
     : clock_(&owner->clock()),
-      rest_(new Rest{{owner, std::move(name), std::move(unit), type}, type.make_slot(nullptr), nullptr}) {
+      rest_(new Rest{
+          {owner, std::move(name), std::move(unit), type}, type.make_slot(nullptr), nullptr}) {
     raw_ = rest_->slot.get();
     owner->declare(this);
     if (finite == nullptr) return;
@@ -217,7 +241,8 @@ inline ParameterBase::ParameterBase(Component* owner, ParameterDeclaration decla
     ParameterValue initial = declaration_.default_value;
     const double* number = std::get_if<double>(&initial);
     if (number == nullptr || std::isfinite(*number)) {
-        if (const std::string why = check(initial); !why.empty()) throw std::logic_error("default value: " + why);
+        if (const std::string why = check(initial); !why.empty())
+            throw std::logic_error("default value: " + why);
     }
     owner->declare(this);
 }
@@ -228,8 +253,10 @@ inline std::string ParameterBase::check(ParameterValue& value) const {
         value = static_cast<double>(std::get<std::int64_t>(value));
     }
     if (value.index() != initial.index()) {
-        static constexpr std::array<const char*, 4> kNames{"a bool", "an int", "a double", "a string"};
-        return fmt::format("parameter {} takes {}, not {}", name, type == "enum" ? "a name" : kNames[initial.index()],
+        static constexpr std::array<const char*, 4> kNames{"a bool", "an int", "a double",
+                                                           "a string"};
+        return fmt::format("parameter {} takes {}, not {}", name,
+                           type == "enum" ? "a name" : kNames[initial.index()],
                            kNames[value.index()]);
     }
     double number = 0.0;
@@ -240,10 +267,12 @@ inline std::string ParameterBase::check(ParameterValue& value) const {
         number = static_cast<double>(*integer);
     }
     if (minimum && number < *minimum) {
-        return fmt::format("parameter {} = {} is below its minimum {} {}", name, number, *minimum, unit);
+        return fmt::format("parameter {} = {} is below its minimum {} {}", name, number, *minimum,
+                           unit);
     }
     if (maximum && number > *maximum) {
-        return fmt::format("parameter {} = {} is above its maximum {} {}", name, number, *maximum, unit);
+        return fmt::format("parameter {} = {} is above its maximum {} {}", name, number, *maximum,
+                           unit);
     }
     if (!choices.empty()) {
         std::string names;
@@ -251,7 +280,8 @@ inline std::string ParameterBase::check(ParameterValue& value) const {
             if (choice.name == std::get<std::string>(value)) return {};
             names += (names.empty() ? "" : ", ") + choice.name;
         }
-        return fmt::format("parameter {} = {} is none of {}", name, std::get<std::string>(value), names);
+        return fmt::format("parameter {} = {} is none of {}", name, std::get<std::string>(value),
+                           names);
     }
     return {};
 }
@@ -260,8 +290,8 @@ inline std::string ParameterBase::check(ParameterValue& value) const {
 /// a runner. The runner's frequency is then nominal.
 class Source : public Component {
    public:
-    /// Called in the real-time thread instead of its sleep. @param deadline_ns CLOCK_MONOTONIC, ns; it must
-    /// return by then. @return true if the device is ready: a cycle begins
+    /// Called in the real-time thread instead of its sleep. @param deadline_ns CLOCK_MONOTONIC, ns;
+    /// it must return by then. @return true if the device is ready: a cycle begins
     virtual bool wait(std::int64_t deadline_ns) noexcept = 0;
 };
 

@@ -24,14 +24,16 @@ namespace rtcf {
 /// A scope that `rtcfctl check` does not complain about, timed and counted. Real-time safe.
 class DeviceIo {
    public:
-    explicit DeviceIo(Component* component) noexcept : context_(component->context()), begin_ns_(now()) {
+    explicit DeviceIo(Component* component) noexcept
+        : context_(component->context()), begin_ns_(now()) {
         if (__rtsan_disable != nullptr) __rtsan_disable();
     }
     ~DeviceIo() {
         if (__rtsan_enable != nullptr) __rtsan_enable();
         const auto relaxed = std::memory_order_relaxed;
         context_.device_calls.store(context_.device_calls.load(relaxed) + 1, relaxed);
-        context_.device_time_ns.store(context_.device_time_ns.load(relaxed) + now() - begin_ns_, relaxed);
+        context_.device_time_ns.store(context_.device_time_ns.load(relaxed) + now() - begin_ns_,
+                                      relaxed);
     }
     DeviceIo(const DeviceIo&) = delete;
     DeviceIo& operator=(const DeviceIo&) = delete;

@@ -7,7 +7,8 @@
 /// | `Eigen::Vector3d` | geometry_msgs/Vector3 |
 /// | `Eigen::Quaterniond` | geometry_msgs/Quaternion |
 /// | `Eigen::Isometry3d` | geometry_msgs/Pose |
-/// | any other fixed-size matrix of double or float | std_msgs/Float64MultiArray or Float32MultiArray, row by row |
+/// | any other fixed-size matrix of double or float | std_msgs/Float64MultiArray or
+/// Float32MultiArray, row by row |
 #pragma once
 
 #include <geometry_msgs/Pose.h>
@@ -65,7 +66,8 @@ struct IsometryConversion {
         QuaternionConversion::fromMessage(message.orientation, rotation);
         value.setIdentity();
         value.linear() = rotation.normalized().toRotationMatrix();
-        value.translation() = Eigen::Vector3d(message.position.x, message.position.y, message.position.z);
+        value.translation() =
+            Eigen::Vector3d(message.position.x, message.position.y, message.position.z);
     }
 };
 
@@ -90,7 +92,8 @@ struct PortType<Eigen::Vector3d>
 
 template <>
 struct PortType<Eigen::Quaterniond>
-    : detail::MappedPortType<Eigen::Quaterniond, geometry_msgs::Quaternion, detail::QuaternionConversion> {};
+    : detail::MappedPortType<Eigen::Quaterniond, geometry_msgs::Quaternion,
+                             detail::QuaternionConversion> {};
 
 template <>
 struct PortType<Eigen::Isometry3d>
@@ -107,9 +110,9 @@ struct PortType<Eigen::Matrix<Scalar, Rows, Cols, Options, MaxRows, MaxCols>,
     static constexpr bool kFixedSize = true;
 
     static const char* name() {
-        static const std::string text = std::string("Eigen::Matrix<") + detail::MultiArray<Scalar>::scalar +
-                                        "," + std::to_string(Rows) + "," + std::to_string(Cols) +
-                                        (kTransposed ? ",RowMajor>" : ">");
+        static const std::string text =
+            std::string("Eigen::Matrix<") + detail::MultiArray<Scalar>::scalar + "," +
+            std::to_string(Rows) + "," + std::to_string(Cols) + (kTransposed ? ",RowMajor>" : ">");
         return text.c_str();
     }
     static const char* md5() { return PortType<Message>::md5(); }
@@ -148,16 +151,19 @@ struct PortType<Eigen::Matrix<Scalar, Rows, Cols, Options, MaxRows, MaxCols>,
     static std::string print(const T& value) {
         std::ostringstream text;
         detail::makeExact(text);
-        text << value.format(Eigen::IOFormat(Eigen::StreamPrecision, Eigen::DontAlignCols, ", ", "; ", "", "", "[", "]"));
+        text << value.format(Eigen::IOFormat(Eigen::StreamPrecision, Eigen::DontAlignCols, ", ",
+                                             "; ", "", "", "[", "]"));
         return text.str();
     }
 
    private:
-    // Another type, as readers take values from the writer's memory; a vector is the same either way.
+    // Another type, as readers take values from the writer's memory; a vector is the same either
+    // way.
     static constexpr bool kTransposed = (Options & Eigen::RowMajor) != 0 && Rows > 1 && Cols > 1;
     static constexpr std::uint32_t kLabelLength = 4;  // "rows", "cols"
 
-    static void dimension(ros::serialization::OStream& stream, const char* label, int size, int stride) {
+    static void dimension(ros::serialization::OStream& stream, const char* label, int size,
+                          int stride) {
         stream.next(kLabelLength);
         std::memcpy(stream.advance(kLabelLength), label, kLabelLength);
         stream.next(static_cast<std::uint32_t>(size));

@@ -48,31 +48,31 @@ class FiniteVisitor {
 template <typename T, typename = void>
 struct IsSequence : std::false_type {};
 template <typename T>
-struct IsSequence<T, std::void_t<decltype(std::declval<const T&>().begin()), decltype(std::declval<const T&>().size())>>
-    : std::true_type {};
+struct IsSequence<T, std::void_t<decltype(std::declval<const T&>().begin()),
+                                 decltype(std::declval<const T&>().size())>> : std::true_type {};
 
 template <typename T, typename = void>
 struct HasAllFinite : std::false_type {};
 template <typename T>
-struct HasAllFinite<T, std::void_t<decltype(std::declval<const T&>().allFinite())>> : std::true_type {};
+struct HasAllFinite<T, std::void_t<decltype(std::declval<const T&>().allFinite())>>
+    : std::true_type {};
 
 template <typename T, typename = void>
 struct HasCoefficients : std::false_type {};
 template <typename T>
-struct HasCoefficients<T, std::void_t<decltype(std::declval<const T&>().coeffs())>> : std::true_type {};
+struct HasCoefficients<T, std::void_t<decltype(std::declval<const T&>().coeffs())>>
+    : std::true_type {};
 
 template <typename T, typename = void>
 struct HasMatrix : std::false_type {};
 template <typename T>
-struct HasMatrix<T, std::void_t<decltype(std::declval<const T&>().matrix().allFinite()), typename T::LinearMatrixType>>
-    : std::true_type {};
+struct HasMatrix<T, std::void_t<decltype(std::declval<const T&>().matrix().allFinite()),
+                                typename T::LinearMatrixType>> : std::true_type {};
 
 template <typename T>
 bool isFinite(const T& value) noexcept {
     if constexpr (std::is_floating_point_v<T>) {
         return std::isfinite(value);
-    } else if constexpr (std::is_arithmetic_v<T> || std::is_same_v<T, std::string>) {
-        return true;
     } else if constexpr (HasMatrix<T>::value) {  // Eigen::Transform
         return value.matrix().allFinite();
     } else if constexpr (HasCoefficients<T>::value) {  // Eigen::Quaternion
@@ -81,15 +81,16 @@ bool isFinite(const T& value) noexcept {
         return value.allFinite();
     } else if constexpr (ros::message_traits::IsMessage<T>::value) {
         FiniteVisitor visitor;
-        ros::serialization::Serializer<T>::template allInOne<FiniteVisitor, const T&>(visitor, value);
+        ros::serialization::Serializer<T>::template allInOne<FiniteVisitor, const T&>(visitor,
+                                                                                      value);
         return visitor.finite();
-    } else if constexpr (IsSequence<T>::value) {
+    } else if constexpr (IsSequence<T>::value && !std::is_same_v<T, std::string>) {
         for (const auto& item : value) {
             if (!isFinite(item)) return false;
         }
         return true;
     } else {
-        return true;  // time and duration, which are integers
+        return true;  // text, integers, and time and duration, which are made of integers
     }
 }
 

@@ -46,10 +46,10 @@ constexpr std::size_t kLogPayload = 320;
 /// One call on its way to the log.
 struct LogRecord {
     const LogSite* site;
-    const char* component;      ///< full name; lives until the record is consumed
-    std::int64_t time_ns;       ///< CLOCK_REALTIME at the call, ns since 1970
-    std::uint64_t iteration;    ///< of the loop at the call
-    bool realtime;              ///< called by the real-time thread
+    const char* component;    ///< full name; lives until the record is consumed
+    std::int64_t time_ns;     ///< CLOCK_REALTIME at the call, ns since 1970
+    std::uint64_t iteration;  ///< of the loop at the call
+    bool realtime;            ///< called by the real-time thread
     /// Makes the text; not real-time safe.
     void (*render)(const LogRecord& record, std::string& text);
     alignas(std::max_align_t) std::array<std::byte, kLogPayload> payload;
@@ -92,8 +92,9 @@ auto logStore(const T& value) noexcept {
     } else if constexpr (std::is_pointer_v<T>) {
         return static_cast<const void*>(value);
     } else {
-        static_assert(std::is_arithmetic_v<T>,
-                      "log arguments are numbers, enums, pointers and strings: log an object's members");
+        static_assert(
+            std::is_arithmetic_v<T>,
+            "log arguments are numbers, enums, pointers and strings: log an object's members");
         return value;
     }
 }
@@ -148,7 +149,8 @@ inline bool logThrottle(std::atomic<std::int64_t>& next_ns, std::int64_t now_ns,
     std::int64_t due = next_ns.load(std::memory_order_relaxed);
     // Further away than a period: a simulated clock has begun anew since.
     const bool passes = now_ns >= due || due - now_ns > period_ns;
-    return passes && next_ns.compare_exchange_strong(due, now_ns + period_ns, std::memory_order_relaxed);
+    return passes &&
+           next_ns.compare_exchange_strong(due, now_ns + period_ns, std::memory_order_relaxed);
 }
 
 }  // namespace detail
@@ -157,32 +159,32 @@ inline bool logThrottle(std::atomic<std::int64_t>& next_ns, std::int64_t now_ns,
 
 /// @name Internals of the macros below
 /// @{
-#define RTCF_LOG_IF_(self, log_level, condition, text, ...)                                       \
-    do {                                                                                          \
-        const ::rtcf::Component& rtcf_log_self = *(self);                                         \
-        if (rtcf_log_self.logs(log_level) && (condition)) {                                       \
-            static constexpr ::rtcf::LogSite rtcf_log_site{                                       \
-                log_level, __FILE__, __LINE__, RTCF_LOG_FUNCTION_, text};                         \
-            if (false) ::rtcf::detail::logCheck(FMT_STRING(text), ##__VA_ARGS__);                 \
-            ::rtcf::detail::logCall(rtcf_log_self.logSink(), rtcf_log_self.fullName().c_str(),    \
-                                    rtcf_log_site, ##__VA_ARGS__);                                \
-        }                                                                                         \
+#define RTCF_LOG_IF_(self, log_level, condition, text, ...)                                    \
+    do {                                                                                       \
+        const ::rtcf::Component& rtcf_log_self = *(self);                                      \
+        if (rtcf_log_self.logs(log_level) && (condition)) {                                    \
+            static constexpr ::rtcf::LogSite rtcf_log_site{log_level, __FILE__, __LINE__,      \
+                                                           RTCF_LOG_FUNCTION_, text};          \
+            if (false) ::rtcf::detail::logCheck(FMT_STRING(text), ##__VA_ARGS__);              \
+            ::rtcf::detail::logCall(rtcf_log_self.logSink(), rtcf_log_self.fullName().c_str(), \
+                                    rtcf_log_site, ##__VA_ARGS__);                             \
+        }                                                                                      \
     } while (false)
 #define RTCF_LOG_FUNCTION_ static_cast<const char*>(__builtin_FUNCTION())
 #define RTCF_LOG_(self, log_level, text, ...) \
     RTCF_LOG_IF_(self, log_level, true, text, ##__VA_ARGS__)
-#define RTCF_LOG_ONCE_(self, log_level, text, ...)                                           \
-    do {                                                                                     \
-        static std::atomic<bool> rtcf_log_done{false};                                       \
-        RTCF_LOG_IF_(self, log_level, !rtcf_log_done.exchange(true), text, ##__VA_ARGS__);   \
+#define RTCF_LOG_ONCE_(self, log_level, text, ...)                                         \
+    do {                                                                                   \
+        static std::atomic<bool> rtcf_log_done{false};                                     \
+        RTCF_LOG_IF_(self, log_level, !rtcf_log_done.exchange(true), text, ##__VA_ARGS__); \
     } while (false)
-#define RTCF_LOG_THROTTLE_(self, log_level, period_s, text, ...)                                   \
-    do {                                                                                           \
-        static std::atomic<std::int64_t> rtcf_log_next{std::numeric_limits<std::int64_t>::min()};  \
-        RTCF_LOG_IF_(self, log_level,                                                              \
-                     ::rtcf::detail::logThrottle(rtcf_log_next, (self)->time(),                    \
-                                                 static_cast<std::int64_t>((period_s)*1e9)),       \
-                     text, ##__VA_ARGS__);                                                         \
+#define RTCF_LOG_THROTTLE_(self, log_level, period_s, text, ...)                                  \
+    do {                                                                                          \
+        static std::atomic<std::int64_t> rtcf_log_next{std::numeric_limits<std::int64_t>::min()}; \
+        RTCF_LOG_IF_(self, log_level,                                                             \
+                     ::rtcf::detail::logThrottle(rtcf_log_next, (self)->time(),                   \
+                                                 static_cast<std::int64_t>((period_s)*1e9)),      \
+                     text, ##__VA_ARGS__);                                                        \
     } while (false)
 /// @}
 
@@ -198,8 +200,12 @@ inline bool logThrottle(std::atomic<std::int64_t>& next_ns, std::int64_t now_ns,
 #define RTCF_INFO_ONCE(self, ...) RTCF_LOG_ONCE_(self, ::rtcf::LogLevel::Info, __VA_ARGS__)
 #define RTCF_WARN_ONCE(self, ...) RTCF_LOG_ONCE_(self, ::rtcf::LogLevel::Warn, __VA_ARGS__)
 #define RTCF_ERROR_ONCE(self, ...) RTCF_LOG_ONCE_(self, ::rtcf::LogLevel::Error, __VA_ARGS__)
-#define RTCF_DEBUG_THROTTLE(self, s, ...) RTCF_LOG_THROTTLE_(self, ::rtcf::LogLevel::Debug, s, __VA_ARGS__)
-#define RTCF_INFO_THROTTLE(self, s, ...) RTCF_LOG_THROTTLE_(self, ::rtcf::LogLevel::Info, s, __VA_ARGS__)
-#define RTCF_WARN_THROTTLE(self, s, ...) RTCF_LOG_THROTTLE_(self, ::rtcf::LogLevel::Warn, s, __VA_ARGS__)
-#define RTCF_ERROR_THROTTLE(self, s, ...) RTCF_LOG_THROTTLE_(self, ::rtcf::LogLevel::Error, s, __VA_ARGS__)
+#define RTCF_DEBUG_THROTTLE(self, s, ...) \
+    RTCF_LOG_THROTTLE_(self, ::rtcf::LogLevel::Debug, s, __VA_ARGS__)
+#define RTCF_INFO_THROTTLE(self, s, ...) \
+    RTCF_LOG_THROTTLE_(self, ::rtcf::LogLevel::Info, s, __VA_ARGS__)
+#define RTCF_WARN_THROTTLE(self, s, ...) \
+    RTCF_LOG_THROTTLE_(self, ::rtcf::LogLevel::Warn, s, __VA_ARGS__)
+#define RTCF_ERROR_THROTTLE(self, s, ...) \
+    RTCF_LOG_THROTTLE_(self, ::rtcf::LogLevel::Error, s, __VA_ARGS__)
 /// @}

@@ -40,7 +40,9 @@ struct PortType<T, std::enable_if_t<ros::message_traits::IsMessage<T>::value>> {
     static const char* rosType() { return name(); }
     static const char* rosMd5() { return md5(); }
     static const char* rosDefinition() { return ros::message_traits::definition<T>(); }
-    static std::uint32_t length(const T& value) { return ros::serialization::serializationLength(value); }
+    static std::uint32_t length(const T& value) {
+        return ros::serialization::serializationLength(value);
+    }
     static void serialize(const T& value, std::uint8_t* to, std::uint32_t size) {
         ros::serialization::OStream stream(to, size);
         ros::serialization::serialize(stream, value);

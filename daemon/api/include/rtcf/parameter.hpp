@@ -85,7 +85,6 @@ class StagedValue {
 /// What the executor handles of any parameter.
 class ParameterBase : public StagedValue {
    public:
-
     const ParameterDeclaration& declaration() const noexcept { return declaration_; }
 
     /// Checks type, bounds and enumerators. @return empty if the value can be
@@ -118,7 +117,9 @@ class Parameter final : public ParameterBase {
 
     /// The value, constant during a cycle. Real-time safe.
     const T& value() const noexcept RTCF_NONBLOCKING { return value_; }
-    operator const T&() const noexcept RTCF_NONBLOCKING { return value_; }  // NOLINT(google-explicit-constructor)
+    operator const T&() const noexcept RTCF_NONBLOCKING {
+        return value_;
+    }  // NOLINT(google-explicit-constructor)
 
     /// The value as it will be if the batch is adopted that prepare() is about.
     const T& proposed() const noexcept { return is_staged_ ? staged_ : value_; }
@@ -129,7 +130,8 @@ class Parameter final : public ParameterBase {
             staged_ = std::get<T>(checked);
         } else if constexpr (std::is_enum_v<T>) {
             for (const Choice& choice : declaration_.choices) {
-                if (choice.name == std::get<std::string>(checked)) staged_ = static_cast<T>(choice.value);
+                if (choice.name == std::get<std::string>(checked))
+                    staged_ = static_cast<T>(choice.value);
             }
         } else if constexpr (std::is_integral_v<T>) {
             staged_ = static_cast<T>(std::get<std::int64_t>(checked));
@@ -144,8 +146,9 @@ class Parameter final : public ParameterBase {
     void release() noexcept override { is_staged_ = false; }
 
    private:
-    static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, std::string>,
-                  "a parameter is a bool, an integer, a floating-point number, a std::string or an enum");
+    static_assert(
+        std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, std::string>,
+        "a parameter is a bool, an integer, a floating-point number, a std::string or an enum");
 
     template <typename... Options>
     static ParameterDeclaration declare(std::string name, const T& initial, Options... options) {
@@ -162,7 +165,8 @@ class Parameter final : public ParameterBase {
             declaration.type = "enum";
             declaration.default_value = std::string();
             for (const Choice& choice : declaration.choices) {
-                if (choice.value == static_cast<std::int64_t>(initial)) declaration.default_value = choice.name;
+                if (choice.value == static_cast<std::int64_t>(initial))
+                    declaration.default_value = choice.name;
             }
         } else if constexpr (std::is_integral_v<T>) {
             declaration.type = "int";
@@ -188,10 +192,18 @@ class Parameter final : public ParameterBase {
             declaration.maximum = std::min(highest, declaration.maximum.value_or(highest));
         }
     }
-    static void apply(ParameterDeclaration& declaration, Min bound) { declaration.minimum = bound.value; }
-    static void apply(ParameterDeclaration& declaration, Max bound) { declaration.maximum = bound.value; }
-    static void apply(ParameterDeclaration& declaration, Unit unit) { declaration.unit = std::move(unit.value); }
-    static void apply(ParameterDeclaration& declaration, Doc doc) { declaration.doc = std::move(doc.value); }
+    static void apply(ParameterDeclaration& declaration, Min bound) {
+        declaration.minimum = bound.value;
+    }
+    static void apply(ParameterDeclaration& declaration, Max bound) {
+        declaration.maximum = bound.value;
+    }
+    static void apply(ParameterDeclaration& declaration, Unit unit) {
+        declaration.unit = std::move(unit.value);
+    }
+    static void apply(ParameterDeclaration& declaration, Doc doc) {
+        declaration.doc = std::move(doc.value);
+    }
     static void apply(ParameterDeclaration& declaration, Choice choice) {
         declaration.choices.push_back(std::move(choice));
     }

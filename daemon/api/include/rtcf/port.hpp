@@ -32,6 +32,7 @@ struct PortIdentity {
     std::string name;
     std::string unit;
     const TypeInfo& type;
+    bool connected = false;  ///< an input's: something feeds it
 };
 
 /// What the executor handles of any input.
@@ -45,7 +46,7 @@ class InputBase {
     const TypeInfo& type() const noexcept { return identity_->type; }
 
     /// True if an output or a ROS topic feeds this input. Real-time safe.
-    bool connected() const noexcept RTCF_NONBLOCKING { return connected_; }
+    bool connected() const noexcept RTCF_NONBLOCKING { return identity_->connected; }
     /// Loop time since the current value was written, ns; -1 without a value. Real-time safe.
     std::int64_t age() const noexcept RTCF_NONBLOCKING;
     /// Writes of its source that this input has read so far. Real-time safe.
@@ -65,17 +66,20 @@ class InputBase {
             seen_ = source->sequence;
         }
         source_ = source;
-        connected_ = true;
+        identity_->connected = true;
     }
     /// Has no writer any more; the present value stays.
-    void disconnect() noexcept RTCF_NONBLOCKING { connected_ = false; }
-    /// A value from outside the loop has arrived in `source`; the slot of the last one is given back.
+    void disconnect() noexcept RTCF_NONBLOCKING { identity_->connected = false; }
+    /// A value from outside the loop has arrived in `source`; the slot of the last one is given
+    /// back.
     void inject(const SlotHeader* source) noexcept RTCF_NONBLOCKING {
         source_ = source;
         current_ = source;
     }
     /// The slot whose value the component has, or would get by read().
-    const SlotHeader& newest() const noexcept { return source_->sequence != seen_ ? *source_ : *current_; }
+    const SlotHeader& newest() const noexcept {
+        return source_->sequence != seen_ ? *source_ : *current_;
+    }
     /// The slot whose value the component has.
     const SlotHeader* current() const noexcept RTCF_NONBLOCKING { return current_; }
     /// @}
@@ -84,7 +88,7 @@ class InputBase {
     ~InputBase() = default;
 
     DataStatus readStatus() noexcept RTCF_NONBLOCKING {
-        if (__builtin_expect(source_->sequence != seen_, 1)) {
+        if (__builtin_expect(static_cast<long>(source_->sequence != seen_), 1) != 0) {
             seen_ = source_->sequence;
             current_ = source_;
             return DataStatus::New;
@@ -93,11 +97,10 @@ class InputBase {
     }
 
    private:
-    const SlotHeader* source_;    // where the writer writes
-    const SlotHeader* current_;   // where the component's value is
-    std::uint64_t seen_ = 0;      // the source's sequence at the last read
-    bool connected_ = false;
-    std::unique_ptr<const PortIdentity> identity_;
+    const SlotHeader* source_;   // where the writer writes
+    const SlotHeader* current_;  // where the component's value is
+    std::uint64_t seen_ = 0;     // the source's sequence at the last read
+    std::unique_ptr<PortIdentity> identity_;
 };
 
 /// An input port carrying values of type T.
@@ -106,7 +109,8 @@ class Input final : public InputBase {
    public:
     /// @param owner the component, `this`
     /// @param name  ROS base name, unique among the component's ports
-    Input(Component* owner, std::string name) : InputBase(owner, std::move(name), typeInfo<T>(), empty()) {}
+    Input(Component* owner, std::string name)
+        : InputBase(owner, std::move(name), typeInfo<T>(), empty()) {}
 
     /// Takes note of the newest value, which value() then gives. Real-time safe.
     DataStatus read() noexcept RTCF_NONBLOCKING { return readStatus(); }
@@ -134,7 +138,8 @@ class Input final : public InputBase {
 /// What the executor handles of any output.
 class OutputBase {
    public:
-    OutputBase(Component* owner, std::string name, std::string unit, const TypeInfo& type, const Finite* finite);
+    OutputBase(Component* owner, std::string name, std::string unit, const TypeInfo& type,
+               const Finite* finite);
     OutputBase(const OutputBase&) = delete;
     OutputBase& operator=(const OutputBase&) = delete;
 

@@ -13,9 +13,9 @@ class Component;
 
 /// One component type of a library; static, in a list.
 struct ComponentRecord {
-    const char* type;       ///< e.g. "Pid"
-    const char* doc;        ///< one line
-    Component* (*create)(); ///< a new component; the caller owns it
+    const char* type;        ///< e.g. "Pid"
+    const char* doc;         ///< one line
+    Component* (*create)();  ///< a new component; the caller owns it
     const ComponentRecord* next;
 };
 
@@ -48,8 +48,10 @@ struct __attribute__((visibility("hidden"))) Registration {
 }  // namespace rtcf
 
 // Weak, as every source file with a component has one; they are all the same.
-extern "C" __attribute__((weak, visibility("default"))) const rtcf::PluginDescriptor* RTCF_ENTRY_POINT() {
-    static rtcf::PluginDescriptor descriptor{RTCF_ABI_VERSION, sizeof(rtcf::PluginDescriptor), RTCF_VERSION, nullptr};
+extern "C" __attribute__((weak, visibility("default"))) const rtcf::PluginDescriptor*
+RTCF_ENTRY_POINT() {
+    static rtcf::PluginDescriptor descriptor{RTCF_ABI_VERSION, sizeof(rtcf::PluginDescriptor),
+                                             RTCF_VERSION, nullptr};
     descriptor.components = rtcf::detail::component_records;
     return &descriptor;
 }
@@ -58,11 +60,11 @@ extern "C" __attribute__((weak, visibility("default"))) const rtcf::PluginDescri
 /// name with RTCF_COMPONENT_NAMED.
 #define RTCF_COMPONENT(CLASS, DOC) RTCF_COMPONENT_NAMED(CLASS, #CLASS, DOC, CLASS)
 
-/// As RTCF_COMPONENT for a class in a namespace: `RTCF_COMPONENT_NAMED(arm::Pid, "Pid", "…", ArmPid)`;
-/// TAG is any identifier unique in the source file.
-#define RTCF_COMPONENT_NAMED(CLASS, NAME, DOC, TAG)                                        \
-    namespace {                                                                            \
-    ::rtcf::ComponentRecord rtcf_record_##TAG{                                             \
-        NAME, DOC, []() -> ::rtcf::Component* { return new CLASS(); }, nullptr};           \
-    const ::rtcf::detail::Registration rtcf_registration_##TAG{rtcf_record_##TAG};         \
+/// As RTCF_COMPONENT for a class in a namespace: `RTCF_COMPONENT_NAMED(arm::Pid, "Pid", "…",
+/// ArmPid)`; TAG is any identifier unique in the source file.
+#define RTCF_COMPONENT_NAMED(CLASS, NAME, DOC, TAG)                                \
+    namespace {                                                                    \
+    ::rtcf::ComponentRecord rtcf_record_##TAG{                                     \
+        NAME, DOC, []() -> ::rtcf::Component* { return new CLASS(); }, nullptr};   \
+    const ::rtcf::detail::Registration rtcf_registration_##TAG{rtcf_record_##TAG}; \
     }

@@ -51,8 +51,8 @@ TEST_F(LoggingMacros, FormatAllKindsOfArguments) {
     RTCF_INFO(self, "{:#x}", 255);
     RTCF_INFO(self, "{{braces}} {1} {0}", 1, 2);
     EXPECT_EQ(messages(),
-              (std::vector<std::string>{"plain", "string pointer", "array view", "-1 2 3", "0.333 0.5 true", "3 5", "c",
-                                        "0xff", "{braces} 2 1"}));
+              (std::vector<std::string>{"plain", "string pointer", "array view", "-1 2 3",
+                                        "0.333 0.5 true", "3 5", "c", "0xff", "{braces} 2 1"}));
 }
 
 TEST_F(LoggingMacros, FormatPointersAsAddresses) {

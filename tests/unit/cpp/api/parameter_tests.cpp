@@ -29,7 +29,8 @@ class ParameterTest : public ::testing::Test {
 };
 
 TEST_F(ParameterTest, HasItsDefaultAtFirst) {
-    const Parameter<double> gain{&component, "gain", 1.5, Min(0.0), Max(2.0), Unit("N/m"), Doc("stiffness")};
+    const Parameter<double> gain{&component,  "gain",          1.5, Min(0.0), Max(2.0),
+                                 Unit("N/m"), Doc("stiffness")};
     EXPECT_EQ(gain.value(), 1.5);
     const ParameterDeclaration& declaration = gain.declaration();
     EXPECT_EQ(declaration.type, "double");
@@ -75,7 +76,9 @@ TEST_F(ParameterTest, NotFiniteDefaultMeansNoLimit) {
 }
 
 TEST_F(ParameterTest, DefaultOutsideItsBoundsIsRefused) {
-    const auto declare = [this] { const Parameter<double> gain{&component, "gain", 3.0, Max(2.0)}; };
+    const auto declare = [this] {
+        const Parameter<double> gain{&component, "gain", 3.0, Max(2.0)};
+    };
     EXPECT_THROW(declare(), std::logic_error);
 }
 
@@ -123,7 +126,11 @@ TEST_F(ParameterTest, FloatTakesNoDoubleBeyondItsRange) {
 enum class Mode { Off = 3, Slow = 7, Fast = 1 };
 
 TEST_F(ParameterTest, EnumeratorTravelsByName) {
-    Parameter<Mode> mode{&component, "mode", Mode::Slow, Choice("off", Mode::Off), Choice("slow", Mode::Slow),
+    Parameter<Mode> mode{&component,
+                         "mode",
+                         Mode::Slow,
+                         Choice("off", Mode::Off),
+                         Choice("slow", Mode::Slow),
                          Choice("fast", Mode::Fast)};
     EXPECT_EQ(mode.declaration().type, "enum");
     EXPECT_EQ(std::get<std::string>(mode.declaration().default_value), "slow");
@@ -135,7 +142,9 @@ TEST_F(ParameterTest, EnumeratorTravelsByName) {
 }
 
 TEST_F(ParameterTest, EnumDefaultWithoutAChoiceIsRefused) {
-    const auto declare = [this] { const Parameter<Mode> mode{&component, "mode", Mode::Off, Choice("fast", Mode::Fast)}; };
+    const auto declare = [this] {
+        const Parameter<Mode> mode{&component, "mode", Mode::Off, Choice("fast", Mode::Fast)};
+    };
     EXPECT_THROW(declare(), std::logic_error);
 }
 

@@ -44,7 +44,8 @@ Bytes rtcfBytes(const T& value) {
 template <typename T>
 bool deserialize(const Bytes& bytes, T& value) {
     Slot<T> slot;
-    const bool done = typeInfo<T>().deserialize(slot, bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+    const bool done =
+        typeInfo<T>().deserialize(slot, bytes.data(), static_cast<std::uint32_t>(bytes.size()));
     value = slot.value;
     return done;
 }
@@ -62,7 +63,9 @@ void expectOtherLengthsRefused(const T& value) {
     const Bytes bytes = rtcfBytes(value);
     T ignored{};
     for (std::size_t size = 0; size < bytes.size(); ++size) {
-        ASSERT_FALSE(deserialize(Bytes(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size)), ignored)) << size;
+        ASSERT_FALSE(deserialize(
+            Bytes(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size)), ignored))
+            << size;
     }
     Bytes longer = bytes;
     longer.push_back(0);
@@ -71,7 +74,8 @@ void expectOtherLengthsRefused(const T& value) {
 
 template <typename Message, typename T>
 void expectArithmetic(const char* name) {
-    for (const T value : {std::numeric_limits<T>::lowest(), T{0}, T{1}, std::numeric_limits<T>::max()}) {
+    for (const T value :
+         {std::numeric_limits<T>::lowest(), T{0}, T{1}, std::numeric_limits<T>::max()}) {
         Message message;
         message.data = value;
         EXPECT_EQ(rtcfBytes(value), roscppBytes(message)) << name;
@@ -124,7 +128,8 @@ TEST(EigenType, QuaterniondIsAQuaternion) {
 
 TEST(EigenType, Isometry3dIsAPose) {
     Eigen::Isometry3d value = Eigen::Isometry3d::Identity();
-    value.linear() = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1.0, 2.0, 3.0).normalized()).toRotationMatrix();
+    value.linear() =
+        Eigen::AngleAxisd(0.7, Eigen::Vector3d(1.0, 2.0, 3.0).normalized()).toRotationMatrix();
     value.translation() = Eigen::Vector3d(4.0, 5.0, 6.0);
     const Eigen::Quaterniond rotation(value.linear());
     geometry_msgs::Pose message;
@@ -151,7 +156,8 @@ Message multiArrayOf(const Matrix& value) {
     message.layout.dim[1].size = static_cast<std::uint32_t>(value.cols());
     message.layout.dim[1].stride = static_cast<std::uint32_t>(value.cols());
     for (Eigen::Index row = 0; row < value.rows(); ++row) {
-        for (Eigen::Index col = 0; col < value.cols(); ++col) message.data.push_back(value(row, col));
+        for (Eigen::Index col = 0; col < value.cols(); ++col)
+            message.data.push_back(value(row, col));
     }
     return message;
 }

@@ -26,7 +26,9 @@ bool deliver(Injector& injector, double value) {
     return injector.deliver(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
 }
 
-double front(const Injector& injector) { return static_cast<const Slot<double>*>(injector.front())->value; }
+double front(const Injector& injector) {
+    return static_cast<const Slot<double>*>(injector.front())->value;
+}
 
 TEST(Injector, HasNothingAtFirst) {
     Injector injector("/x", typeInfo<double>());
@@ -88,7 +90,8 @@ TEST(Injector, IsNeverTornBetweenTwoThreads) {
     for (bool over = false; !over;) {
         over = done;
         if (!injector.adopt(LoopClock{})) continue;
-        const std::string& text = static_cast<const Slot<std_msgs::String>*>(injector.front())->value.data;
+        const std::string& text =
+            static_cast<const Slot<std_msgs::String>*>(injector.front())->value.data;
         ASSERT_EQ(text.size(), 8U);
         std::uint32_t first = 0;
         std::uint32_t second = 0;

@@ -56,7 +56,8 @@ TEST(Tap, GoesOnWhereItsRingEnds) {
         for (int i = 1; i < 100; ++i) {
             write(slot, static_cast<double>(i));
             tap.push();
-            ASSERT_EQ(takeAll(tap), std::vector<double>{static_cast<double>(i)}) << "ring of " << capacity;
+            ASSERT_EQ(takeAll(tap), std::vector<double>{static_cast<double>(i)})
+                << "ring of " << capacity;
         }
         EXPECT_EQ(tap.dropped(), 0U);
     }

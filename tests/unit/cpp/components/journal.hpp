@@ -69,4 +69,5 @@ class Journal {
 }  // namespace rtcf_unit_test
 
 /// The journal of the program; libraries see a null function without one.
-extern "C" __attribute__((weak, visibility("default"))) rtcf_unit_test::Journal* rtcf_unit_test_journal();
+extern "C" __attribute__((weak, visibility("default"))) rtcf_unit_test::Journal*
+rtcf_unit_test_journal();

@@ -20,7 +20,8 @@ class Recorder : public rtcf::Component {
     rtcf::Output<std_msgs::Float64> out{this, "out"};
     rtcf::Parameter<std::string> refuses{this, "refuses", "", rtcf::Doc("hook that returns false")};
     rtcf::Parameter<std::string> throws{this, "throws", "", rtcf::Doc("hook that throws")};
-    rtcf::Parameter<std::int64_t> throws_at{this, "throws_at", -1, rtcf::Doc("update, from 0, that throws")};
+    rtcf::Parameter<std::int64_t> throws_at{this, "throws_at", -1,
+                                            rtcf::Doc("update, from 0, that throws")};
     rtcf::Parameter<double> gain{this, "gain", 1.0, rtcf::Min(0.0), rtcf::Max(10.0)};
 
     bool configure() override { return hook("configure"); }

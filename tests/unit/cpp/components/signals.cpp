@@ -46,7 +46,8 @@ class Spinner final : public rtcf::Component {
     void update() override {
         periods.value().data += static_cast<double>(elapsed()) / static_cast<double>(period());
         periods.publish();
-        if (iteration() < 20 || iteration() >= 20 + static_cast<std::uint64_t>(busy_cycles.value())) return;
+        if (iteration() < 20 || iteration() >= 20 + static_cast<std::uint64_t>(busy_cycles.value()))
+            return;
         timespec now{};
         clock_gettime(CLOCK_MONOTONIC, &now);
         const std::int64_t until = nanoseconds(now) + busy_us * 1000;
@@ -95,7 +96,9 @@ class Chatter final : public rtcf::Component {
         RTCF_INFO(this, "start in iteration {}", iteration());
         return true;
     }
-    void update() override { RTCF_INFO_THROTTLE(this, 0.01, "update {} of {}", iteration(), name()); }
+    void update() override {
+        RTCF_INFO_THROTTLE(this, 0.01, "update {} of {}", iteration(), name());
+    }
     void safe() noexcept override { RTCF_WARN(this, "safe"); }
     void stop() override { RTCF_INFO(this, "stop"); }
     void cleanup() override { RTCF_INFO(this, "cleanup"); }

@@ -42,7 +42,8 @@ std::vector<Renaming> renamingsOf(unsigned nodes) {
 // The least of all graphs that differ in the nodes' names only.
 Digraph canonical(Digraph graph, unsigned nodes, const std::vector<Renaming>& renamings) {
     Digraph least = ~Digraph{0};
-    for (const Renaming& renaming : renamings) least = std::min(least, renaming.apply(graph, nodes));
+    for (const Renaming& renaming : renamings)
+        least = std::min(least, renaming.apply(graph, nodes));
     return least;
 }
 
@@ -50,7 +51,8 @@ Digraph canonical(Digraph graph, unsigned nodes, const std::vector<Renaming>& re
 
 std::vector<Digraph> digraphsUpToIsomorphism(unsigned nodes) {
     const std::vector<Renaming> renamings = renamingsOf(nodes);
-    const std::vector<Digraph> smaller = nodes == 1 ? std::vector<Digraph>{0} : digraphsUpToIsomorphism(nodes - 1);
+    const std::vector<Digraph> smaller =
+        nodes == 1 ? std::vector<Digraph>{0} : digraphsUpToIsomorphism(nodes - 1);
     std::vector<Digraph> found;
     // Each graph is a smaller one and a node more, joined to the others in some way.
     const unsigned last = nodes - 1;

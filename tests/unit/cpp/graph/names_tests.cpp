@@ -34,17 +34,21 @@ TEST(Names, DoubledAndTrailingSlashesGo) {
 }
 
 TEST(Names, AreLegalAsInRos) {
-    for (const char* name : {"a", "/a", "~a", "a/b", "a_1", "/", "~"}) EXPECT_TRUE(isGraphName(name)) << name;
-    for (const char* name : {"", "1a", "a-b", "a b", "a~", "_a", "a.b", "ä"}) EXPECT_FALSE(isGraphName(name)) << name;
+    for (const char* name : {"a", "/a", "~a", "a/b", "a_1", "/", "~"})
+        EXPECT_TRUE(isGraphName(name)) << name;
+    for (const char* name : {"", "1a", "a-b", "a b", "a~", "_a", "a.b", "ä"})
+        EXPECT_FALSE(isGraphName(name)) << name;
 }
 
 TEST(Names, BaseNamesHaveNoSlashes) {
     for (const char* name : {"a", "H1", "left_arm"}) EXPECT_TRUE(isBaseName(name)) << name;
-    for (const char* name : {"", "/a", "a/b", "~a", "1a", "_a", "a-b"}) EXPECT_FALSE(isBaseName(name)) << name;
+    for (const char* name : {"", "/a", "a/b", "~a", "1a", "_a", "a-b"})
+        EXPECT_FALSE(isBaseName(name)) << name;
 }
 
 TEST(Names, NamespaceThatIsNoNameIsRefused) {
-    for (const char* ns : {"~arm", "left arm", "/a-b"}) EXPECT_THROW(canonicalNamespace(ns), Refusal) << ns;
+    for (const char* ns : {"~arm", "left arm", "/a-b"})
+        EXPECT_THROW(canonicalNamespace(ns), Refusal) << ns;
 }
 
 TEST(Names, ComponentsAreTakenInTheRoot) {
@@ -54,7 +58,9 @@ TEST(Names, ComponentsAreTakenInTheRoot) {
     for (const char* name : {"", "~H1", "H 1"}) EXPECT_THROW(fullNameOf(name), Refusal) << name;
 }
 
-TEST(MappedName, WithoutRemapIsResolved) { EXPECT_EQ(mappedName("in", "/arm", "/arm/pid", {}), "/arm/in"); }
+TEST(MappedName, WithoutRemapIsResolved) {
+    EXPECT_EQ(mappedName("in", "/arm", "/arm/pid", {}), "/arm/in");
+}
 
 TEST(MappedName, RemapIsResolvedOnBothSides) {
     EXPECT_EQ(mappedName("in", "/arm", "/arm/pid", {{"in", "speed"}}), "/arm/speed");
@@ -64,7 +70,8 @@ TEST(MappedName, RemapIsResolvedOnBothSides) {
 }
 
 TEST(MappedName, RemapOfAnotherNameDoesNotCount) {
-    EXPECT_EQ(mappedName("in", "/arm", "/arm/pid", {{"in1", "speed"}, {"/in", "/x"}, {"~in", "y"}}), "/arm/in");
+    EXPECT_EQ(mappedName("in", "/arm", "/arm/pid", {{"in1", "speed"}, {"/in", "/x"}, {"~in", "y"}}),
+              "/arm/in");
 }
 
 TEST(MappedName, RemapsDoNotChain) {

@@ -65,7 +65,8 @@ TEST(Order, OfNothingIsNothing) {
 }
 
 TEST(Order, CountsParallelConnections) {
-    const OrderProblem problem{{"/a", "/b"}, {false, false}, {{1, 0, "o", "i"}, {1, 0, "o", "j"}, {1, 0, "p", "k"}}};
+    const OrderProblem problem{
+        {"/a", "/b"}, {false, false}, {{1, 0, "o", "i"}, {1, 0, "o", "j"}, {1, 0, "p", "k"}}};
     EXPECT_EQ(namesInOrder(problem), (std::vector<std::string>{"/b", "/a"}));
 }
 
@@ -76,7 +77,8 @@ OrderProblem problemOf(Digraph graph, unsigned nodes) {
         problem.names.push_back(kNodes[from]);
         problem.first.push_back(false);
         for (unsigned to = 0; to < nodes; ++to) {
-            if (hasEdge(graph, from, to)) problem.edges.push_back({from, to, "out", "in" + std::to_string(from)});
+            if (hasEdge(graph, from, to))
+                problem.edges.push_back({from, to, "out", "in" + std::to_string(from)});
         }
     }
     return problem;
@@ -87,7 +89,8 @@ bool sameEdge(const Edge& a, const Edge& b) {
 }
 
 bool contains(const std::vector<Edge>& edges, const Edge& wanted) {
-    return std::any_of(edges.begin(), edges.end(), [&](const Edge& edge) { return sameEdge(edge, wanted); });
+    return std::any_of(edges.begin(), edges.end(),
+                       [&](const Edge& edge) { return sameEdge(edge, wanted); });
 }
 
 // Why the loop is none; empty = it is one.
@@ -106,8 +109,9 @@ std::string flawOfCuts(const OrderProblem& problem, const OrderResult& result) {
         if (!contains(result.cuts[i], result.loop[i])) return "a cut without its edge";
         OrderProblem cut = problem;
         for (const Edge& edge : result.cuts[i]) {
-            const auto gone = std::remove_if(cut.edges.begin(), cut.edges.end(),
-                                             [&](const Edge& other) { return sameEdge(edge, other); });
+            const auto gone =
+                std::remove_if(cut.edges.begin(), cut.edges.end(),
+                               [&](const Edge& other) { return sameEdge(edge, other); });
             if (gone == cut.edges.end()) return "a cut of what is not there";
             cut.edges.erase(gone, cut.edges.end());
         }
@@ -164,9 +168,12 @@ TEST_P(AllDigraphs, AreOrderedOrRefusedWithATrueLoopAndCutsThatHelp) {
 }
 
 INSTANTIATE_TEST_SUITE_P(UpTo5Nodes, AllDigraphs,
-                         ::testing::Values(ClassCount{1, 2, 1}, ClassCount{2, 10, 2}, ClassCount{3, 104, 6},
-                                           ClassCount{4, 3044, 31}, ClassCount{5, 291968, 302}),
-                         [](const auto& suite) { return "Of" + std::to_string(suite.param.nodes); });
+                         ::testing::Values(ClassCount{1, 2, 1}, ClassCount{2, 10, 2},
+                                           ClassCount{3, 104, 6}, ClassCount{4, 3044, 31},
+                                           ClassCount{5, 291968, 302}),
+                         [](const auto& suite) {
+                             return "Of" + std::to_string(suite.param.nodes);
+                         });
 
 }  // namespace
 }  // namespace rtcf::test

@@ -17,7 +17,8 @@ class WiringTest : public GraphFixture {};
 
 std::vector<std::string> orderOf(const Graph& graph) {
     std::vector<std::string> names;
-    for (const std::size_t index : wire(graph, {}, {}).order) names.push_back(graph.nodes()[index].instance->fullName());
+    for (const std::size_t index : wire(graph, {}, {}).order)
+        names.push_back(graph.nodes()[index].instance->fullName());
     return names;
 }
 
@@ -26,7 +27,8 @@ TEST_F(WiringTest, OrderOfFig1IsTheSameWhateverTheOrderOfLoading) {
     std::sort(instances.begin(), instances.end());
     int permutations = 0;
     do {
-        EXPECT_EQ(orderOf(graphOf(instances)), (std::vector<std::string>{"/H1", "/F1", "/R1", "/R2", "/R3"}));
+        EXPECT_EQ(orderOf(graphOf(instances)),
+                  (std::vector<std::string>{"/H1", "/F1", "/R1", "/R2", "/R3"}));
         ++permutations;
     } while (std::next_permutation(instances.begin(), instances.end()));
     EXPECT_EQ(permutations, 120);
@@ -61,17 +63,17 @@ TEST_F(WiringTest, BlacklistTakesFromTheWhitelist) {
 }
 
 TEST_F(WiringTest, TwoWritersAreRefusedByName) {
-    const std::string text = refusalOf(graphOf({mimo("A", {{"out1", "x"}, {"out2", "a2"}}),
-                                                mimo("B", {{"out1", "b1"}, {"out2", "x"}})}));
+    const std::string text = refusalOf(graphOf(
+        {mimo("A", {{"out1", "x"}, {"out2", "a2"}}), mimo("B", {{"out1", "b1"}, {"out2", "x"}})}));
     for (const char* part : {"/x has two writers", "/A.out1", "/B.out2"}) {
         EXPECT_NE(text.find(part), std::string::npos) << text;
     }
 }
 
 TEST_F(WiringTest, TypesThatDifferAreRefusedWithBothPortsAndTypes) {
-    const std::string text =
-        refusalOf(graphOf({make(kUnitComponents, "VectorSource", "V", {{"out", "x"}}),
-                           mimo("M", {{"in1", "x"}, {"in2", "i2"}, {"in3", "i3"}, {"in4", "i4"}})}));
+    const std::string text = refusalOf(
+        graphOf({make(kUnitComponents, "VectorSource", "V", {{"out", "x"}}),
+                 mimo("M", {{"in1", "x"}, {"in2", "i2"}, {"in3", "i3"}, {"in4", "i4"}})}));
     for (const char* part : {"/x", "/V.out is Eigen::Vector3d", "/M.in1 is std_msgs/Float64"}) {
         EXPECT_NE(text.find(part), std::string::npos) << text;
     }
@@ -88,16 +90,18 @@ TEST_F(WiringTest, LoopIsRefusedPortByPortWithTheCommandsThatCutIt) {
 }
 
 TEST_F(WiringTest, LoopThroughAComponentBeingLoadedNamesItsOption) {
-    const std::string text = refusalOf(graphOf({mimo("A", {{"in1", "b"}, {"out1", "a"}, {"out2", "a2"}}),
-                                                mimo("B", {{"in1", "a"}, {"out1", "b"}, {"out2", "b2"}})}),
-                                       "/B");
+    const std::string text =
+        refusalOf(graphOf({mimo("A", {{"in1", "b"}, {"out1", "a"}, {"out2", "a2"}}),
+                           mimo("B", {{"in1", "a"}, {"out1", "b"}, {"out2", "b2"}})}),
+                  "/B");
     EXPECT_NE(text.find("loading B with `--break in1`"), std::string::npos) << text;
     EXPECT_NE(text.find("`rtcfctl break A.in1`"), std::string::npos) << text;
 }
 
 TEST_F(WiringTest, IgnoredConnectionIsALoopBreak) {
-    const Graph graph = graphOf({mimo("A", {{"in1", "b"}, {"out1", "a"}, {"out2", "a2"}}, false, "/b"),
-                                 mimo("B", {{"in1", "a"}, {"out1", "b"}, {"out2", "b2"}})});
+    const Graph graph =
+        graphOf({mimo("A", {{"in1", "b"}, {"out1", "a"}, {"out2", "a2"}}, false, "/b"),
+                 mimo("B", {{"in1", "a"}, {"out1", "b"}, {"out2", "b2"}})});
     EXPECT_EQ(orderOf(graph), (std::vector<std::string>{"/A", "/B"}));
     EXPECT_TRUE(wire(graph, {}, {}).connections.at("/b").readers[0].broken);
 }

@@ -31,7 +31,8 @@ TEST_F(LogTest, KeepsTheOrderOfOneThread) {
     for (int i = 0; i < 100; ++i) RTCF_INFO(self, "{}", i);
     log.drain();
     ASSERT_EQ(entries.size(), 100U);
-    for (int i = 0; i < 100; ++i) EXPECT_EQ(entries[static_cast<std::size_t>(i)].message, std::to_string(i));
+    for (int i = 0; i < 100; ++i)
+        EXPECT_EQ(entries[static_cast<std::size_t>(i)].message, std::to_string(i));
 }
 
 TEST_F(LogTest, RecordsThatFindItFullAreCountedAndReportedOnce) {
@@ -41,7 +42,8 @@ TEST_F(LogTest, RecordsThatFindItFullAreCountedAndReportedOnce) {
     log.drain();
     ASSERT_EQ(entries.size(), 1025U);
     EXPECT_EQ(entries.back().level, LogLevel::Warn);
-    EXPECT_EQ(entries.back().message.rfind("6 log records were lost", 0), 0U) << entries.back().message;
+    EXPECT_EQ(entries.back().message.rfind("6 log records were lost", 0), 0U)
+        << entries.back().message;
     entries.clear();
     RTCF_INFO(self, "one more");
     log.drain();

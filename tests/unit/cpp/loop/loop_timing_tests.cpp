@@ -47,7 +47,8 @@ TEST_F(LoopTiming, RelativeBeginsThePeriodAnew) {
     overrun(OverrunPolicy::Relative);
     EXPECT_GE(overruns(), 1U);
     EXPECT_EQ(missed(), 0U);
-    EXPECT_GE(periods(), static_cast<double>(iteration() + 6)) << "whole periods since the last update";
+    EXPECT_GE(periods(), static_cast<double>(iteration() + 6))
+        << "whole periods since the last update";
 }
 
 TEST_F(LoopTiming, OverrunIsCountedForTheComponentThatWasRunning) {

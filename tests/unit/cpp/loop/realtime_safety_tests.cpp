@@ -28,7 +28,9 @@ class RealtimeSafety : public RunnerFixture {
 
 TEST_F(RealtimeSafety, Fig1WithTopicsLogsAndHotSwapsBreaksNoRule) {
     loadFig1();
-    configure([](RunnerSettings& settings) { settings.whitelist = ".*R3_G2H1|.*R1_H1R2|.*G2_R2|/T_out"; });
+    configure([](RunnerSettings& settings) {
+        settings.whitelist = ".*R3_G2H1|.*R1_H1R2|.*G2_R2|/T_out";
+    });
     start();
     ASSERT_TRUE(runs());
     ComponentDefinition talker = definition("Talker", "T");

@@ -44,13 +44,17 @@ TEST(Library, MissingFileIsNamed) {
     EXPECT_EQ(refusalOf("/nowhere/x.so"), "library /nowhere/x.so: No such file or directory");
 }
 
-TEST(Library, FolderIsRefused) { EXPECT_NE(refusalOf("/tmp").find("not a regular file"), std::string::npos); }
+TEST(Library, FolderIsRefused) {
+    EXPECT_NE(refusalOf("/tmp").find("not a regular file"), std::string::npos);
+}
 
 TEST(Library, MissingSymbolIsNamed) {
     const std::string text = refusalOf(kFolder + "missing_symbol.so");
     EXPECT_NE(text.find("missing_symbol.so: does not load"), std::string::npos) << text;
-    EXPECT_NE(text.find("undefined symbol: rtcf_unit_test_undefined_function"), std::string::npos) << text;
-    EXPECT_EQ(text.find("/proc/"), std::string::npos) << "the name of the private copy means nothing to a person";
+    EXPECT_NE(text.find("undefined symbol: rtcf_unit_test_undefined_function"), std::string::npos)
+        << text;
+    EXPECT_EQ(text.find("/proc/"), std::string::npos)
+        << "the name of the private copy means nothing to a person";
 }
 
 TEST(Library, WithoutEntryPointIsRefused) {
@@ -62,7 +66,8 @@ TEST(Library, WithoutEntryPointIsRefused) {
 TEST(Library, OfAnotherAbiIsRefusedWithBothNumbers) {
     const std::string text = refusalOf(kFolder + "wrong_abi.so");
     EXPECT_NE(text.find("ABI 4711"), std::string::npos) << text;
-    EXPECT_NE(text.find("this executor has " + std::to_string(RTCF_ABI_VERSION)), std::string::npos) << text;
+    EXPECT_NE(text.find("this executor has " + std::to_string(RTCF_ABI_VERSION)), std::string::npos)
+        << text;
 }
 
 TEST(Library, ThatIsNoLibraryIsRefused) {
@@ -82,7 +87,8 @@ TEST(LibraryStore, LoadsARebuiltFileBesideTheOldCode) {
     std::filesystem::copy_file(kFolder + "versioned_1.so", path);
     const auto before = store.open(path);
     // In place, as a linker does it: the same file with other bytes.
-    std::filesystem::copy_file(kFolder + "versioned_2.so", path, std::filesystem::copy_options::overwrite_existing);
+    std::filesystem::copy_file(kFolder + "versioned_2.so", path,
+                               std::filesystem::copy_options::overwrite_existing);
     const auto after = store.open(path);
     EXPECT_NE(before, after);
     EXPECT_EQ(versionOf(*before), 1);

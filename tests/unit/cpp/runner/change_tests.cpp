@@ -25,7 +25,8 @@ class Change : public RunnerFixture {
     }
 
     // A change that fails has left everything as it was.
-    void expectUnchanged(const std::vector<std::string>& order_before, std::uint64_t generation_before) {
+    void expectUnchanged(const std::vector<std::string>& order_before,
+                         std::uint64_t generation_before) {
         EXPECT_EQ(order(), order_before);
         EXPECT_EQ(generation(), generation_before);
         EXPECT_EQ(state(), RunnerState::Running);
@@ -65,7 +66,8 @@ TEST_F(Change, EachCycleOfAComponentThatStaysIsCounted) {
         unload("/B");
     }
     stop();
-    EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration())) << "one update in every cycle, none twice";
+    EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration()))
+        << "one update in every cycle, none twice";
 }
 
 TEST_F(Change, ReplacementTakesOverAtTheBoundary) {
@@ -73,10 +75,12 @@ TEST_F(Change, ReplacementTakesOverAtTheBoundary) {
     replace("/A", recorder("A"));
     ASSERT_TRUE(runs());
     stop();
-    EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration())) << "it counts on from its predecessor's count";
+    EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration()))
+        << "it counts on from its predecessor's count";
     EXPECT_EQ(journal().notes(),
-              (std::vector<std::string>{"/A configure", "/A start", "/A update", "/A configure", "/A start",
-                                        "/A takeOver", "/A stop", "/A cleanup", "/A safe", "/A stop"}));
+              (std::vector<std::string>{"/A configure", "/A start", "/A update", "/A configure",
+                                        "/A start", "/A takeOver", "/A stop", "/A cleanup",
+                                        "/A safe", "/A stop"}));
 }
 
 TEST_F(Change, ReplacementByAnotherNameTakesOverToo) {
@@ -117,7 +121,8 @@ TEST_F(Change, ConfigureThatThrowsIsToldAndUndone) {
     const auto before = generation();
     ComponentDefinition bad = recorder("B");
     bad.parameters = {{"throws", std::string("configure")}};
-    EXPECT_EQ(refusal([&] { load(bad); }), "/B (rtcf_unit_test/Recorder): configure failed: it threw: as told");
+    EXPECT_EQ(refusal([&] { load(bad); }),
+              "/B (rtcf_unit_test/Recorder): configure failed: it threw: as told");
     expectUnchanged({"/A"}, before);
     EXPECT_EQ(journal().count("/B cleanup"), 1U);
 }
@@ -206,9 +211,13 @@ TEST_F(Change, BatchOfParametersIsSetInOneCycle) {
 
 TEST_F(Change, BatchWithABadValueSetsNothing) {
     startWithA();
-    const std::string text = refusal([&] { setParameters("/A", {{"gain", 2.0}, {"throws_at", 1.5}}); });
+    const std::string text = refusal([&] {
+        setParameters("/A", {{"gain", 2.0}, {"throws_at", 1.5}});
+    });
     EXPECT_NE(text.find("throws_at"), std::string::npos) << text;
-    EXPECT_NE(refusal([&] { setParameters("/A", {{"gain", 3.0}, {"nonsense", 1.0}}); }).find("nonsense"),
+    EXPECT_NE(refusal([&] {
+                  setParameters("/A", {{"gain", 3.0}, {"nonsense", 1.0}});
+              }).find("nonsense"),
               std::string::npos);
     ASSERT_TRUE(runs());
     stop();
@@ -231,9 +240,11 @@ TEST_F(Change, FrequencyChangesWhileTheLoopRuns) {
 
 TEST_F(Change, BadSettingsAreRefusedAndTheOldOnesStay) {
     startWithA();
-    EXPECT_NE(refusal([&] { configure([](RunnerSettings& s) { s.frequency_hz = std::nan(""); }); }), "");
+    EXPECT_NE(refusal([&] { configure([](RunnerSettings& s) { s.frequency_hz = std::nan(""); }); }),
+              "");
     EXPECT_NE(refusal([&] { configure([](RunnerSettings& s) { s.whitelist = "("; }); }), "");
-    EXPECT_NE(refusal([&] { configure([](RunnerSettings& s) { s.loop.realtime.priority = 99; }); }), "");
+    EXPECT_NE(refusal([&] { configure([](RunnerSettings& s) { s.loop.realtime.priority = 99; }); }),
+              "");
     EXPECT_EQ(runner().picture().settings.frequency_hz, 1000.0);
     EXPECT_TRUE(runs());
 }
@@ -302,7 +313,8 @@ TEST_F(Change, ManyRandomChangesLeaveTheGraphThatWasAskedFor) {
     }
     stop();
     EXPECT_EQ(state(), RunnerState::Stopped);
-    EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration())) << "A was updated in every cycle";
+    EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration()))
+        << "A was updated in every cycle";
     EXPECT_TRUE(events().empty() || events().back().kind != RunnerEvent::Kind::LoopEnded);
 }
 

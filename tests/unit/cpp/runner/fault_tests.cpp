@@ -59,9 +59,11 @@ TEST_F(Fault, SafeIsCalledForAllButTheCulprit) {
     EXPECT_EQ(journal().count("/A safe"), 1U);
     EXPECT_EQ(journal().count("/B safe"), 0U);
     EXPECT_EQ(journal().count("/C safe"), 1U);
-    for (const char* note : {"/A stop", "/B stop", "/C stop"}) EXPECT_EQ(journal().count(note), 1U) << note;
+    for (const char* note : {"/A stop", "/B stop", "/C stop"})
+        EXPECT_EQ(journal().count(note), 1U) << note;
     const auto notes = journal().notes();
-    EXPECT_LT(std::find(notes.begin(), notes.end(), "/A safe"), std::find(notes.begin(), notes.end(), "/C safe"));
+    EXPECT_LT(std::find(notes.begin(), notes.end(), "/A safe"),
+              std::find(notes.begin(), notes.end(), "/C safe"));
 }
 
 TEST_F(Fault, LoopStartsAgainOnceTheCauseIsGone) {
@@ -108,7 +110,8 @@ TEST_F(Fault, ComponentLoadedRightAfterItIsNotStarted) {
     const ComponentDefinition late = recorder("C", -1);
     onGraphThread([&] {
         EXPECT_TRUE(eventually([this] { return !runner().loop().running(); }));
-        return runner().load(late, RTCF_UNIT_COMPONENTS "/rtcf_unit_test.so", [](const std::string&) {});
+        return runner().load(late, RTCF_UNIT_COMPONENTS "/rtcf_unit_test.so",
+                             [](const std::string&) {});
     });
     EXPECT_EQ(state(), RunnerState::Faulted);
     EXPECT_EQ(ends().size(), 1U);

@@ -11,7 +11,8 @@ namespace {
 class Lifecycle : public RunnerFixture {
    protected:
     // A Recorder that reads `in` and writes `out`.
-    static ComponentDefinition recorder(const std::string& name, const std::string& in, const std::string& out) {
+    static ComponentDefinition recorder(const std::string& name, const std::string& in,
+                                        const std::string& out) {
         ComponentDefinition result = definition("Recorder", name);
         result.remaps = {{"in", in}, {"out", out}};
         return result;
@@ -29,7 +30,8 @@ class Lifecycle : public RunnerFixture {
         std::vector<std::string> result;
         for (const std::string& note : journal().notes()) {
             const std::string suffix = " " + hook;
-            if (note.size() > suffix.size() && note.compare(note.size() - suffix.size(), suffix.size(), suffix) == 0) {
+            if (note.size() > suffix.size() &&
+                note.compare(note.size() - suffix.size(), suffix.size(), suffix) == 0) {
                 result.push_back(note.substr(0, note.size() - suffix.size()));
             }
         }
@@ -50,8 +52,8 @@ TEST_F(Lifecycle, HooksKeepTheirOrder) {
     ASSERT_TRUE(runs());
     stop();
     endRunner();
-    EXPECT_EQ(journal().notes(), (std::vector<std::string>{"/A configure", "/A start", "/A update", "/A safe",
-                                                           "/A stop", "/A cleanup"}));
+    EXPECT_EQ(journal().notes(), (std::vector<std::string>{"/A configure", "/A start", "/A update",
+                                                           "/A safe", "/A stop", "/A cleanup"}));
 }
 
 TEST_F(Lifecycle, ComponentCanBeStartedAgain) {
@@ -83,7 +85,9 @@ TEST_F(Lifecycle, StartThatIsRefusedStopsWhatHadStarted) {
     loadChain();
     setParameters("/A", {{"refuses", std::string("start")}});
     const std::string text = refusal([this] { start(); });
-    EXPECT_NE(text.find("/A (rtcf_unit_test/Recorder): start failed: told to refuse start"), std::string::npos) << text;
+    EXPECT_NE(text.find("/A (rtcf_unit_test/Recorder): start failed: told to refuse start"),
+              std::string::npos)
+        << text;
     EXPECT_EQ(state(), RunnerState::Stopped);
     EXPECT_EQ(notesOf("stop"), (std::vector<std::string>{"/B", "/C"}));
     setParameters("/A", {{"refuses", std::string()}});
@@ -184,9 +188,11 @@ TEST_F(Lifecycle, WhatHooksLogComesWithTheComponentsName) {
         const std::string kind = entry.message.substr(0, entry.message.find(' '));
         if (kinds.empty() || kinds.back() != kind) kinds.push_back(kind);
     }
-    // The loop's own ring is emptied beside the other one, so that those two are in no order to each other.
+    // The loop's own ring is emptied beside the other one, so that those two are in no order to
+    // each other.
     std::sort(kinds.begin(), kinds.end());
-    EXPECT_EQ(kinds, (std::vector<std::string>{"cleanup", "configure", "safe", "start", "stop", "update"}));
+    EXPECT_EQ(kinds, (std::vector<std::string>{"cleanup", "configure", "safe", "start", "stop",
+                                               "update"}));
 }
 
 TEST_F(Lifecycle, WhatARefusedComponentLoggedIsNotLost) {

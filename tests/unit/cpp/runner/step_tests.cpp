@@ -12,7 +12,8 @@ namespace {
 class Stepping : public RunnerFixture {
    protected:
     void mapPapersTopics() {
-        configure([](RunnerSettings& settings) { settings.whitelist = ".*R3_G2H1|.*R1_H1R2|.*G2_R2"; });
+        configure(
+            [](RunnerSettings& settings) { settings.whitelist = ".*R3_G2H1|.*R1_H1R2|.*G2_R2"; });
     }
 
     void deliver(const std::string& topic, double number) {
@@ -63,7 +64,8 @@ TEST_F(Stepping, MessageKIsIterationKOfAnIndependentModel) {
     for (int round = 0; round < 10; ++round) {
         step(100);
         std::vector<double> expected;
-        for (int i = 0; i < 100; ++i) expected.push_back(model.cycle(round == 0 && i == 0 ? 0.5 : 0.0));
+        for (int i = 0; i < 100; ++i)
+            expected.push_back(model.cycle(round == 0 && i == 0 ? 0.5 : 0.0));
         ASSERT_EQ(taken("/R3_G2H1"), expected) << "round " << round;
     }
     EXPECT_EQ(bridge().tap("/R3_G2H1")->dropped(), 0U);
@@ -117,8 +119,8 @@ TEST_F(Stepping, CallsTheHooksOnceAndSafeAtItsEnd) {
     step(5);
     step(5);
     stop();
-    EXPECT_EQ(journal().notes(),
-              (std::vector<std::string>{"/A configure", "/A start", "/A update", "/A safe", "/A stop"}));
+    EXPECT_EQ(journal().notes(), (std::vector<std::string>{"/A configure", "/A start", "/A update",
+                                                           "/A safe", "/A stop"}));
 }
 
 TEST_F(Stepping, IsRefusedWhileTheLoopRuns) {
@@ -141,7 +143,8 @@ TEST_F(Stepping, GoesOverIntoRunning) {
 
 TEST_F(Stepping, EndsByRequest) {
     load(definition("Ticker", "T"));
-    auto endless = begin([this] { return runner().step(std::uint64_t{1} << 60, [](const std::string&) {}); });
+    auto endless =
+        begin([this] { return runner().step(std::uint64_t{1} << 60, [](const std::string&) {}); });
     ASSERT_TRUE(eventually([this] { return iteration() > 100; }));
     runner().requestStop();
     endless.get();
@@ -151,7 +154,9 @@ TEST_F(Stepping, EndsByRequest) {
 TEST_F(Stepping, EndsWithItsRunner) {
     load(definition("Ticker", "T"));
     Runner& ending = runner();
-    const auto endless = [&ending] { return ending.step(std::uint64_t{1} << 60, [](const std::string&) {}); };
+    const auto endless = [&ending] {
+        return ending.step(std::uint64_t{1} << 60, [](const std::string&) {});
+    };
     auto begun = begin(endless);
     auto queued = begin(endless);
     ASSERT_TRUE(eventually([this] { return iteration() > 100; }));

@@ -81,7 +81,8 @@ class ServerTest : public ::testing::Test {
     executor::Log log_{[this](executor::LogEntry&& entry) { server_.publish(entry); }};
     executor::FlightRecorder recorder_;
     executor::Runner runner_{"rt_runner", log_,
-                             [this](const executor::RunnerEvent& event) { server_.publish(event); }, nullptr, recorder_};
+                             [this](const executor::RunnerEvent& event) { server_.publish(event); },
+                             nullptr, recorder_};
     std::thread thread_;
 };
 
@@ -188,7 +189,7 @@ TEST_F(ServerTest, ChangeIsAnsweredWithProgressAndOutcome) {
         }
         progress.push_back(response->progress());
     }
-    EXPECT_EQ(progress, (std::vector<std::string>{"loading /A", "configuring /A"}));
+    EXPECT_EQ(progress, (std::vector<std::string>{"loading /A", "configuring /A", "adopting the change"}));
 }
 
 TEST_F(ServerTest, RefusalCarriesItsCodeAndText) {
@@ -217,7 +218,8 @@ TEST_F(ServerTest, QueriesAreAnsweredWhileAHookBlocks) {
     Request info;
     info.mutable_get_component()->set_component("A");
     const Response component = client.ask(info);
-    EXPECT_EQ(component.component().full_name(), "/A") << "without the values of its ports, but at once";
+    EXPECT_EQ(component.component().full_name(), "/A")
+        << "without the values of its ports, but at once";
     journal().gate_open = true;
     EXPECT_TRUE(client.answerTo(loading).has_change());
 }
@@ -239,6 +241,30 @@ TEST_F(ServerTest, StopEndsTheLoopWhileAHookBlocks) {
     EXPECT_TRUE(client.answerTo(stopping).has_change());
 }
 
+// Takes the ten seconds that a hook has.
+TEST_F(ServerTest, ChangeThatWasGivenUpDoesNotHappenLater) {
+    ExecutorClient client(socket_);
+    client.hello();
+    journal().gate_open = false;
+    const std::uint64_t hanging = client.send(load("Blocker", "B"));
+    const std::uint64_t queued = client.send(load("Recorder", "C"));
+    const Response first = client.answerTo(hanging);
+    EXPECT_EQ(first.error().code(), executor::v1::Error::CODE_UNAVAILABLE);
+    EXPECT_EQ(first.error().message(), "runner rt_runner is stuck in /B.configure()");
+    EXPECT_TRUE(client.answerTo(queued).has_error());
+    EXPECT_EQ(client.ask(getStatus()).status().state(), rtcf::v1::RUNNER_STATE_STUCK);
+    EXPECT_TRUE(client.ask(load("Recorder", "D")).has_error()) << "only stop and restart are taken now";
+    journal().gate_open = true;
+    ASSERT_TRUE(eventually([] { return journal().count("/B cleanup") == 1; }));
+    ASSERT_TRUE(client.ask(load("Recorder", "E")).has_change());
+    Request list;
+    list.mutable_list_components();
+    const Response response = client.ask(list);
+    ASSERT_EQ(response.components().components_size(), 1);
+    EXPECT_EQ(response.components().components(0).full_name(), "/E");
+    EXPECT_EQ(journal().count("/C configure"), 0U);
+}
+
 TEST_F(ServerTest, EventGoesToAllDaemons) {
     ExecutorClient first(socket_);
     ExecutorClient second(socket_);
@@ -254,7 +280,9 @@ TEST_F(ServerTest, EventGoesToAllDaemons) {
         for (;;) {
             const auto response = client->receive();
             ASSERT_TRUE(response.has_value());
-            if (!response->has_event() || response->event().kind() != executor::v1::Event::KIND_LOOP_ENDED) continue;
+            if (!response->has_event() ||
+                response->event().kind() != executor::v1::Event::KIND_LOOP_ENDED)
+                continue;
             EXPECT_EQ(response->id(), 0U);
             EXPECT_EQ(response->event().component(), "/A");
             break;

@@ -18,7 +18,8 @@ constexpr double kError = 0.03;
 
 TEST(Histogram, EachBucketBeginsWhereTheLastOneEnds) {
     for (std::size_t i = 0; i + 1 < Histogram::kBuckets; ++i) {
-        ASSERT_EQ(Histogram::lowerBound(i) + Histogram::width(i), Histogram::lowerBound(i + 1)) << i;
+        ASSERT_EQ(Histogram::lowerBound(i) + Histogram::width(i), Histogram::lowerBound(i + 1))
+            << i;
     }
 }
 
@@ -41,7 +42,8 @@ TEST(Histogram, HasLessThan3PercentErrorUpTo10Seconds) {
 
 TEST(Histogram, TakesValuesOutsideItsRange) {
     EXPECT_EQ(Histogram::bucketOf(-5), 0U);
-    EXPECT_EQ(Histogram::bucketOf(std::numeric_limits<std::int64_t>::max()), Histogram::kBuckets - 1);
+    EXPECT_EQ(Histogram::bucketOf(std::numeric_limits<std::int64_t>::max()),
+              Histogram::kBuckets - 1);
 }
 
 // The value of rank ceil(q n), as quantiles are defined.
@@ -62,7 +64,8 @@ TEST(Histogram, GivesTheQuantilesOfWhatWasAdded) {
         const DistributionSummary summary = summarize(histogram.snapshot(), 1.0);
         EXPECT_EQ(summary.count, values.size());
         const auto near = [](double expected) { return kError * expected + 0.5; };
-        EXPECT_NEAR(summary.min, static_cast<double>(values.front()), near(static_cast<double>(values.front())));
+        EXPECT_NEAR(summary.min, static_cast<double>(values.front()),
+                    near(static_cast<double>(values.front())));
         EXPECT_NEAR(summary.p50, exactQuantile(values, 0.5), near(exactQuantile(values, 0.5)));
         EXPECT_NEAR(summary.p99, exactQuantile(values, 0.99), near(exactQuantile(values, 0.99)));
         EXPECT_NEAR(summary.p999, exactQuantile(values, 0.999), near(exactQuantile(values, 0.999)));

@@ -28,7 +28,9 @@ class BridgeKeeper final : public executor::Bridge {
    public:
     explicit BridgeKeeper(std::shared_ptr<BridgeRecord> record) : record_(std::move(record)) {}
     void configure(const executor::BridgeSettings&) override {}
-    void setTable(std::shared_ptr<const executor::BridgeTable> table) override { record_->set(std::move(table)); }
+    void setTable(std::shared_ptr<const executor::BridgeTable> table) override {
+        record_->set(std::move(table));
+    }
     executor::BridgeStatus status() const override { return {}; }
 
    private:

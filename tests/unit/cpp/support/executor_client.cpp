@@ -19,7 +19,8 @@ constexpr int kPatience = 20000;  // ms
 
 }  // namespace
 
-ExecutorClient::ExecutorClient(const std::string& socket_path) : fd_(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+ExecutorClient::ExecutorClient(const std::string& socket_path)
+    : fd_(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     std::copy(socket_path.begin(), socket_path.end(), address.sun_path);
@@ -37,7 +38,7 @@ std::string ExecutorClient::frame(const executor::v1::Request& request) {
     return bytes + body;
 }
 
-void ExecutorClient::sendBytes(const std::string& bytes) {
+void ExecutorClient::sendBytes(const std::string& bytes) const {
     for (std::size_t sent = 0; sent < bytes.size();) {
         const ssize_t count = ::send(fd_, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL);
         if (count < 0) return;  // the peer has closed; isClosed() tells
@@ -61,7 +62,8 @@ std::optional<executor::v1::Response> ExecutorClient::receive() {
     for (;;) {
         std::uint32_t length = 0;
         if (in_.size() >= 4) {
-            for (unsigned i = 0; i < 4; ++i) length |= std::uint32_t{static_cast<unsigned char>(in_[i])} << (8 * i);
+            for (unsigned i = 0; i < 4; ++i)
+                length |= std::uint32_t{static_cast<unsigned char>(in_[i])} << (8 * i);
             if (in_.size() - 4 >= length) {
                 executor::v1::Response response;
                 EXPECT_TRUE(response.ParseFromArray(in_.data() + 4, static_cast<int>(length)));

@@ -22,16 +22,19 @@ class ExecutorClient {
     /// A request as it stands on the wire.
     static std::string frame(const executor::v1::Request& request);
 
-    void sendBytes(const std::string& bytes);
+    void sendBytes(const std::string& bytes) const;
     /// @return the request's id
     std::uint64_t send(executor::v1::Request request);
     void hello();
 
-    /// The next message, or none if the connection has ended. Fails the test if nothing comes in time.
+    /// The next message, or none if the connection has ended. Fails the test if nothing comes in
+    /// time.
     std::optional<executor::v1::Response> receive();
     /// The answer to request `id`, past progress, events and other answers.
     executor::v1::Response answerTo(std::uint64_t id);
-    executor::v1::Response ask(const executor::v1::Request& request) { return answerTo(send(request)); }
+    executor::v1::Response ask(const executor::v1::Request& request) {
+        return answerTo(send(request));
+    }
     /// Whether the peer has closed the connection; waits for it.
     bool isClosed();
 

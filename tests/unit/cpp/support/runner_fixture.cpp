@@ -50,8 +50,8 @@ Pending<ChangeOutcome> RunnerFixture::beginLoad(const ComponentDefinition& compo
     return begin([this, component] { return runner_->load(component, kLibrary, kSilent); });
 }
 
-ChangeOutcome RunnerFixture::loadExample(const std::string& type, const std::string& name, executor::Remaps remaps,
-                                         bool first) {
+ChangeOutcome RunnerFixture::loadExample(const std::string& type, const std::string& name,
+                                         executor::Remaps remaps, bool first) {
     ComponentDefinition component = definition(type, name);
     component.package = "rtcf_examples";
     component.remaps = std::move(remaps);
@@ -62,14 +62,20 @@ ChangeOutcome RunnerFixture::loadExample(const std::string& type, const std::str
 void RunnerFixture::loadFig1() {
     const auto loadMimo = [this](const std::string& name, const executor::Remaps& connected) {
         executor::Remaps remaps;
-        for (const char* port : {"in1", "in2", "in3", "in4", "out1", "out2"}) remaps.emplace_back(port, name + "_" + port);
+        for (const char* port : {"in1", "in2", "in3", "in4", "out1", "out2"})
+            remaps.emplace_back(port, name + "_" + port);
         remaps.insert(remaps.end(), connected.begin(), connected.end());
         loadExample("Mimo", name, remaps, name == "H1");
     };
     loadMimo("R3", {{"in1", "F1_R2R3"}, {"in2", "R2_R3"}, {"out1", "R3_G2H1"}});
     loadMimo("R1", {{"in1", "H1_R1R2"}, {"out1", "R1_H1R2"}});
-    loadMimo("H1", {{"in1", "R3_G2H1"}, {"in2", "R1_H1R2"}, {"out1", "H1_F1"}, {"out2", "H1_R1R2"}});
-    loadMimo("R2", {{"in1", "F1_R2R3"}, {"in2", "H1_R1R2"}, {"in3", "R1_H1R2"}, {"in4", "G2_R2"}, {"out1", "R2_R3"}});
+    loadMimo("H1",
+             {{"in1", "R3_G2H1"}, {"in2", "R1_H1R2"}, {"out1", "H1_F1"}, {"out2", "H1_R1R2"}});
+    loadMimo("R2", {{"in1", "F1_R2R3"},
+                    {"in2", "H1_R1R2"},
+                    {"in3", "R1_H1R2"},
+                    {"in4", "G2_R2"},
+                    {"out1", "R2_R3"}});
     loadMimo("F1", {{"in1", "H1_F1"}, {"out1", "F1_R2R3"}});
 }
 
@@ -77,16 +83,18 @@ ChangeOutcome RunnerFixture::unload(const std::string& name) {
     return onGraphThread([&] { return runner_->unload({name}, kSilent); });
 }
 
-ChangeOutcome RunnerFixture::replace(const std::string& name, const ComponentDefinition& component) {
+ChangeOutcome RunnerFixture::replace(const std::string& name,
+                                     const ComponentDefinition& component) {
     return onGraphThread([&] { return runner_->replace(name, component, kLibrary, kSilent); });
 }
 
-ChangeOutcome RunnerFixture::setBreak(const std::string& name, const std::string& port, bool broken) {
+ChangeOutcome RunnerFixture::setBreak(const std::string& name, const std::string& port,
+                                      bool broken) {
     return onGraphThread([&] { return runner_->setBreaks({{name, port}}, broken); });
 }
 
-ChangeOutcome RunnerFixture::setParameters(const std::string& name,
-                                           const std::vector<std::pair<std::string, ParameterValue>>& batch) {
+ChangeOutcome RunnerFixture::setParameters(
+    const std::string& name, const std::vector<std::pair<std::string, ParameterValue>>& batch) {
     return onGraphThread([&] { return runner_->setParameters(name, batch); });
 }
 

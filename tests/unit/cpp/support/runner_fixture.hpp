@@ -77,8 +77,8 @@ class RunnerFixture : public ::testing::Test {
     ChangeOutcome load(const ComponentDefinition& component);
     /// Loads without waiting for the end of it.
     Pending<ChangeOutcome> beginLoad(const ComponentDefinition& component);
-    ChangeOutcome loadExample(const std::string& type, const std::string& name, executor::Remaps remaps,
-                              bool first = false);
+    ChangeOutcome loadExample(const std::string& type, const std::string& name,
+                              executor::Remaps remaps, bool first = false);
     /// Fig. 1 of the paper.
     void loadFig1();
     ChangeOutcome unload(const std::string& name);

@@ -7,8 +7,10 @@
 
 namespace rtcf::test {
 
-TemporaryFolder::TemporaryFolder() : path_(std::filesystem::temp_directory_path() / "rtcf-unit-XXXXXX") {
-    if (::mkdtemp(path_.data()) == nullptr) throw std::system_error(errno, std::generic_category(), path_);
+TemporaryFolder::TemporaryFolder()
+    : path_(std::filesystem::temp_directory_path() / "rtcf-unit-XXXXXX") {
+    if (::mkdtemp(path_.data()) == nullptr)
+        throw std::system_error(errno, std::generic_category(), path_);
 }
 
 TemporaryFolder::~TemporaryFolder() {
