@@ -68,18 +68,17 @@ def test_what_an_executor_has_is_true(daemon: DaemonUnderTest, left: int) -> Non
     assert after["running"] is True
 
 
-def test_what_a_running_loop_lacks_stays_out_of_it_and_in_the_state(
+def test_what_was_left_out_of_a_running_loop_stays_out_of_it_and_in_the_state(
     daemon: DaemonUnderTest, left: int
 ) -> None:
     saved = daemon.saved()
     saved["components"].append({**saved["components"][0], "name": "x"})
+    saved["left_out"]["/x"] = "no such library"
     (daemon.state / "rt_runner.json").write_text(json.dumps(saved))
     daemon.start()
     with daemon.client() as client:
         assert client.get_order() == ["/a", "/b"]
-        assert (
-            "/x is left out: its executor does not have it" in client.get_status().runners[0].status
-        )
+        assert "/x is left out: no such library" in client.get_status().runners[0].status
         (x,) = [each for each in client.list_components() if each.full_name == "/x"]
         assert x.state == graph_pb2.COMPONENT_STATE_LEFT_OUT
         client.release(["x"])
