@@ -189,7 +189,8 @@ TEST_F(ServerTest, ChangeIsAnsweredWithProgressAndOutcome) {
         }
         progress.push_back(response->progress());
     }
-    EXPECT_EQ(progress, (std::vector<std::string>{"loading /A", "configuring /A", "adopting the change"}));
+    EXPECT_EQ(progress,
+              (std::vector<std::string>{"loading /A", "configuring /A", "adopting the change"}));
 }
 
 TEST_F(ServerTest, RefusalCarriesItsCodeAndText) {
@@ -253,7 +254,8 @@ TEST_F(ServerTest, ChangeThatWasGivenUpDoesNotHappenLater) {
     EXPECT_EQ(first.error().message(), "runner rt_runner is stuck in /B.configure()");
     EXPECT_TRUE(client.answerTo(queued).has_error());
     EXPECT_EQ(client.ask(getStatus()).status().state(), rtcf::v1::RUNNER_STATE_STUCK);
-    EXPECT_TRUE(client.ask(load("Recorder", "D")).has_error()) << "only stop and restart are taken now";
+    EXPECT_TRUE(client.ask(load("Recorder", "D")).has_error())
+        << "only stop and restart are taken now";
     journal().gate_open = true;
     ASSERT_TRUE(eventually([] { return journal().count("/B cleanup") == 1; }));
     ASSERT_TRUE(client.ask(load("Recorder", "E")).has_change());
