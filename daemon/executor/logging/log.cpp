@@ -21,7 +21,7 @@ std::int64_t wallClockNow() noexcept {
 
 void Log::setRealtimeThread(bool realtime) noexcept { on_realtime_thread = realtime; }
 
-LogRecord* Log::claim() noexcept RTCF_NONBLOCKING {
+LogRecord* Log::claim() noexcept {
     if (!on_realtime_thread) others_mutex_.lock();
     LogRecord* record = (on_realtime_thread ? realtime_ : others_).claim();
     if (record == nullptr) {
@@ -34,7 +34,7 @@ LogRecord* Log::claim() noexcept RTCF_NONBLOCKING {
     return record;
 }
 
-void Log::commit(LogRecord* /*record*/) noexcept RTCF_NONBLOCKING {
+void Log::commit(LogRecord* /*record*/) noexcept {
     if (on_realtime_thread) {
         realtime_.commit();
     } else {

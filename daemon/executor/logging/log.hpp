@@ -35,8 +35,8 @@ class Log final : public LogSink {
     /// @param consumer gets every record, in drain()
     explicit Log(Consumer consumer) : consumer_(std::move(consumer)) {}
 
-    LogRecord* claim() noexcept RTCF_NONBLOCKING override;
-    void commit(LogRecord* record) noexcept RTCF_NONBLOCKING override;
+    LogRecord* claim() noexcept override;
+    void commit(LogRecord* record) noexcept override;
 
     /// A record of the executor's own. Not real-time safe.
     void write(LogLevel level, const std::string& component, std::string message);

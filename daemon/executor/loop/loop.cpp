@@ -78,14 +78,18 @@ void Loop::beginStepping(const LoopSettings& settings) {
 }
 
 std::uint64_t Loop::step(std::uint64_t cycles) noexcept {
-    for (std::uint64_t done = 0; done < cycles; ++done) {
-        if (stop_requested_.load(std::memory_order_acquire) || fault_.kind != LoopFault::Kind::None)
-            return done;
+    std::uint64_t done = 0;
+    // Components log as in any cycle; there is no other thread that runs one.
+    Log::setRealtimeThread(true);
+    for (; done < cycles; ++done) {
+        if (stop_requested_.load(std::memory_order_acquire)) break;
+        if (fault_.kind != LoopFault::Kind::None) break;
         const std::int64_t period = clock_.period_ns;
         const std::int64_t now = clock_.time_ns + (clock_.iteration == 0 ? 0 : period);
         cycle(now, now);
     }
-    return cycles;
+    Log::setRealtimeThread(false);
+    return done;
 }
 
 RealtimeProblems Loop::start(const LoopSettings& settings) {

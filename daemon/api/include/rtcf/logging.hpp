@@ -59,10 +59,11 @@ struct LogRecord {
 class LogSink {
    public:
     /// A record to fill, its time, iteration and thread already noted; null if the log is
-    /// full, which is counted and reported. Real-time safe.
-    virtual LogRecord* claim() noexcept RTCF_NONBLOCKING = 0;
+    /// full, which is counted and reported. Real-time safe in the cycle; other threads share a
+    /// lock.
+    virtual LogRecord* claim() noexcept = 0;
     /// Hands over the record that claim() gave. Real-time safe.
-    virtual void commit(LogRecord* record) noexcept RTCF_NONBLOCKING = 0;
+    virtual void commit(LogRecord* record) noexcept = 0;
 
    protected:
     ~LogSink() = default;
