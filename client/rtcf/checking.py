@@ -19,8 +19,8 @@ from rtcf.sanitizer import Violation, violations
 INSTALLED = Path("/usr/lib/rtcf/rtcf-executor-rtsan")
 CONFIGURATION = Path("/etc/rtcfd/rtcfd.toml")
 _DESCRIBE_TIMEOUT_S = 30.0
-# The sanitizer knows how to speak with either, by its name.
-_SYMBOLIZERS = ("llvm-symbolizer", "addr2line")
+# The sanitizer knows by its name how to speak with each. The first is what rtcf-check depends on.
+_SYMBOLIZERS = ("llvm-symbolizer-22", "llvm-symbolizer", "addr2line")
 
 
 @dataclass
