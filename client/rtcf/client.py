@@ -23,8 +23,9 @@ _OPTIONS = (
     ("grpc.use_local_subchannel_pool", 1),
     # After a restart of rtcfd a client is to be back soon, not in gRPC's 1 to 120 s.
     ("grpc.initial_reconnect_backoff_ms", 100),
-    ("grpc.min_reconnect_backoff_ms", 100),
     ("grpc.max_reconnect_backoff_ms", 1000),
+    # How long one attempt to connect may take: on a busy machine rtcfd may not have been scheduled.
+    ("grpc.min_reconnect_backoff_ms", 10_000),
 )
 
 OnProgress = Callable[[str], None]
