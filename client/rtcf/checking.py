@@ -3,7 +3,6 @@
 Uses the executor that is built with it (Debian package rtcf-check).
 """
 
-import difflib
 import os
 import shutil
 import signal
@@ -14,6 +13,7 @@ from pathlib import Path
 
 from rtcf.errors import RtcfError
 from rtcf.folders import component_folders, packages
+from rtcf.naming import listing, suggestion
 from rtcf.sanitizer import Violation, violations
 
 INSTALLED = Path("/usr/lib/rtcf/rtcf-executor-rtsan")
@@ -89,7 +89,8 @@ def _find(executor: Path, folders: Sequence[Path], package: str, type_name: str)
     if package not in known:
         listed = ", ".join(map(str, folders))
         raise RtcfError(
-            f'no package "{package}" with component libraries in {listed}{_meant(package, known)}'
+            f'no package "{package}" with component libraries in {listed}'
+            f"{suggestion(package, known, most=1)}"
         )
     types: list[str] = []
     problems: list[str] = []
@@ -118,8 +119,8 @@ def _find(executor: Path, folders: Sequence[Path], package: str, type_name: str)
     raise RtcfError(
         "; ".join(
             [
-                f'no type "{type_name}" in package "{package}"{_meant(type_name, types)} '
-                f"(types: {', '.join(sorted(types)) or 'none'})",
+                f'no type "{type_name}" in package "{package}"'
+                f"{suggestion(type_name, types, most=1)} (types: {listing(types)})",
                 *problems,
             ]
         )
@@ -153,8 +154,3 @@ def _why(status: int, lines: Sequence[str]) -> str:
     if said:
         return said[-1].removeprefix("rtcf-executor: ")
     return f"the process of the component ended with exit status {status}"
-
-
-def _meant(name: str, known: Sequence[str] | dict[str, list[Path]]) -> str:
-    close = difflib.get_close_matches(name, list(known), n=1)
-    return f'; did you mean "{close[0]}"?' if close else ""

@@ -4,13 +4,13 @@ docs/graph-files.md describes the format.  Scalars are typed as YAML 1.2 does
 (see rtcf.spec), so that a graph file and the command line agree.
 """
 
-import difflib
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
 from rtcf.enums import choices
 from rtcf.errors import RtcfError
+from rtcf.naming import suggestion
 from rtcf.spec import parse_value
 from rtcf.v1 import graph_pb2, runner_pb2
 
@@ -185,8 +185,7 @@ class _Reader:
     ) -> None:
         for name, (key, _) in keys.items():
             if name not in known:
-                close = difflib.get_close_matches(name, list(known), n=1)
-                meant = f'; did you mean "{close[0]}"?' if close else ""
+                meant = suggestion(name, known, most=1)
                 raise self._error(
                     key, f'unknown key "{name}" {where}{meant} (known: {", ".join(known)})'
                 )

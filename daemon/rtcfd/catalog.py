@@ -11,11 +11,12 @@ from pathlib import Path
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.folders import packages
+from rtcf.naming import listing, suggestion
 from rtcf.v1 import graph_pb2
 
 from rtcfd.describe import Describer
 from rtcfd.errors import FailedPrecondition, NotFound
-from rtcfd.names import check_base_name, listing, suggestion
+from rtcfd.names import check_base_name
 
 
 @dataclass

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from rtcf.enums import choices
+from rtcf.naming import listing, suggestion
 from rtcf.v1 import runner_pb2
 
 from rtcfd import settings
 from rtcfd.errors import InvalidArgument, Refusal
-from rtcfd.names import listing, suggestion
 
 DEFAULT_FILE = Path("/etc/rtcfd/rtcfd.toml")
 

@@ -6,6 +6,7 @@ Functions on a Runner; each is one transaction of its executor.
 from collections.abc import Sequence
 
 from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.naming import listing, suggestion
 from rtcf.v1 import control_pb2, graph_pb2
 
 from rtcfd import settings
@@ -13,7 +14,7 @@ from rtcfd.catalog import loads
 from rtcfd.desired import replacement
 from rtcfd.errors import InvalidArgument, NotFound, Refusal
 from rtcfd.link import Progress
-from rtcfd.names import absolute, full_name, listing, suggestion
+from rtcfd.names import absolute, full_name
 from rtcfd.runner import Runner
 
 

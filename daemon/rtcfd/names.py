@@ -1,8 +1,6 @@
 """Names of runners, packages, types and components: checking and resolving."""
 
-import difflib
 import re
-from collections.abc import Iterable
 
 from rtcf.v1 import graph_pb2
 
@@ -35,16 +33,3 @@ def full_name(spec: graph_pb2.ComponentSpec) -> str:
     """Return namespace and name of a component as the executor makes them."""
     parts = [part for part in spec.ns.split("/") if part]
     return "/" + "/".join([*parts, spec.name or spec.type])
-
-
-def suggestion(name: str, known: Iterable[str]) -> str:
-    """Return '; did you mean "x"?', or nothing where no known name is close."""
-    close = difflib.get_close_matches(name, list(known), n=2, cutoff=0.6)
-    if not close:
-        return ""
-    return "; did you mean " + " or ".join(f'"{name}"' for name in close) + "?"
-
-
-def listing(names: Iterable[str]) -> str:
-    """Return names in order, separated by commas, or "none"."""
-    return ", ".join(sorted(names)) or "none"

@@ -9,13 +9,13 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.naming import listing
 from rtcf.v1 import control_pb2, runner_pb2
 
 from rtcfd.adoption import follow_components, follow_settings
 from rtcfd.catalog import loads
 from rtcfd.crash import MOST_ATTEMPTS, MOST_CRASHES, WINDOW_S, Verdict
 from rtcfd.errors import InvalidArgument, Refusal
-from rtcfd.names import listing
 
 if TYPE_CHECKING:
     from rtcfd.runner import Runner

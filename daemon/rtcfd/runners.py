@@ -4,6 +4,7 @@ import asyncio
 import logging
 from collections.abc import Iterable
 
+from rtcf.naming import listing, suggestion
 from rtcf.v1 import control_pb2, runner_pb2
 
 from rtcfd import graph, settings
@@ -11,7 +12,7 @@ from rtcfd.catalog import loads
 from rtcfd.desired import Desired
 from rtcfd.errors import AlreadyExists, NotFound, Refusal, Unavailable
 from rtcfd.link import Progress
-from rtcfd.names import DEFAULT_RUNNER, check_base_name, full_name, listing, suggestion
+from rtcfd.names import DEFAULT_RUNNER, check_base_name, full_name
 from rtcfd.runner import Runner, Surroundings
 
 log = logging.getLogger(__name__)

@@ -1,0 +1,17 @@
+"""Names in messages: those there are, and the one that was probably meant."""
+
+import difflib
+from collections.abc import Iterable
+
+
+def suggestion(name: str, known: Iterable[str], most: int = 2) -> str:
+    """Return '; did you mean "x"?' with at most so many, or nothing where no name is close."""
+    close = difflib.get_close_matches(name, list(known), n=most, cutoff=0.6)
+    if not close:
+        return ""
+    return "; did you mean " + " or ".join(f'"{name}"' for name in close) + "?"
+
+
+def listing(names: Iterable[str]) -> str:
+    """Return names in order, separated by commas, or "none"."""
+    return ", ".join(sorted(names)) or "none"
