@@ -5,14 +5,20 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_process import Daemon
+from daemon_process import NO_ROS, Daemon
 from ros_processes import Master
 
 
 @pytest.fixture
-def daemon(tmp_path: Path) -> Iterator[Daemon]:
+def settings() -> str:
+    """Give the settings of `daemon`; modules that need others have their own."""
+    return NO_ROS
+
+
+@pytest.fixture
+def daemon(tmp_path: Path, settings: str) -> Iterator[Daemon]:
     """Give an rtcfd whose loops have no ROS node."""
-    daemon = Daemon(tmp_path)
+    daemon = Daemon(tmp_path, settings)
     daemon.start()
     yield daemon
     if not daemon.ended:

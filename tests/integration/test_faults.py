@@ -4,30 +4,20 @@ import os
 import re
 import signal
 import time
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 import rtcf
 from daemon_process import Daemon, wait_for
 from rtcf.v1 import graph_pb2, runner_pb2
+from values import state
 
 SETTINGS = "[runner]\nstall_timeout_ms = 300\n[runner.ros]\nenabled = false\n"
 
 
 @pytest.fixture
-def daemon(tmp_path: Path) -> Iterator[Daemon]:
-    """Give an rtcfd whose loops are soon taken for stalled."""
-    daemon = Daemon(tmp_path, SETTINGS)
-    daemon.start()
-    yield daemon
-    if not daemon.ended:
-        daemon.end()
-
-
-def state(client: rtcf.Client, runner: str = "rt_runner") -> runner_pb2.RunnerStatus:
-    status: runner_pb2.RunnerStatus = client.get_status(runner).runners[0]
-    return status
+def settings() -> str:
+    """Let there be an rtcfd whose loops are soon taken for stalled."""
+    return SETTINGS
 
 
 def faulty(type_name: str, *, optional: bool = False, after: int = 20) -> graph_pb2.ComponentSpec:

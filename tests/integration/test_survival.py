@@ -7,13 +7,14 @@ import os
 import random
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import rtcf
 from daemon_process import Daemon, wait_for
 from rtcf.v1 import runner_pb2
+from values import state
 
 # As long as the system's, other than a private daemon's own default.
 SETTINGS = "[runner]\norphan_timeout_s = 60\n[runner.ros]\nenabled = false\n"
@@ -21,18 +22,9 @@ LONGEST_WAIT_S = 0.2  # before a death
 
 
 @pytest.fixture
-def daemon(tmp_path: Path) -> Iterator[Daemon]:
-    """Give an rtcfd whose executors outlive it for a minute."""
-    daemon = Daemon(tmp_path, SETTINGS)
-    daemon.start()
-    yield daemon
-    if not daemon.ended:
-        daemon.end()
-
-
-def state(client: rtcf.Client) -> runner_pb2.RunnerStatus:
-    status: runner_pb2.RunnerStatus = client.get_status("rt_runner").runners[0]
-    return status
+def settings() -> str:
+    """Let there be an rtcfd whose executors outlive it for a minute."""
+    return SETTINGS
 
 
 def is_gone(pid: int) -> bool:

@@ -4,6 +4,7 @@ import re
 
 import rtcf
 from daemon_process import wait_for
+from rtcf.v1 import runner_pb2
 
 
 def port_value(client: rtcf.Client, component: str, port: str) -> float:
@@ -19,9 +20,15 @@ def number(text: str) -> float:
     return float(match[1])
 
 
+def state(client: rtcf.Client, runner: str = "rt_runner") -> runner_pb2.RunnerStatus:
+    """Return what a runner is doing."""
+    status: runner_pb2.RunnerStatus = client.get_status(runner).runners[0]
+    return status
+
+
 def iteration(client: rtcf.Client, runner: str = "rt_runner") -> int:
     """Return how many cycles the loop has run."""
-    return int(client.get_status(runner).runners[0].iteration)
+    return int(state(client, runner).iteration)
 
 
 def wait_until_after(client: rtcf.Client, cycle: int) -> int:
