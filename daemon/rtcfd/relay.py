@@ -21,6 +21,8 @@ _EVENT_LEVELS: dict[int, int] = {
     wire.Event.KIND_LOOP_ENDED: logging.ERROR,
     wire.Event.KIND_DEGRADED: logging.WARNING,
     wire.Event.KIND_ROS: logging.INFO,
+    wire.Event.KIND_COMPONENT_FAILED: logging.WARNING,
+    wire.Event.KIND_OVERRUNS: logging.WARNING,
 }
 
 

@@ -92,6 +92,7 @@ void Runner::tick() {
         tuneSpin();
     }
     noteComponentFaults();
+    noteOverruns(false);
     CycleRecord record{};
     while (loop_.popRecord(record)) {
     }
@@ -105,6 +106,7 @@ void Runner::noticeEnd() {
 
 void Runner::loopEnded() {
     loop_.join(INT64_MAX);
+    noteOverruns(true);
     noteLoopFault();
     stopAll();
     publish({loop_.fault().component_name.data()});
@@ -163,6 +165,14 @@ void Runner::noteComponentFaults() {
     }
 }
 
+void Runner::noteOverruns(bool last) {
+    std::string line = overrun_report_.take(loop_, plan_->graph, last);
+    if (line.empty()) return;
+    if (lacks_realtime_ && settings_.loop.max_overruns != 0)
+        line += "; max_overruns ends no loop that runs degraded";
+    events_({RunnerEvent::Kind::Overruns, std::move(line), {}, loop_.figures().iteration.load()});
+}
+
 // spin = auto: as long as 99 of 100 wake-ups of the last second were late, at most a tenth of the
 // period.
 void Runner::tuneSpin() {
@@ -172,9 +182,8 @@ void Runner::tuneSpin() {
     tuned_from_ = now;
     tuned_at_ns_ = monotonicNow();
     if (late.count == 0) return;
-    settings_.loop.spin_ns =
-        std::min(static_cast<std::int64_t>(late.p99), settings_.loop.period_ns / 10);
-    loop_.setSpin(settings_.loop.spin_ns);
+    tuned_spin_ns_ = std::min(static_cast<std::int64_t>(late.p99), settings_.loop.period_ns / 10);
+    loop_.setSpin(tuned_spin_ns_);
 }
 
 MappingFilter Runner::filter() const {
@@ -199,8 +208,9 @@ void Runner::configure(RunnerSettings settings) {
         settings_ = previous;
         throw;
     }
+    tuned_spin_ns_ = -1;
     if (loop_.joinable()) {
-        for (const RealtimeProblem& problem : loop_.retune(settings_.loop)) {
+        for (const RealtimeProblem& problem : loop_.retune(loopSettings())) {
             if (!contains(degraded_, problem.text)) degraded_.push_back(problem.text);
         }
     }
@@ -236,19 +246,30 @@ ChangeOutcome Runner::start(const Progress& progress) {
 }
 
 RealtimeProblems Runner::lockAndStart() {
+    lacks_realtime_ = false;
     RealtimeProblems problems = lockMemory(settings_.loop.realtime);
     for (RealtimeProblem& problem : checkScheduling(settings_.loop.realtime))
         problems.push_back(std::move(problem));
     for (const RealtimeProblem& problem : problems) {
-        if (!settings_.realtime_required || !problem.essential) continue;
+        if (!problem.essential) continue;
+        lacks_realtime_ = true;
+        if (!settings_.realtime_required) continue;
         throw Refusal(RefusalKind::FailedPrecondition,
                       fmt::format("no real time: {}; or let it run degraded: rtcfctl runner set {} "
                                   "--realtime preferred",
                                   problem.text, name_));
     }
-    for (RealtimeProblem& problem : loop_.start(settings_.loop))
+    tuned_spin_ns_ = -1;
+    for (RealtimeProblem& problem : loop_.start(loopSettings()))
         problems.push_back(std::move(problem));
     return problems;
+}
+
+// As chosen; but where there is no real time, cycles are late that the graph is not to blame for.
+LoopSettings Runner::loopSettings() const {
+    LoopSettings settings = settings_.loop;
+    if (lacks_realtime_) settings.max_overruns = 0;
+    return settings;
 }
 
 ChangeOutcome Runner::stop(const Progress& progress) {
@@ -576,6 +597,7 @@ void Runner::publish(const std::set<std::string>& changed) {
 void Runner::publishPicture() {
     RunnerPicture next{state_, settings_, degraded_, status_,
                        bridge_ ? bridge_->status() : BridgeStatus{}};
+    if (settings_.spin_auto && tuned_spin_ns_ >= 0) next.settings.loop.spin_ns = tuned_spin_ns_;
     const std::lock_guard<std::mutex> lock(published_mutex_);
     picture_ = std::move(next);
 }

@@ -26,6 +26,7 @@
 #include "logging/log.hpp"
 #include "loop/loop.hpp"
 #include "plugins/library.hpp"
+#include "runner/overrun_report.hpp"
 #include "runner/settings.hpp"
 #include "runner/snapshot.hpp"
 
@@ -44,7 +45,7 @@ struct ChangeOutcome {
 
 /// Something that happened without a request.
 struct RunnerEvent {
-    enum class Kind { LoopEnded, Degraded, Ros, ComponentFailed };
+    enum class Kind { LoopEnded, Degraded, Ros, ComponentFailed, Overruns };
     Kind kind;
     std::string message;
     std::string component;
@@ -137,6 +138,7 @@ class Runner {
     void loopEnded();
     void noteLoopFault();
     void noteComponentFaults();
+    void noteOverruns(bool last);
     void tuneSpin();
     const GraphNode* nodeOf(const Component* component) const noexcept;
     void endStepping();
@@ -152,6 +154,7 @@ class Runner {
     void stopAll() noexcept;
     ChangeOutcome outcome(std::string component = {}) const;
     RealtimeProblems lockAndStart();
+    LoopSettings loopSettings() const;
     MappingFilter filter() const;
     void publish(const std::set<std::string>& changed = {});
     void publishPicture();
@@ -173,7 +176,10 @@ class Runner {
     RunnerState state_ = RunnerState::Stopped;
     std::vector<std::string> degraded_;
     std::string status_;
-    HistogramSnapshot tuned_from_;  // wake-up latency at the last tuneSpin()
+    bool lacks_realtime_ = false;  // the loop runs without something essential
+    OverrunReport overrun_report_;
+    std::int64_t tuned_spin_ns_ = -1;  // by tuneSpin(); -1 = not yet
+    HistogramSnapshot tuned_from_;     // wake-up latency at the last tuneSpin()
     std::int64_t tuned_at_ns_ = 0;
 
     // Published for queries.

@@ -318,6 +318,9 @@ v1::Event eventTo(const RunnerEvent& event) {
         case RunnerEvent::Kind::ComponentFailed:
             message.set_kind(v1::Event::KIND_COMPONENT_FAILED);
             break;
+        case RunnerEvent::Kind::Overruns:
+            message.set_kind(v1::Event::KIND_OVERRUNS);
+            break;
         case RunnerEvent::Kind::Ros:
             message.set_kind(v1::Event::KIND_ROS);
             break;

@@ -2,6 +2,8 @@
 // what the counters must say of a cycle that took 6 ms of 1 ms.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "support/runner_fixture.hpp"
 
 namespace rtcf::test {
@@ -24,6 +26,13 @@ class LoopTiming : public RunnerFixture {
 
     std::uint64_t overruns() { return runner().loop().figures().overruns.load(); }
     std::uint64_t missed() { return runner().loop().figures().missed.load(); }
+    std::vector<std::string> linesOnOverruns() const {
+        std::vector<std::string> lines;
+        for (const RunnerEvent& event : events()) {
+            if (event.kind == RunnerEvent::Kind::Overruns) lines.push_back(event.message);
+        }
+        return lines;
+    }
     // What elapsed() added up to, in periods.
     double periods() { return value("/S", "periods"); }
 };
@@ -55,6 +64,54 @@ TEST_F(LoopTiming, OverrunIsCountedForTheComponentThatWasRunning) {
     load(definition("Ticker", "A"));
     overrun(OverrunPolicy::Skip);
     EXPECT_GE(runner().snapshot()->get("/S").figures->overruns.load(), 1U);
+}
+
+// Also where the machine gives no real time: then a loop is not to blame for being late.
+TEST_F(LoopTiming, FullBucketStopsTheLoopUnlessItRunsDegraded) {
+    configure([](RunnerSettings& settings) { settings.loop.max_overruns = 3; });
+    ComponentDefinition spinner = definition("Spinner", "S");
+    spinner.parameters = {{"busy_us", std::int64_t{3000}}, {"busy_cycles", std::int64_t{10}}};
+    load(spinner);
+    load(definition("Recorder", "A"));
+    start();
+    const std::vector<std::string> degraded = runner().picture().degraded;
+    const bool realtime = std::none_of(degraded.begin(), degraded.end(), [](const auto& line) {
+        return line.find("no SCHED_FIFO") != std::string::npos;
+    });
+    if (realtime) {
+        ASSERT_TRUE(eventually([this] { return state() == RunnerState::Faulted; }));
+        EXPECT_EQ(events().back().kind, RunnerEvent::Kind::LoopEnded);
+        EXPECT_NE(events().back().message.find("more than 3 overruns"), std::string::npos);
+        EXPECT_EQ(overruns(), 4U);
+        EXPECT_EQ(journal().count("/A safe"), 1U);
+    } else {
+        EXPECT_TRUE(runs(60));
+        EXPECT_EQ(state(), RunnerState::Running);
+    }
+    EXPECT_FALSE(linesOnOverruns().empty());
+}
+
+TEST_F(LoopTiming, ManyOverrunsAreOneLine) {
+    overrun(OverrunPolicy::Skip, 30);
+    ASSERT_GE(overruns(), 30U);
+    const std::vector<std::string> lines = linesOnOverruns();
+    ASSERT_LE(lines.size(), 2U) << "the first one, and what came after it at the end of the loop";
+    EXPECT_NE(lines.back().find("ended late"), std::string::npos) << lines.back();
+    EXPECT_NE(lines.back().find("in /S"), std::string::npos) << lines.back();
+}
+
+TEST_F(LoopTiming, SpinFollowsTheWakeUpLatencyUpToATenthOfThePeriod) {
+    configure([](RunnerSettings& settings) { settings.spin_auto = true; });
+    load(definition("Ticker", "A"));
+    start();
+    ASSERT_TRUE(eventually([this] { return runner().picture().settings.loop.spin_ns > 0; }));
+    EXPECT_LE(runner().picture().settings.loop.spin_ns, 100'000);
+    // What it has chosen is no setting that others could contradict.
+    configure([](RunnerSettings& settings) { settings.frequency_hz = 20000.0; });
+    ASSERT_TRUE(runs());
+    EXPECT_LE(runner().picture().settings.loop.spin_ns, 5'000);
+    configure([](RunnerSettings& settings) { settings.spin_auto = false; });
+    EXPECT_EQ(runner().picture().settings.loop.spin_ns, 0);
 }
 
 TEST_F(LoopTiming, EveryCycleIsInTheFigures) {

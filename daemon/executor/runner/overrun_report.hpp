@@ -1,0 +1,31 @@
+/// @file
+/// Sums up late cycles, so that a loop that is late all the time is one line in
+/// the log now and then. Owned by the Runner; used by its graph thread.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "graph/graph.hpp"
+#include "loop/loop.hpp"
+
+namespace rtcf::executor {
+
+class OverrunReport {
+   public:
+    /// What there is to say, in one line. Empty if no cycle was late since the last one, or if
+    /// that was a moment ago, unless this is the `last` one. Not real-time.
+    std::string take(const Loop& loop, const Graph& graph, bool last);
+
+   private:
+    std::string latestComponent(const Graph& graph);
+
+    std::int64_t told_at_ns_ = 0;
+    std::uint64_t told_overruns_ = 0;
+    std::uint64_t told_missed_ = 0;
+    std::map<std::shared_ptr<const ComponentFigures>, std::uint64_t> told_of_;
+};
+
+}  // namespace rtcf::executor
