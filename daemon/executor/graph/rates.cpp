@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "refusal.hpp"
@@ -32,26 +33,38 @@ std::string suffix(std::uint32_t every) {
     return every == 1 ? "every cycle" : fmt::format("every {} cycles", every);
 }
 
-}  // namespace
-
-void assignPhases(const Graph& graph) {
-    std::vector<std::uint32_t> rates;
-    std::map<std::uint32_t, const Instance*> first_of_rate;
+// @param loading the component to be blamed if it is one of two that do not go together
+void requireHarmonic(const Graph& graph, const std::string& loading) {
+    std::map<std::uint32_t, const Instance*> of_rate;
     for (const GraphNode& node : graph.nodes()) {
-        const ComponentDefinition& definition = node.instance->definition();
-        for (const auto& [rate, other] : first_of_rate) {
-            if (harmonic(rate, definition.every)) continue;
+        const Instance* blamed = node.instance.get();
+        for (auto [rate, other] : of_rate) {
+            if (harmonic(rate, blamed->definition().every)) continue;
+            if (other->fullName() == loading) std::swap(blamed, other);
+            std::vector<std::uint32_t> others;
+            for (const GraphNode& each : graph.nodes()) {
+                if (each.instance.get() != blamed)
+                    others.push_back(each.instance->definition().every);
+            }
+            const std::uint32_t every = blamed->definition().every;
             throw Refusal(
                 RefusalKind::InvalidArgument,
                 fmt::format("{} runs {}, which does not go with {} {}: one must divide the other; "
                             "try --every {}",
-                            node.instance->fullName(), suffix(definition.every), other->fullName(),
-                            suffix(rate), nearestRates(definition.every, rates)));
+                            blamed->fullName(), suffix(every), other->fullName(),
+                            suffix(other->definition().every), nearestRates(every, others)));
         }
-        if (first_of_rate.emplace(definition.every, node.instance.get()).second)
-            rates.push_back(definition.every);
+        of_rate.emplace(blamed->definition().every, blamed);
     }
-    const std::uint32_t slowest = rates.empty() ? 1 : *std::max_element(rates.begin(), rates.end());
+}
+
+}  // namespace
+
+void assignPhases(const Graph& graph, const std::string& loading) {
+    requireHarmonic(graph, loading);
+    std::uint32_t slowest = 1;
+    for (const GraphNode& node : graph.nodes())
+        slowest = std::max(slowest, node.instance->definition().every);
     if (slowest == 1) return;
     // How many slower components run in each cycle of the slowest rate.
     std::vector<std::uint32_t> load(slowest, 0);

@@ -180,7 +180,7 @@ void requireOneSource(const Graph& graph) {
 Wiring wire(const Graph& graph, const MappingFilter& filter, const std::string& loading) {
     Wiring wiring;
     requireOneSource(graph);
-    assignPhases(graph);
+    assignPhases(graph, loading);
     Collector collector(graph, wiring.connections);
     for (std::size_t index = 0; index < graph.nodes().size(); ++index) collector.addNode(index);
     for (auto& [name, plan] : wiring.connections) {

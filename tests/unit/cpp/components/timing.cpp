@@ -1,0 +1,58 @@
+// A device that paces its loop, and a component that tells what it is told of time.
+#include <time.h>
+
+#include <cstdint>
+#include <rtcf/component.hpp>
+
+#include "journal.hpp"
+
+namespace {
+
+std::int64_t now() {
+    timespec time{};
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
+}
+
+// Ready once each time that the test opens the journal's gate.
+class Device final : public rtcf::Source {
+    rtcf::Output<std::int32_t> out{this, "out"};
+    std::int32_t count_ = 0;
+
+    bool wait(std::int64_t deadline_ns) noexcept override {
+        do {
+            if (rtcf_unit_test_journal()->gate_open.exchange(false)) return true;
+            const timespec pause{0, 50'000};
+            nanosleep(&pause, nullptr);
+        } while (now() < deadline_ns);
+        return false;
+    }
+    void update() override { out.write(++count_); }
+};
+
+// All times in periods of a loop at 1 kHz.
+class Watch final : public rtcf::Component {
+    rtcf::Input<std::int32_t> in{this, "in"};
+    rtcf::Output<std::int32_t> updates{this, "updates"};
+    rtcf::Output<double> nominal{this, "nominal"};
+    rtcf::Output<double> since{this, "since"};
+    rtcf::Output<double> age{this, "age"};
+    rtcf::Output<double> cycle{this, "cycle"};
+    std::int32_t count_ = 0;
+
+    void update() override {
+        in.read();
+        updates.write(++count_);
+        nominal.write(static_cast<double>(period()) / kMillisecond);
+        since.write(static_cast<double>(elapsed()) / kMillisecond);
+        age.write(static_cast<double>(in.age()) / kMillisecond);
+        cycle.write(static_cast<double>(iteration()));
+    }
+
+    static constexpr double kMillisecond = 1e6;
+};
+
+}  // namespace
+
+RTCF_COMPONENT(Device, "Paces the loop")
+RTCF_COMPONENT(Watch, "Tells what it is told of time")

@@ -1,0 +1,83 @@
+// A component that waits for its device and so paces the loop.
+#include <gtest/gtest.h>
+
+#include "support/runner_fixture.hpp"
+
+namespace rtcf::test {
+namespace {
+
+class SourceTest : public RunnerFixture {
+   protected:
+    static ComponentDefinition device(const std::string& name) {
+        ComponentDefinition result = definition("Device", name);
+        result.remaps = {{"out", name + "_out"}};
+        return result;
+    }
+
+    // One cycle's worth of the device. @return false if no cycle comes of it
+    bool tick() {
+        const std::uint64_t before = iteration();
+        journal().gate_open.store(true);
+        return eventually([&] { return iteration() == before + 1; });
+    }
+
+    void startSilent(const std::string& name = "D") {
+        load(device(name));
+        journal().gate_open.store(false);
+        start();
+    }
+};
+
+TEST_F(SourceTest, PacesTheLoop) {
+    startSilent();
+    for (int i = 1; i <= 50; ++i) {
+        ASSERT_TRUE(tick());
+        ASSERT_EQ(value("/D", "out"), static_cast<double>(i));
+    }
+    EXPECT_EQ(iteration(), 50U) << "one cycle for each time that it is ready";
+    EXPECT_EQ(runner().loop().figures().overruns.load(), 0U);
+}
+
+TEST_F(SourceTest, ChangesAreAdoptedWhileItIsSilent) {
+    startSilent();
+    ASSERT_TRUE(tick());
+    load(definition("Recorder", "A"));
+    setParameters("/A", {{"gain", 2.0}});
+    EXPECT_EQ(order(), (std::vector<std::string>{"/A", "/D"}));
+    EXPECT_EQ(iteration(), 1U);
+    EXPECT_EQ(value("/D", "out"), 1.0) << "queries are answered, too";
+    ASSERT_TRUE(tick());
+    EXPECT_EQ(value("/A", "out"), 2.0);
+}
+
+TEST_F(SourceTest, LoopStopsWhileItIsSilent) {
+    startSilent();
+    load(definition("Recorder", "A"));
+    stop();
+    EXPECT_EQ(state(), RunnerState::Stopped);
+    EXPECT_EQ(iteration(), 0U);
+    EXPECT_EQ(journal().count("/A safe"), 1U);
+}
+
+TEST_F(SourceTest, ClockPacesTheLoopWithoutIt) {
+    startSilent();
+    load(definition("Recorder", "A"));
+    unload("/D");
+    EXPECT_TRUE(runs(50));
+    load(device("E"));
+    const std::uint64_t before = iteration();
+    ASSERT_TRUE(tick());
+    EXPECT_LE(iteration(), before + 2) << "and the next one paces it again";
+}
+
+TEST_F(SourceTest, TwoAreRefusedByName) {
+    startSilent();
+    const std::string text = refusal([&] { load(device("E")); });
+    EXPECT_NE(text.find("/D and /E both pace the loop"), std::string::npos) << text;
+    EXPECT_EQ(order(), std::vector<std::string>{"/D"});
+    replace("/D", device("E"));
+    ASSERT_TRUE(tick());
+}
+
+}  // namespace
+}  // namespace rtcf::test
