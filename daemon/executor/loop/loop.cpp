@@ -493,8 +493,11 @@ std::int64_t Loop::nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) n
 }
 
 void Loop::makeSafe() noexcept {
+    // Not of one that threw: nobody knows what state that left it in.
+    const bool threw = fault_.kind == LoopFault::Kind::Exception;
     for (const Step& step : schedule_->steps) {
-        if (step.component != fault_.component && !step.context->disabled) step.component->safe();
+        if (threw && step.component == fault_.component) continue;
+        if (!step.context->disabled) step.component->safe();
     }
 }
 
