@@ -4,7 +4,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -41,13 +41,25 @@ def clean_environment() -> dict[str, str]:
 class Daemon:
     """rtcfd, its folder and its log."""
 
-    def __init__(self, folder: Path, settings: str = NO_ROS) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        settings: str = NO_ROS,
+        *,
+        arguments: Sequence[str] = (),
+        wrapper: Sequence[str] = (),
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
+        """`arguments` are rtcfd's, `wrapper` is a command that runs it."""
         # Short, as pytest's folders are not, and a unix socket's path has 107 characters.
         self.socket = folder / "s"
         self.log_file = folder / "log"
         self.pid = 0
         self._folder = folder
         self._settings = settings
+        self._arguments = arguments
+        self._wrapper = wrapper
+        self._environment = environment or {}
         self._process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
@@ -59,11 +71,13 @@ class Daemon:
             # In a session of its own, as a terminal's foreground job is in a process group.
             self._process = subprocess.Popen(
                 [
+                    *self._wrapper,
                     *(str(BUILD_TREE / "bin" / "rtcfd"), "--foreground"),
                     *("--socket", str(self.socket), "--config", str(settings)),
                     *("--state-dir", str(self._folder / "state")),
+                    *self._arguments,
                 ],
-                env=clean_environment() | {"ROS_HOSTNAME": "localhost"},
+                env=clean_environment() | {"ROS_HOSTNAME": "localhost"} | self._environment,
                 stderr=log,
                 start_new_session=True,
             )

@@ -7,9 +7,9 @@ from daemon_process import wait_for
 from rtcf.v1 import runner_pb2
 
 
-def port_value(client: rtcf.Client, component: str, port: str) -> float:
+def port_value(client: rtcf.Client, component: str, port: str, runner: str = "") -> float:
     """Return the newest value of a port that carries one number; NaN if it never had one."""
-    (found,) = (each for each in client.get_component(component).ports if each.name == port)
+    (found,) = (each for each in client.get_component(component, runner).ports if each.name == port)
     return number(found.value) if found.HasField("value") else float("nan")
 
 

@@ -1,0 +1,118 @@
+"""Loops on accounts and under limits that do not allow real time: refused or degraded, and it
+is said which right is missing."""
+
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import rtcf
+from daemon_process import NO_ROS, Daemon, wait_for
+from rtcf.v1 import runner_pb2
+from values import iteration
+
+
+@dataclass(frozen=True)
+class Lack:
+    """A right that is taken away, and what is said then."""
+
+    limit: str  # of prlimit(1): what anybody has without the capability
+    capability: str  # what root has
+    problem: str
+    remedies: list[str]
+    settings: str = ""
+
+    def wrapper(self) -> list[str]:
+        """Return a command that runs another without the right."""
+        limited = ["prlimit", self.limit]
+        if os.geteuid() != 0:
+            return limited
+        # Programs of root have no capability that is not in the bounding set.
+        without = f"-{self.capability}"
+        return [*limited, "setpriv", "--inh-caps", without, "--bounding-set", without]
+
+
+NO_FIFO = Lack(
+    "--rtprio=0:0", "sys_nice", "no SCHED_FIFO priority 80", ["CAP_SYS_NICE", "LimitRTPRIO"],
+    "lock_memory = false\n",
+)  # fmt: skip
+LACKS = {
+    "no SCHED_FIFO": NO_FIFO,
+    "no memory lock": Lack(
+        "--memlock=65536:65536", "ipc_lock", "memory is not locked",
+        ["CAP_IPC_LOCK", "LimitMEMLOCK"],
+    ),
+}  # fmt: skip
+
+
+@contextmanager
+def running(folder: Path, lack: Lack, realtime: str) -> Iterator[Daemon]:
+    settings = f'[daemon]\nrealtime = "{realtime}"\n[runner]\n{lack.settings}{NO_ROS}'
+    daemon = Daemon(folder, settings, wrapper=lack.wrapper())
+    daemon.start()
+    try:
+        yield daemon
+    finally:
+        daemon.end()
+
+
+@pytest.mark.parametrize("lack", LACKS.values(), ids=LACKS)
+def test_real_time_that_is_required_is_refused_with_what_is_missing(
+    tmp_path: Path, lack: Lack
+) -> None:
+    with running(tmp_path, lack, "required") as daemon:
+        done = daemon.ctl("load", "rtcf_test", "Witness")
+        assert done.returncode == 0, done.stderr
+        refused = daemon.ctl("start")
+        assert (refused.returncode, refused.stdout) == (1, "")
+        assert re.fullmatch(r"rtcfctl: [^\n]+\n", refused.stderr)
+        for word in (lack.problem, *lack.remedies, "--realtime preferred"):
+            assert word in refused.stderr
+        with rtcf.Client(daemon.socket) as client:
+            status = client.get_status("rt_runner").runners[0]
+            assert (status.state, status.iteration) == (runner_pb2.RUNNER_STATE_STOPPED, 0)
+        # What had been started is stopped again; and the advice is true.
+        wait_for(lambda: "hook stop" in daemon.log(), "the stop hook")
+        assert daemon.ctl("runner", "set", "--realtime", "preferred").returncode == 0
+        assert daemon.ctl("start").returncode == 0
+
+
+@pytest.mark.parametrize("lack", LACKS.values(), ids=LACKS)
+def test_real_time_that_is_preferred_runs_degraded_and_says_so_first(
+    tmp_path: Path, lack: Lack
+) -> None:
+    with running(tmp_path, lack, "preferred") as daemon, rtcf.Client(daemon.socket) as client:
+        assert daemon.ctl("load", "rtcf_test", "Counter").returncode == 0
+        notes = client.start().notes
+        assert notes[0].startswith("degraded real time: ")
+        assert any(lack.problem in note for note in notes)
+        wait_for(lambda: iteration(client) > 100, "100 cycles")
+        (line,) = (
+            each
+            for each in client.get_status("rt_runner").runners[0].degraded
+            if lack.problem in each
+        )
+        for word in lack.remedies:
+            assert word in line
+        assert lack.problem in daemon.ctl("status").stdout
+        wait_for(lambda: f"degraded real time: {lack.problem}" in daemon.log(), "the log")
+
+
+def test_a_full_bucket_does_not_stop_a_loop_that_runs_degraded(tmp_path: Path) -> None:
+    with running(tmp_path, NO_FIFO, "preferred") as daemon, rtcf.Client(daemon.socket) as client:
+        # 100 µs in each cycle of 50 µs: late in every one.
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=20000.0, max_overruns=5))
+        client.load(rtcf.component("rtcf_faults", "Sleeps", parameters=["after:=0"]))
+        client.start()
+        wait_for(lambda: client.get_statistics().overruns > 50, "overruns")
+        status = client.get_status("rt_runner").runners[0]
+        assert status.state == runner_pb2.RUNNER_STATE_RUNNING
+        wait_for(lambda: "ended late" in daemon.log(), "the log")
+        assert "max_overruns ends no loop that runs degraded" in daemon.log()
+        client.stop()
+        lines = [line for line in daemon.log().splitlines() if "ended late" in line]
+        assert len(lines) < 10, "one line for many overruns"
+        assert any("most of them in /Sleeps" in line for line in lines)

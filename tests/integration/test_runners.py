@@ -1,0 +1,96 @@
+"""Several runners: what happens to one is not felt by another."""
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import rtcf
+from bystander import Bystander
+from daemon_process import wait_for
+from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+from values import iteration
+
+ROUNDS = 6
+CHANGES = 24  # in a round, about
+CYCLES = 400  # of the bystander, in a round
+
+
+@dataclass(frozen=True)
+class Window:
+    """What was counted in some cycles of the bystander."""
+
+    preempted: int  # its real-time thread
+    sleeps_off: int  # system calls of the thread that slept, other than one in each cycle
+    shootdowns: int  # TLB, on its CPU
+
+
+def shootdowns(cpu: int) -> int:
+    """Return the TLB shootdowns of a CPU so far; 0 where the machine does not count them."""
+    header, *rows = Path("/proc/interrupts").read_text().splitlines()
+    column = header.split().index(f"CPU{cpu}")
+    for row in rows:
+        name, *counts = row.split()
+        if name == "TLB:":
+            return int(counts[column])
+    return 0
+
+
+def test_starting_changing_and_crashing_one_does_not_touch_another(client: rtcf.Client) -> None:
+    allowed = sorted(os.sched_getaffinity(0))
+    mine, other = allowed[0], allowed[-1]
+    bystander = Bystander(client, runner_pb2.RunnerSettings(frequency_hz=1000.0, cpu=mine))
+
+    def window(work: Callable[[], None]) -> Window:
+        before, cycles = bystander.usage(), iteration(client, bystander.runner)
+        shot = shootdowns(mine)
+        work()
+        wait_for(lambda: iteration(client, bystander.runner) > cycles + CYCLES, "its cycles")
+        shot = shootdowns(mine) - shot
+        after, done = bystander.usage(), iteration(client, bystander.runner) - cycles
+        return Window(after.preempted - before.preempted, after.slept - before.slept - done, shot)
+
+    quiet, busy = [], []
+    for _ in range(ROUNDS):
+        quiet.append(window(lambda: None))
+        busy.append(window(lambda: life_of_a_runner(client, "other", other)))
+    bystander.check()
+    print("quiet:", *quiet, sep="\n  ")
+    print("busy:", *busy, sep="\n  ")
+    # Others share this machine and its counters. What the changes caused would be in each of
+    # the rounds, so that the quietest ones tell.
+    assert min(each.preempted for each in busy) == 0
+    # The counters of thread and loop are not read at one moment.
+    assert min(abs(each.sleeps_off) for each in busy) < CHANGES
+    quietest = min(each.shootdowns for each in quiet)
+    assert min(each.shootdowns for each in busy) < quietest + CHANGES
+
+
+def life_of_a_runner(client: rtcf.Client, name: str, cpu: int) -> None:
+    """Add a runner, change its running graph in every way, crash it, and take it away."""
+    client.add_runner(name, runner_pb2.RunnerSettings(frequency_hz=1000.0, cpu=cpu))
+    client.load(_mixer("a"), name)
+    client.start(name)
+    wait_for(lambda: iteration(client, name) > 0, "a cycle")
+    for number in range(4):
+        client.load(_mixer("b"), name)
+        client.set_parameters("b", [rtcf.parse_parameter(f"offset:={number}")], name)
+        client.set_breaks([control_pb2.PortName(component="b", port="in1")], True, name)
+        client.replace("b", _mixer("c"), name)
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=500.0 + number), name)
+        client.unload(["c"], name)
+    client.load(
+        rtcf.component("rtcf_faults", "NullDereference", name="bad", parameters=["after:=5"]), name
+    )
+    wait_for(
+        lambda: client.get_status(name).runners[0].state == runner_pb2.RUNNER_STATE_FAULTED,
+        "its crash and recovery",
+    )
+    client.remove_runner(name)
+
+
+def _mixer(name: str) -> graph_pb2.ComponentSpec:
+    ports = ("in1", "in2", "level", "out", "half", "updates")
+    return rtcf.component(
+        "rtcf_test", "Mixer", name=name, remaps=[f"{port}:=~{port}" for port in ports]
+    )
