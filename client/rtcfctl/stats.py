@@ -59,14 +59,13 @@ def _print(found: runner_pb2.RunnerStatistics, output: Output) -> None:
     if not output.for_people:
         output.data(found)
         return
-    output.table(
-        (f"{found.runner} (µs)", *_COLUMNS),
-        (
-            _row("calculation duration", found.duration),
-            _row("wake-up latency", found.latency),
-        ),
-        right=_COLUMNS,
-    )
+    rows = [
+        _row("calculation duration", found.duration),
+        _row("wake-up latency", found.latency),
+    ]
+    if found.adoption.count:
+        rows.append(_row("adoption of a change", found.adoption))
+    output.table((f"{found.runner} (µs)", *_COLUMNS), rows, right=_COLUMNS)
     output.line(
         f"{found.iterations} cycles, {found.overruns} overruns, {found.missed} missed; "
         f"{found.minor_faults} minor and {found.major_faults} major page faults, "

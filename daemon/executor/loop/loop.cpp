@@ -385,6 +385,7 @@ void Loop::takeAdoption() noexcept RTCF_NONBLOCKING {
     if (adoption == nullptr) return;
     // Claimed before it is applied, so that the graph thread cannot take it back meanwhile.
     if (!pending_.compare_exchange_strong(adoption, &claimed_, std::memory_order_acq_rel)) return;
+    const std::int64_t begin = readCycleCounter();
     adoption->apply();
     if (adoption->schedule != nullptr) schedule_ = adoption->schedule;
     if (adoption->period_ns != 0) {
@@ -394,6 +395,7 @@ void Loop::takeAdoption() noexcept RTCF_NONBLOCKING {
     for (const Step& step : schedule_->steps)
         step.context->period_ns = clock_.period_ns * step.every;
     noteSchedule();
+    figures_.adoption.add(readCycleCounter() - begin);
     pending_.store(nullptr, std::memory_order_release);
 }
 

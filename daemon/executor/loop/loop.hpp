@@ -68,6 +68,7 @@ struct ComponentFault {
 struct LoopFigures {
     Histogram duration;  ///< ticks
     Histogram latency;   ///< ns
+    Histogram adoption;  ///< ticks; what a change took of the cycle that adopted it
     Histogram wake_up;   ///< ns after the end of the sleep, which is `spin` before the deadline
     std::atomic<std::uint64_t> iteration{0};  ///< cycles completed since the loop started
     std::atomic<std::uint64_t> overruns{0};

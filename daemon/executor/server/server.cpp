@@ -556,6 +556,9 @@ pb::RunnerStatistics Server::statistics() const {
     setDistribution(
         *message.mutable_latency(),
         summarize(difference(loop.figures().latency.snapshot(), baseline_.latency), 1.0));
+    setDistribution(
+        *message.mutable_adoption(),
+        summarize(difference(loop.figures().adoption.snapshot(), baseline_.adoption), ns_per_tick));
     message.set_overruns(loop.figures().overruns.load(std::memory_order_relaxed) -
                          baseline_.overruns);
     message.set_missed(loop.figures().missed.load(std::memory_order_relaxed) - baseline_.missed);
@@ -593,6 +596,7 @@ void Server::resetStatistics() {
     }
     baseline_.duration = loop.figures().duration.snapshot();
     baseline_.latency = loop.figures().latency.snapshot();
+    baseline_.adoption = loop.figures().adoption.snapshot();
     baseline_.overruns = loop.figures().overruns.load(std::memory_order_relaxed);
     baseline_.missed = loop.figures().missed.load(std::memory_order_relaxed);
 }

@@ -53,6 +53,7 @@ class Server {
             components;
         HistogramSnapshot duration;
         HistogramSnapshot latency;
+        HistogramSnapshot adoption;
         std::uint64_t overruns = 0;
         std::uint64_t missed = 0;
     };
