@@ -1,23 +1,52 @@
-// Says in the log which hook is called.
+// Says in the log which hook is called; and, for whoever looks when nobody takes logs any more,
+// in a file.
+#include <fstream>
+#include <string>
+
 #include <rtcf/component.hpp>
 
 namespace {
 
 class Witness final : public rtcf::Component {
+    rtcf::Parameter<std::string> file{this, "file", "", rtcf::Doc("gets a line for each hook")};
+    bool updated_ = false;
+    bool safe_ = false;
+
+    void note(const char* hook) {
+        if (!file.value().empty()) std::ofstream(file.value(), std::ios::app) << hook << '\n';
+    }
+
     bool configure() override {
         RTCF_INFO(this, "hook {}", "configure");
+        note("configure");
         return true;
     }
     bool start() override {
         RTCF_INFO(this, "hook {}", "start");
+        note("start");
         return true;
     }
-    void update() override { RTCF_INFO_ONCE(this, "hook {}", "update"); }
-    void safe() noexcept override { RTCF_INFO(this, "hook {}", "safe"); }
-    void stop() override { RTCF_INFO(this, "hook {}", "stop"); }
-    void cleanup() override { RTCF_INFO(this, "hook {}", "cleanup"); }
+    void update() override {
+        RTCF_INFO_ONCE(this, "hook {}", "update");
+        updated_ = true;
+    }
+    void safe() noexcept override {
+        RTCF_INFO(this, "hook {}", "safe");
+        safe_ = true;
+    }
+    void stop() override {
+        RTCF_INFO(this, "hook {}", "stop");
+        // Files are not for the real-time thread: its hooks are noted afterwards.
+        if (updated_) note("update");
+        if (safe_) note("safe");
+        note("stop");
+    }
+    void cleanup() override {
+        RTCF_INFO(this, "hook {}", "cleanup");
+        note("cleanup");
+    }
 };
 
 }  // namespace
 
-RTCF_COMPONENT(Witness, "Logs each hook")
+RTCF_COMPONENT(Witness, "Tells of each hook")

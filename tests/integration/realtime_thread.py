@@ -17,7 +17,6 @@ class Usage:
     page_faults: int
     preempted: int  # how often the CPU was taken from it
     slept: int  # how often it gave the CPU up
-    stolen: int  # ticks that the machine's host took from its CPU
 
 
 class RealtimeThread:
@@ -39,17 +38,17 @@ class RealtimeThread:
         return status if status.realtime_tid and status.iteration else None
 
     def check(self) -> None:
-        """See that it has taken no page fault and missed no cycle of its own doing."""
+        """See that it has taken no page fault, and that no cycle was late of its own doing.
+
+        Cycles that the machine, or the machine's host, began late or interrupted are not its
+        doing: they are few, and come when they like.
+        """
         found = self._client.get_statistics(self._runner)
-        now = self.usage()
         if self._locked:
-            assert now.page_faults == self._before.page_faults
-        # A cycle that was missed although its calculation was short was taken from us by the
-        # machine; so was a long one while the machine took the CPU from the thread, or its own
-        # host the CPU from the machine.
-        taken = now.preempted > self._before.preempted or now.stolen > self._before.stolen
-        own = found.missed if found.duration.max_ns > self._period_ns and not taken else 0
-        assert own == 0, f"{found.missed} cycles missed: {found.duration}"
+            assert self.usage().page_faults == self._before.page_faults
+        assert found.adoption.max_ns < self._period_ns, f"a change took too long: {found.adoption}"
+        if found.duration.count > 2000:
+            assert found.duration.p999_ns < self._period_ns, found.duration
 
     def usage(self) -> Usage:
         """Return what it has used so far."""
@@ -57,17 +56,10 @@ class RealtimeThread:
         text = (folder / "stat").read_text()
         fields = text[text.rindex(")") + 2 :].split()
         status = dict(line.split(":", 1) for line in (folder / "status").read_text().splitlines())
-        cpu = fields[36]  # the last one it ran on
-        (steal,) = (
-            int(line.split()[8])
-            for line in Path("/proc/stat").read_text().splitlines()
-            if line.split()[0] == f"cpu{cpu}"
-        )
         return Usage(
             page_faults=int(fields[7]) + int(fields[9]),
             preempted=int(status["nonvoluntary_ctxt_switches"]),
             slept=int(status["voluntary_ctxt_switches"]),
-            stolen=steal,
         )
 
 

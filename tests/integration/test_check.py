@@ -1,17 +1,19 @@
-"""`rtcfctl check` with the executor that is built with RealtimeSanitizer, if it is."""
+"""`rtcfctl check` with the executor that is built with RealtimeSanitizer."""
 
 import json
 import subprocess
+from pathlib import Path
 
 import pytest
+import rtcf
 from daemon_process import BUILD_TREE, clean_environment
+from rtsan import EXECUTOR, HOW_TO_BUILD
 
-EXECUTOR = BUILD_TREE.with_name(f"{BUILD_TREE.name}-rtsan") / "bin" / "rtcf-executor"
-
-pytestmark = pytest.mark.skipif(not EXECUTOR.exists(), reason=f"there is no {EXECUTOR}")
+OURS = {folder.name for folder in (Path(__file__).parents[2] / "components").iterdir()}
 
 
 def check(*arguments: str) -> subprocess.CompletedProcess[str]:
+    assert EXECUTOR.exists(), HOW_TO_BUILD
     return subprocess.run(
         [str(BUILD_TREE / "bin" / "rtcfctl"), "check", *arguments],
         env=clean_environment(),
@@ -21,11 +23,13 @@ def check(*arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.parametrize("name", ["Mimo", "Identity", "PaperExample"])
-def test_components_that_come_with_rtcf_are_clean(name: str) -> None:
-    done = check("rtcf_examples", name)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert done.stdout == f"rtcf_examples/{name}: clean in 1000 cycles\n"
+def test_all_components_that_come_with_rtcf_are_clean(client: rtcf.Client) -> None:
+    types = [each for each in client.list_types().types if each.package in OURS]
+    assert len(types) >= 3
+    for each in types:
+        done = check(each.package, each.type)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert done.stdout == f"{each.package}/{each.type}: clean in 1000 cycles\n"
 
 
 @pytest.mark.parametrize(

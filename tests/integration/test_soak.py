@@ -93,6 +93,9 @@ class GraphMachine(stateful.RuleBasedStateMachine):
 
     @stateful.initialize()
     def begin(self) -> None:
+        # Hypothesis runs what failed once more.
+        self.client.stop()
+        self.client.apply([])
         self.client.apply([_steady()])
         self._start()
 

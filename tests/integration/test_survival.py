@@ -96,6 +96,23 @@ def test_a_private_rtcfd_takes_its_executors_with_it(tmp_path: Path) -> None:
     wait_for(lambda: is_gone(pid), "its end")
 
 
+@pytest.mark.parametrize("loop", ["running", "stopped"])
+def test_an_orphan_ends_in_order_after_its_timeout(tmp_path: Path, loop: str) -> None:
+    daemon = Daemon(tmp_path, "[runner]\norphan_timeout_s = 1.5\n[runner.ros]\nenabled = false\n")
+    daemon.start()
+    hooks = tmp_path / "hooks"
+    with rtcf.Client(daemon.socket) as client:
+        client.load(rtcf.component("rtcf_test", "Witness", parameters=[f"file:={hooks}"]))
+        if loop == "running":
+            client.start()
+            wait_for(lambda: state(client).iteration > 10, "some cycles")
+        pid = state(client).pid
+    daemon.end(signal.SIGKILL)
+    wait_for(lambda: is_gone(pid), "its end")
+    in_loop = ["start", "update", "safe", "stop"] if loop == "running" else []
+    assert hooks.read_text().split() == ["configure", *in_loop, "cleanup"]
+
+
 class Churn:
     """Changes a graph at random, and knows what it must be: the acknowledged
     changes, and perhaps the one that was under way when the other side died."""

@@ -13,6 +13,7 @@ namespace {
 
 class Throws final : public Faulty {
     void fault() override { throw std::runtime_error("the encoder jumped"); }
+    void safe() noexcept override { RTCF_INFO(this, "hook {} of what threw", "safe"); }
 };
 
 class Allocates final : public Faulty {
@@ -32,6 +33,7 @@ class NotFinite final : public Faulty {
 
 class NotFiniteStops final : public Faulty {
     void fault() override { value_.write(std::numeric_limits<double>::infinity()); }
+    void safe() noexcept override { RTCF_INFO(this, "hook {}", "safe"); }
     rtcf::Output<double> value_{this, "value", "", rtcf::Finite(rtcf::OnNonFinite::Stop)};
 };
 

@@ -1,9 +1,7 @@
 // Changes of a graph while its loop runs: whole, at one boundary, or not at all.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "support/runner_fixture.hpp"
 
@@ -274,48 +272,6 @@ TEST_F(Change, InputIsSubscribedOnlyWithoutAWriter) {
     unload("/W");
     EXPECT_NE(bridge().injector("/A_in"), nullptr);
     EXPECT_TRUE(runs());
-}
-
-// The same changes to the graph and to a list of names, at random.
-TEST_F(Change, ManyRandomChangesLeaveTheGraphThatWasAskedFor) {
-    startWithA();
-    std::mt19937 random(7);
-    const auto chance = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
-    std::vector<std::string> loaded{"A"};
-#ifdef RTCF_SANITIZED
-    constexpr int kChanges = 100;
-#else
-    constexpr int kChanges = 400;
-#endif
-    for (int i = 0; i < kChanges; ++i) {
-        const std::string name(1, static_cast<char>('B' + chance(8)));
-        const auto found = std::find(loaded.begin(), loaded.end(), name);
-        ComponentDefinition component = recorder(name);
-        component.remaps[0].second = std::string(1, static_cast<char>('A' + chance(9))) + "_out";
-        component.breaks = {"in"};
-        if (found == loaded.end()) {
-            load(component);
-            loaded.push_back(name);
-        } else if (chance(3) == 0) {
-            replace("/" + name, component);
-        } else if (chance(3) == 0) {
-            setParameters("/" + name, {{"gain", static_cast<double>(chance(10))}});
-        } else {
-            unload("/" + name);
-            loaded.erase(found);
-        }
-        std::vector<std::string> expected;
-        for (const std::string& one : loaded) expected.push_back("/" + one);
-        std::sort(expected.begin(), expected.end());
-        std::vector<std::string> actual = order();
-        std::sort(actual.begin(), actual.end());
-        ASSERT_EQ(actual, expected);
-    }
-    stop();
-    EXPECT_EQ(state(), RunnerState::Stopped);
-    EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration()))
-        << "A was updated in every cycle";
-    EXPECT_TRUE(events().empty() || events().back().kind != RunnerEvent::Kind::LoopEnded);
 }
 
 }  // namespace

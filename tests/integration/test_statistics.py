@@ -1,0 +1,145 @@
+"""The figures of a loop: read, begun anew, and watched, while it runs."""
+
+import itertools
+import json
+
+import pytest
+import rtcf
+from daemon_process import Daemon, wait_for
+from rtcf.v1 import graph_pb2, runner_pb2
+from values import iteration
+
+
+def _slow(name: str) -> graph_pb2.ComponentSpec:
+    """A component that sleeps 100 µs in each cycle."""
+    return rtcf.component(
+        "rtcf_faults", "Sleeps", name=name, remaps=["out:=~out"], parameters=["after:=0"]
+    )
+
+
+def test_each_cycle_is_counted_once_in_all_figures(client: rtcf.Client) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(warmup_cycles=7))
+    client.load(rtcf.component("rtcf_test", "Counter"))
+    client.start()
+    wait_for(lambda: iteration(client) > 200, "200 cycles")
+    client.stop()
+    figures = client.get_statistics()
+    cycles = iteration(client) - 7
+    assert figures.iterations == cycles
+    assert figures.duration.count == figures.latency.count == cycles
+    (counter,) = figures.components
+    assert (counter.component, counter.duration.count) == ("/Counter", cycles)
+    assert 0 < counter.duration.min_ns <= counter.duration.p50_ns <= counter.duration.p99_ns
+    assert counter.duration.p99_ns <= counter.duration.p999_ns <= counter.duration.max_ns
+
+
+def test_a_reset_begins_anew_and_touches_no_loop(client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter"))
+    client.start()
+    wait_for(lambda: client.get_statistics().iterations > 1000, "1000 cycles")
+    before = iteration(client)
+    client.reset_statistics()
+    figures = client.get_statistics()
+    assert figures.iterations <= iteration(client) - before + 1
+    assert figures.components[0].duration.count <= figures.iterations + 1
+    wait_for(lambda: client.get_statistics().iterations > 100, "more cycles")
+    assert client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_RUNNING
+
+
+def test_a_start_begins_anew(client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter"))
+    for _ in range(2):
+        client.start()
+        wait_for(lambda: iteration(client) > 100, "100 cycles")
+        client.stop()
+        figures = client.get_statistics()
+        assert figures.iterations == iteration(client) - 10  # the warm-up's default
+
+
+def test_overruns_are_counted_for_the_component_that_was_running(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=20000.0))
+    client.load(rtcf.component("rtcf_test", "Counter", name="quick"))
+    client.load(_slow("slow"))
+    client.start()
+    wait_for(lambda: client.get_statistics().overruns > 100, "overruns")
+    figures = client.get_statistics()
+    overruns = {each.component: each.overruns for each in figures.components}
+    assert overruns["/slow"] > 50 > overruns["/quick"]
+    assert figures.missed >= figures.overruns - 1
+    status = client.get_status("rt_runner").runners[0]
+    assert status.overruns >= figures.overruns
+    client.reset_statistics()
+    assert client.get_statistics().overruns < figures.overruns
+
+
+def test_figures_are_watched_while_they_grow(daemon: Daemon, client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter"))
+    client.start()
+    seen = [
+        each.iterations for each in itertools.islice(client.watch_statistics(interval_s=0.1), 5)
+    ]
+    assert seen == sorted(set(seen)), "each has more cycles than the one before"
+    # And people see them, too.
+    assert json.loads(daemon.ctl("stats", "-o", "json").stdout)["iterations"] > 0
+
+
+def test_a_component_that_left_leaves_the_figures(client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter", name="a", remaps=["out:=/a"]))
+    client.load(rtcf.component("rtcf_test", "Counter", name="b", remaps=["out:=/b"]))
+    client.start()
+    wait_for(lambda: client.get_statistics().iterations > 100, "100 cycles")
+    client.unload(["a"])
+    client.load(rtcf.component("rtcf_test", "Counter", name="a", remaps=["out:=/a"]))
+    first, second = client.get_statistics().components
+    assert (first.component, second.component) == ("/a", "/b")
+    # The new one is not the old one, whatever its name.
+    assert first.duration.count < second.duration.count
+
+
+@pytest.mark.parametrize(
+    ("policy", "misses"),
+    [
+        (runner_pb2.OVERRUN_POLICY_SKIP, True),
+        (runner_pb2.OVERRUN_POLICY_CATCH_UP, False),
+        (runner_pb2.OVERRUN_POLICY_RELATIVE, False),
+    ],
+)
+def test_the_overrun_policy_changes_while_the_loop_runs(
+    client: rtcf.Client, policy: runner_pb2.OverrunPolicy, misses: bool
+) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=10000.0))
+    client.load(_slow("slow"))
+    client.start()
+    client.set_runner(runner_pb2.RunnerSettings(overrun=policy))
+    wait_for(lambda: iteration(client) > 20, "some cycles")
+    client.reset_statistics()
+    wait_for(lambda: client.get_statistics().overruns > 50, "overruns")
+    assert (client.get_statistics().missed > 0) == misses
+
+
+def test_rates_that_do_not_go_together_are_refused_with_what_does(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    def load(name: str, *every: str) -> str:
+        done = daemon.ctl(
+            "load", "rtcf_test", "Counter", "--name", name, "--remap", f"out:=/{name}", *every
+        )
+        return done.stderr
+
+    assert load("four", "--every", "4") == ""
+    client.start()
+    refused = load("six", "--every", "6")
+    assert "/six runs every 6 cycles" in refused
+    assert "try --every 4 or 8" in refused
+    assert client.get_order() == ["/four"]
+    assert load("eight", "--every", "8") == ""
+    wait_for(lambda: iteration(client) > 200, "200 cycles")
+    client.stop()
+    counts = {
+        each: next(p for p in client.get_component(each).ports if p.name == "out").count
+        for each in ("four", "eight")
+    }
+    assert counts["four"] in (iteration(client) // 4, iteration(client) // 4 + 1)
+    assert 0 < counts["eight"] <= counts["four"] // 2 + 1
