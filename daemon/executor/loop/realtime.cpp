@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <link.h>
 #include <malloc.h>
 #include <sched.h>
 #include <sys/mman.h>
@@ -36,6 +37,23 @@ void prefaultHeap(std::size_t bytes) {
     for (std::size_t at = 0; at < bytes; at += page) {
         static_cast<volatile unsigned char*>(block.get())[at] = 1;
     }
+}
+
+// ICU's tables, 30 MB of text conversion and locales that ROS's logging brings along, are half of
+// the process, and no real-time thread reads them. They are read from disk again where needed.
+int releaseTextTables(dl_phdr_info* library, std::size_t /*size*/, void* /*unused*/) {
+    if (std::strstr(library->dlpi_name, "/libicudata.so") == nullptr) return 0;
+    const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
+    for (unsigned i = 0; i < library->dlpi_phnum; ++i) {
+        const ElfW(Phdr)& segment = library->dlpi_phdr[i];
+        if (segment.p_type != PT_LOAD || (segment.p_flags & PF_W) != 0) continue;
+        const std::uintptr_t begin = (library->dlpi_addr + segment.p_vaddr) / page * page;
+        const std::uintptr_t end = library->dlpi_addr + segment.p_vaddr + segment.p_memsz;
+        // NOLINTNEXTLINE(performance-no-int-to-ptr): the loader gives addresses as numbers
+        void* const address = reinterpret_cast<void*>(begin);
+        if (munlock(address, end - begin) == 0) madvise(address, end - begin, MADV_DONTNEED);
+    }
+    return 0;
 }
 
 std::string fifoProblem(const RealtimeSettings& settings, int error) {
@@ -81,6 +99,7 @@ RealtimeProblems lockMemory(const RealtimeSettings& settings) {
                      systemError(errno)),
                  true});
         }
+        dl_iterate_phdr(&releaseTextTables, nullptr);
     } else {
         munlockall();
         problems.push_back({"memory is not locked: the runner's lock_memory is off", false});

@@ -33,7 +33,8 @@ struct RealtimeSettings {
 /// stacks. At the beginning of the process, before any thread.
 void prepareProcess();
 
-/// Locks all memory, present and future, and touches the heap.
+/// Locks all memory, present and future, but tables that only text conversion reads, and touches
+/// the heap.
 RealtimeProblems lockMemory(const RealtimeSettings& settings);
 
 /// Whether threads may have the settings' SCHED_FIFO priority, and whether the kernel is one for
