@@ -67,9 +67,8 @@ class Daemon:
         """Return the path of one of rtcf's programs."""
         return str(self._setting.build / "bin" / name)
 
-    def call(self, *arguments: str) -> float:
-        """Call rtcfctl and return how long it took, s."""
-        begin = time.monotonic()
+    def call(self, *arguments: str) -> None:
+        """Call rtcfctl."""
         done = subprocess.run(
             [self.program("rtcfctl"), *arguments],
             env={**os.environ, "RTCF_SOCKET": str(self.socket)},
@@ -80,9 +79,13 @@ class Daemon:
         )
         if done.returncode != 0:
             raise Failed(f"rtcfctl {' '.join(arguments)}: {done.stderr.strip()}")
-        return time.monotonic() - begin
 
     @property
     def executor(self) -> int:
         """Return the process id of the default runner's executor."""
         return int(self.client.get_status().runners[0].pid)
+
+    @property
+    def servers(self) -> list[int]:
+        """Return the process ids of rtcfd and the executor."""
+        return [self.process.pid, self.executor]

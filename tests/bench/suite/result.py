@@ -55,7 +55,7 @@ class Result:
                 )
                 lines.append("  ".join([first, *others]).rstrip())
         for budget in self.budgets:
-            verdict = "kept" if budget.kept else "BROKEN"
+            verdict = "kept" if budget.kept else "NOT KEPT"
             lines.append(
                 f"budget {verdict}: {budget.text}: {_text(budget.measured)} of "
                 f"{_text(budget.limit)} {budget.unit}"

@@ -1,0 +1,57 @@
+"""What an action takes: on the clock, and of the CPUs, which others do not change.
+
+On a machine that others keep busy, the clock shows how long one had to wait
+for a CPU. Beside it stands the CPU time of all processes that took part.
+"""
+
+import resource
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from figures import median
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Durations of one action, ms."""
+
+    clock: float
+    cpu: float  # of this process, of the programs it called, and of the servers
+
+
+def cost_of(action: Callable[[], object], servers: Iterable[int]) -> Cost:
+    """Do it; `servers` are processes that run on and take part in it."""
+    pids = list(servers)
+    cpu, clock = _cpu_ms(pids), time.monotonic()
+    action()
+    elapsed = (time.monotonic() - clock) * 1e3
+    return Cost(elapsed, _cpu_ms(pids) - cpu)
+
+
+def median_cost(costs: Iterable[Cost]) -> Cost:
+    """Return the medians, each by itself."""
+    found = list(costs)
+    return Cost(median(cost.clock for cost in found), median(cost.cpu for cost in found))
+
+
+def busy_with_others() -> float:
+    """Return the share of the last minute in which something waited for a CPU, 0 to 1."""
+    try:
+        text = Path("/proc/pressure/cpu").read_text()
+    except OSError:
+        return 0.0  # a kernel that does not tell
+    fields = dict(field.split("=") for field in text.splitlines()[0].split()[1:])
+    return float(fields["avg60"]) / 100
+
+
+def _cpu_ms(servers: list[int]) -> float:
+    total = time.process_time() * 1e3
+    called = resource.getrusage(resource.RUSAGE_CHILDREN)
+    total += (called.ru_utime + called.ru_stime) * 1e3
+    for pid in servers:
+        for thread in Path(f"/proc/{pid}/task").iterdir():
+            # sched_debug(5) of the kernel's documentation: ns on the CPU, ns waiting, time slices.
+            total += int((thread / "schedstat").read_text().split()[0]) / 1e6
+    return total
