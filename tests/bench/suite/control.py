@@ -7,6 +7,7 @@ from pathlib import Path
 import rtcf
 from cost import Cost, busy_with_others, cost_of, median_cost
 from graphs import chain, paper
+from processes import output_of
 from result import Budget, Result
 from rtcf.v1 import graph_pb2, runner_pb2
 from setting import FREQUENCY_HZ, Setting
@@ -18,6 +19,7 @@ _LONG_CHAIN = 200
 _GRAPH = 1000
 _ROUNDS = 3
 _MB = 1024.0  # kB
+_REFERENCE = ("/usr/bin/python3", "-I", "-c", "import grpc")
 
 
 def run(setting: Setting) -> Result:
@@ -28,7 +30,11 @@ def run(setting: Setting) -> Result:
         client.set_runner(settings=runner_pb2.RunnerSettings(frequency_hz=FREQUENCY_HZ))
         for component in paper():
             client.load(component)
-        cold = median_cost(_calls(daemon, "status") for _ in range(_CALLS))
+        cold_calls, references = [], []
+        for _ in range(_CALLS):
+            cold_calls.append(_calls(daemon, "status"))
+            references.append(cost_of(lambda: output_of(_REFERENCE), daemon.servers))
+        cold = median_cost(cold_calls)
         client.start()
         by_rtcfctl = median_cost(_load_by_rtcfctl(daemon, i) for i in range(_CALLS))
         by_client = median_cost(_load_by_client(daemon, i) for i in range(_CALLS))
@@ -49,6 +55,7 @@ def run(setting: Setting) -> Result:
         [what, cost.clock, cost.cpu]
         for what, cost in (
             ("rtcfctl status, cold", cold),
+            ("in turn with it: Python loading gRPC", median_cost(references)),
             (f"load one component into Fig. 1 at {FREQUENCY_HZ} Hz, rtcfctl", by_rtcfctl),
             (f"load one component into Fig. 1 at {FREQUENCY_HZ} Hz, Python client", by_client),
             (f"load {_LONG_CHAIN} components one by one, Python client", long_chain),

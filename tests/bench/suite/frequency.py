@@ -1,24 +1,40 @@
 """The highest frequency at which Fig. 1 runs without missing cycles."""
 
+from figures import median
 from paper_graph import run_rtcf
 from result import Result
 from setting import Setting
 
-_LADDER_HZ = (1000, 2000, 5000, 10_000, 20_000, 30_000, 40_000, 50_000, 60_000, 80_000, 100_000)
-_SECONDS = 2.0
-_ALLOWED = 0.001  # of all cycles: on a shared host some are taken from anybody
+_LADDER_HZ = (2000, 5000, 10_000, 20_000, 30_000, 40_000, 50_000, 60_000, 80_000, 100_000)
+_EASY_HZ = 1000  # what is missed here was taken by others
+_ROUNDS = 3
+_SECONDS = 1.0
+_ALLOWED = 0.005
 
 
 def run(setting: Setting) -> Result:
-    """Climb until more than 1 cycle in 1000 is missed."""
-    result = Result("frequency", "Fig. 1, missed cycles by frequency", ["Hz", "missed", "share"])
-    highest = 0
+    """Climb until a larger share of cycles is missed than at a frequency that is easy."""
+    result = Result(
+        "frequency", "Fig. 1, share of missed cycles", ["Hz", "missed", f"at {_EASY_HZ} Hz in turn"]
+    )
+    highest = _EASY_HZ
     for frequency in _LADDER_HZ:
-        found = run_rtcf(setting, _SECONDS, frequency)
-        share = found.missed / (len(found.durations_ns) + found.missed)
-        result.rows.append([frequency, found.missed, share])
-        if share > _ALLOWED:
+        rungs, references = [], []
+        for _ in range(_ROUNDS):
+            references.append(_missed(setting, _EASY_HZ))
+            rungs.append(_missed(setting, frequency))
+        share, reference = median(rungs), median(references)
+        result.rows.append([frequency, share, reference])
+        if share > reference + _ALLOWED:
             break
         highest = frequency
-    result.notes.append(f"highest stable frequency: {highest} Hz (at most {_ALLOWED:.1%} missed)")
+    result.notes.append(
+        f"highest stable frequency: {highest} Hz (at most {_ALLOWED:.1%} more missed than at "
+        f"{_EASY_HZ} Hz, which others on the machine have taken; medians of {_ROUNDS} runs)"
+    )
     return result
+
+
+def _missed(setting: Setting, frequency_hz: int) -> float:
+    found = run_rtcf(setting, _SECONDS, frequency_hz)
+    return found.missed / (len(found.durations_ns) + found.missed)

@@ -17,7 +17,9 @@ from setting import FREQUENCY_HZ, PRIORITY, Setting
 
 _HAL = Path(__file__).resolve().parent.parent / "hal"
 _MODULES = Path("/usr/lib/linuxcnc/modules")
-_COMPONENTS = ("rtcf_mimo", "rtcf_record")
+HAL_MIMO = "rtcf_mimo"  # takes new values only, as rtcf's does
+HAL_SUM = "rtcf_sum"  # takes all
+HAL_COMPONENTS = (HAL_MIMO, HAL_SUM, "rtcf_record")
 _SKIP = 3000  # cycles, in which the threads get their priority
 _NOBODY = 65534
 
@@ -54,15 +56,15 @@ def hal_components(setting: Setting) -> Iterator[None]:
     """Build HAL's Mimo and lend it to the HAL of this machine, which has one folder for all."""
     folder = setting.output / "hal"
     folder.mkdir(parents=True, exist_ok=True)
-    for name in _COMPONENTS:
+    for name in HAL_COMPONENTS:
         (folder / f"{name}.comp").write_bytes((_HAL / f"{name}.comp").read_bytes())
         source = ["halcompile", "--compile", f"{name}.comp"]
         done = subprocess.run(source, cwd=folder, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             raise Failed(f"halcompile {name}: {done.stderr.strip()}")
-    links = [_MODULES / f"{name}.so" for name in _COMPONENTS]
+    links = [_MODULES / f"{name}.so" for name in HAL_COMPONENTS]
     try:
-        for name, link in zip(_COMPONENTS, links, strict=True):
+        for name, link in zip(HAL_COMPONENTS, links, strict=True):
             link.unlink(missing_ok=True)
             link.symlink_to((folder / f"{name}.so").resolve())
         yield
@@ -74,17 +76,19 @@ def hal_components(setting: Setting) -> Iterator[None]:
                 link.unlink()
 
 
-def run_hal(seconds: float, frequency_hz: int = FREQUENCY_HZ) -> Samples:
+def run_hal(seconds: float, component: str = HAL_MIMO) -> Samples:
     """Run Fig. 1 by HAL, with hal_components(); return the cycles' durations in ns."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         folder.chmod(0o777)  # HAL gives up its rights before it writes
         text = (_HAL / "fig1.hal.in").read_text()
         for key, value in {
+            "COMPONENT": component,
+            "COUNTS": "" if component == HAL_MIMO else "# ",
             "SAMPLES": str(folder / "samples"),
             "SKIP": str(_SKIP),
-            "PERIOD_NS": str(1_000_000_000 // frequency_hz),
-            "SECONDS": str(seconds + _SKIP / frequency_hz),
+            "PERIOD_NS": str(1_000_000_000 // FREQUENCY_HZ),
+            "SECONDS": str(seconds + _SKIP / FREQUENCY_HZ),
         }.items():
             text = text.replace(f"@{key}@", value)
         (folder / "fig1.hal").write_text(text)
@@ -99,7 +103,7 @@ def run_hal(seconds: float, frequency_hz: int = FREQUENCY_HZ) -> Samples:
                 ["halrun", str(folder / "fig1.hal")], env=environment, stdout=log, stderr=log
             )
             try:
-                _make_realtime(process, deadline_s=_SKIP / frequency_hz)
+                _make_realtime(process, deadline_s=_SKIP / FREQUENCY_HZ)
                 process.wait(seconds + 60)
             except subprocess.TimeoutExpired:
                 raise Failed("halrun does not end") from None

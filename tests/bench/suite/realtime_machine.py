@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from figures import Samples, median_of, summary
-from paper_graph import hal_components
+from paper_graph import HAL_COMPONENTS, hal_components
 from processes import Failed, missing, output_of
 from result import Budget, Cell, Result
 from setting import Setting
@@ -55,6 +55,7 @@ def _report(found: dict[str, list[float]], boots: int, with_hal: bool) -> Result
             for key, title in (
                 ("rtcf.duration", "calculation, rtcf"),
                 ("hal.duration", "calculation, LinuxCNC HAL"),
+                ("hal-sums.duration", "calculation, LinuxCNC HAL, plain sums"),
                 ("cyclictest", "wake-up, cyclictest"),
                 ("rtcf.latency", "wake-up, rtcf"),
                 ("rtcf-spin.latency", "wake-up, rtcf with spin"),
@@ -82,6 +83,7 @@ def _report(found: dict[str, list[float]], boots: int, with_hal: bool) -> Result
                 f"wake-up p99 with spin, {kind}", found[f"rtcf-spin.latency.{kind}"][1], 0.2, "µs"
             ),
         ]
+    result.notes.append("rtcf and HAL take new values only; plain sums take all, and cannot tell")
     return result
 
 
@@ -102,7 +104,9 @@ def _read(folder: Path, with_hal: bool) -> dict[str, Samples]:
         latencies = [float(field[2]) for field in fields if field[2].strip().isdigit()]
         found[f"cyclictest.{kind}"] = np.array(latencies)
         if with_hal:
-            found[f"hal.duration.{kind}"] = np.fromfile(folder / f"hal.{kind}", sep=" ")
+            for name in ("hal", "hal-sums"):
+                samples = np.fromfile(folder / f"{name}.{kind}", sep=" ")
+                found[f"{name}.duration.{kind}"] = samples
     return found
 
 
@@ -132,7 +136,7 @@ def _fill(payload: Path, setting: Setting) -> bool:
     output_of([*command, *names])
     if with_hal:
         folder = setting.output / "hal"
-        names = [f"{name}.so" for name in ("rtcf_mimo", "rtcf_record")]
+        names = [f"{name}.so" for name in HAL_COMPONENTS]
         place = "--transform=s,^,usr/lib/linuxcnc/modules/,"
         output_of(["tar", "-rf", str(payload / "files.tar"), place, "-C", str(folder), *names])
     return with_hal
