@@ -116,10 +116,17 @@ class Client:
         component: graph_pb2.ComponentSpec,
         runner: str = "",
         on_progress: OnProgress | None = None,
+        *,
+        wait: bool = False,
     ) -> control_pb2.ChangeResult:
-        """Load a component (see rtcf.component); the loop misses no cycle."""
-        request = control_pb2.LoadRequest(runner=runner, component=component)
-        return self._change(self._stub.Load, request, on_progress)
+        """Load a component (see rtcf.component); the loop misses no cycle.
+
+        With `wait`, one whose hooks need a ROS master waits for it as long as it takes.
+        """
+        request = control_pb2.LoadRequest(runner=runner, component=component, wait=wait)
+        if not wait:
+            return self._change(self._stub.Load, request, on_progress)
+        return self._change(self._stub.Load, request, on_progress, timeout_s=None)
 
     def unload(
         self,

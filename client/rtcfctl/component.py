@@ -20,6 +20,9 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verbs."""
     loading = verbs.add_parser("load", parents=[common], help="load a component")
     _component_options(loading)
+    loading.add_argument(
+        "--wait", action="store_true", help="for a ROS master, if the component needs one"
+    )
     loading.set_defaults(run=load)
 
     unloading = verbs.add_parser("unload", parents=[common], help="unload components")
@@ -49,7 +52,7 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 
 def load(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Load a component."""
-    result = client.load(_spec(args), args.runner, output.progress)
+    result = client.load(_spec(args), args.runner, output.progress, wait=args.wait)
     output.changed(f"loaded {result.component}", result)
 
 

@@ -13,7 +13,8 @@ enum class RefusalKind {
     NotFound,
     AlreadyExists,
     FailedPrecondition,
-    Unavailable
+    Unavailable,
+    NoMaster
 };
 
 class Refusal : public std::runtime_error {

@@ -1,5 +1,6 @@
 #include "ros/master_client.hpp"
 
+#include <ros/network.h>
 #include <xmlrpcpp/XmlRpcException.h>
 
 namespace rtcf::ros1 {
@@ -53,6 +54,15 @@ MasterAnswer MasterClient::call(const char* method, const XmlRpc::XmlRpcValue& a
     }
     client_.close();
     return answer;
+}
+
+bool splitMasterUri(const std::string& uri, std::string& host, std::uint32_t& port) {
+    if (uri.rfind("http://", 0) != 0) return false;
+    try {
+        return ros::network::splitURI(uri, host, port) && !host.empty() && port > 0 && port < 65536;
+    } catch (const std::exception&) {
+        return false;
+    }
 }
 
 }  // namespace rtcf::ros1

@@ -9,6 +9,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <string>
 
 namespace rtcf::ros1 {
@@ -46,5 +47,8 @@ class MasterClient {
     std::chrono::milliseconds timeout_;
     const std::atomic<bool>& cancel_;
 };
+
+/// Host and port of a master's URI. @return false if it is none
+bool splitMasterUri(const std::string& uri, std::string& host, std::uint32_t& port);
 
 }  // namespace rtcf::ros1

@@ -79,6 +79,7 @@ executor::BridgeStatus MasterWatch::status() const {
 
 void MasterWatch::stop() {
     stop_ = true;
+    node_.leaveMaster();
     {
         const std::lock_guard lock(mutex_);
         due_ = true;
@@ -86,14 +87,25 @@ void MasterWatch::stop() {
     changed_.notify_all();
 }
 
-bool MasterWatch::waitForEnd(std::chrono::milliseconds timeout) {
-    {
-        std::unique_lock lock(mutex_);
-        if (changed_.wait_for(lock, timeout, [this] { return ended_; })) return true;
+void MasterWatch::awaitNode() {
+    constexpr auto kPatience = std::chrono::seconds(5);  // a step may wait for several calls
+    std::unique_lock lock(mutex_);
+    due_ = true;
+    changed_.notify_all();
+    // What a step that has begun already found may be old.
+    const std::uint64_t wanted = steps_begun_ + 1;
+    const auto known = [&] {
+        return stop_ || (settings_ && !settings_->enabled) || steps_ended_ >= wanted;
+    };
+    const bool in_time = changed_.wait_for(lock, kPatience, known);
+    if (settings_ && !settings_->enabled) {
+        throw NoMaster("ROS is off for this runner: turn it on: rtcfctl runner set " + name_.base +
+                       " --ros");
     }
-    const std::lock_guard lock(report_mutex_);
-    report_ = nullptr;
-    return false;
+    if (in_time && status_.connected) return;
+    const std::string silent = "no ROS master answers at " + status_.master_uri;
+    const bool other = in_time && !status_.problem.empty() && status_.problem.rfind(silent, 0) != 0;
+    throw NoMaster(other ? status_.problem : silent + ": start one (roscore), or load with --wait");
 }
 
 void MasterWatch::run() {
@@ -104,6 +116,7 @@ void MasterWatch::run() {
             due_ = false;
             if (stop_) break;
             if (!settings_) continue;
+            ++steps_begun_;
         }
         // What a master answers must never end the executor.
         try {
@@ -113,12 +126,13 @@ void MasterWatch::run() {
         } catch (const XmlRpc::XmlRpcException& error) {  // not a std::exception
             setProblem("the ROS master's answer is not understood: " + error.getMessage());
         }
+        {
+            const std::lock_guard lock(mutex_);
+            steps_ended_ = steps_begun_;
+        }
+        changed_.notify_all();
     }
     end();
-    {
-        const std::lock_guard lock(mutex_);
-        ended_ = true;
-    }
     changed_.notify_all();
 }
 
@@ -158,7 +172,7 @@ void MasterWatch::step() {
         if (off_ == Off::No) subscribing_.reconcile(node_.handle(), false);
         return;
     }
-    openAndClose(master, settings.queue);
+    openAndClose(settings.queue);
 }
 
 bool MasterWatch::startNode(const std::string& uri) {
@@ -283,13 +297,11 @@ bool MasterWatch::watchMaster(MasterClient& master) {
     return true;
 }
 
-void MasterWatch::openAndClose(MasterClient& master, std::uint32_t queue) {
-    const bool published = publishing_.reconcile(node_.handle(), queue);
-    const bool subscribed = subscribing_.reconcile(node_.handle(), true);
-    // roscpp does not say if the master took them; if it has gone meanwhile, do it again later.
-    if ((published || subscribed) && lookUp(master, node_).kind != Lookup::Kind::Ours) {
-        registered_ = false;
-    }
+void MasterWatch::openAndClose(std::uint32_t queue) {
+    publishing_.reconcile(node_.handle(), queue);
+    subscribing_.reconcile(node_.handle(), true);
+    // If it has gone meanwhile, do it again later.
+    if (node_.calls().takeMissed()) registered_ = false;
     setConnected();
     for (const std::string& refusal : refusals_->take()) say(refusal);
 }
@@ -327,8 +339,7 @@ void MasterWatch::setConnected() {
 void MasterWatch::say(const std::string& message) {
     if (message == said_) return;
     said_ = message;
-    const std::lock_guard lock(report_mutex_);
-    if (report_) report_(message);
+    report_(message);
 }
 
 }  // namespace rtcf::ros1

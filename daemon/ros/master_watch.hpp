@@ -12,6 +12,7 @@
 #include <string>
 
 #include "bridge/bridge.hpp"
+#include "ros/hooks.hpp"
 #include "ros/master_client.hpp"
 #include "ros/publishing.hpp"
 #include "ros/refusals.hpp"
@@ -30,12 +31,15 @@ class MasterWatch {
     void configure(const executor::BridgeSettings& settings);
     void setTable(const executor::BridgeTable& table);
     executor::BridgeStatus status() const;
-    /// Lets run() end.
+    /// Lets run() end, soon whatever the master does.
     void stop();
-    /// Waits until run() has ended. @return false if it has not in time; it reports nothing more
-    /// then
-    bool waitForEnd(std::chrono::milliseconds timeout);
     /// @}
+
+    /// Waits until the node is up and its master answers, at most some seconds. Any thread.
+    /// @throws NoMaster
+    void awaitNode();
+    /// By which components' hooks come to the node; as long as this.
+    executor::HookGate& hooks() noexcept { return hooks_; }
 
     /// Serves until stop(). Called once.
     void run();
@@ -49,7 +53,7 @@ class MasterWatch {
     void changeMaster(const std::string& uri);
     void obeyShutdownRequest(MasterClient& master);
     bool watchMaster(MasterClient& master);
-    void openAndClose(MasterClient& master, std::uint32_t queue);
+    void openAndClose(std::uint32_t queue);
     bool leaveTopics(MasterClient& master);
     bool nameIsTaken(const Lookup& found);
     std::string whyOff() const;
@@ -63,17 +67,18 @@ class MasterWatch {
     const NodeName name_;
     std::atomic<bool> stop_{false};
 
-    mutable std::mutex mutex_;  // down to ended_
+    mutable std::mutex mutex_;  // down to status_
     std::condition_variable changed_;
     std::optional<executor::BridgeSettings> settings_;
     std::optional<std::string> shutdown_request_;
     bool revived_ = false;  // configured anew since it was killed
     bool due_ = false;      // something changed since the last step
+    std::uint64_t steps_begun_ = 0;
+    std::uint64_t steps_ended_ = 0;
     executor::BridgeStatus status_;
-    bool ended_ = false;
 
-    std::mutex report_mutex_;  // report_
-    executor::BridgeReport report_;
+    const executor::BridgeReport report_;
+    Hooks hooks_{*this};
 
     // The watch thread's alone, but for what is thread-safe in itself.
     RoscppNode node_;

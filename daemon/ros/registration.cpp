@@ -1,9 +1,5 @@
 #include "ros/registration.hpp"
 
-#include <ros/connection_manager.h>
-#include <ros/network.h>
-#include <ros/service_manager.h>
-
 #include <vector>
 
 namespace rtcf::ros1 {
@@ -33,18 +29,6 @@ bool topics(MasterClient& self, const char* method, std::vector<Topic>& found) {
     return true;
 }
 
-// roscpp gives no list of services; this is what is left of its own.
-std::vector<std::string> services(const RoscppNode& node) {
-    const std::string name = node.name().full() + "/set_logger_level";
-    if (!ros::ServiceManager::instance()->lookupServicePublication(name)) return {};
-    return {name};
-}
-
-std::string serviceUri() {
-    return "rosrpc://" + ros::network::getHost() + ":" +
-           std::to_string(ros::ConnectionManager::instance()->getTCPPort());
-}
-
 }  // namespace
 
 Lookup lookUp(MasterClient& master, const RoscppNode& node) {
@@ -67,8 +51,8 @@ bool registerAll(MasterClient& master, MasterClient& self, const RoscppNode& nod
         if (!master.call("registerPublisher", array({caller, topic.name, topic.type, uri})))
             return false;
     }
-    for (const std::string& service : services(node)) {
-        if (!master.call("registerService", array({caller, service, serviceUri(), uri})))
+    for (const auto& [service, service_uri] : node.calls().services()) {
+        if (!master.call("registerService", array({caller, service, service_uri, uri})))
             return false;
     }
     for (const Topic& topic : subscriptions) {
@@ -99,8 +83,8 @@ bool withdrawAll(MasterClient& master, MasterClient& self, const RoscppNode& nod
     for (const Topic& topic : subscriptions) {
         if (!withdraw("unregisterSubscriber", topic.name, node.uri())) return false;
     }
-    for (const std::string& service : services(node)) {
-        if (!withdraw("unregisterService", service, serviceUri())) return false;
+    for (const auto& [service, service_uri] : node.calls().services()) {
+        if (!withdraw("unregisterService", service, service_uri)) return false;
     }
     return true;
 }

@@ -30,9 +30,10 @@ class RosNode final : public executor::Bridge {
     void configure(const executor::BridgeSettings& settings) override;
     void setTable(std::shared_ptr<const executor::BridgeTable> table) override;
     executor::BridgeStatus status() const override;
+    executor::HookGate* hooks() noexcept override;
 
    private:
-    std::shared_ptr<MasterWatch> watch_;  // shared with its thread
+    std::unique_ptr<MasterWatch> watch_;
     std::thread thread_;
 };
 

@@ -8,7 +8,9 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <thread>
 
+#include "ros/master_calls.hpp"
 #include "ros/node_name.hpp"
 
 namespace ros {
@@ -16,8 +18,6 @@ class NodeHandle;
 }
 
 namespace rtcf::ros1 {
-
-class DeadEnd;
 
 class RoscppNode {
    public:
@@ -48,8 +48,12 @@ class RoscppNode {
     ros::NodeHandle& handle() { return *handle_; }
 
     /// No master from now on: closing topics does not wait for one that has hung.
-    /// Registrations are to be withdrawn before, and stop() comes next.
-    void leaveMaster();
+    /// Registrations are to be withdrawn before, and stop() comes next. Any thread.
+    void leaveMaster() noexcept { calls_.end(); }
+
+    /// What is said to the master by way of roscpp.
+    MasterCalls& calls() noexcept { return calls_; }
+    const MasterCalls& calls() const noexcept { return calls_; }
 
     /// Ends the node for good, without a word to any master.
     void stop();
@@ -57,11 +61,10 @@ class RoscppNode {
    private:
     NodeName name_;
     ShutdownRequest on_shutdown_request_;
+    MasterCalls calls_;
     std::unique_ptr<ros::NodeHandle> handle_;
-    std::unique_ptr<DeadEnd> nowhere_;
+    std::atomic<bool> ending_{false};
+    std::thread spinner_;  // of the callbacks of what components subscribe and advertise
 };
-
-/// Host and port of a master's URI. @return false if it is none
-bool splitMasterUri(const std::string& uri, std::string& host, std::uint32_t& port);
 
 }  // namespace rtcf::ros1

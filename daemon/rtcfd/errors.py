@@ -25,5 +25,9 @@ class FailedPrecondition(Refusal):
     """The graph, a library, a hook or the machine refuses."""
 
 
+class NoMaster(FailedPrecondition):
+    """A hook needs a ROS master, and none answers."""
+
+
 class Unavailable(Refusal):
     """The executor does not answer."""

@@ -3,6 +3,7 @@
 Functions on a Runner; each is one transaction of its executor.
 """
 
+import asyncio
 from collections.abc import Sequence
 
 from rtcf.executor.v1 import executor_pb2 as wire
@@ -12,10 +13,12 @@ from rtcf.v1 import control_pb2, graph_pb2
 from rtcfd import settings
 from rtcfd.catalog import loads
 from rtcfd.desired import replacement
-from rtcfd.errors import InvalidArgument, NotFound, Refusal
+from rtcfd.errors import InvalidArgument, NoMaster, NotFound, Refusal
 from rtcfd.link import Progress
 from rtcfd.names import absolute, full_name
 from rtcfd.runner import Runner
+
+_MASTER_POLL_S = 0.5
 
 
 async def load(
@@ -35,6 +38,19 @@ async def load(
     result = await runner.change(f"the load of {what}", work)
     runner.log.info("%s loaded (%s)", result.component, what)
     return result
+
+
+async def load_when_master(
+    runner: Runner, spec: graph_pb2.ComponentSpec, progress: Progress
+) -> control_pb2.ChangeResult:
+    """Load a component; wait for a ROS master if its hooks need one and there is none."""
+    while True:
+        try:
+            return await load(runner, spec, progress)
+        except NoMaster as refusal:
+            progress(f"waiting for a ROS master: {refusal}")
+        # Between turns, so that other changes go on.
+        await asyncio.sleep(_MASTER_POLL_S)
 
 
 async def unload(runner: Runner, names: list[str], progress: Progress) -> control_pb2.ChangeResult:

@@ -28,6 +28,7 @@ _REFUSALS: dict[int, type[errors.Refusal]] = {
     wire.Error.CODE_ALREADY_EXISTS: errors.AlreadyExists,
     wire.Error.CODE_FAILED_PRECONDITION: errors.FailedPrecondition,
     wire.Error.CODE_UNAVAILABLE: errors.Unavailable,
+    wire.Error.CODE_NO_MASTER: errors.NoMaster,
 }
 
 

@@ -146,7 +146,8 @@ class Control(control_pb2_grpc.ControlServicer):
     def Load(self, request: control_pb2.LoadRequest) -> Any:
         """Load a component."""
         runner = self._runners.get(request.runner)
-        return lambda progress: graph.load(runner, request.component, progress)
+        load = graph.load_when_master if request.wait else graph.load
+        return lambda progress: load(runner, request.component, progress)
 
     @_changing
     def Unload(self, request: control_pb2.UnloadRequest) -> Any:

@@ -95,15 +95,19 @@ class Daemon:
 
     def run(self, *command: str) -> subprocess.CompletedProcess[str]:
         """Run a command with rtcfctl on its PATH and this daemon as the one it talks to."""
-        path = f"{BUILD_TREE / 'bin'}:{os.environ['PATH']}"
         return subprocess.run(
             command,
-            env=clean_environment() | {"RTCF_SOCKET": str(self.socket), "PATH": path},
+            env=self.environment(),
             capture_output=True,
             text=True,
             timeout=DEADLINE_S,
             check=False,
         )
+
+    def environment(self) -> dict[str, str]:
+        """Return the environment of a command that is to talk to this daemon."""
+        path = f"{BUILD_TREE / 'bin'}:{os.environ['PATH']}"
+        return clean_environment() | {"RTCF_SOCKET": str(self.socket), "PATH": path}
 
     def log(self) -> str:
         """Return all it has logged, of earlier starts too."""

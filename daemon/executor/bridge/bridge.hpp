@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "bridge/hook_gate.hpp"
 #include "bridge/injector.hpp"
 #include "bridge/tap.hpp"
 
@@ -57,6 +58,9 @@ class Bridge {
     virtual void setTable(std::shared_ptr<const BridgeTable> table) = 0;
 
     virtual BridgeStatus status() const = 0;
+
+    /// What hooks reach the outside by; null if they do not. As long as the bridge.
+    virtual HookGate* hooks() noexcept { return nullptr; }
 };
 
 /// Reports that a bridge's state has changed, one line; callable from any thread.

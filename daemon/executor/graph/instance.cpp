@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <utility>
 
 #include "refusal.hpp"
 
@@ -29,31 +30,45 @@ std::string parameterNames(const Component& component) {
     return names.empty() ? "none" : names;
 }
 
-// The flight recorder's note of a hook, as long as it runs.
+// What the flight recorder and the gate to ROS know of a hook, as long as it runs.
 class HookNote {
    public:
-    HookNote(FlightRecorder& recorder, std::uint32_t slot, Hook hook) : recorder_(recorder) {
+    HookNote(FlightRecorder& recorder, std::uint32_t slot, Hook hook, HookGate* gate,
+             const std::string& component)
+        : recorder_(recorder), gate_(gate) {
         recorder_.enterHook(slot, hook);
+        if (gate_ != nullptr) gate_->enter(component);
     }
-    ~HookNote() { recorder_.leaveHook(); }
+    ~HookNote() {
+        (void)unanswered();
+        recorder_.leaveHook();
+    }
     HookNote(const HookNote&) = delete;
     HookNote& operator=(const HookNote&) = delete;
 
+    // What the hook asked of the ROS master and got no answer to; the hook has returned.
+    std::string unanswered() {
+        HookGate* const gate = std::exchange(gate_, nullptr);
+        return gate != nullptr ? gate->leave() : std::string();
+    }
+
    private:
     FlightRecorder& recorder_;
+    HookGate* gate_;
 };
 
 }  // namespace
 
 Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library> library,
                    const std::string& runner, const LoopClock& clock, Log& log,
-                   FlightRecorder& recorder)
+                   FlightRecorder& recorder, HookGate* gate)
     : definition_(std::move(definition)),
       library_(std::move(library)),
       record_(&findRecord(*library_, definition_)),
       ignore_("ignore of " + definition_.fullName(), definition_.ignore),
       log_(log),
       recorder_(recorder),
+      gate_(gate),
       slot_(recorder.addSlot(definition_.fullName())) {
     phase_ = definition_.phase;
     context_.full_name = definition_.fullName();
@@ -64,6 +79,11 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
     context_.period_ns = clock.period_ns * definition_.every;
     context_.elapsed_ns = context_.period_ns;
     context_.log = &log;
+    context_.gate = gate;
+    for (const auto& [from, to] : definition_.remaps) {
+        context_.remaps.emplace_back(resolveName(from, context_.ns, context_.full_name),
+                                     resolveName(to, context_.ns, context_.full_name));
+    }
     try {
         callHook(Hook::Constructor, [this] {
             component_.reset(record_->create());
@@ -91,22 +111,48 @@ Instance::~Instance() {
 
 // A failing hook's own words, or its exception's, in one line.
 void Instance::callHook(Hook hook, const std::function<bool()>& call) {
-    const HookNote note(recorder_, slot_, hook);
+    HookNote note(recorder_, slot_, hook, gate_, context_.full_name);
+    RefusalKind kind = RefusalKind::FailedPrecondition;
     std::string why;
     try {
-        if (call()) return;
-        why = component_->failure().empty() ? "it returned false and did not say why"
-                                            : component_->failure();
+        const bool passed = call();
+        why = note.unanswered();
+        if (!why.empty()) {
+            kind = RefusalKind::NoMaster;
+        } else if (passed) {
+            return;
+        } else {
+            why = component_->failure().empty() ? "it returned false and did not say why"
+                                                : component_->failure();
+        }
     } catch (const Refusal&) {
         throw;
+    } catch (const NoMaster& error) {
+        kind = RefusalKind::NoMaster;
+        why = error.what();
     } catch (const std::exception& error) {
         why = fmt::format("it threw: {}", error.what());
     } catch (...) {
         why = "it threw an exception of unknown type";
     }
-    throw Refusal(RefusalKind::FailedPrecondition,
-                  fmt::format("{} ({}/{}): {} failed: {}", context_.full_name, definition_.package,
-                              definition_.type, hookName(hook), why));
+    throw Refusal(kind, fmt::format("{} ({}/{}): {} failed: {}", context_.full_name,
+                                    definition_.package, definition_.type, hookName(hook), why));
+}
+
+void Instance::callLastHook(Hook hook, const std::function<void()>& call) noexcept {
+    HookNote note(recorder_, slot_, hook, gate_, context_.full_name);
+    std::string why;
+    try {
+        call();
+        why = note.unanswered();
+    } catch (const std::exception& error) {
+        why = fmt::format("it threw: {}", error.what());
+    } catch (...) {
+        why = "it threw an exception of unknown type";
+    }
+    // There is nobody left to refuse to: the component is on its way out.
+    if (why.empty()) return;
+    log_.write(LogLevel::Error, context_.full_name, fmt::format("{}: {}", hookName(hook), why));
 }
 
 void Instance::configure() {
@@ -149,26 +195,13 @@ void Instance::start() {
 void Instance::stop() noexcept {
     if (!started_) return;
     started_ = false;
-    const HookNote note(recorder_, slot_, Hook::Stop);
-    try {
-        component_->stop();
-    } catch (...) {
-        // There is nobody left to refuse to: the component is on its way out.
-        if (component_->logs(LogLevel::Error))
-            RTCF_ERROR(component_.get(), "stop() threw an exception");
-    }
+    callLastHook(Hook::Stop, [this] { component_->stop(); });
 }
 
 void Instance::cleanup() noexcept {
     if (!configured_) return;
     configured_ = false;
-    const HookNote note(recorder_, slot_, Hook::Cleanup);
-    try {
-        component_->cleanup();
-    } catch (...) {
-        if (component_->logs(LogLevel::Error))
-            RTCF_ERROR(component_.get(), "cleanup() threw an exception");
-    }
+    callLastHook(Hook::Cleanup, [this] { component_->cleanup(); });
 }
 
 std::vector<std::string> Instance::uselessRemaps() const {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "bridge/hook_gate.hpp"
 #include "faults/flight_recorder.hpp"
 #include "graph/definition.hpp"
 #include "graph/name_pattern.hpp"
@@ -22,9 +23,11 @@ namespace rtcf::executor {
 class Instance {
    public:
     /// Constructs the component and checks and sets its load-time parameters.
+    /// @param gate by which hooks reach ROS; null = they do not
     /// @throws Refusal and leaves nothing behind
     Instance(ComponentDefinition definition, std::shared_ptr<const Library> library,
-             const std::string& runner, const LoopClock& clock, Log& log, FlightRecorder& recorder);
+             const std::string& runner, const LoopClock& clock, Log& log, FlightRecorder& recorder,
+             HookGate* gate = nullptr);
     /// Stops and cleans up what still is started and configured, and drains the log of what it
     /// said.
     ~Instance();
@@ -87,6 +90,8 @@ class Instance {
 
    private:
     void callHook(Hook hook, const std::function<bool()>& call);
+    /// Of a hook that cannot refuse any more: what goes wrong is logged.
+    void callLastHook(Hook hook, const std::function<void()>& call) noexcept;
 
     ComponentDefinition definition_;
     std::shared_ptr<const Library> library_;
@@ -94,6 +99,7 @@ class Instance {
     NamePattern ignore_;
     Log& log_;
     FlightRecorder& recorder_;
+    HookGate* gate_;
     std::uint32_t slot_;
     std::optional<std::uint32_t> phase_;
     ComponentContext context_;

@@ -79,9 +79,11 @@ void Runner::threadMain() {
     if (state_ == RunnerState::Stepping) loop_.endStepping();
     stopAll();
     if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>());
+    // Components may reach for ROS until they are gone.
+    plan_ = std::make_unique<Plan>();
+    snapshot_ = std::make_shared<GraphSnapshot>();
     bridge_.reset();
     log_.drain();
-    plan_ = std::make_unique<Plan>();
 }
 
 // What has to be done now and then: a loop that ended by itself, clocks, counters.
@@ -361,8 +363,9 @@ std::shared_ptr<Instance> Runner::makeInstance(ComponentDefinition definition,
     progress("loading " + full_name);
     note(full_name + ".constructor");
     const std::shared_ptr<const Library> code = libraries_.open(library);
-    auto instance = std::make_shared<Instance>(std::move(definition), code, name_, loop_.clock(),
-                                               log_, recorder_);
+    auto instance =
+        std::make_shared<Instance>(std::move(definition), code, name_, loop_.clock(), log_,
+                                   recorder_, bridge_ ? bridge_->hooks() : nullptr);
     if (!configure) {
         instance->freezePorts();
         return instance;

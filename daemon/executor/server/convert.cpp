@@ -272,6 +272,9 @@ v1::Error errorTo(RefusalKind kind, const std::string& message) {
         case RefusalKind::Unavailable:
             error.set_code(v1::Error::CODE_UNAVAILABLE);
             break;
+        case RefusalKind::NoMaster:
+            error.set_code(v1::Error::CODE_NO_MASTER);
+            break;
     }
     error.set_message(message);
     return error;

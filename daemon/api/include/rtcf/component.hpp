@@ -14,10 +14,12 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "rtcf/derived.hpp"
 #include "rtcf/logging.hpp"
+#include "rtcf/node_gate.hpp"
 #include "rtcf/parameter.hpp"
 #include "rtcf/port.hpp"
 #include "rtcf/realtime.hpp"
@@ -37,10 +39,12 @@ struct ComponentContext {
     std::int64_t updated_ns =
         -1;                 ///< loop time in whole periods at its last update, ns; -1 = not yet
     bool disabled = false;  ///< taken out after a fault; written by the loop
-    std::atomic<std::uint64_t> device_calls{0};       ///< scopes of RTCF_DEVICE_IO so far
-    std::atomic<std::int64_t> device_time_ns{0};      ///< time spent in them, ns
-    LogSink* log = nullptr;                           ///< never null once attached
-    std::atomic<LogLevel> log_level{LogLevel::Info};  ///< calls below it are not logged
+    std::atomic<std::uint64_t> device_calls{0};               ///< scopes of RTCF_DEVICE_IO so far
+    std::atomic<std::int64_t> device_time_ns{0};              ///< time spent in them, ns
+    LogSink* log = nullptr;                                   ///< never null once attached
+    NodeGate* gate = nullptr;                                 ///< to the ROS node; null without one
+    std::vector<std::pair<std::string, std::string>> remaps;  ///< resolved names, from and to
+    std::atomic<LogLevel> log_level{LogLevel::Info};          ///< calls below it are not logged
 };
 
 /// Base class of all components.

@@ -1,0 +1,130 @@
+"""Components that use ROS in their hooks, by rtcf/ros.hpp."""
+
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rtcf
+from daemon_process import Daemon, wait_for, with_ros
+from ros_processes import Master, free_port
+from rtcf.v1 import graph_pb2, runner_pb2
+from values import iteration, port_value
+
+
+def user(hook: str = "configure") -> graph_pb2.ComponentSpec:
+    """Return RosUser as /arm/user, whose topic /arm/ear is remapped to /voice."""
+    return rtcf.component(
+        "rtcf_test_ros",
+        "RosUser",
+        name="user",
+        ns="/arm",
+        remaps=["ear:=/voice", "~said:=/answer"],
+        parameters=[f"in:={hook}"],
+    )
+
+
+@pytest.fixture
+def lonely(tmp_path: Path) -> Iterator[tuple[Daemon, rtcf.Client, Master]]:
+    """Give a daemon and the master that it looks for, which is not started."""
+    master = Master(tmp_path, free_port())
+    daemon = Daemon(tmp_path, with_ros(master.uri, ""))
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        yield daemon, client, master
+    daemon.end()
+
+
+def test_hooks_have_node_handles_with_the_components_names(tmp_path: Path, master: Master) -> None:
+    daemon = Daemon(tmp_path, with_ros(master.uri, ""))
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            ros("rosparam", "set", "/arm/user/gain", "2.5", master=master)
+            client.load(user())
+            client.start()
+            wait_for(lambda: port_value(client, "/arm/user", "gain") == 2.5, "the parameter")
+            # Subscribed under its remapped name, and called back.
+            sender = master.node("latch", "/voice", "7.25")
+            wait_for(lambda: port_value(client, "/arm/user", "heard") == 7.25, "the message")
+            sender.end()
+            # Advertised likewise.
+            listener = master.node("record", "/answer")
+            listener.wait_for_values(1)
+            assert listener.values() == [2.5]
+            listener.end()
+            client.unload(["/arm/user"])
+            published, subscribed = master.topics()
+            assert "/answer" not in published
+            assert "/voice" not in subscribed
+    finally:
+        daemon.end()
+
+
+def test_a_component_that_needs_ros_is_refused_without_a_master(
+    lonely: tuple[Daemon, rtcf.Client, Master],
+) -> None:
+    daemon, client, master = lonely
+    result = daemon.ctl("load", "rtcf_test_ros", "RosUser", "--name", "user")
+    assert result.returncode == 1
+    (line,) = result.stderr.splitlines()
+    for word in ("/user", "configure", "no ROS master answers at", master.uri, "roscore", "--wait"):
+        assert word in line
+    assert list(client.list_components()) == []
+
+
+def test_load_waits_for_a_master_if_told_to(
+    lonely: tuple[Daemon, rtcf.Client, Master],
+) -> None:
+    daemon, client, master = lonely
+    load = subprocess.Popen(
+        ["rtcfctl", "load", "rtcf_test_ros", "RosUser", "--name", "user", "--wait"],
+        env=daemon.environment(),
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    wait_for(lambda: "no ROS master" in _ros(client).problem, "the node to look for a master")
+    # Other changes go on meanwhile.
+    client.load(rtcf.component("rtcf_test", "Knobs", name="knobs"))
+    assert load.poll() is None
+    master.start()
+    try:
+        assert load.wait(60.0) == 0
+        assert {each.full_name for each in client.list_components()} == {"/user", "/knobs"}
+    finally:
+        load.kill()
+        client.unload(["/user"])
+        master.end()
+
+
+def test_a_master_call_that_fails_in_a_hook_fails_the_hook(
+    lonely: tuple[Daemon, rtcf.Client, Master],
+) -> None:
+    daemon, client, master = lonely
+    master.start()
+    client.load(user("careless"))
+    client.load(rtcf.component("rtcf_test", "Knobs", name="knobs"))
+    master.end()
+    result = daemon.ctl("start")
+    assert result.returncode == 1
+    (line,) = result.stderr.splitlines()
+    for word in ("/arm/user", "start", "no ROS master answers at", "getParam"):
+        assert word in line
+    status = client.get_status("rt_runner").runners[0]
+    assert status.state == runner_pb2.RUNNER_STATE_STOPPED
+    client.unload(["/arm/user"])
+    client.start()
+    wait_for(lambda: iteration(client) > 10, "the loop without it")
+
+
+def ros(*command: str, master: Master) -> str:
+    """Run a command of ROS; return what it prints."""
+    done = subprocess.run(
+        command, env=master.environment(), capture_output=True, text=True, timeout=60, check=True
+    )
+    return done.stdout
+
+
+def _ros(client: rtcf.Client) -> runner_pb2.RosStatus:
+    status: runner_pb2.RosStatus = client.get_status("rt_runner").runners[0].ros
+    return status
