@@ -86,7 +86,7 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
     }
     try {
         callHook(Hook::Constructor, [this] {
-            component_.reset(record_->create());
+            component_.reset(record_->create(definition_.name.c_str()));
             return true;
         });
         component_->attach(context_);

@@ -13,9 +13,11 @@ class Component;
 
 /// One component type of a library; static, in a list.
 struct ComponentRecord {
-    const char* type;        ///< e.g. "Pid"
-    const char* doc;         ///< one line
-    Component* (*create)();  ///< a new component; the caller owns it
+    const char* type;  ///< e.g. "Pid"
+    const char* doc;   ///< one line
+    /// A new component, which the caller owns. `name` is the one that it will have; few components
+    /// want to know it so early.
+    Component* (*create)(const char* name);
     const ComponentRecord* next;
 };
 
@@ -62,9 +64,9 @@ RTCF_ENTRY_POINT() {
 
 /// As RTCF_COMPONENT for a class in a namespace: `RTCF_COMPONENT_NAMED(arm::Pid, "Pid", "…",
 /// ArmPid)`; TAG is any identifier unique in the source file.
-#define RTCF_COMPONENT_NAMED(CLASS, NAME, DOC, TAG)                                \
-    namespace {                                                                    \
-    ::rtcf::ComponentRecord rtcf_record_##TAG{                                     \
-        NAME, DOC, []() -> ::rtcf::Component* { return new CLASS(); }, nullptr};   \
-    const ::rtcf::detail::Registration rtcf_registration_##TAG{rtcf_record_##TAG}; \
+#define RTCF_COMPONENT_NAMED(CLASS, NAME, DOC, TAG)                                         \
+    namespace {                                                                             \
+    ::rtcf::ComponentRecord rtcf_record_##TAG{                                              \
+        NAME, DOC, [](const char*) -> ::rtcf::Component* { return new CLASS(); }, nullptr}; \
+    const ::rtcf::detail::Registration rtcf_registration_##TAG{rtcf_record_##TAG};          \
     }
