@@ -38,6 +38,9 @@ class Builder {
         if (connection.published) addTap(name, connection);
         if (connection.writer) {
             for (const Reader& reader : connection.readers) bindToWriter(connection, reader);
+            OutputBase& output = *connection.writer->output;
+            const bool heard = connection.published || !connection.readers.empty();
+            if (heard != output.connected()) adoption_.audiences.push_back({&output, heard});
         } else if (connection.subscribed) {
             addFeed(name, connection);
         } else {

@@ -85,6 +85,12 @@ struct Rewire {
     }
 };
 
+/// An output that learns whether anybody gets its values.
+struct Audience {
+    OutputBase* output;
+    bool present;
+};
+
 /// One component handing its state to its successor.
 struct HandOver {
     Component* successor;
@@ -97,6 +103,7 @@ struct Adoption {
     const Schedule* schedule = nullptr;  ///< the next one; null = stays
     std::vector<Latch> new_latches;      ///< to be filled before inputs read them
     std::vector<Rewire> rewires;
+    std::vector<Audience> audiences;
     std::vector<HandOver> hand_overs;
     std::vector<StagedValue*> values;  ///< parameters, and what derives from them
     std::int64_t period_ns = 0;        ///< the loop's new period; 0 = stays
@@ -105,6 +112,7 @@ struct Adoption {
     void apply() noexcept {
         for (const Latch& latch : new_latches) latch.copy();
         for (Rewire& rewire : rewires) rewire.apply();
+        for (const Audience& audience : audiences) audience.output->setConnected(audience.present);
         for (StagedValue* value : values) value->commit();
         for (const HandOver& hand_over : hand_overs)
             hand_over.successor->takeOver(*hand_over.previous);

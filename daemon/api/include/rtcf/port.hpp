@@ -32,7 +32,7 @@ struct PortIdentity {
     std::string name;
     std::string unit;
     const TypeInfo& type;
-    bool connected = false;  ///< an input's: something feeds it
+    bool connected = false;  ///< an input's: something feeds it; an output's: something reads it
 };
 
 /// What the executor handles of any input.
@@ -146,6 +146,12 @@ class OutputBase {
     const std::string& name() const noexcept { return rest_->identity.name; }
     const std::string& unit() const noexcept { return rest_->identity.unit; }
     const TypeInfo& type() const noexcept { return rest_->identity.type; }
+    /// True if an input or a ROS topic gets what this output writes. Real-time safe.
+    bool connected() const noexcept RTCF_NONBLOCKING { return rest_->identity.connected; }
+    /// For the executor, at a cycle boundary. Real-time safe.
+    void setConnected(bool connected) noexcept RTCF_NONBLOCKING {
+        rest_->identity.connected = connected;
+    }
     /// The slot that this output writes; inputs may keep it alive beyond the component.
     const std::shared_ptr<SlotHeader>& slot() const noexcept { return rest_->slot; }
     /// The clock that stamps what is written; for the executor.
