@@ -7,7 +7,7 @@ set(stage ${CMAKE_CURRENT_BINARY_DIR}/rtcf_msgs-stage)
 set(staged ${stage}${CMAKE_INSTALL_PREFIX})
 set(python_modules lib/python3/dist-packages)
 
-file(GLOB definitions CONFIGURE_DEPENDS ${package}/msg/*.msg)
+file(GLOB definitions CONFIGURE_DEPENDS ${package}/msg/*.msg ${package}/srv/*.srv)
 set(headers)
 foreach(definition IN LISTS definitions)
   cmake_path(GET definition STEM name)

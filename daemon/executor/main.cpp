@@ -157,6 +157,9 @@ int run(const Options& options) {
                 options.runner,
                 [&server](const std::string& message) {
                     server.publish(RunnerEvent{RunnerEvent::Kind::Ros, message, {}, 0});
+                },
+                [&server](const OutsideCall& call, const std::atomic<bool>& cancel) {
+                    return server.ask(call, cancel);
                 }),
             recorder);
         server.serve(runner, log);

@@ -42,6 +42,12 @@ MasterWatch::MasterWatch(const std::string& runner, executor::BridgeReport repor
     status_.node = name_.full();
 }
 
+void MasterWatch::attach(executor::RunnerView& runner, const executor::AskSupervisor& ask) {
+    auto introspection = std::make_unique<Introspection>(runner, ask);
+    const std::lock_guard lock(mutex_);
+    introspection_ = std::move(introspection);
+}
+
 void MasterWatch::configure(const executor::BridgeSettings& settings) {
     {
         const std::lock_guard lock(mutex_);
@@ -121,6 +127,7 @@ void MasterWatch::run() {
         // What a master answers must never end the executor.
         try {
             step();
+            if (introspection_) introspection_->publishDiagnostics();
         } catch (const std::exception& error) {
             setProblem(std::string("ROS: ") + error.what());
         } catch (const XmlRpc::XmlRpcException& error) {  // not a std::exception
@@ -240,8 +247,10 @@ std::string MasterWatch::whyOff() const {
 // Closes all topics and withdraws what is left. roscpp asks the master while it
 // closes, so that one must answer. @return true if there was anything, and it is done
 bool MasterWatch::leaveTopics(MasterClient& master) {
-    if (!registered_ && publishing_.open() == 0 && subscribing_.open() == 0) return false;
+    const bool shown = introspection_ && introspection_->isOpen();
+    if (!registered_ && !shown && publishing_.open() == 0 && subscribing_.open() == 0) return false;
     if (lookUp(master, node_).kind == Lookup::Kind::Silent) return false;
+    if (introspection_) introspection_->close();
     publishing_.closeAll();
     subscribing_.closeAll();
     MasterClient node = self();
@@ -298,6 +307,7 @@ bool MasterWatch::watchMaster(MasterClient& master) {
 }
 
 void MasterWatch::openAndClose(std::uint32_t queue) {
+    if (introspection_) introspection_->open(node_.handle());
     publishing_.reconcile(node_.handle(), queue);
     subscribing_.reconcile(node_.handle(), true);
     // If it has gone meanwhile, do it again later.
@@ -317,6 +327,8 @@ void MasterWatch::end() {
         withdrawAll(master, node, node_, std::chrono::steady_clock::now() + 2 * kShort);
         node_.leaveMaster();
     }
+    if (introspection_) introspection_->close();
+    introspection_.reset();
     publishing_.setTaps({});
     publishing_.closeAll();
     subscribing_.closeAll();

@@ -13,6 +13,7 @@
 
 #include "bridge/bridge.hpp"
 #include "ros/hooks.hpp"
+#include "ros/introspection.hpp"
 #include "ros/master_client.hpp"
 #include "ros/publishing.hpp"
 #include "ros/refusals.hpp"
@@ -25,6 +26,9 @@ namespace rtcf::ros1 {
 class MasterWatch {
    public:
     MasterWatch(const std::string& runner, executor::BridgeReport report);
+
+    /// Once, before configure(): the runner to show, and whom to ask for changes of it.
+    void attach(executor::RunnerView& runner, const executor::AskSupervisor& ask);
 
     /// @name Any thread; return at once
     /// @{
@@ -84,6 +88,7 @@ class MasterWatch {
     RoscppNode node_;
     Publishing publishing_;
     Subscribing subscribing_;
+    std::unique_ptr<Introspection> introspection_;  // null without a runner
     std::unique_ptr<Refusals> refusals_;
     std::string master_uri_;   // of the running node
     bool registered_ = false;  // everything that is open, as far as we know

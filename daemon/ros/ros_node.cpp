@@ -5,13 +5,19 @@
 
 namespace rtcf::ros1 {
 
-RosNode::RosNode(std::string runner, executor::BridgeReport report)
-    : watch_(std::make_unique<MasterWatch>(runner, std::move(report))),
+RosNode::RosNode(std::string runner, executor::BridgeReport report, executor::AskSupervisor ask)
+    : ask_(std::move(ask)),
+      watch_(std::make_unique<MasterWatch>(runner, std::move(report))),
       thread_(quietThread("ros-watch", [this] { watch_->run(); })) {}
 
 RosNode::~RosNode() {
     watch_->stop();
     thread_.join();
+}
+
+bool RosNode::attach(executor::RunnerView& runner) {
+    watch_->attach(runner, ask_);
+    return true;
 }
 
 void RosNode::configure(const executor::BridgeSettings& settings) { watch_->configure(settings); }

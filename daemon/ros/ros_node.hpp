@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "bridge/bridge.hpp"
+#include "bridge/outside_call.hpp"
 
 namespace rtcf::ros1 {
 
@@ -19,7 +20,8 @@ class RosNode final : public executor::Bridge {
    public:
     /// @param runner names the node, `/rtcfd/<host>/<runner>`
     /// @param report hears of what changes; not called after the destructor
-    RosNode(std::string runner, executor::BridgeReport report);
+    /// @param ask who decides on changes that ROS peers ask for by services
+    RosNode(std::string runner, executor::BridgeReport report, executor::AskSupervisor ask);
 
     /// Withdraws from the master and closes all topics, in less than two seconds whatever the
     /// master does. Taps and injectors are not used any more afterwards.
@@ -27,12 +29,14 @@ class RosNode final : public executor::Bridge {
     RosNode(const RosNode&) = delete;
     RosNode& operator=(const RosNode&) = delete;
 
+    bool attach(executor::RunnerView& runner) override;
     void configure(const executor::BridgeSettings& settings) override;
     void setTable(std::shared_ptr<const executor::BridgeTable> table) override;
     executor::BridgeStatus status() const override;
     executor::HookGate* hooks() noexcept override;
 
    private:
+    const executor::AskSupervisor ask_;
     std::unique_ptr<MasterWatch> watch_;
     std::thread thread_;
 };

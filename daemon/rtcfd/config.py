@@ -1,6 +1,6 @@
 """The configuration file, /etc/rtcfd/rtcfd.toml: reading and checking.
 
-    [daemon]            socket, path, realtime, state_dir, runtime_dir, executor
+    [daemon]            socket, path, realtime, state_dir, runtime_dir, executor, ros_services
     [runner]            defaults of runners, named as in RunnerSettings
     [runner.ros]        likewise, named as in RosSettings
 
@@ -8,6 +8,7 @@ Every key is optional; an unknown one is refused by name.
 """
 
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from rtcf.enums import choices
 from rtcf.naming import listing, suggestion
 from rtcf.v1 import runner_pb2
 
-from rtcfd import settings
+from rtcfd import ros_services, settings
 from rtcfd.errors import InvalidArgument, Refusal
 
 DEFAULT_FILE = Path("/etc/rtcfd/rtcfd.toml")
@@ -32,6 +33,7 @@ class Config:
     executor: Path | None = None
     path: list[Path] = field(default_factory=list)
     realtime: str = ""
+    ros_services: str = ""
     runner: runner_pb2.RunnerSettings = field(default_factory=runner_pb2.RunnerSettings)
 
 
@@ -56,7 +58,7 @@ def read(file: Path) -> Config:
 
 def _read_daemon(table: dict[str, Any], config: Config) -> None:
     paths = ("socket", "state_dir", "runtime_dir", "executor")
-    _check_keys("daemon.", table, (*paths, "path", "realtime"))
+    _check_keys("daemon.", table, (*paths, "path", "realtime", "ros_services"))
     for name in paths:
         if name in table:
             setattr(config, name, _absolute_path(f"daemon.{name}", table[name]))
@@ -67,6 +69,8 @@ def _read_daemon(table: dict[str, Any], config: Config) -> None:
     if "realtime" in table:
         _enumerator("daemon.realtime", runner_pb2.Realtime.DESCRIPTOR, table["realtime"])
         config.realtime = table["realtime"]
+    if "ros_services" in table:
+        config.ros_services = _word("daemon.ros_services", ros_services.LEVELS, table)
 
 
 def _read_message(table: dict[str, Any], where: str, message: Any) -> None:
@@ -103,6 +107,13 @@ def _enumerator(name: str, enum_type: Any, value: Any) -> int:
     if not isinstance(value, str) or value not in known:
         raise InvalidArgument(f"{name} must be one of {', '.join(known)}, not {value!r}")
     return known[value]
+
+
+def _word(name: str, known: Sequence[str], table: dict[str, Any]) -> str:
+    value = table[name.rpartition(".")[2]]
+    if value not in known:
+        raise InvalidArgument(f"{name} must be one of {', '.join(known)}, not {value!r}")
+    return str(value)
 
 
 def _absolute_path(name: str, value: Any) -> Path:

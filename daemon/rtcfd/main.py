@@ -21,6 +21,7 @@ from rtcfd.errors import FailedPrecondition, Refusal
 from rtcfd.executor import left_overs
 from rtcfd.names import DEFAULT_RUNNER
 from rtcfd.notify import Notify
+from rtcfd.ros_services import RosServices
 from rtcfd.runner import Surroundings
 from rtcfd.runners import Runners
 from rtcfd.service import Control
@@ -47,7 +48,14 @@ class Daemon:
         self._store = Store(given.state_dir)
         catalog = Catalog(given.folders, Describer(given.executor))
         self._runners = Runners(
-            Surroundings(self._command, catalog, self._store, given.defaults, self._tell)
+            Surroundings(
+                command=self._command,
+                catalog=catalog,
+                store=self._store,
+                defaults=given.defaults,
+                on_change=self._tell,
+                serve_ros=RosServices(given.ros_services).serve,
+            )
         )
         self._server = grpc.aio.server(options=_SERVER_OPTIONS)
         self._endpoint = Endpoint(given.socket)

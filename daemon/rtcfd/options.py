@@ -31,6 +31,7 @@ class Options:
     folders: list[Path]
     defaults: runner_pb2.RunnerSettings
     default_runner: bool
+    ros_services: str  # one of ros_services.LEVELS
     verbose: bool
 
 
@@ -71,6 +72,8 @@ def parse(arguments: Sequence[str] | None, build_tree: Path | None) -> Options:
             file.runner,
         ),
         default_runner=args.default_runner,
+        # Privately, its ROS is as much its user's as its socket.
+        ros_services=file.ros_services or ("admin" if args.foreground else "observe"),
         verbose=args.verbose,
     )
 

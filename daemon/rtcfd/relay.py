@@ -29,9 +29,15 @@ _EVENT_LEVELS: dict[int, int] = {
 class Relay:
     """The unasked frames of one runner's executor."""
 
-    def __init__(self, runner: str, on_loop_ended: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        runner: str,
+        on_loop_ended: Callable[[], None],
+        on_call: Callable[[wire.ServiceCall], None],
+    ) -> None:
         self._runner = runner
         self._on_loop_ended = on_loop_ended
+        self._on_call = on_call
 
     def take(self, response: wire.Response) -> None:
         """Take one unasked frame."""
@@ -40,6 +46,8 @@ class Relay:
             self._log(response.log)
         elif kind == "event":
             self._event(response.event)
+        elif kind == "service_call":
+            self._on_call(response.service_call)
         elif kind == "error":
             log.error("%s", response.error.message, extra={"runner": self._runner})
 

@@ -46,6 +46,8 @@ class Surroundings:
     store: Store
     defaults: runner_pb2.RunnerSettings  # complete
     on_change: Callable[[], None]  # what summary() says may have changed
+    # Answers what ROS peers ask of a runner.
+    serve_ros: Callable[["Runner", wire.ServiceCall], Awaitable[wire.ServiceAnswer]]
 
 
 class Runner:
@@ -60,7 +62,7 @@ class Runner:
         self.log = logger_of(self.name)
         self._shared = surroundings
         self._turns = Turns(self.name, self.log)
-        self._relay = Relay(self.name, self._loop_ended)
+        self._relay = Relay(self.name, self._loop_ended, self._called)
         self._executor: Executor | None = None
         self._trouble = "its executor is not started"  # why there is none
         self._saving = asyncio.Lock()
@@ -176,6 +178,16 @@ class Runner:
         """The loop has ended by itself."""
         self._note_running(False)
         self._in_background(self._save_quietly())
+
+    def _called(self, call: wire.ServiceCall) -> None:
+        """Somebody calls a service of the executor's ROS node."""
+        self._in_background(self._answer(call))
+
+    async def _answer(self, call: wire.ServiceCall) -> None:
+        answer = await self._shared.serve_ros(self, call)
+        # An executor that has ended since has told its caller so.
+        with contextlib.suppress(Refusal):
+            await self._alive().request(wire.Request(service_answer=answer))
 
     def _note_running(self, running: bool) -> None:
         self.running = running

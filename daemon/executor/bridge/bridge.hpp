@@ -43,12 +43,21 @@ struct BridgeStatus {
     std::string problem;  ///< one line; empty = none
 };
 
+class RunnerView;
+
 /// A link between taps and injectors and their peers outside. All calls come
 /// from one thread that is not real-time and return at once; the work is done
 /// in threads of the bridge's own.
 class Bridge {
    public:
     virtual ~Bridge() = default;
+
+    /// Once, before anything else: the runner that it serves, which outlives it.
+    /// @return true if the bridge takes the runner's cycle records; else they are discarded
+    virtual bool attach(RunnerView& runner) {
+        (void)runner;
+        return false;
+    }
 
     /// The settings to use from now on. The first call lets the bridge begin.
     virtual void configure(const BridgeSettings& settings) = 0;

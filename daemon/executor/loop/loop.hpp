@@ -118,12 +118,13 @@ class Loop {
     RealtimeProblems retune(const LoopSettings& settings);
     /// After join().
     const LoopFault& fault() const noexcept { return fault_; }
-    /// Takes the oldest cycle record. @return false if there is none
-    bool popRecord(CycleRecord& record);
     /// Takes the oldest report of a component that failed without ending the loop. @return false if
     /// there is none
     bool popFault(ComponentFault& fault);
     /// @}
+
+    /// Takes the oldest cycle record. By one thread, whichever. @return false if there is none
+    bool popRecord(CycleRecord& record);
 
     /// @name By any thread
     /// @{

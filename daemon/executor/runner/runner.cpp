@@ -35,6 +35,7 @@ Runner::Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr
     validate(settings_);
     stall_monitor_.setTimeout(settings_.stall_timeout_ns);
     publishPicture();
+    if (bridge_) discards_cycles_ = !bridge_->attach(*this);
     thread_ = std::thread([this] { threadMain(); });
 }
 
@@ -96,7 +97,7 @@ void Runner::tick() {
     noteComponentFaults();
     noteOverruns(false);
     CycleRecord record{};
-    while (loop_.popRecord(record)) {
+    while (discards_cycles_ && loop_.popRecord(record)) {
     }
     publishPicture();
 }

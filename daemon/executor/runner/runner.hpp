@@ -27,6 +27,7 @@
 #include "loop/loop.hpp"
 #include "plugins/library.hpp"
 #include "runner/overrun_report.hpp"
+#include "runner/runner_view.hpp"
 #include "runner/settings.hpp"
 #include "runner/snapshot.hpp"
 
@@ -61,7 +62,7 @@ struct RunnerPicture {
     BridgeStatus bridge;
 };
 
-class Runner {
+class Runner final : private RunnerView {
    public:
     using Progress = std::function<void(const std::string&)>;
     using EventConsumer = std::function<void(RunnerEvent)>;
@@ -111,10 +112,10 @@ class Runner {
 
     /// @name Any thread, at any time
     /// @{
-    const std::string& name() const noexcept { return name_; }
-    std::shared_ptr<const GraphSnapshot> snapshot() const;
-    RunnerPicture picture() const;
-    const Loop& loop() const noexcept { return loop_; }
+    const std::string& name() const noexcept override { return name_; }
+    std::shared_ptr<const GraphSnapshot> snapshot() const override;
+    RunnerPicture picture() const override;
+    const Loop& loop() const noexcept override { return loop_; }
     const FlightRecorder& recorder() const noexcept { return recorder_; }
     /// Name of the hook that the graph thread is in, and since when; empty = none.
     std::pair<std::string, std::int64_t> activity() const;
@@ -131,6 +132,9 @@ class Runner {
         std::vector<HandOver> hand_overs;
         std::int64_t period_ns = 0;
     };
+
+    std::uint64_t logRecordsDropped() const override { return log_.dropped(); }
+    bool popCycle(CycleRecord& record) override { return loop_.popRecord(record); }
 
     void threadMain();
     void tick();
@@ -169,6 +173,7 @@ class Runner {
     Loop loop_;
     StallMonitor stall_monitor_;
     std::unique_ptr<Bridge> bridge_;
+    bool discards_cycles_ = true;  // nobody else takes the cycle records
 
     // Graph thread only.
     RunnerSettings settings_;

@@ -185,6 +185,26 @@ ComponentDefinition replacementFrom(const pb::ComponentSpec& spec, const Compone
     return definitionFrom(full);
 }
 
+v1::ServiceCall callTo(std::uint64_t number, const OutsideCall& call) {
+    v1::ServiceCall message;
+    message.set_call(number);
+    switch (call.kind) {
+        case OutsideCall::Kind::Load:
+            *message.mutable_load() = specTo(call.component);
+            break;
+        case OutsideCall::Kind::Unload:
+            message.set_unload(call.name);
+            break;
+        case OutsideCall::Kind::Start:
+            message.mutable_start();
+            break;
+        case OutsideCall::Kind::Stop:
+            message.mutable_stop();
+            break;
+    }
+    return message;
+}
+
 RunnerSettings settingsFrom(const pb::RunnerSettings& message, RunnerSettings base) {
     if (message.has_frequency_hz()) base.frequency_hz = message.frequency_hz();
     RealtimeSettings& realtime = base.loop.realtime;

@@ -3,6 +3,7 @@
 /// no further than this folder. Pure functions.
 #pragma once
 
+#include "bridge/outside_call.hpp"
 #include "graph/definition.hpp"
 #include "logging/log.hpp"
 #include "refusal.hpp"
@@ -30,6 +31,7 @@ std::vector<std::pair<std::string, ParameterValue>> parametersFrom(
 v1::Error errorTo(RefusalKind kind, const std::string& message);
 ::rtcf::v1::ChangeResult outcomeTo(const ChangeOutcome& outcome);
 v1::LogRecord logTo(const LogEntry& entry);
+v1::ServiceCall callTo(std::uint64_t number, const OutsideCall& call);
 v1::Event eventTo(const RunnerEvent& event);
 ::rtcf::v1::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t position,
                                       RunnerState state);

@@ -30,6 +30,8 @@ constexpr std::uint32_t kProtocol = 1;
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kHookTimeout = 10 * kSecond;
 constexpr std::int64_t kProbeTimeout = kSecond / 2;
+// Longer than rtcfd takes for one change, those before it included.
+constexpr std::chrono::seconds kAskTimeout{70};
 constexpr std::size_t kLargestOutbox = 10000;  // messages kept while no daemon is connected
 constexpr std::size_t kLargestConnections = 8;
 
@@ -162,6 +164,27 @@ void Server::publish(const RunnerEvent& event) {
     post(0, std::move(response), false);
 }
 
+OutsideAnswer Server::ask(const OutsideCall& call, const std::atomic<bool>& cancel) {
+    const std::uint64_t number = calls_.begin();
+    v1::Response response;
+    *response.mutable_service_call() = callTo(number, call);
+    post(0, std::move(response), false);
+    return calls_.wait(number, kAskTimeout, cancel);
+}
+
+// To one daemon, the one that came last: nothing is to be done twice.
+void Server::handOn(const v1::Response& call) {
+    const std::uint64_t number = call.service_call().call();
+    for (auto each = connections_.rbegin(); each != connections_.rend(); ++each) {
+        if (!each->second->greeted()) continue;
+        const std::uint64_t id = each->first;
+        calls_.sent(number, id);
+        respond(id, call);
+        return;
+    }
+    calls_.answer(number, {false, "no rtcfd is connected to this executor: is it running?"});
+}
+
 void Server::serve(Runner& runner, Log& log) {
     runner_ = &runner;
     log_ = &log;
@@ -234,6 +257,7 @@ void Server::receive(Connection& connection) {
 
 void Server::drop(std::uint64_t id) {
     connections_.erase(id);
+    calls_.lost(id);
     for (auto it = waiting_.begin(); it != waiting_.end();)
         it = it->first.first == id ? waiting_.erase(it) : std::next(it);
 }
@@ -255,10 +279,13 @@ void Server::deliver() {
             if (lost_records_ != 0) outgoing.push_back({0, lostRecords(lost_records_), false});
             lost_records_ = 0;
         } else {
-            while (!outbox_.empty() && outbox_.front().connection != 0) {
-                outgoing.push_back(std::move(outbox_.front()));
-                outbox_.pop_front();
+            // Answers that nobody waits for, and calls, which cannot wait.
+            std::deque<Outgoing> kept;
+            for (Outgoing& message : outbox_) {
+                const bool now = message.connection != 0 || message.response.has_service_call();
+                (now ? outgoing : kept).push_back(std::move(message));
             }
+            outbox_.swap(kept);
         }
     }
     for (Outgoing& message : outgoing) {
@@ -267,6 +294,10 @@ void Server::deliver() {
             if (waiting_.count(request) == 0) continue;  // given up on, or its daemon has gone
             if (message.last) waiting_.erase(request);
             respond(message.connection, message.response);
+            continue;
+        }
+        if (message.response.has_service_call()) {
+            handOn(message.response);
             continue;
         }
         std::vector<std::uint64_t> ids;
@@ -357,6 +388,11 @@ bool Server::answerQuery(std::uint64_t connection, const v1::Request& request) {
             break;
         case v1::Request::kGetStatus:
             *response.mutable_status() = status();
+            break;
+        case v1::Request::kServiceAnswer:
+            calls_.answer(request.service_answer().call(),
+                          {request.service_answer().success(), request.service_answer().message()});
+            response.mutable_done();
             break;
         case v1::Request::kExit:
             response.mutable_done();

@@ -17,6 +17,7 @@
 #include "logging/log.hpp"
 #include "runner/runner.hpp"
 #include "server/connection.hpp"
+#include "server/outside_calls.hpp"
 #include "statistics/histogram.hpp"
 
 namespace rtcf::executor {
@@ -34,6 +35,10 @@ class Server {
     void publish(const LogEntry& entry);
     void publish(const RunnerEvent& event);
     /// @}
+
+    /// Hands what a peer outside asks for to the daemon and waits for its answer. Any other thread
+    /// than serve()'s; ends soon after `cancel` becomes true.
+    OutsideAnswer ask(const OutsideCall& call, const std::atomic<bool>& cancel);
 
     /// Serves until an `exit` request or a signal. @param runner what to serve; outlives the call
     void serve(Runner& runner, Log& log);
@@ -59,6 +64,7 @@ class Server {
     };
 
     void post(std::uint64_t connection, v1::Response response, bool last);
+    void handOn(const v1::Response& call);
     void accept();
     void receive(Connection& connection);
     void drop(std::uint64_t id);
@@ -95,6 +101,8 @@ class Server {
         std::shared_ptr<std::atomic<bool>> given_up;  // of a change, which then does not happen
     };
     std::map<std::pair<std::uint64_t, std::uint64_t>, Waiting> waiting_;
+
+    OutsideCalls calls_;
 
     std::mutex outbox_mutex_;
     std::deque<Outgoing> outbox_;

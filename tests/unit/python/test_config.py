@@ -33,6 +33,7 @@ def test_a_file_is_read(tmp_path: Path) -> None:
         socket = "/run/x.sock"
         path = ["/opt/a/lib/rtcf"]
         realtime = "preferred"
+        ros_services = "operate"
         [runner]
         frequency_hz = 2000
         overrun = "catch_up"
@@ -42,6 +43,7 @@ def test_a_file_is_read(tmp_path: Path) -> None:
     )
     found = config.read(file)
     assert (found.socket, found.realtime) == (Path("/run/x.sock"), "preferred")
+    assert found.ros_services == "operate"
     assert found.path == [Path("/opt/a/lib/rtcf")]
     assert found.runner == runner_pb2.RunnerSettings(
         frequency_hz=2000.0,
@@ -59,6 +61,10 @@ def test_a_file_is_read(tmp_path: Path) -> None:
         ("[daemon]\nsocket = 1", "daemon.socket must be an absolute path"),
         ('[daemon]\nsocket = "x"', "daemon.socket must be an absolute path"),
         ('[daemon]\nrealtime = "no"', "daemon.realtime must be one of required, preferred"),
+        (
+            '[daemon]\nros_services = "all"',
+            "daemon.ros_services must be one of observe, operate, admin, not 'all'",
+        ),
         ("daemon = 1", "daemon must be a table"),
         ("[runner]\npriority = true", "runner.priority must be an integer"),
         ("[runner]\npriority = -1", "runner.priority is out of range"),

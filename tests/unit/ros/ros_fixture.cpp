@@ -101,10 +101,15 @@ std::string RosFixture::lookAtLoggers() {
 }
 
 void RosFixture::startNode() {
-    node_ = std::make_unique<rtcf::ros1::RosNode>("rt_runner", [this](const std::string& message) {
-        const std::lock_guard lock(mutex_);
-        reports_.push_back(message);
-    });
+    node_ = std::make_unique<rtcf::ros1::RosNode>(
+        "rt_runner",
+        [this](const std::string& message) {
+            const std::lock_guard lock(mutex_);
+            reports_.push_back(message);
+        },
+        [](const rtcf::executor::OutsideCall&, const std::atomic<bool>&) {
+            return rtcf::executor::OutsideAnswer{};
+        });
     rtcf::executor::BridgeSettings settings;
     settings.master_uri = masterUri();
     node_->configure(settings);

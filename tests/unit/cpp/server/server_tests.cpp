@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <future>
 #include <memory>
 #include <string>
 #include <thread>
@@ -342,6 +344,88 @@ TEST_F(ServerTest, ResetStatisticsCountFromThere) {
     const Response response = client.ask(statistics);
     EXPECT_EQ(response.statistics().iterations(), 10U);
     EXPECT_EQ(response.statistics().components(0).duration().count(), 10U);
+}
+
+// A thread of the ROS node that asks for something, as long as it waits.
+class Asking {
+   public:
+    Asking(executor::Server& server, const executor::OutsideCall& call)
+        : answer_(std::async(std::launch::async,
+                             [this, &server, call] { return server.ask(call, cancel_); })) {}
+    executor::OutsideAnswer get() { return answer_.get(); }
+    void cancel() { cancel_ = true; }
+
+   private:
+    std::atomic<bool> cancel_{false};
+    std::future<executor::OutsideAnswer> answer_;
+};
+
+// The next call that a daemon gets.
+executor::v1::ServiceCall nextCall(ExecutorClient& client) {
+    for (;;) {
+        const auto response = client.receive();
+        if (!response || response->has_service_call())
+            return response ? response->service_call() : executor::v1::ServiceCall();
+    }
+}
+
+TEST_F(ServerTest, CallFromOutsideIsAnsweredByTheDaemonThatCameLast) {
+    ExecutorClient first(socket_);
+    first.hello();
+    ExecutorClient client(socket_);
+    client.hello();
+    executor::OutsideCall load;
+    load.kind = executor::OutsideCall::Kind::Load;
+    load.component.type = "Ticker";
+    load.component.remaps = {{"out", "there"}};
+    load.component.first = true;
+    Asking asking(server_, load);
+    const executor::v1::ServiceCall call = nextCall(client);
+    EXPECT_EQ(call.load().type(), "Ticker");
+    EXPECT_EQ(call.load().remaps(0).to(), "there");
+    EXPECT_TRUE(call.load().first());
+    Request answer;
+    answer.mutable_service_answer()->set_call(call.call());
+    answer.mutable_service_answer()->set_success(true);
+    answer.mutable_service_answer()->set_message("as you like it");
+    EXPECT_TRUE(client.ask(answer).has_done());
+    const executor::OutsideAnswer got = asking.get();
+    EXPECT_TRUE(got.success);
+    EXPECT_EQ(got.message, "as you like it");
+    // The other one has not heard of it.
+    first.send(getStatus());
+    const auto next = first.receive();
+    ASSERT_TRUE(next.has_value());
+    EXPECT_TRUE(next->has_status());
+}
+
+TEST_F(ServerTest, CallFromOutsideWithoutADaemonFailsAtOnce) {
+    Asking asking(server_, {});
+    EXPECT_EQ(asking.get().message, "no rtcfd is connected to this executor: is it running?");
+}
+
+TEST_F(ServerTest, CallFromOutsideFailsWithItsDaemon) {
+    auto client = std::make_unique<ExecutorClient>(socket_);
+    client->hello();
+    Asking asking(server_, {});
+    EXPECT_TRUE(nextCall(*client).has_start());
+    client.reset();
+    const executor::OutsideAnswer got = asking.get();
+    EXPECT_FALSE(got.success);
+    EXPECT_EQ(got.message, "rtcfd has gone away; what was asked for may have been done");
+}
+
+TEST_F(ServerTest, CallFromOutsideCanBeGivenUp) {
+    ExecutorClient client(socket_);
+    client.hello();
+    Asking asking(server_, {});
+    const std::uint64_t number = nextCall(client).call();
+    asking.cancel();
+    EXPECT_EQ(asking.get().message, "the executor is ending");
+    // An answer that comes too late is no error.
+    Request answer;
+    answer.mutable_service_answer()->set_call(number);
+    EXPECT_TRUE(client.ask(answer).has_done());
 }
 
 }  // namespace

@@ -1,0 +1,46 @@
+/// @file
+/// The topic `/<runner>/iteration_info`: one message for each cycle.
+#pragma once
+
+#include <ros/publisher.h>
+
+#include <atomic>
+#include <mutex>
+#include <thread>
+
+namespace ros {
+class NodeHandle;
+}
+namespace rtcf::executor {
+class RunnerView;
+}
+
+namespace rtcf::ros1 {
+
+/// Owned by the introspection. Its thread takes all cycle records, with or
+/// without a master, so that none is lost in the executor's ring.
+class CycleTopic {
+   public:
+    explicit CycleTopic(executor::RunnerView& runner);
+    ~CycleTopic();
+    CycleTopic(const CycleTopic&) = delete;
+    CycleTopic& operator=(const CycleTopic&) = delete;
+
+    /// @name Watch thread
+    /// @{
+    void open(ros::NodeHandle& handle);  ///< with a master
+    void close();
+    /// @}
+
+   private:
+    void run();
+    void publishAll();
+
+    executor::RunnerView& runner_;
+    std::mutex mutex_;  // publisher_
+    ros::Publisher publisher_;
+    std::atomic<bool> stop_{false};
+    std::thread thread_;
+};
+
+}  // namespace rtcf::ros1

@@ -1,0 +1,54 @@
+#include "ros/introspection.hpp"
+
+#include <ros/node_handle.h>
+#include <unistd.h>
+
+#include <array>
+
+namespace rtcf::ros1 {
+
+namespace {
+
+std::string hostName() {
+    std::array<char, 256> name{};
+    return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
+}
+
+ros::Time wallTime() {
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    ros::Time time;
+    time.fromNSec(static_cast<std::uint64_t>(std::chrono::nanoseconds(now).count()));
+    return time;
+}
+
+}  // namespace
+
+Introspection::Introspection(executor::RunnerView& runner, const executor::AskSupervisor& ask)
+    : cycles_(runner), report_(runner, hostName()), services_(runner, ask) {}
+
+void Introspection::open(ros::NodeHandle& handle) {
+    if (open_) return;
+    open_ = true;
+    cycles_.open(handle);
+    diagnostics_ = handle.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10);
+    services_.open(handle);
+}
+
+void Introspection::close() {
+    if (!open_) return;
+    open_ = false;
+    services_.close();
+    diagnostics_.shutdown();
+    cycles_.close();
+}
+
+void Introspection::publishDiagnostics() {
+    if (!open_ || std::chrono::steady_clock::now() < due_) return;
+    // The watch comes by twice a second.
+    due_ = std::chrono::steady_clock::now() + std::chrono::milliseconds(900);
+    diagnostic_msgs::DiagnosticArray array = report_.take();
+    array.header.stamp = wallTime();
+    diagnostics_.publish(array);
+}
+
+}  // namespace rtcf::ros1

@@ -1,0 +1,71 @@
+"""A ROS node that listens to what a runner tells of itself; the tests start it.
+
+introspection_peer.py cycles TOPIC COUNT      prints `connected`, then iteration, stamp and
+                                              duration (ns) of so many cycles
+introspection_peer.py diagnostics NAME LEVEL  prints all statuses, until that name has that level:
+                                              name|level|message|key=value|...
+"""
+
+import sys
+import threading
+from typing import Any
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+from rtcf_msgs.msg import IterationInfo
+
+_POLL_S = 0.01
+_DEADLINE_S = 60.0
+
+
+def _cycles(topic: str, count: int) -> None:
+    cycles: list[str] = []
+    full = threading.Event()
+
+    def take(message: Any) -> None:
+        if len(cycles) < count:
+            cycles.append(f"{message.iteration} {message.stamp.to_nsec()} {message.duration_ns}")
+        else:
+            full.set()
+
+    peer = rospy.Subscriber(topic, IterationInfo, take, tcp_nodelay=True)
+    while peer.get_num_connections() == 0 and not rospy.is_shutdown():
+        full.wait(_POLL_S)
+    print("connected", flush=True)
+    if not full.wait(_DEADLINE_S):
+        sys.exit(f"only {len(cycles)} cycles")
+    print("\n".join(cycles))
+
+
+def _diagnostics(name: str, level: int) -> None:
+    found = threading.Event()
+
+    def take(message: Any) -> None:
+        for status in message.status:
+            if found.is_set():
+                return
+            pairs = [f"{pair.key}={pair.value}" for pair in status.values]
+            print("|".join([status.name, str(status.level), status.message, *pairs]))
+        found_now = any(each.name == name and each.level == level for each in message.status)
+        if found_now:
+            found.set()
+
+    rospy.Subscriber("/diagnostics", DiagnosticArray, take)
+    if not found.wait(_DEADLINE_S):
+        sys.exit(f"{name} never had level {level}")
+
+
+def main() -> None:
+    """Do what the command line says."""
+    action, what, number = sys.argv[1:]
+    rospy.init_node("introspection_peer", anonymous=True)
+    if action == "cycles":
+        _cycles(what, int(number))
+    else:
+        _diagnostics(what, int(number))
+    sys.stdout.flush()
+    rospy.signal_shutdown("done")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,262 @@
+"""What ROS peers see of a loop besides its topics, and what they may ask of it."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import fig_1
+import pytest
+import rosgraph
+import rtcf
+import yaml
+from daemon_process import BUILD_TREE, DEADLINE_S, Daemon, wait_for, with_ros
+from ros_processes import Master
+from rtcf.v1 import runner_pb2
+from values import iteration
+
+PEER = Path(__file__).with_name("introspection_peer.py")
+SERVICES = {
+    "/rt_runner/activate_rt_loop",
+    "/rt_runner/deactivate_rt_loop",
+    "/rt_runner/get_introspection_information",
+    "/rt_runner/load_orocos_component",
+    "/rt_runner/unload_orocos_component",
+}
+
+
+@pytest.fixture
+def ros_daemon(tmp_path: Path, master: Master) -> Iterator[Daemon]:
+    daemon = Daemon(tmp_path, with_ros(master.uri, fig_1.WHITELIST))
+    daemon.start()
+    yield daemon
+    if not daemon.ended:
+        daemon.end()
+
+
+@pytest.fixture
+def ros_client(ros_daemon: Daemon) -> Iterator[rtcf.Client]:
+    with rtcf.Client(ros_daemon.socket) as client:
+        yield client
+
+
+def _services(master: Master) -> set[str]:
+    state = rosgraph.Master("/test", master.uri).getSystemState()
+    return {name for name, _ in state[2]}
+
+
+def _wait_for_services(master: Master) -> None:
+    wait_for(lambda: _services(master) >= SERVICES, "the services of the runner")
+
+
+def _call(master: Master, service: str, request: str = "") -> dict[str, object]:
+    """Call a service as a person does; return its answer."""
+    done = subprocess.run(
+        ["/usr/bin/rosservice", "call", f"/rt_runner/{service}", *([request] if request else [])],
+        env=_environment(master),
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE_S,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    answer: dict[str, object] = yaml.safe_load(done.stdout)
+    return answer
+
+
+def _environment(master: Master) -> dict[str, str]:
+    return master.environment() | {"PYTHONPATH": str(BUILD_TREE / "python")}
+
+
+def _peer(master: Master, *arguments: str) -> "subprocess.Popen[str]":
+    return subprocess.Popen(
+        [sys.executable, str(PEER), *arguments],
+        env=_environment(master),
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+
+def _lines(peer: "subprocess.Popen[str]") -> list[str]:
+    out, _ = peer.communicate(timeout=DEADLINE_S)
+    assert peer.returncode == 0, out
+    return out.splitlines()
+
+
+def test_every_cycle_is_published_with_stamp_and_duration(
+    ros_client: rtcf.Client, master: Master
+) -> None:
+    ros_client.set_runner(runner_pb2.RunnerSettings(frequency_hz=2000.0))
+    fig_1.load(ros_client)
+    _wait_for_services(master)
+    peer = _peer(master, "cycles", "/rt_runner/iteration_info", "6000")
+    assert peer.stdout is not None
+    assert peer.stdout.readline() == "connected\n"
+    ros_client.start()
+    cycles = [[int(word) for word in line.split()] for line in _lines(peer)]
+    ros_client.stop()
+    assert [each[0] for each in cycles] == list(range(6000))  # none lost, from the first on
+    stamps = [each[1] for each in cycles]
+    assert all(later > earlier for earlier, later in zip(stamps, stamps[1:], strict=False))
+    assert all(duration > 0 for _, _, duration in cycles)
+
+
+def test_rostopic_knows_the_type_of_iteration_info(
+    ros_daemon: Daemon, master: Master
+) -> None:
+    _wait_for_services(master)
+    done = subprocess.run(
+        ["/usr/bin/rostopic", "info", "/rt_runner/iteration_info"],
+        env=_environment(master),
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE_S,
+        check=True,
+    )
+    assert "Type: rtcf_msgs/IterationInfo" in done.stdout
+
+
+def test_diagnostics_tell_the_health_of_loop_and_components(
+    ros_client: rtcf.Client, master: Master
+) -> None:
+    ros_client.load(rtcf.component("rtcf_faults", "Throws", name="Bomb", parameters=["after:=2000"]))
+    ros_client.load(rtcf.component("rtcf_examples", "Mimo", name="Sum"))
+    ros_client.start()
+    peer = _peer(master, "diagnostics", "rt_runner: loop", "2")
+    statuses = [line.split("|") for line in _lines(peer)]
+    # name, level, message, then key=value
+    loop = [each for each in statuses if each[0] == "rt_runner: loop"]
+    bomb = [each for each in statuses if each[0] == "rt_runner: /Bomb"]
+    names = {each[0] for each in statuses}
+    assert names == {"rt_runner: loop", "rt_runner: /Bomb", "rt_runner: /Sum"}
+    assert loop[-1][1] == "2"
+    assert "/Bomb: update() threw" in loop[-1][2]
+    assert bomb[-1][1] == "2"
+    keys = {pair.partition("=")[0] for pair in loop[-1][3:]}
+    assert {"state", "frequency wanted (Hz)", "iteration", "overruns", "missed cycles",
+            "values lost on the way to topics", "log records lost",
+            "iteration_info messages lost", "real time"} <= keys  # fmt: skip
+    assert "state=faulted" in loop[-1]
+
+
+def test_services_load_run_and_unload_as_rtcfctl_does(
+    ros_daemon: Daemon, ros_client: rtcf.Client, master: Master
+) -> None:
+    _wait_for_services(master)
+    sum_1 = "{name: Sum, ns: arm, package: rtcf_examples, type: Mimo, remaps: ['out1:=total']}"
+    assert _call(master, "load_orocos_component", sum_1) == {"success": True, "message": ""}
+    sum_2 = (
+        "{name: Second, package: rtcf_examples, type: Mimo, is_first: true,"
+        " remaps: ['in1:=/arm/total', 'in2:=loop', 'out1:=/arm/in3'],"
+        " topics_ignore_for_graph: '/nothing'}"
+    )
+    assert _call(master, "load_orocos_component", sum_2)["success"] is True
+    assert ros_daemon.ctl("order").stdout.split() == ["/Second", "/arm/Sum"]
+
+    assert _call(master, "activate_rt_loop")["success"] is True
+    wait_for(lambda: iteration(ros_client) > 10, "the loop")
+    told = _call(master, "get_introspection_information")
+    assert (told["runner"], told["state"], told["frequency"]) == ("rt_runner", "running", 1000.0)
+    assert told["component_order"] == ["/Second", "/arm/Sum"]
+    components = told["components"]
+    assert isinstance(components, list)
+    assert [(each["name"], each["package"], each["type"], each["is_first"]) for each in components] == [
+        ("/Second", "rtcf_examples", "Mimo", True),
+        ("/arm/Sum", "rtcf_examples", "Mimo", False),
+    ]
+    (in1,) = (port for port in components[0]["ports"] if port["name"] == "in1")
+    assert in1 == {
+        "direction": 0, "name": "in1", "mapped_name": "/arm/total", "type": "std_msgs/Float64",
+        "connected": True, "mapped": False, "broken": True,
+    }  # fmt: skip
+    connections = told["connections"]
+    assert isinstance(connections, list)
+    (total,) = (each for each in connections if each["name"] == "/arm/total")
+    assert (total["writer"], total["readers"]) == ("/arm/Sum", ["/Second"])
+
+    assert _call(master, "deactivate_rt_loop")["success"] is True
+    assert ros_client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_STOPPED
+    assert _call(master, "unload_orocos_component", "{name: Sum, ns: /arm}")["success"] is True
+    assert _call(master, "unload_orocos_component", "{name: /Second}")["success"] is True
+    assert ros_daemon.ctl("order").stdout.split() == []
+
+
+def test_what_services_change_is_the_desired_state(
+    ros_daemon: Daemon, ros_client: rtcf.Client, master: Master
+) -> None:
+    _wait_for_services(master)
+    spec = "{name: Sum, package: rtcf_examples, type: Mimo}"
+    assert _call(master, "load_orocos_component", spec)["success"] is True
+    ros_daemon.end()
+    ros_daemon.start()
+    wait_for(lambda: "/Sum" in ros_daemon.ctl("order").stdout, "the component after a restart")
+
+
+@pytest.mark.parametrize(
+    ("service", "request_text", "why"),
+    [
+        ("load_orocos_component", "{package: nowhere, type: Mimo}", "nowhere"),
+        ("load_orocos_component", "{package: rtcf_examples, type: Mimoo}", "Mimoo"),
+        ("load_orocos_component", "{package: rtcf_examples, type: Mimo, remaps: [a]}", "from:=to"),
+        ("load_orocos_component", "{name: '1', package: rtcf_examples, type: Mimo}", "'1'"),
+        ("unload_orocos_component", "{name: Nobody}", "/Nobody"),
+    ],
+)
+def test_refusals_say_what_is_wrong(
+    ros_daemon: Daemon, master: Master, service: str, request_text: str, why: str
+) -> None:
+    _wait_for_services(master)
+    answer = _call(master, service, request_text)
+    assert answer["success"] is False
+    assert why in str(answer["message"])
+    assert ros_daemon.ctl("order").stdout.split() == []
+
+
+@pytest.mark.parametrize(
+    ("access", "loads", "starts"), [("observe", False, False), ("operate", False, True)]
+)
+def test_ros_may_do_what_the_settings_allow(
+    tmp_path: Path, master: Master, access: str, loads: bool, starts: bool
+) -> None:
+    settings = f'[daemon]\nros_services = "{access}"\n' + with_ros(master.uri, "")
+    daemon = Daemon(tmp_path, settings)
+    daemon.start()
+    try:
+        _wait_for_services(master)
+        load = _call(
+            master, "load_orocos_component", "{package: rtcf_examples, type: Mimo}"
+        )
+        assert load["success"] is loads
+        assert 'ros_services = "admin"' in str(load["message"])
+        start = _call(master, "activate_rt_loop")
+        assert start["success"] is starts
+        assert _call(master, "deactivate_rt_loop")["success"] is starts
+        assert _call(master, "get_introspection_information")["state"] == "stopped"
+    finally:
+        daemon.end()
+
+
+def test_services_and_topics_are_there_again_after_a_restart_of_the_master(
+    tmp_path: Path,
+) -> None:
+    master = Master(tmp_path)
+    master.start()
+    daemon = Daemon(tmp_path, with_ros(master.uri, ""))
+    daemon.start()
+    try:
+        _wait_for_services(master)
+        master.end()
+        master.start()
+        _wait_for_services(master)
+        published, _ = master.topics()
+        assert {"/rt_runner/iteration_info", "/diagnostics"} <= published
+        assert _call(master, "activate_rt_loop")["success"] is True
+    finally:
+        daemon.end()
+        master.end()
+
+
+def test_services_leave_with_the_daemon(ros_daemon: Daemon, master: Master) -> None:
+    _wait_for_services(master)
+    ros_daemon.end()
+    assert not _services(master) & SERVICES
