@@ -1,0 +1,60 @@
+/// @file
+/// How RTCF 2021's components are registered.
+#pragma once
+
+#include <type_traits>
+
+#include "rtcf/registration.hpp"
+#include "rtt/TaskContext.hpp"
+
+class RtcfExtension;
+
+namespace rtcf::rtt_compat {
+
+/// Makes a component of OROCOS' kind: its constructor takes its name.
+template <typename T>
+Component* create(const char* name) {
+    static_assert(std::is_base_of_v<RTT::TaskContext, T>,
+                  "ORO_CREATE_COMPONENT takes a class derived from RTT::TaskContext");
+    auto* const component = new T(std::string(name));
+    // Found by its argument: only who includes rtcf_extension.hpp has it.
+    if constexpr (std::is_base_of_v<RtcfExtension, T>) bindRtcfExtension(*component, *component);
+    return component;
+}
+
+}  // namespace rtcf::rtt_compat
+
+/// @name Internals of the macros below: an identifier that is unique in its source file
+/// @{
+#define RTCF_COMPAT_JOIN_(a, b) RTCF_COMPAT_JOIN_EXPANDED_(a, b)
+#define RTCF_COMPAT_JOIN_EXPANDED_(a, b) a##b
+#define RTCF_COMPAT_REGISTER_(CLASS, NUMBER)                                                    \
+    namespace {                                                                                 \
+    ::rtcf::ComponentRecord RTCF_COMPAT_JOIN_(rtcf_record_, NUMBER){                            \
+        ::rtcf::rtt_compat::baseName(#CLASS), "", &::rtcf::rtt_compat::create<CLASS>, nullptr}; \
+    const ::rtcf::detail::Registration RTCF_COMPAT_JOIN_(rtcf_registration_, NUMBER){           \
+        RTCF_COMPAT_JOIN_(rtcf_record_, NUMBER)};                                               \
+    }
+/// @}
+
+namespace rtcf::rtt_compat {
+
+/// A class name without its namespaces: a type's name is a ROS base name.
+constexpr const char* baseName(const char* qualified) {
+    const char* base = qualified;
+    for (const char* at = qualified; *at != '\0'; ++at) {
+        if (*at == ':' || *at == ' ') base = at + 1;
+    }
+    return base;
+}
+
+}  // namespace rtcf::rtt_compat
+
+/// Registers a component class by its name; of a class in a namespace, the last part of it.
+/// @{
+#define ORO_CREATE_COMPONENT(CLASS) RTCF_COMPAT_REGISTER_(CLASS, __COUNTER__)
+#define ORO_LIST_COMPONENT_TYPE(CLASS) RTCF_COMPAT_REGISTER_(CLASS, __COUNTER__)
+/// @}
+
+/// Of a library with several components; there is nothing more to be done.
+#define ORO_CREATE_COMPONENT_LIBRARY() static_assert(true, "")

@@ -1,0 +1,191 @@
+// Components that are written for RTCF 2021, in a real runner. In the build with
+// RealtimeSanitizer every one of these tests is a test of real-time safety too.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "support/runner_fixture.hpp"
+
+namespace rtcf::test {
+namespace {
+
+constexpr double kNoData = 0.0;
+constexpr double kOldData = 1.0;
+constexpr double kNewData = 2.0;
+
+class RttCompat : public RunnerFixture {
+   protected:
+    ChangeOutcome loadOld(const std::string& type, const std::string& name,
+                          executor::Remaps remaps = {}) {
+        ComponentDefinition component = definition(type, name);
+        component.remaps = std::move(remaps);
+        return onGraphThread([&] {
+            return runner().load(component, RTCF_UNIT_COMPONENTS "/old_style.so",
+                                 [](const std::string&) {});
+        });
+    }
+
+    // What a component has said, in order.
+    std::vector<std::string> said(const std::string& component) {
+        std::vector<std::string> lines;
+        for (const LogEntry& entry : logged()) {
+            if (entry.component == component) lines.push_back(entry.message);
+        }
+        return lines;
+    }
+    bool hasSaid(const std::string& component, const std::string& line) {
+        const std::vector<std::string> lines = said(component);
+        return std::find(lines.begin(), lines.end(), line) != lines.end();
+    }
+};
+
+TEST_F(RttCompat, PortsOfConstructorAndConfigureHookAreThere) {
+    loadOld("Reader", "R");
+    std::vector<std::string> names;
+    const auto snapshot = runner().snapshot();
+    for (const auto& port : snapshot->get("/R").ports) names.push_back(port.name);
+    EXPECT_EQ(names, (std::vector<std::string>{"in", "flow", "copied", "copied_old", "connected"}));
+}
+
+TEST_F(RttCompat, PortsAreFrozenAfterConfigureHook) {
+    loadOld("TooLate", "L");
+    EXPECT_EQ(refusal([this] { start(); }),
+              "/L (rtcf_unit_test/TooLate): start failed: it threw: port 'late' declared after "
+              "configure()");
+}
+
+TEST_F(RttCompat, PortAddedTwiceIsRefused) {
+    EXPECT_EQ(refusal([this] { loadOld("Twice", "T"); }),
+              "/T (rtcf_unit_test/Twice): configure failed: it threw: port 'port' is added twice");
+}
+
+TEST_F(RttCompat, ReadTellsWhetherDataAreThereAndNew) {
+    loadOld("Reader", "R", {{"in", "thirds"}});
+    step(1);
+    EXPECT_EQ(value("/R", "flow"), kNoData);
+    EXPECT_EQ(value("/R", "copied"), -1.0);
+    EXPECT_EQ(value("/R", "copied_old"), -1.0);
+    EXPECT_EQ(value("/R", "connected"), 0.0);
+    stop();
+    loadOld("Third", "T", {{"out", "thirds"}});
+    step(1);  // iteration 0
+    EXPECT_EQ(value("/R", "flow"), kNewData);
+    EXPECT_EQ(value("/R", "copied"), 0.0);
+    EXPECT_EQ(value("/R", "connected"), 1.0);
+    step(1);
+    EXPECT_EQ(value("/R", "flow"), kOldData);
+    EXPECT_EQ(value("/R", "copied"), -1.0);  // old data were not asked for
+    EXPECT_EQ(value("/R", "copied_old"), 0.0);
+    step(2);
+    EXPECT_EQ(value("/R", "flow"), kNewData);
+    EXPECT_EQ(value("/R", "copied"), 3.0);
+}
+
+TEST_F(RttCompat, OutputKnowsWhetherAnybodyReadsIt) {
+    loadOld("Third", "T", {{"out", "thirds"}});
+    step(1);
+    EXPECT_EQ(value("/T", "connected"), 0.0);
+    loadOld("Reader", "R", {{"in", "thirds"}});
+    step(3);
+    EXPECT_EQ(value("/T", "connected"), 1.0);
+    unload("/R");
+    step(3);
+    EXPECT_EQ(value("/T", "connected"), 0.0);
+    configure([](RunnerSettings& settings) { settings.whitelist = "/thirds"; });
+    step(3);
+    EXPECT_EQ(value("/T", "connected"), 1.0);  // by a topic
+}
+
+TEST_F(RttCompat, StatesFollowTheHooks) {
+    loadOld("Teller", "T");
+    step(1);
+    stop();
+    unload("/T");
+    std::vector<std::string> lines = said("/T");
+    lines.erase(std::remove_if(lines.begin(), lines.end(),
+                               [](const std::string& line) {
+                                   return line.find(", state ") == std::string::npos;
+                               }),
+                lines.end());
+    // PreOperational is 1, Stopped 4, Running 5.
+    EXPECT_EQ(lines, (std::vector<std::string>{
+                         "configure: not running, state 1, target 4",
+                         "start: not running, state 4, target 5",
+                         "update: running, state 5, target 5",
+                         "stop: running, state 5, target 4",
+                         "cleanup: not running, state 4, target 1",
+                     }));
+}
+
+TEST_F(RttCompat, ComponentKnowsItsNameFromTheConstructorOn) {
+    ComponentDefinition component = definition("Teller", "T");
+    component.ns = "/arm";
+    onGraphThread([&] {
+        return runner().load(component, RTCF_UNIT_COMPONENTS "/old_style.so",
+                             [](const std::string&) {});
+    });
+    EXPECT_TRUE(hasSaid("/arm/T", "constructed as T, is T"));
+}
+
+TEST_F(RttCompat, ComponentKnowsTheLoopsTime) {
+    configure([](RunnerSettings& settings) {
+        settings.frequency_hz = 500.0;
+        settings.loop.period_ns = 2'000'000;
+    });
+    loadOld("Teller", "T");
+    step(3);
+    EXPECT_TRUE(hasSaid("/T", "period 0.002 s, 500 Hz, iteration 2, time 0.004000000"));
+}
+
+TEST_F(RttCompat, LogKeepsEachTextAsItIs) {
+    loadOld("Writer", "W");
+    step(1);
+    const std::vector<std::string> lines = said("/W");
+    const std::string long_text = std::string(1000, 'x') + "...";
+    std::vector<std::string> expected{"100 % as it is: {} %d", "a std::string",
+                                      "a number 0.333 ff 1", "arm has 7 joints of 0.50 m", "100 %"};
+    // A text that takes several records, twice.
+    for (int round = 0; round < 2; ++round) {
+        for (std::size_t at = 0; at < long_text.size(); at += 318)
+            expected.push_back(long_text.substr(at, 318));
+    }
+    expected.emplace_back("no braces are needed");
+    EXPECT_EQ(lines, expected);
+}
+
+TEST_F(RttCompat, LogHasLevelAndPlaceOfTheCall) {
+    loadOld("Writer", "W");
+    step(1);
+    const std::vector<LogEntry> entries = logged();
+    const auto found = std::find_if(entries.begin(), entries.end(), [](const LogEntry& entry) {
+        return entry.message == "a std::string";
+    });
+    ASSERT_NE(found, entries.end());
+    EXPECT_EQ(found->level, LogLevel::Warn);
+    EXPECT_NE(found->file.find("old_style.cpp"), std::string::npos);
+    EXPECT_EQ(found->function, "updateHook");
+    EXPECT_TRUE(found->realtime);
+}
+
+TEST_F(RttCompat, MessagesThatGrowWithinTheSampleAreWritten) {
+    loadOld("Grower", "G");
+    step(400);
+    EXPECT_EQ(iteration(), 400U);
+}
+
+TEST_F(RttCompat, ExtensionInAConstructorIsRefused) {
+    EXPECT_EQ(refusal([this] { loadOld("TooEarly", "E"); }),
+              "/E (rtcf_unit_test/TooEarly): constructor failed: it threw: RtcfExtension is of no "
+              "use in a constructor: use it from configureHook() on, in a component that "
+              "ORO_CREATE_COMPONENT registers");
+}
+
+TEST_F(RttCompat, NodeHandleWithoutANodeIsRefused) {
+    const std::string why = refusal([this] { loadOld("NeedsRos", "N"); });
+    EXPECT_NE(why.find("configure failed"), std::string::npos) << why;
+    EXPECT_NE(why.find("nodeHandle()"), std::string::npos) << why;
+}
+
+}  // namespace
+}  // namespace rtcf::test
