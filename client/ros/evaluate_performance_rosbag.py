@@ -1,0 +1,211 @@
+#!/usr/bin/python3 -I
+"""Evaluates a loop's recorded cycles, as Fig. 2 of the paper does: two histograms and numbers.
+
+rosbag record /rt_runner/iteration_info
+rosrun rtcf evaluate_performance_rosbag BAG FREQUENCY
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+_TYPE = "rtcf_msgs/IterationInfo"
+_QUANTILES = {"p50": 0.5, "p99": 0.99, "p999": 0.999}
+_US = 1e-3  # of a ns
+
+
+class Unusable(Exception):
+    """The bag cannot be evaluated; the text says why."""
+
+
+@dataclass
+class Cycles:
+    """What was recorded, one entry a cycle, in ns; in the order of the cycles."""
+
+    begins: list[int]  # when the cycle began
+    durations: list[int]
+    lost: int  # cycles that the loop ran and the bag does not have
+    runs: list[int]  # indices where the loop was started anew
+
+
+def read(bag: Path, topic: str) -> tuple[str, Cycles]:
+    """Return the topic and its cycles; without a topic, the only one of that type."""
+    try:
+        import rosbag  # takes a while
+    except ImportError:
+        raise Unusable("reading bags needs the package python3-rosbag: install it") from None
+    try:
+        with rosbag.Bag(str(bag)) as opened:
+            found = [
+                name
+                for name, info in opened.get_type_and_topic_info().topics.items()
+                if info.msg_type.endswith("/IterationInfo")
+            ]
+            chosen = _choose(bag, topic, found)
+            return chosen, _cycles(message for _, message, _ in opened.read_messages([chosen]))
+    except OSError as error:
+        raise Unusable(f"cannot read {bag}: {error.strerror}") from None
+    except rosbag.ROSBagException as error:
+        raise Unusable(f"{bag}: {error}; `rosbag reindex` may mend it") from None
+
+
+def _choose(bag: Path, topic: str, found: list[str]) -> str:
+    if topic:
+        if topic not in found:
+            raise Unusable(
+                f"{bag} has no {topic} of type {_TYPE}; it has: {', '.join(found) or 'none'}"
+            )
+        return topic
+    if not found:
+        raise Unusable(
+            f"{bag} has no topic of type {_TYPE}: record it with "
+            "`rosbag record /rt_runner/iteration_info`"
+        )
+    if len(found) > 1:
+        raise Unusable(f"{bag} has several loops: choose one by --topic: {', '.join(found)}")
+    return found[0]
+
+
+def _cycles(messages: Iterable[Any]) -> Cycles:
+    cycles = Cycles([], [], 0, [0])
+    last = -1
+    for message in messages:
+        # Bags of RTCF 2021 have neither.
+        latency = getattr(message, "latency_ns", 0)
+        iteration = getattr(message, "iteration", last + 1)
+        if iteration <= last:
+            cycles.runs.append(len(cycles.begins))
+        elif last >= 0:
+            cycles.lost += iteration - last - 1
+        last = iteration
+        cycles.begins.append(message.stamp.to_nsec() + latency)
+        cycles.durations.append(int(message.duration_ns))
+    return cycles
+
+
+def jitter(cycles: Cycles, period_ns: float) -> list[float]:
+    """Return how far each time between two begins is from a whole number of periods, in ns."""
+    runs = set(cycles.runs)
+    found = []
+    for index in range(1, len(cycles.begins)):
+        if index in runs:
+            continue
+        between = cycles.begins[index] - cycles.begins[index - 1]
+        # After a lost message or a missed cycle several periods have passed.
+        periods = max(1, round(between / period_ns))
+        found.append(between - periods * period_ns)
+    return found
+
+
+def summary(values_ns: Sequence[float]) -> dict[str, float]:
+    """Return the figures of a distribution, in µs."""
+    ordered = sorted(values_ns)
+    figures = {"min": ordered[0], "mean": sum(ordered) / len(ordered)}
+    for name, quantile in _QUANTILES.items():
+        # The smallest value that so many are not above.
+        figures[name] = ordered[min(len(ordered) - 1, int(quantile * len(ordered)))]
+    figures["max"] = ordered[-1]
+    return {name: round(value * _US, 3) for name, value in figures.items()}
+
+
+def evaluate(cycles: Cycles, frequency: float) -> dict[str, Any]:
+    """Return all numbers."""
+    period_ns = 1e9 / frequency
+    deviations = jitter(cycles, period_ns)
+    if not deviations:
+        raise Unusable(f"{len(cycles.begins)} cycles are too few to evaluate: record at least 2")
+    return {
+        "cycles": len(cycles.begins),
+        "lost": cycles.lost,
+        "overruns": sum(duration >= period_ns for duration in cycles.durations),
+        "duration_us": summary(cycles.durations),
+        # Early and late alike.
+        "jitter_us": summary([abs(each) for each in deviations]),
+    }
+
+
+def plot(cycles: Cycles, frequency: float, title: str, file: Path) -> None:
+    """Write two histograms with logarithmic counts."""
+    try:
+        import matplotlib
+
+        matplotlib.use("Agg")
+        from matplotlib import pyplot
+    except ImportError:
+        raise Unusable("plotting needs the package python3-matplotlib: install it") from None
+
+    figure, axes = pyplot.subplots(1, 2, figsize=(10, 4), layout="constrained")
+    figure.suptitle(title)
+    panels = (
+        (cycles.durations, "(a) calculation duration [µs]"),
+        (jitter(cycles, 1e9 / frequency), "(b) scheduling jitter [µs]"),
+    )
+    for axis, (values, label) in zip(axes, panels, strict=True):
+        axis.hist([value * _US for value in values], bins=100, log=True)
+        limit = summary([abs(value) for value in values])["p999"]
+        axis.axvline(limit, color="black", linestyle="--", label=f"99.9 %: {limit:.1f} µs")
+        axis.set_xlabel(label)
+        axis.set_ylabel("cycles")
+        axis.legend()
+    figure.savefig(file, dpi=150)
+
+
+def table(topic: str, numbers: dict[str, Any]) -> str:
+    """Return the numbers for people."""
+    rows = (("calculation duration", "duration_us"), ("scheduling jitter", "jitter_us"))
+    names = list(numbers["duration_us"])
+    lines = [
+        f"{topic}: {numbers['cycles']} cycles, {numbers['lost']} messages lost, "
+        f"{numbers['overruns']} overruns",
+        "µs".ljust(22) + "".join(f"{name:>10}" for name in names),
+    ]
+    lines += [
+        f"{label:22}" + "".join(f"{numbers[key][name]:10.3f}" for name in names)
+        for label, key in rows
+    ]
+    return "\n".join(lines)
+
+
+def _frequency(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise ValueError
+    return value
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Evaluate a bag; return the exit status: 0 done, 1 the bag is of no use, 2 wrong usage."""
+    parser = argparse.ArgumentParser(
+        prog="evaluate_performance_rosbag",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("bag", type=Path, metavar="BAG", help="a bag with an iteration_info topic")
+    parser.add_argument(
+        "frequency", type=_frequency, metavar="FREQUENCY", help="nominal frequency of the loop, Hz"
+    )
+    parser.add_argument("--topic", default="", help="if the bag has several loops")
+    parser.add_argument("--png", type=Path, help="where the plot goes (default: BAG's name, .png)")
+    parser.add_argument("--json", action="store_true", help="print the numbers as JSON")
+    given = parser.parse_args(arguments)
+    try:
+        topic, cycles = read(given.bag, given.topic)
+        numbers = evaluate(cycles, given.frequency)
+        file = given.png or given.bag.with_suffix(".png")
+        try:
+            plot(cycles, given.frequency, f"{topic} at {given.frequency:g} Hz", file)
+        except OSError as error:
+            raise Unusable(f"cannot write {file}: {error.strerror}") from None
+    except Unusable as problem:
+        print(f"evaluate_performance_rosbag: {problem}", file=sys.stderr)
+        return 1
+    print(json.dumps(numbers, indent=2) if given.json else f"{table(topic, numbers)}\n{file}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
