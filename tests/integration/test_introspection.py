@@ -1,5 +1,6 @@
 """What ROS peers see of a loop besides its topics, and what they may ask of it."""
 
+import itertools
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -97,13 +98,11 @@ def test_every_cycle_is_published_with_stamp_and_duration(
     ros_client.stop()
     assert [each[0] for each in cycles] == list(range(6000))  # none lost, from the first on
     stamps = [each[1] for each in cycles]
-    assert all(later > earlier for earlier, later in zip(stamps, stamps[1:], strict=False))
+    assert all(later > earlier for earlier, later in itertools.pairwise(stamps))
     assert all(duration > 0 for _, _, duration in cycles)
 
 
-def test_rostopic_knows_the_type_of_iteration_info(
-    ros_daemon: Daemon, master: Master
-) -> None:
+def test_rostopic_knows_the_type_of_iteration_info(ros_daemon: Daemon, master: Master) -> None:
     _wait_for_services(master)
     done = subprocess.run(
         ["/usr/bin/rostopic", "info", "/rt_runner/iteration_info"],
@@ -119,7 +118,9 @@ def test_rostopic_knows_the_type_of_iteration_info(
 def test_diagnostics_tell_the_health_of_loop_and_components(
     ros_client: rtcf.Client, master: Master
 ) -> None:
-    ros_client.load(rtcf.component("rtcf_faults", "Throws", name="Bomb", parameters=["after:=2000"]))
+    ros_client.load(
+        rtcf.component("rtcf_faults", "Throws", name="Bomb", parameters=["after:=2000"])
+    )
     ros_client.load(rtcf.component("rtcf_examples", "Mimo", name="Sum"))
     ros_client.start()
     peer = _peer(master, "diagnostics", "rt_runner: loop", "2")
@@ -160,7 +161,9 @@ def test_services_load_run_and_unload_as_rtcfctl_does(
     assert told["component_order"] == ["/Second", "/arm/Sum"]
     components = told["components"]
     assert isinstance(components, list)
-    assert [(each["name"], each["package"], each["type"], each["is_first"]) for each in components] == [
+    assert [
+        (each["name"], each["package"], each["type"], each["is_first"]) for each in components
+    ] == [
         ("/Second", "rtcf_examples", "Mimo", True),
         ("/arm/Sum", "rtcf_examples", "Mimo", False),
     ]
@@ -223,9 +226,7 @@ def test_ros_may_do_what_the_settings_allow(
     daemon.start()
     try:
         _wait_for_services(master)
-        load = _call(
-            master, "load_orocos_component", "{package: rtcf_examples, type: Mimo}"
-        )
+        load = _call(master, "load_orocos_component", "{package: rtcf_examples, type: Mimo}")
         assert load["success"] is loads
         assert 'ros_services = "admin"' in str(load["message"])
         start = _call(master, "activate_rt_loop")

@@ -63,7 +63,10 @@ def tuned(tmp_path_factory: pytest.TempPathFactory) -> Path:
     steps = (
         [
             *("cmake", "-S", str(TUNED), "-B", str(folder), "-G", "Ninja"),
-            *(f"-Drtcf_DIR={BUILD_TREE / 'cmake' / 'rtcf'}", "-DPYTHON_EXECUTABLE=/usr/bin/python3"),
+            *(
+                f"-Drtcf_DIR={BUILD_TREE / 'cmake' / 'rtcf'}",
+                "-DPYTHON_EXECUTABLE=/usr/bin/python3",
+            ),
             *("-DCATKIN_BUILD_BINARY_PACKAGE=ON", "-DCATKIN_ENABLE_TESTING=OFF"),
             # Nothing to debug or to be fast here.
             "-DCMAKE_CXX_FLAGS=-O0",
