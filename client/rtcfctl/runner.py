@@ -21,7 +21,7 @@ _CHOICES = {
 _FIELDS = ("frequency_hz", "cpu", "priority", "spin_us", "spin_auto", "max_overruns",
            "warmup_cycles", "stall_timeout_ms", "orphan_timeout_s", "lock_memory", "heap_kb",
            "stack_kb")  # fmt: skip
-_ROS_FIELDS = ("enabled", "master_uri", "whitelist", "blacklist", "queue")
+_ROS_FIELDS = ("enabled", "master_uri", "hostname", "whitelist", "blacklist", "queue")
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
@@ -148,6 +148,12 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
     to.add_argument("--stack-kb", type=int, metavar="KIB", help="stack of the real-time thread")
     to.add_argument("--ros", dest="ros_enabled", action=switch, help="have a ROS node")
     to.add_argument("--master-uri", dest="ros_master_uri", metavar="URI", help="the ROS master")
+    to.add_argument(
+        "--hostname",
+        dest="ros_hostname",
+        metavar="HOST",
+        help="name or address by which ROS peers reach the loop's node",
+    )
     to.add_argument(
         "--whitelist",
         dest="ros_whitelist",

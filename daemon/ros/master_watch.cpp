@@ -160,7 +160,7 @@ void MasterWatch::step() {
     }
     if (!node_.started()) {
         if (!settings.enabled) return setProblem("");
-        if (!startNode(uri)) return;
+        if (!startNode(uri, settings.hostname)) return;
     }
     if (!node_.alive()) {
         failed_ = true;
@@ -173,6 +173,10 @@ void MasterWatch::step() {
         return setProblem("");
     }
     if (uri != master_uri_) changeMaster(uri);
+    if (settings.hostname != hostname_) {
+        hostname_ = settings.hostname;
+        say("the new ROS hostname takes effect at the next start of the executor");
+    }
     MasterClient master = clientOf(uri, kCallTimeout, stop_);
     obeyShutdownRequest(master);
     if (!watchMaster(master)) {
@@ -182,7 +186,7 @@ void MasterWatch::step() {
     openAndClose(settings.queue);
 }
 
-bool MasterWatch::startNode(const std::string& uri) {
+bool MasterWatch::startNode(const std::string& uri, const std::string& hostname) {
     MasterClient master = clientOf(uri, kCallTimeout, stop_);
     XmlRpc::XmlRpcValue arguments;
     arguments[0] = name_.full();
@@ -192,7 +196,7 @@ bool MasterWatch::startNode(const std::string& uri) {
         return false;
     }
     try {
-        node_.start(uri);
+        node_.start(uri, hostname);
     } catch (const std::exception& error) {
         failed_ = true;
         const std::string problem =
@@ -203,6 +207,7 @@ bool MasterWatch::startNode(const std::string& uri) {
     }
     refusals_ = std::make_unique<Refusals>();
     master_uri_ = uri;
+    hostname_ = hostname;
     registered_ = true;  // roscpp has done so
     say("ROS node " + name_.full() + " is up at " + uri);
     return true;

@@ -53,7 +53,7 @@ class MasterWatch {
     enum class Off { No, NameTaken, Killed };
 
     void step();
-    bool startNode(const std::string& uri);
+    bool startNode(const std::string& uri, const std::string& hostname);
     void changeMaster(const std::string& uri);
     void obeyShutdownRequest(MasterClient& master);
     bool watchMaster(MasterClient& master);
@@ -91,6 +91,7 @@ class MasterWatch {
     std::unique_ptr<Introspection> introspection_;  // null without a runner
     std::unique_ptr<Refusals> refusals_;
     std::string master_uri_;   // of the running node
+    std::string hostname_;     // as it was at the node's start
     bool registered_ = false;  // everything that is open, as far as we know
     bool was_silent_ = false;  // the master, at the last step
     int taken_ = 0;            // steps since another node got our name, or does not answer

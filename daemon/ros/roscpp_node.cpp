@@ -25,10 +25,11 @@ RoscppNode::RoscppNode(NodeName name, ShutdownRequest on_shutdown_request)
 
 RoscppNode::~RoscppNode() { stop(); }
 
-void RoscppNode::start(const std::string& master_uri) {
+void RoscppNode::start(const std::string& master_uri, const std::string& hostname) {
     if (ros::isShuttingDown()) throw std::runtime_error("ROS has been shut down in this process");
     calls_.useMaster(master_uri);
-    const ros::M_string settings{{"__master", master_uri}, {"__ns", name_.name_space}};
+    ros::M_string settings{{"__master", master_uri}, {"__ns", name_.name_space}};
+    if (!hostname.empty()) settings["__hostname"] = hostname;
     ros::init(settings, name_.base,
               ros::init_options::NoSigintHandler | ros::init_options::NoRosout);
     try {

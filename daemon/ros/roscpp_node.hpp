@@ -32,8 +32,10 @@ class RoscppNode {
 
     const NodeName& name() const { return name_; }
 
-    /// Starts the node; its master must be there. @throws std::exception if roscpp cannot
-    void start(const std::string& master_uri);
+    /// Starts the node; its master must be there.
+    /// @param hostname name or address that peers are told; empty: of the environment
+    /// @throws std::exception if roscpp cannot
+    void start(const std::string& master_uri, const std::string& hostname);
     bool started() const { return handle_ != nullptr; }
     /// False if roscpp has been shut down by someone in this process.
     bool alive() const;

@@ -53,6 +53,7 @@ def defaults(
             whitelist="",
             blacklist="",
             queue=1000,
+            hostname="",
         ),
     )
 

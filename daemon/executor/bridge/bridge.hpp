@@ -26,9 +26,11 @@ struct BridgeTable {
 struct BridgeSettings {
     bool enabled = true;
     std::string master_uri;      ///< empty: of the environment
+    std::string hostname;        ///< by which peers reach us; empty: of the environment
     std::uint32_t queue = 1000;  ///< messages kept for a slow subscriber
     bool operator==(const BridgeSettings& other) const {
-        return enabled == other.enabled && master_uri == other.master_uri && queue == other.queue;
+        return enabled == other.enabled && master_uri == other.master_uri &&
+               hostname == other.hostname && queue == other.queue;
     }
 };
 

@@ -231,6 +231,7 @@ RunnerSettings settingsFrom(const pb::RunnerSettings& message, RunnerSettings ba
     const pb::RosSettings& ros = message.ros();
     if (ros.has_enabled()) base.bridge.enabled = ros.enabled();
     if (ros.has_master_uri()) base.bridge.master_uri = ros.master_uri();
+    if (ros.has_hostname()) base.bridge.hostname = ros.hostname();
     if (ros.has_queue()) base.bridge.queue = ros.queue();
     if (ros.has_whitelist()) base.whitelist = ros.whitelist();
     if (ros.has_blacklist()) base.blacklist = ros.blacklist();
@@ -259,6 +260,7 @@ pb::RunnerSettings settingsTo(const RunnerSettings& settings) {
     pb::RosSettings& ros = *message.mutable_ros();
     ros.set_enabled(settings.bridge.enabled);
     ros.set_master_uri(settings.bridge.master_uri);
+    ros.set_hostname(settings.bridge.hostname);
     ros.set_queue(settings.bridge.queue);
     ros.set_whitelist(settings.whitelist);
     ros.set_blacklist(settings.blacklist);
