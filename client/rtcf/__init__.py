@@ -14,6 +14,7 @@ from rtcf.errors import DaemonUnreachableError, RefusedError, RtcfError
 from rtcf.graph_reader import Graph, GraphFileError, read_graphs
 from rtcf.graph_writer import live_spec, write_graphs
 from rtcf.spec import component, parse_parameter, parse_port, parse_remap, parse_value
+from rtcf.tenancy import Tenancy
 
 __version__ = "0.1.0"
 
@@ -24,6 +25,7 @@ __all__ = [
     "GraphFileError",
     "RefusedError",
     "RtcfError",
+    "Tenancy",
     "component",
     "default_socket",
     "live_spec",

@@ -8,6 +8,7 @@ from typing import Any
 import grpc
 
 from rtcf import errors
+from rtcf.tenancy import Tenancy
 from rtcf.v1 import control_pb2, control_pb2_grpc, graph_pb2, runner_pb2
 
 DEFAULT_SOCKET = "/run/rtcfd/control.sock"
@@ -201,6 +202,17 @@ class Client:
             runner=runner, component=component, parameters=parameters
         )
         return self._change(self._stub.SetParameters, request, on_progress)
+
+    def hold_runner(self, opening: control_pb2.OpenHold) -> Tenancy:
+        """Take a runner for as long as the tenancy lasts; its messages are HoldRunnerResponse."""
+        return Tenancy(self._stub.HoldRunner, control_pb2.HoldRunnerRequest, opening, self.socket)
+
+    def lease_component(self, opening: control_pb2.OpenLease) -> Tenancy:
+        """Load a component for as long as the tenancy lasts; its messages are
+        LeaseComponentResponse."""
+        return Tenancy(
+            self._stub.LeaseComponent, control_pb2.LeaseComponentRequest, opening, self.socket
+        )
 
     def list_components(self, runner: str = "") -> list[graph_pb2.ComponentInfo]:
         """Return all components in order of the schedule, without values; then those left out."""

@@ -229,6 +229,8 @@ def _notes(found: graph_pb2.ComponentInfo) -> str:
         notes.append(f"every {spec.every} cycles{phase}")
     if spec.optional:
         notes.append("optional")
+    if found.holder:
+        notes.append(f"held by {found.holder}")
     if found.fault:
         notes.append(found.fault)
     return ", ".join(notes)

@@ -1,6 +1,7 @@
 """`rtcfctl order|connections|break|unbreak`."""
 
 import argparse
+import difflib
 from typing import Any
 
 import rtcf
@@ -52,6 +53,26 @@ def show_connections(client: rtcf.Client, args: argparse.Namespace, output: Outp
             for each in connections
         ),
     )
+
+
+def show_connection(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Print one connection."""
+    wanted = args.connection if args.connection.startswith("/") else "/" + args.connection
+    connections = {each.name: each for each in client.list_connections(args.runner)}
+    found = connections.get(wanted)
+    if found is None:
+        close = difflib.get_close_matches(wanted, connections, n=1)
+        hint = f"; did you mean {close[0]}?" if close else ""
+        raise rtcf.RefusedError(f"no connection {wanted}{hint}", "NOT_FOUND")
+    if not output.for_people:
+        output.data(found)
+        return
+    output.line(f"{found.name}: {found.type}", "bold")
+    output.line(f"  written by {_end(found.writer) if found.HasField('writer') else 'nobody here'}")
+    for reader in found.readers:
+        output.line(f"  read by {_end(reader)}")
+    if ros := _ros(found):
+        output.line(f"  {ros} as a ROS topic")
 
 
 def set_breaks(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:

@@ -4,12 +4,32 @@ Owned by its Runner; store.py keeps it on disk.
 """
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 from google.protobuf import json_format
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 
 from rtcfd import names, settings
 from rtcfd.names import absolute
+
+
+@dataclass(frozen=True)
+class LeaseTerms:
+    """Of a component that stays only while it is held; see leases.py."""
+
+    run_id: str
+    on_lost: int  # OnLeaseLost
+    holder: str  # for people
+
+
+@dataclass
+class HoldTerms:
+    """Of a runner that is held for a while; see holds.py."""
+
+    token: str
+    holder: str  # for people
+    parked: runner_pb2.RunnerSettings  # the runner's own choice, for afterwards
+    added: bool = False  # there is no such runner otherwise
 
 
 class Desired:
@@ -21,6 +41,8 @@ class Desired:
         self.running = False  # the loop was started, and neither stopped nor ended by a fault
         self.quarantined: dict[str, str] = {}  # components that a fault took out, and why
         self.left_out: dict[str, str] = {}  # components that are not loaded, and why
+        self.leased: dict[str, LeaseTerms] = {}  # components that are held; not saved themselves
+        self.hold: HoldTerms | None = None
         self._components: dict[str, graph_pb2.ComponentSpec] = {}
         # The text of each component as it is saved: a change of one among
         # a thousand costs the text of one.
@@ -55,6 +77,15 @@ class Desired:
             self._components.pop(name, None)
             self._texts.pop(name, None)
             self.quarantined.pop(name, None)
+            self.left_out.pop(name, None)
+            self.leased.pop(name, None)
+
+    def let_go(self) -> None:
+        """Forget a hold and what is leased; the settings are the runner's own again."""
+        self.drop(list(self.leased))
+        if self.hold is not None:
+            self.chosen = self.hold.parked
+            self.hold = None
 
     def quarantine(self, full_name: str, reason: str) -> None:
         """Note that a component is not to be loaded until it is released."""
@@ -70,6 +101,9 @@ class Desired:
             self.put(name, spec)
             if name in texts and before[name] == self._components[name]:
                 self._texts[name] = texts[name]
+        self.leased = {
+            name: terms for name, terms in self.leased.items() if name in self._components
+        }
 
     def set_breaks(self, ports: Iterable[control_pb2.PortName], broken: bool) -> None:
         """Note loop breaks that were set or removed."""
@@ -96,13 +130,14 @@ class Desired:
         self._texts.pop(name, None)
 
     def component_texts(self) -> list[str]:
-        """Return each component as a line of JSON."""
-        for name, spec in self._components.items():
+        """Return each component that stays as a line of JSON."""
+        staying = [name for name in self._components if name not in self.leased]
+        for name in staying:
             if name not in self._texts:
                 self._texts[name] = json_format.MessageToJson(
-                    spec, preserving_proto_field_name=True, indent=None
+                    self._components[name], preserving_proto_field_name=True, indent=None
                 )
-        return [self._texts[name] for name in self._components]
+        return [self._texts[name] for name in staying]
 
 
 def replacement(

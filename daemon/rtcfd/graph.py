@@ -5,6 +5,7 @@ Functions on a Runner; each is one transaction of its executor.
 
 import asyncio
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.naming import listing, suggestion
@@ -16,13 +17,15 @@ from rtcfd.desired import replacement
 from rtcfd.errors import InvalidArgument, NoMaster, NotFound, Refusal
 from rtcfd.link import Progress
 from rtcfd.names import absolute, full_name
-from rtcfd.runner import Runner
+
+if TYPE_CHECKING:
+    from rtcfd.runner import Runner
 
 _MASTER_POLL_S = 0.5
 
 
 async def load(
-    runner: Runner, spec: graph_pb2.ComponentSpec, progress: Progress
+    runner: "Runner", spec: graph_pb2.ComponentSpec, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Load a component."""
     library = await runner.catalog.find(spec.package, spec.type)
@@ -41,7 +44,7 @@ async def load(
 
 
 async def load_when_master(
-    runner: Runner, spec: graph_pb2.ComponentSpec, progress: Progress
+    runner: "Runner", spec: graph_pb2.ComponentSpec, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Load a component; wait for a ROS master if its hooks need one and there is none."""
     while True:
@@ -53,7 +56,9 @@ async def load_when_master(
         await asyncio.sleep(_MASTER_POLL_S)
 
 
-async def unload(runner: Runner, names: list[str], progress: Progress) -> control_pb2.ChangeResult:
+async def unload(
+    runner: "Runner", names: list[str], progress: Progress
+) -> control_pb2.ChangeResult:
     """Unload components.
 
     Those that were left out, or belong to an executor that is down, are only
@@ -83,7 +88,7 @@ async def unload(runner: Runner, names: list[str], progress: Progress) -> contro
 
 
 async def replace(
-    runner: Runner, name: str, given: graph_pb2.ComponentSpec, progress: Progress
+    runner: "Runner", name: str, given: graph_pb2.ComponentSpec, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Put a new component in the place of an old one."""
     old = absolute(name)
@@ -108,7 +113,9 @@ async def replace(
     return result
 
 
-async def release(runner: Runner, names: list[str], progress: Progress) -> control_pb2.ChangeResult:
+async def release(
+    runner: "Runner", names: list[str], progress: Progress
+) -> control_pb2.ChangeResult:
     """Load components again that were left out of the loop."""
     if not names:
         raise InvalidArgument("no component named to release")
@@ -140,7 +147,7 @@ async def release(runner: Runner, names: list[str], progress: Progress) -> contr
 
 
 async def apply(
-    runner: Runner, request: control_pb2.ApplyRequest, progress: Progress
+    runner: "Runner", request: control_pb2.ApplyRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Make the graph, and the settings that are given, what a request says."""
     check_graph(request.components)
@@ -178,7 +185,7 @@ async def apply(
     return result
 
 
-def left_out(runner: Runner) -> list[graph_pb2.ComponentInfo]:
+def left_out(runner: "Runner") -> list[graph_pb2.ComponentInfo]:
     """Return what belongs to the graph but is not loaded, with the reason."""
     return [
         graph_pb2.ComponentInfo(
@@ -202,7 +209,7 @@ def check_graph(specs: Sequence[graph_pb2.ComponentSpec]) -> None:
 
 
 async def set_breaks(
-    runner: Runner, request: control_pb2.SetBreaksRequest, progress: Progress
+    runner: "Runner", request: control_pb2.SetBreaksRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Set or remove loop breaks."""
 
@@ -218,7 +225,7 @@ async def set_breaks(
 
 
 async def set_parameters(
-    runner: Runner, request: control_pb2.SetParametersRequest, progress: Progress
+    runner: "Runner", request: control_pb2.SetParametersRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Change parameters of one component."""
     name = absolute(request.component)
@@ -234,12 +241,12 @@ async def set_parameters(
     return result
 
 
-async def _saved(runner: Runner, result: control_pb2.ChangeResult) -> control_pb2.ChangeResult:
+async def _saved(runner: "Runner", result: control_pb2.ChangeResult) -> control_pb2.ChangeResult:
     result.notes.extend(await runner.save())
     return result
 
 
-def _check_known(runner: Runner, full_names: list[str]) -> None:
+def _check_known(runner: "Runner", full_names: list[str]) -> None:
     known = runner.desired.components
     for name in full_names:
         if name not in known:

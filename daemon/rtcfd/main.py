@@ -3,9 +3,10 @@
 import asyncio
 import contextlib
 import logging
+import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import grpc
@@ -19,6 +20,7 @@ from rtcfd.desired import Desired
 from rtcfd.endpoint import Endpoint
 from rtcfd.errors import FailedPrecondition, Refusal
 from rtcfd.executor import left_overs
+from rtcfd.holds import await_holder
 from rtcfd.names import DEFAULT_RUNNER
 from rtcfd.notify import Notify
 from rtcfd.ros_services import RosServices
@@ -69,6 +71,8 @@ class Daemon:
         end = asyncio.Event()
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
             asyncio.get_running_loop().add_signal_handler(number, end.set)
+        if self._options.end_with_stdin:
+            _when_stdin_ends(end.set)
         self._command.prepare()
         try:
             self._store.prepare()
@@ -99,6 +103,8 @@ class Daemon:
 
     async def _start(self) -> None:
         await self._runners.bring_up(self._left_over)
+        for runner in self._runners.all():
+            await_holder(self._runners, runner)
         self._notify.ready(self._runners.summary())
         log.info("ready; runners: %s", self._runners.summary())
 
@@ -114,6 +120,17 @@ class Daemon:
         if self._options.own_runtime_dir:
             with contextlib.suppress(OSError):
                 self._options.runtime_dir.rmdir()
+
+
+def _when_stdin_ends(do: Callable[[], None]) -> None:
+    loop = asyncio.get_running_loop()
+
+    def readable() -> None:
+        if not os.read(0, 4096):
+            loop.remove_reader(0)
+            do()
+
+    loop.add_reader(0, readable)
 
 
 async def _run(given: options.Options) -> None:

@@ -32,6 +32,7 @@ class Options:
     defaults: runner_pb2.RunnerSettings
     default_runner: bool
     ros_services: str  # one of ros_services.LEVELS
+    end_with_stdin: bool
     verbose: bool
 
 
@@ -74,6 +75,7 @@ def parse(arguments: Sequence[str] | None, build_tree: Path | None) -> Options:
         default_runner=args.default_runner,
         # Privately, its ROS is as much its user's as its socket.
         ros_services=file.ros_services or ("admin" if args.foreground else "observe"),
+        end_with_stdin=args.end_with_stdin,
         verbose=args.verbose,
     )
 
@@ -154,6 +156,11 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
         dest="default_runner",
         action="store_false",
         help="do not create the runner rt_runner",
+    )
+    parser.add_argument(
+        "--end-with-stdin",
+        action="store_true",
+        help="end in order when standard input ends: with the process at its other end",
     )
     parser.add_argument("--verbose", action="store_true", help="log debugging messages too")
     return parser

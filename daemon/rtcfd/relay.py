@@ -4,7 +4,7 @@ Owned by the Runner; called by its Link on rtcfd's one thread.
 """
 
 import logging
-from collections.abc import Callable
+from typing import Protocol
 
 from rtcf.executor.v1 import executor_pb2 as wire
 
@@ -26,18 +26,28 @@ _EVENT_LEVELS: dict[int, int] = {
 }
 
 
+class Audience(Protocol):
+    """Who else hears of it: the Runner."""
+
+    def loop_ended(self, component: str, reason: str) -> None:
+        """The loop has ended by itself."""
+
+    def component_failed(self, component: str, reason: str) -> None:
+        """A component has failed; the loop goes on."""
+
+    def take_log(self, record: wire.LogRecord) -> None:
+        """A record has come."""
+
+    def called(self, call: wire.ServiceCall) -> None:
+        """Somebody calls a service of the executor's ROS node."""
+
+
 class Relay:
     """The unasked frames of one runner's executor."""
 
-    def __init__(
-        self,
-        runner: str,
-        on_loop_ended: Callable[[], None],
-        on_call: Callable[[wire.ServiceCall], None],
-    ) -> None:
+    def __init__(self, runner: str, audience: Audience) -> None:
         self._runner = runner
-        self._on_loop_ended = on_loop_ended
-        self._on_call = on_call
+        self._audience = audience
 
     def take(self, response: wire.Response) -> None:
         """Take one unasked frame."""
@@ -47,11 +57,12 @@ class Relay:
         elif kind == "event":
             self._event(response.event)
         elif kind == "service_call":
-            self._on_call(response.service_call)
+            self._audience.called(response.service_call)
         elif kind == "error":
             log.error("%s", response.error.message, extra={"runner": self._runner})
 
     def _log(self, record: wire.LogRecord) -> None:
+        self._audience.take_log(record)
         level = _LEVELS.get(record.level, logging.INFO)
         if not log.isEnabledFor(level):
             return
@@ -87,7 +98,9 @@ class Relay:
             },
         )
         if event.kind == wire.Event.KIND_LOOP_ENDED:
-            self._on_loop_ended()
+            self._audience.loop_ended(event.component, event.message)
+        elif event.kind == wire.Event.KIND_COMPONENT_FAILED:
+            self._audience.component_failed(event.component, event.message)
 
 
 def logger_of(runner: str) -> "logging.LoggerAdapter[logging.Logger]":

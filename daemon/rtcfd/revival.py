@@ -9,8 +9,9 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.graph_writer import live_spec
 from rtcf.naming import listing
-from rtcf.v1 import control_pb2, runner_pb2
+from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 
 from rtcfd.adoption import follow_components, follow_settings
 from rtcfd.catalog import loads
@@ -43,6 +44,7 @@ async def follow(runner: "Runner") -> None:
         status.iteration,
     )  # fmt: skip
     lines = follow_settings(runner.desired, runner.defaults, status.settings)
+    _follow_leased(runner, listed.components.components)
     fresh = status.state == runner_pb2.RUNNER_STATE_STOPPED and not status.iteration
     more, runner.left_out = follow_components(
         runner.desired, listed.components.components, restored=not fresh
@@ -57,6 +59,17 @@ async def follow(runner: "Runner") -> None:
         await _load_each(runner, missing)
     if lines or more or runner.desired.running != was_running:
         await runner.save()
+    runner.leases.await_holders()
+
+
+def _follow_leased(runner: "Runner", found: Iterable[graph_pb2.ComponentInfo]) -> None:
+    """Take leased components, which are not saved, from the executor that has them."""
+    live = {str(info.full_name): info for info in found}
+    for name in list(runner.desired.leased):
+        if name in live:
+            runner.desired.put(name, live_spec(live[name]))
+        else:
+            runner.desired.drop([name])
 
 
 async def restore(runner: "Runner") -> None:

@@ -22,7 +22,9 @@ from rtcfd.crash import Crashes, judge
 from rtcfd.desired import Desired
 from rtcfd.errors import Refusal, Unavailable
 from rtcfd.executor import CONNECT_TIMEOUT_S, Executor
+from rtcfd.leases import Leases
 from rtcfd.link import Progress
+from rtcfd.outbox import Outbox
 from rtcfd.process import End
 from rtcfd.relay import Relay, logger_of
 from rtcfd.store import Store
@@ -33,6 +35,8 @@ STOP_TIMEOUT_S = 30.0
 STATUS_TIMEOUT_S = 2.0
 _LAST_WORDS_S = 2.0  # from the loss of a link to the end of its executor
 _WORTH_SAYING_S = 2.0  # a change that takes longer shows in the status
+
+_Ended = control_pb2.LeaseEnded
 
 Result = TypeVar("Result")
 
@@ -62,7 +66,10 @@ class Runner:
         self.log = logger_of(self.name)
         self._shared = surroundings
         self._turns = Turns(self.name, self.log)
-        self._relay = Relay(self.name, self._loop_ended, self._called)
+        self.leases = Leases(self)
+        self.hold_outbox: Outbox | None = None  # of the holder, if it is there
+        self.fault = ""  # why the loop ended by itself
+        self._relay = Relay(self.name, self)
         self._executor: Executor | None = None
         self._trouble = "its executor is not started"  # why there is none
         self._saving = asyncio.Lock()
@@ -91,13 +98,18 @@ class Runner:
 
         return await self.change("the start of its executor", work)
 
-    async def shut_down(self) -> None:
-        """Stop the loop in order and end the executor."""
+    async def shut_down(
+        self,
+        why: "control_pb2.LeaseEnded.Why" = _Ended.WHY_UNLOADED,
+        message: str = "it is removed",
+    ) -> None:
+        """Stop the loop in order and end the executor; holders hear the last records, then why."""
         self._closing = True
         executor, self._executor = self._executor, None
         self._trouble = "it is being ended"
         if executor is not None:
             await executor.shut_down()
+        self.end_leases(why, f"runner {self.name}: {message}")
         await self._turns.drain()
         await asyncio.gather(*self._background)
 
@@ -133,6 +145,22 @@ class Runner:
         self._shared.on_change()
         return True
 
+    async def restart_executor(self) -> None:
+        """Begin anew with a fresh executor, in a turn; what is desired is loaded, held."""
+        executor, self._executor = self._executor, None
+        if executor is not None:
+            self._trouble = "its executor is being restarted"
+            await executor.shut_down()
+        self.running, self.held, self.fault = False, "", ""
+        await self.start_executor()
+
+    def end_leases(self, why: "control_pb2.LeaseEnded.Why", message: str) -> None:
+        """Tell the holders of this runner and of its components that it is over."""
+        self.leases.end_all(why, message)
+        if self.hold_outbox is not None:
+            self.hold_outbox.end(why, message)
+            self.hold_outbox = None
+
     async def _launch(self) -> Executor:
         executor = await Executor.launch(
             self.name, self._shared.command, self._relay.take, self._ended
@@ -166,22 +194,59 @@ class Runner:
         self._shared.on_change()
         if ours and verdict.orderly:
             self._trouble += f"; `rtcfctl -r {self.name} start` brings it back with its components"
-            self._loop_ended()
+            self.loop_ended("", self._trouble)
         elif ours:
             self.crashes.add()
             self.desired.quarantine(verdict.culprit, str(verdict))
             # From here on a `stop` counts.
             self.desired.running = was_running and revival.resumes(self, verdict)
-            self._in_background(revival.recover(self, verdict, self._trouble))
+            if not self.desired.running:
+                self.fault = self._trouble
+            self.tell()
+            self.in_background(revival.recover(self, verdict, self._trouble))
 
-    def _loop_ended(self) -> None:
+    def loop_ended(self, component: str, reason: str) -> None:
         """The loop has ended by itself."""
+        self.fault = reason
         self._note_running(False)
-        self._in_background(self._save_quietly())
+        self.leases.failed(component, reason)
+        self.in_background(self._save_quietly())
 
-    def _called(self, call: wire.ServiceCall) -> None:
+    def component_failed(self, component: str, reason: str) -> None:
+        """A component was taken out of the loop, which goes on."""
+        self.leases.failed(component, reason)
+
+    def take_log(self, record: wire.LogRecord) -> None:
+        """Hand a record to whom it concerns: the holder of the component, or of the runner."""
+        if self.hold_outbox is None and not self.desired.leased:
+            return
+        copy = control_pb2.LogRecord(
+            level=wire.LogRecord.Level.Name(record.level),
+            time_ns=record.time_ns,
+            iteration=record.iteration,
+            component=record.component,
+            message=record.message,
+        )
+        if record.component:
+            self.leases.take_log(copy)
+        elif self.hold_outbox is not None:
+            self.hold_outbox.log(copy)
+
+    def tell(self) -> None:
+        """After any change: tell who wants to know."""
+        self._shared.on_change()
+        self.leases.settle()
+        if self.hold_outbox is not None:
+            loaded = sum(name not in self.left_out for name in self.desired.components)
+            self.hold_outbox.report(
+                control_pb2.HoldReport(
+                    components=loaded if self.up else 0, running=self.running, fault=self.fault
+                )
+            )
+
+    def called(self, call: wire.ServiceCall) -> None:
         """Somebody calls a service of the executor's ROS node."""
-        self._in_background(self._answer(call))
+        self.in_background(self._answer(call))
 
     async def _answer(self, call: wire.ServiceCall) -> None:
         answer = await self._shared.serve_ros(self, call)
@@ -194,15 +259,17 @@ class Runner:
         # What ends because rtcfd does is to run again.
         if not self._closing:
             self.desired.running = running
-        self._shared.on_change()
+        self.tell()
 
     async def _save_quietly(self) -> None:
         await self.save()
 
-    def _in_background(self, work: Coroutine[Any, Any, None]) -> None:
+    def in_background(self, work: Coroutine[Any, Any, None]) -> "asyncio.Task[None]":
+        """Do what nobody waits for; it is waited for at the end of the runner."""
         task = asyncio.create_task(work)
         self._background.add(task)
         task.add_done_callback(self._background.discard)
+        return task
 
     # -- queries ------------------------------------------------------------
 
@@ -261,6 +328,8 @@ class Runner:
         # Some settings are rtcfd's alone.
         status.settings.CopyFrom(settings.merged(self.settings(), status.settings))
         status.chosen.CopyFrom(self.desired.chosen)
+        if self.desired.hold is not None:
+            status.holder, status.hold = self.desired.hold.holder, self.desired.hold.token
         if self.held:
             lines.append(self.held)
             if status.state == runner_pb2.RUNNER_STATE_STOPPED:
@@ -309,7 +378,7 @@ class Runner:
     async def start_loop(self, progress: Progress | None = None) -> control_pb2.ChangeResult:
         """Start the loop, in a turn."""
         response = await self.ask(wire.Request(start=wire.Start()), progress)
-        self.held = ""
+        self.held = self.fault = ""
         self._note_running(True)
         response.change.notes.extend(await self.save())
         return response.change
@@ -322,6 +391,7 @@ class Runner:
             self.log.info("loop stopped")
         else:
             result = control_pb2.ChangeResult(notes=[f"no loop to stop: {self._trouble}"])
+        self.fault = ""
         was_desired = self.desired.running
         self._note_running(False)
         if was_desired:
@@ -359,7 +429,10 @@ class Runner:
         timeout_s: float | None = CHANGE_TIMEOUT_S,
     ) -> Result:
         """Do one change in its turn."""
-        return await self._turns.take(what, work, timeout_s)
+        try:
+            return await self._turns.take(what, work, timeout_s)
+        finally:
+            self.tell()
 
     async def ask(self, request: wire.Request, progress: Progress | None = None) -> wire.Response:
         """Ask the executor for a change; its caller's limit is change()'s."""

@@ -2,14 +2,15 @@
 
 import asyncio
 import logging
-from collections.abc import Iterable
+from collections.abc import Coroutine, Iterable
+from typing import Any
 
 from rtcf.naming import listing, suggestion
 from rtcf.v1 import control_pb2, runner_pb2
 
 from rtcfd import graph, settings
 from rtcfd.catalog import loads
-from rtcfd.desired import Desired
+from rtcfd.desired import Desired, HoldTerms
 from rtcfd.errors import AlreadyExists, NotFound, Refusal, Unavailable
 from rtcfd.link import Progress
 from rtcfd.names import DEFAULT_RUNNER, check_base_name, full_name
@@ -24,7 +25,8 @@ class Runners:
     def __init__(self, surroundings: Surroundings) -> None:
         self._shared = surroundings
         self._runners: dict[str, Runner] = {}
-        self._closing = False
+        self.closing = asyncio.Event()
+        self._background: set[asyncio.Task[None]] = set()
 
     def adopt(self, states: Iterable[Desired]) -> None:
         """Take runners as they were kept, without starting them yet."""
@@ -37,7 +39,10 @@ class Runners:
 
         async def one(runner: Runner) -> None:
             try:
-                await runner.bring_up()
+                if runner.desired.hold or runner.desired.leased:
+                    await self._bring_up_held(runner)
+                else:
+                    await runner.bring_up()
             except Refusal as refusal:
                 runner.log.error("%s", refusal)
 
@@ -46,6 +51,19 @@ class Runners:
             *(one(runner) for runner in self._runners.values()),
             *(self._take_left_over(name) for name in unknown),
         )
+
+    async def _bring_up_held(self, runner: Runner) -> None:
+        """Of a launch: it goes on if its loop does; otherwise it is over."""
+        if await runner.bring_up(only_left_over=True):
+            return
+        hold = runner.desired.hold
+        runner.desired.let_go()
+        runner.desired.running = False  # that was the launch's loop
+        if hold is not None and hold.added:
+            await self.remove(runner.name)
+            return
+        await runner.save()
+        await runner.bring_up()
 
     async def _take_left_over(self, name: str) -> None:
         runner = self._runners[name] = Runner(Desired(name), self._shared)
@@ -77,9 +95,11 @@ class Runners:
         """Return one line on all loops."""
         return ", ".join(f"{runner.name} {runner.summary()}" for runner in self.all()) or "none"
 
-    async def add(self, name: str, chosen: runner_pb2.RunnerSettings) -> Runner:
+    async def add(
+        self, name: str, chosen: runner_pb2.RunnerSettings, hold: HoldTerms | None = None
+    ) -> Runner:
         """Add a runner and start its executor; if that fails there is no such runner."""
-        if self._closing:
+        if self.closing.is_set():
             raise Unavailable("rtcfd is ending")
         name = check_base_name("runner", name or DEFAULT_RUNNER)
         if name in self._runners:
@@ -89,6 +109,7 @@ class Runners:
         settings.check(chosen)
         desired = Desired(name)
         desired.choose(chosen)
+        desired.hold = hold
         runner = self._runners[name] = Runner(desired, self._shared)
         try:
             await runner.bring_up()
@@ -143,5 +164,14 @@ class Runners:
 
     async def close(self) -> None:
         """Stop all loops in order and end all executors, at once."""
-        self._closing = True
-        await asyncio.gather(*(runner.shut_down() for runner in self._runners.values()))
+        self.closing.set()
+        why = control_pb2.LeaseEnded.WHY_DAEMON_ENDED
+        runners = list(self._runners.values())
+        await asyncio.gather(*(each.shut_down(why, "rtcfd is being ended") for each in runners))
+        await asyncio.gather(*self._background)
+
+    def in_background(self, work: Coroutine[Any, Any, None]) -> None:
+        """Do what nobody waits for; it is waited for at the end."""
+        task = asyncio.create_task(work)
+        self._background.add(task)
+        task.add_done_callback(self._background.discard)

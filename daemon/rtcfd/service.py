@@ -9,7 +9,7 @@ import logging
 import os
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
-from typing import Any
+from typing import Any, Protocol
 
 import grpc
 from rtcf.executor.v1 import executor_pb2 as wire
@@ -17,8 +17,12 @@ from rtcf.v1 import control_pb2, control_pb2_grpc, graph_pb2, runner_pb2
 
 from rtcfd import VERSION, errors, graph
 from rtcfd.catalog import Catalog
+from rtcfd.holds import Hold
+from rtcfd.leases import Lease
 from rtcfd.link import Progress
 from rtcfd.names import absolute
+from rtcfd.outbox import Outbox
+from rtcfd.runner import Runner
 from rtcfd.runners import Runners
 
 log = logging.getLogger(__name__)
@@ -86,6 +90,66 @@ def _changing(
                 task.cancel()  # a change that has begun goes on: see turns.py
 
     return wrapper
+
+
+class _Tenancy(Protocol):
+    """What a call holds for as long as it lasts: a runner, or a component."""
+
+    async def open(self) -> None:
+        """Take it."""
+
+    async def end(self) -> None:
+        """Give it back, at the caller's word."""
+
+    def lost(self) -> None:
+        """The caller has left without a word."""
+
+
+def _holding(method: Callable[..., tuple[Outbox, _Tenancy]]) -> Any:
+    """Serve a call that holds something: its first message opens, `end` or its death ends it."""
+
+    @functools.wraps(method)
+    async def wrapper(self: "Control", requests: Any, context: Any) -> AsyncIterator[Any]:
+        tasks: list[asyncio.Future[None]] = []
+        tenancy: _Tenancy | None = None
+        messages = aiter(requests)
+        try:
+            first = await anext(messages, None)
+            if first is None or first.WhichOneof("kind") != "open":
+                raise errors.InvalidArgument("the first message of such a call is `open`")
+            outbox, tenancy = method(self, first.open)
+            opening = asyncio.ensure_future(_open(tenancy, outbox))
+            tasks = [opening, asyncio.ensure_future(_listen(messages, opening, tenancy, outbox))]
+            async for response in outbox:
+                yield response
+        except Exception as error:
+            await _abort(context, error)
+        finally:
+            if tenancy is not None and not outbox.ended:
+                tenancy.lost()
+            for task in tasks:
+                task.cancel()
+
+    return wrapper
+
+
+async def _open(tenancy: _Tenancy, outbox: Outbox) -> None:
+    try:
+        await tenancy.open()
+    except Exception as error:
+        outbox.refuse(error)
+
+
+async def _listen(
+    messages: AsyncIterator[Any], opening: "asyncio.Future[None]", tenancy: _Tenancy, outbox: Outbox
+) -> None:
+    """Wait for the caller's `end`.  A stream that just ends says nothing: the connection counts."""
+    async for message in messages:
+        if message.WhichOneof("kind") == "end":
+            await asyncio.wait({opening})
+            await tenancy.end()
+            outbox.end(control_pb2.LeaseEnded.WHY_ASKED)
+            return
 
 
 class Control(control_pb2_grpc.ControlServicer):
@@ -186,12 +250,27 @@ class Control(control_pb2_grpc.ControlServicer):
         runner = self._runners.get(request.runner)
         return lambda progress: graph.set_parameters(runner, request, progress)
 
+    @_holding
+    def HoldRunner(self, request: control_pb2.OpenHold) -> Any:
+        """A runner, for as long as the call lasts."""
+        outbox = Outbox(control_pb2.HoldRunnerResponse)
+        return outbox, Hold(self._runners, request, outbox)
+
+    @_holding
+    def LeaseComponent(self, request: control_pb2.OpenLease) -> Any:
+        """A component, for as long as the call lasts."""
+        outbox = Outbox(control_pb2.LeaseComponentResponse)
+        return outbox, Lease(self._runners.get(request.runner), request, outbox)
+
     @_answering
     async def ListComponents(self, request: control_pb2.ListComponentsRequest) -> Any:
         """All components, in order of the schedule; then those that are left out."""
         components = await self._components(request.runner)
-        left_out = graph.left_out(self._runners.get(request.runner))
-        return control_pb2.ListComponentsResponse(components=components + left_out)
+        runner = self._runners.get(request.runner)
+        found = components + graph.left_out(runner)
+        for info in found:
+            _add_holder(runner, info)
+        return control_pb2.ListComponentsResponse(components=found)
 
     @_answering
     async def GetComponent(self, request: control_pb2.GetComponentRequest) -> Any:
@@ -201,8 +280,9 @@ class Control(control_pb2_grpc.ControlServicer):
         runner = self._runners.get(request.runner)
         for info in graph.left_out(runner):
             if info.full_name == name:
-                return info
-        return (await runner.query(wire.Request(get_component=query))).component
+                return _add_holder(runner, info)
+        found = await runner.query(wire.Request(get_component=query))
+        return _add_holder(runner, found.component)
 
     @_answering
     async def GetOrder(self, request: control_pb2.GetOrderRequest) -> Any:
@@ -263,3 +343,10 @@ class Control(control_pb2_grpc.ControlServicer):
         found: list[graph_pb2.ComponentInfo] = list(response.components.components)
         found.sort(key=lambda component: int(component.position))
         return found
+
+
+def _add_holder(runner: Runner, info: graph_pb2.ComponentInfo) -> graph_pb2.ComponentInfo:
+    terms = runner.desired.leased.get(info.full_name)
+    if terms is not None:
+        info.holder = terms.holder or "a client"
+    return info

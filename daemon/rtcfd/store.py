@@ -3,16 +3,18 @@
 A file that cannot be read is set aside and reported, never overwritten.
 """
 
+import dataclasses
 import json
 import logging
 import os
 import time
 from pathlib import Path
+from typing import Any
 
 from google.protobuf import json_format
-from rtcf.v1 import graph_pb2
+from rtcf.v1 import graph_pb2, runner_pb2
 
-from rtcfd.desired import Desired
+from rtcfd.desired import Desired, HoldTerms, LeaseTerms
 from rtcfd.errors import Refusal
 from rtcfd.names import check_base_name, full_name
 
@@ -43,15 +45,14 @@ class Store:
                 states.append(_parse(file.stem, file.read_bytes()))
             except OSError as error:
                 log.error("state %s cannot be read: %s", file, error.strerror)
-            except (ValueError, json_format.ParseError, Refusal) as error:
+            except (ValueError, TypeError, KeyError, json_format.ParseError, Refusal) as error:
                 self._set_aside(file, error)
         return states
 
     def text(self, desired: Desired) -> bytes:
         """Return what save() is to write; on the thread that owns the state."""
-        chosen = json_format.MessageToJson(
-            desired.chosen, preserving_proto_field_name=True, indent=None
-        )
+        # A hold is for now, what it parked is for good.
+        chosen = _json(desired.hold.parked if desired.hold else desired.chosen)
         components = ",\n".join("    " + text for text in desired.component_texts())
         return (
             "{\n"
@@ -59,8 +60,10 @@ class Store:
             f'  "runner": {json.dumps(desired.runner)},\n'
             f'  "settings": {chosen},\n'
             f'  "running": {json.dumps(desired.running)},\n'
-            f'  "quarantined": {json.dumps(desired.quarantined)},\n'
-            f'  "left_out": {json.dumps(desired.left_out)},\n'
+            f'  "quarantined": {json.dumps(_staying(desired, desired.quarantined))},\n'
+            f'  "left_out": {json.dumps(_staying(desired, desired.left_out))},\n'
+            f'  "leased": {json.dumps(_leased(desired))},\n'
+            f'  "hold": {_hold(desired)},\n'
             f'  "components": [\n{components}\n  ]\n'
             "}\n"
         ).encode()
@@ -110,6 +113,26 @@ class Store:
         log.error("state %s is corrupt (%s): set aside as %s", file, reason, aside)
 
 
+def _json(message: Any) -> str:
+    return str(json_format.MessageToJson(message, preserving_proto_field_name=True, indent=None))
+
+
+def _staying(desired: Desired, reasons: dict[str, str]) -> dict[str, str]:
+    return {name: reason for name, reason in reasons.items() if name not in desired.leased}
+
+
+def _leased(desired: Desired) -> dict[str, dict[str, Any]]:
+    return {name: dataclasses.asdict(terms) for name, terms in desired.leased.items()}
+
+
+def _hold(desired: Desired) -> str:
+    hold = desired.hold
+    if hold is None:
+        return "null"
+    fields = {"token": hold.token, "holder": hold.holder, "added": hold.added}
+    return f'{json.dumps(fields)[:-1]}, "settings": {_json(desired.chosen)}}}'
+
+
 def _parse(runner: str, text: bytes) -> Desired:
     document = json.loads(text)
     if not isinstance(document, dict):
@@ -124,6 +147,11 @@ def _parse(runner: str, text: bytes) -> Desired:
         spec = json_format.ParseDict(entry, graph_pb2.ComponentSpec())
         desired.put(full_name(spec), spec)
     desired.running = document.get("running", False) is True
+    for name, terms in document.get("leased", {}).items():
+        desired.leased[name] = LeaseTerms(**terms)
+    if hold := document.get("hold"):
+        desired.hold = HoldTerms(hold["token"], hold["holder"], desired.chosen, hold["added"])
+        desired.chosen = json_format.ParseDict(hold["settings"], runner_pb2.RunnerSettings())
     for name, reason in document.get("quarantined", {}).items():
         desired.quarantine(name, str(reason))
     for name, reason in document.get("left_out", {}).items():

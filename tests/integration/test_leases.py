@@ -1,0 +1,257 @@
+"""Components and runners that stay only as long as somebody holds them."""
+
+import json
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rtcf
+from daemon_process import Daemon, wait_for
+from holders import held, hold, lease, leased
+from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+from values import iteration, wait_until_after
+
+UNLOAD = control_pb2.ON_LEASE_LOST_UNLOAD
+KEEP = control_pb2.ON_LEASE_LOST_KEEP
+ENDED = control_pb2.LeaseEnded
+
+
+def counter(name: str) -> graph_pb2.ComponentSpec:
+    return rtcf.component("rtcf_test", "Counter", name=name, ns="/", remaps=["out:=~out"])
+
+
+def names(client: rtcf.Client) -> list[str]:
+    return [info.full_name for info in client.list_components()]
+
+
+def state(client: rtcf.Client) -> runner_pb2.RunnerStatus:
+    status: runner_pb2.RunnerStatus = client.get_status("rt_runner").runners[0]
+    return status
+
+
+def running(client: rtcf.Client) -> bool:
+    return bool(state(client).state == runner_pb2.RUNNER_STATE_RUNNING)
+
+
+def test_a_component_leaves_at_its_holders_word_and_the_loop_goes_on(client: rtcf.Client) -> None:
+    client.load(counter("stays"))
+    holder = leased(client, counter("leaves"))
+    client.start()
+    (found,) = (info for info in client.list_components() if info.full_name == "/leaves")
+    assert found.holder == "holder of leaves"
+    holder.end()
+    assert names(client) == ["/stays"]
+    wait_until_after(client, iteration(client) + 10)
+
+
+def test_the_death_of_a_holder_stops_the_loop_and_unloads_its_component(
+    client: rtcf.Client, daemon: Daemon
+) -> None:
+    client.load(counter("stays"))
+    holder = leased(client, counter("leaves"))
+    client.start()
+    holder.tenancy.drop()
+    wait_for(lambda: names(client) == ["/stays"], "the component to leave")
+    assert state(client).state == runner_pb2.RUNNER_STATE_STOPPED
+    assert "/leaves: holder of leaves has died: stopping the loop" in daemon.log()
+
+
+def test_the_death_of_a_holder_only_unloads_its_component_if_it_said_so(
+    client: rtcf.Client,
+) -> None:
+    client.load(counter("stays"))
+    holder = leased(client, counter("leaves"), UNLOAD)
+    client.start()
+    holder.tenancy.drop()
+    wait_for(lambda: names(client) == ["/stays"], "the component to leave")
+    wait_until_after(client, iteration(client) + 10)
+
+
+def test_a_component_whose_dead_holder_said_keep_is_saved_like_any_other(
+    client: rtcf.Client, daemon: Daemon
+) -> None:
+    holder = leased(client, counter("kept"), KEEP)
+    client.start()
+    assert "kept" not in saved(daemon)["components"]
+    holder.tenancy.drop()
+    wait_for(lambda: saved(daemon)["components"], "the component in the saved graph")
+    wait_until_after(client, iteration(client) + 10)
+    assert client.get_component("kept").holder == ""
+
+
+def test_leases_of_one_run_that_end_together_leave_in_one_transaction(client: rtcf.Client) -> None:
+    client.load(counter("stays"))
+    holders = [leased(client, counter(f"leaves{i}")) for i in range(4)]
+    other = leased(client, counter("other"), run="other run")
+    client.start()
+    before = state(client).generation
+    for holder in holders:
+        holder.tenancy.end()
+    for holder in holders:
+        assert holder.why() == ENDED.WHY_ASKED
+    assert state(client).generation == before + 1
+    assert sorted(names(client)) == ["/other", "/stays"]
+    other.end()
+
+
+def test_a_holder_hears_that_another_client_has_taken_its_component_out(
+    client: rtcf.Client,
+) -> None:
+    holder = leased(client, counter("taken"))
+    client.unload(["taken"])
+    assert holder.why() == ENDED.WHY_UNLOADED
+    assert "another client" in holder.wait("ended").message
+
+
+@pytest.mark.parametrize(("type_name", "reason"), [("Throws", "threw"), ("CallsAbort", "SIGABRT")])
+def test_the_holder_of_a_component_that_fails_hears_why_and_others_stay(
+    client: rtcf.Client, type_name: str, reason: str
+) -> None:
+    other = leased(client, counter("other"))
+    bad = rtcf.component("rtcf_faults", type_name, name="bad", remaps=["out:=~out"])
+    holder = leased(client, bad)
+    client.start()
+    assert holder.why() == ENDED.WHY_FAILED
+    assert reason in holder.wait("ended").message
+    wait_for(lambda: names(client) == ["/other"], "the component to leave")
+    client.start()  # what is left runs again
+    assert other.of("ended") == []
+    other.end()
+
+
+def test_a_holder_gets_the_log_records_of_its_component_and_of_no_other(
+    client: rtcf.Client,
+) -> None:
+    def witness(name: str) -> graph_pb2.ComponentSpec:
+        return rtcf.component("rtcf_test", "Witness", name=name)
+
+    first = leased(client, witness("first"))
+    second = leased(client, witness("second"))
+    client.start()
+
+    def components(holder: object) -> set[str]:
+        batches = first.of("logs") if holder is first else second.of("logs")
+        return {record.component for batch in batches for record in batch.records}
+
+    wait_for(lambda: components(first) and components(second), "log records")
+    assert components(first) == {"/first"}
+    assert components(second) == {"/second"}
+    for holder in (first, second):
+        holder.end()
+
+
+def test_a_load_that_is_refused_leaves_nothing_behind(client: rtcf.Client, daemon: Daemon) -> None:
+    client.load(counter("there"))
+    refusal = lease(client, counter("there")).refusal()
+    assert "/there is there already" in str(refusal)
+    refusal = lease(client, rtcf.component("rtcf_test", "FailingConfigure", name="bad")).refusal()
+    assert "configure" in str(refusal)
+    refusal = lease(client, rtcf.component("rtcf_examples", "Mino", name="x")).refusal()
+    assert 'did you mean "Mimo"' in str(refusal)
+    refusal = lease(client, counter("new"), hold="nobody's").refusal()
+    assert "the holder of runner rt_runner has ended" in str(refusal)
+    assert names(client) == ["/there"]
+    assert saved(daemon)["leased"] == {}
+
+
+def test_a_loop_outlives_rtcfd_and_those_who_come_back_keep_what_they_held(
+    client: rtcf.Client, daemon: Daemon
+) -> None:
+    held(client, "back", "1")
+    held(client, "away", "2")
+    leased(client, counter("comes_back"), runner="back")
+    leased(client, counter("stays_away"), UNLOAD, runner="back")
+    assert saved(daemon, "back")["components"] == []
+    client.start("back")
+    before = iteration(client, "back")
+    daemon.end(signal.SIGKILL)
+    daemon.start()
+    with rtcf.Client(daemon.socket) as again:
+        assert iteration(again, "back") > before
+        runner = held(again, "back", "1", attach=True)
+        holder = leased(again, counter("comes_back"), runner="back", attach=True)
+        refusal = lease(again, counter("comes_back"), runner="back", attach=True).refusal()
+        assert "keeps no /comes_back" in str(refusal)
+        assert sorted(again.get_order("back")) == ["/comes_back", "/stays_away"]
+        # After 10 s of waiting for the others.
+        wait_for(lambda: again.get_order("back") == ["/comes_back"], "the component to leave")
+        wait_for(
+            lambda: "away" not in [each.runner for each in again.get_status().runners],
+            "the runner whose holder stays away to be removed",
+        )
+        wait_for(lambda: runner.of("report")[-1].running, "the report of a running loop")
+        holder.end()
+        assert again.get_order("back") == []
+        runner.end()
+        assert [each.runner for each in again.get_status().runners] == ["rt_runner"]
+
+
+def test_a_runner_that_is_held_gets_its_own_settings_back(
+    client: rtcf.Client, daemon: Daemon
+) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=100.0, priority=11))
+    holder = held(client, settings=runner_pb2.RunnerSettings(frequency_hz=500.0))
+    status = state(client)
+    assert (status.settings.frequency_hz, status.settings.priority) == (500.0, 11)
+    assert (status.holder, status.hold) == ("holder token", "token")
+    assert saved(daemon)["settings"]["frequency_hz"] == 100.0
+    member = leased(client, counter("member"), hold="token")
+    client.start()
+    wait_for(lambda: holder.of("report")[-1].running, "the report of a running loop")
+    assert holder.of("report")[-1].components == 1
+    holder.end()
+    assert member.why() == ENDED.WHY_RUNNER_ENDED
+    status = state(client)
+    assert (status.settings.frequency_hz, status.hold, status.components) == (100.0, "", 0)
+    assert status.state == runner_pb2.RUNNER_STATE_STOPPED
+
+
+def test_a_runner_that_is_in_use_is_not_given_away(client: rtcf.Client) -> None:
+    client.load(counter("own"))
+    assert "has components of its own (/own)" in str(hold(client).refusal())
+    client.unload(["own"])
+    client.start()
+    assert "the loop of runner rt_runner runs" in str(hold(client).refusal())
+    client.stop()
+    holder = held(client)
+    assert "is held by holder token" in str(hold(client, token="other").refusal())
+    settings = runner_pb2.RunnerSettings(ros=runner_pb2.RosSettings(whitelist="*.ros.*"))
+    refusal = hold(client, "another", "other", settings).refusal()
+    assert "whitelist" in str(refusal) and "*.ros.*" in str(refusal)
+    assert [each.runner for each in client.get_status().runners] == ["rt_runner"]
+    holder.end()
+
+
+def test_a_runner_that_was_added_goes_with_its_dead_holder(client: rtcf.Client) -> None:
+    holder = held(client, "arm")
+    member = leased(client, counter("member"), runner="arm", hold="token")
+    client.start("arm")
+    holder.tenancy.drop()
+    assert member.why() == ENDED.WHY_RUNNER_ENDED
+    wait_for(
+        lambda: [each.runner for each in client.get_status().runners] == ["rt_runner"],
+        "the runner to be removed",
+    )
+
+
+def test_a_launch_that_was_cut_off_with_its_executor_leaves_nothing(
+    client: rtcf.Client, daemon: Daemon
+) -> None:
+    held(client, settings=runner_pb2.RunnerSettings(frequency_hz=500.0, orphan_timeout_s=0.0))
+    held(client, "added", "other", runner_pb2.RunnerSettings(orphan_timeout_s=0.0))
+    leased(client, counter("member"))
+    pids = [status.pid for status in client.get_status().runners]
+    daemon.end(signal.SIGKILL)
+    for pid in pids:
+        wait_for(lambda pid=pid: not Path(f"/proc/{pid}").exists(), "the executors to end")  # type: ignore[misc]
+    daemon.start()
+    with rtcf.Client(daemon.socket) as again:
+        (status,) = again.get_status().runners
+        assert (status.runner, status.hold) == ("rt_runner", "")
+        assert status.settings.frequency_hz == 1000.0
+        assert names(again) == []
+
+
+def saved(daemon: Daemon, runner: str = "rt_runner") -> Any:
+    return json.loads((Path(daemon.socket).parent / "state" / f"{runner}.json").read_text())
