@@ -1,0 +1,83 @@
+"""Which rtcfd holds the runner of a launch: the system's, or a private one.
+
+`auto` takes the system's if it answers and we may use it, it finds each package
+in the folder where we would, it has the same ROS master, and the runner is free.
+"""
+
+import urllib.parse
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import rtcf
+from rtcf.folders import component_folders, packages
+from rtcf.v1 import runner_pb2
+
+from rtcf_launch import rendezvous
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Whether it is the system's, and why."""
+
+    system: bool
+    why: str
+
+
+def choose(socket: str, runner: str, master_uri: str, build_tree: Path | None) -> Choice:
+    """Return what `auto` means here."""
+    try:
+        with rtcf.Client(socket) as client:
+            objection = _objection(client, runner, master_uri, component_folders([], build_tree))
+    except rtcf.DaemonUnreachableError as error:
+        return Choice(False, str(error).partition(": ")[0])  # without how to mend it
+    except rtcf.RtcfError as error:
+        return Choice(False, f"the system daemon says: {error}")
+    if objection:
+        return Choice(False, objection)
+    return Choice(True, "it may be used, has all packages and the same ROS master")
+
+
+def _objection(client: rtcf.Client, runner: str, master_uri: str, folders: Sequence[Path]) -> str:
+    """Say what stands against the system daemon; empty = nothing."""
+    runners = list(client.get_status().runners)
+    here = [each for each in runners if each.runner == runner]
+    for status in here:
+        if status.hold:
+            return f"the system daemon's runner {runner} is held by {status.holder}"
+        if status.components:
+            return f"the system daemon's runner {runner} has components of its own"
+        if status.state == runner_pb2.RUNNER_STATE_RUNNING:
+            return f"the loop of the system daemon's runner {runner} runs"
+    for status in here or runners[:1]:
+        uri = status.settings.ros.master_uri
+        if not same_master(uri, master_uri):
+            return f"the system daemon has another ROS master: {uri}, not {master_uri}"
+    for package, libraries in sorted(packages(folders).items()):
+        # The system's folders are searched by every rtcfd.
+        if str(libraries[0]).startswith("/usr/lib/"):
+            continue
+        wanted = libraries[0].parent
+        try:
+            found = {Path(each.library).parent for each in client.list_types(package).types}
+        except rtcf.RefusedError:
+            found = set()
+        if wanted not in found:
+            return f"the system daemon does not load package {package} from {wanted}"
+    return ""
+
+
+def same_master(one: str, other: str) -> bool:
+    """Tell whether two URIs mean the same master, as far as names tell."""
+    return _address(one) == _address(other)
+
+
+def _address(uri: str) -> tuple[str, int | None]:
+    try:
+        parts = urllib.parse.urlsplit(uri)
+        port = parts.port
+    except ValueError:
+        return uri, None
+    name = (parts.hostname or "").lower()
+    ours = ("localhost", "127.0.0.1", "::1", "127.0.1.1", rendezvous.host().lower())
+    return "localhost" if name in ours else name, port

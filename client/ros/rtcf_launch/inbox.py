@@ -1,0 +1,64 @@
+"""What the one thread of a node waits for: signals, and the messages of a tenancy.
+
+The main thread owns it; each tenancy has a thread of its own that reads it.
+"""
+
+import signal
+import threading
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from typing import Any
+
+import rtcf
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The process was asked to end."""
+
+
+@dataclass(frozen=True)
+class Lost:
+    """A tenancy ended without its last message."""
+
+    error: rtcf.RtcfError
+
+
+class Inbox:
+    """A queue that signals may fill too."""
+
+    def __init__(self) -> None:
+        self._queue: SimpleQueue[Any] = SimpleQueue()
+        self.asked = False
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self._signalled)
+
+    def read(self, tenancy: rtcf.Tenancy) -> None:
+        """Let the messages of a tenancy come in here."""
+        threading.Thread(target=self._read, args=(tenancy,), daemon=True).start()
+
+    def get(self, timeout_s: float | None = None) -> Any:
+        """Return what comes next; None when the time is up."""
+        try:
+            return self._queue.get(timeout=timeout_s)
+        except Empty:
+            return None
+
+    def pause(self, seconds: float) -> bool:
+        """Wait, but not longer than until the process is asked to end; tell whether it was."""
+        if not self.asked:
+            event = self.get(seconds)
+            if event is not None and not isinstance(event, Asked):
+                self._queue.put(event)
+        return self.asked
+
+    def _signalled(self, _: int, __: Any) -> None:
+        self.asked = True
+        self._queue.put(Asked())
+
+    def _read(self, tenancy: rtcf.Tenancy) -> None:
+        try:
+            for message in tenancy:
+                self._queue.put(message)
+        except rtcf.RtcfError as error:
+            self._queue.put(Lost(error))

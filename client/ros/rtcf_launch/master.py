@@ -1,0 +1,62 @@
+"""The parameter server of a ROS master, with a limit for each call."""
+
+import xmlrpc.client
+from http.client import HTTPException
+from typing import Any
+
+TIMEOUT_S = 2.0
+
+
+class MasterSilent(Exception):
+    """No master answers."""
+
+
+class _Transport(xmlrpc.client.Transport):
+    def __init__(self, timeout_s: float) -> None:
+        super().__init__()
+        self._timeout_s = timeout_s
+
+    def make_connection(self, host: Any) -> Any:
+        connection = super().make_connection(host)
+        connection.timeout = self._timeout_s
+        return connection
+
+
+class Master:
+    """One master.  Every call returns in `timeout_s`, or raises MasterSilent."""
+
+    def __init__(self, uri: str, caller: str, timeout_s: float = TIMEOUT_S) -> None:
+        self.uri = uri
+        self._caller = caller
+        self._timeout_s = timeout_s
+
+    def parameter(self, name: str, default: Any = None) -> Any:
+        """Return a parameter; a namespace is a dict."""
+        code, _, value = self._call("getParam", name)
+        return value if code == 1 else default
+
+    def has(self, name: str) -> bool:
+        """Tell whether a parameter or namespace is there."""
+        return bool(self._call("hasParam", name)[2])
+
+    def set(self, name: str, value: Any) -> None:
+        """Set a parameter."""
+        self._call("setParam", name, value)
+
+    def delete(self, name: str) -> None:
+        """Delete a parameter, if it is there."""
+        self._call("deleteParam", name)
+
+    def _call(self, method: str, *arguments: Any) -> Any:
+        # A connection for each call: a master may be restarted between two of them.
+        try:
+            proxy = xmlrpc.client.ServerProxy(self.uri, transport=_Transport(self._timeout_s))
+            with proxy:
+                answer = getattr(proxy, method)(self._caller, *arguments)
+            if not (isinstance(answer, list) and len(answer) == 3):
+                raise ValueError
+            return answer
+        except (OSError, HTTPException, xmlrpc.client.Error, ValueError):
+            raise MasterSilent(
+                f"no ROS master answers at {self.uri}: start roscore, or set ROS_MASTER_URI"
+            ) from None

@@ -1,0 +1,92 @@
+"""Private parameters of a node: reading them with their types, one clear line for what is wrong."""
+
+import difflib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from rtcf_launch.codes import Code, Ending
+
+_MISSING = object()
+
+
+def _wrong(message: str) -> Ending:
+    return Ending(Code.USAGE, message)
+
+
+class Parameters:
+    """The private parameters of one node; each is taken by its name."""
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        self._values = dict(values)
+
+    def boolean(self, name: str, default: bool | None = None) -> bool | None:
+        """Take true or false."""
+        value = self._take(name)
+        if value is _MISSING:
+            return default
+        if not isinstance(value, bool):
+            raise _wrong(f"~{name} must be true or false, not {_shown(value)}")
+        return value
+
+    def integer(self, name: str, low: int, high: int) -> int | None:
+        """Take an integer in a range."""
+        value = self._take(name)
+        if value is _MISSING:
+            return None
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise _wrong(f"~{name} must be an integer, not {_shown(value)}")
+        if not low <= value <= high:
+            raise _wrong(f"~{name} of {value} is out of range: {low} to {high}")
+        return value
+
+    def number(self, name: str, low: float, high: float) -> float | None:
+        """Take a number in a range."""
+        value = self._take(name)
+        if value is _MISSING:
+            return None
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise _wrong(f"~{name} must be a number, not {_shown(value)}")
+        if not low <= value <= high:  # NaN is in no range
+            raise _wrong(f"~{name} of {value:g} is out of range: {low:g} to {high:g}")
+        return float(value)
+
+    def text(self, name: str) -> str | None:
+        """Take a string."""
+        value = self._take(name)
+        if value is _MISSING:
+            return None
+        if not isinstance(value, str):
+            raise _wrong(f"~{name} must be a string, not {_shown(value)}: put it in quotes")
+        return value
+
+    def word(self, name: str, allowed: Iterable[str]) -> str | None:
+        """Take one of some words."""
+        value = self._take(name)
+        if value is _MISSING:
+            return None
+        words = list(allowed)
+        if value not in words:
+            raise _wrong(f"~{name} must be one of {', '.join(words)}, not {_shown(value)}")
+        return str(value)
+
+    def raw(self, name: str) -> Any:
+        """Take a value of any type; None if it is not there."""
+        value = self._take(name)
+        return None if value is _MISSING else value
+
+    def rest(self) -> dict[str, Any]:
+        """Return what nobody has taken."""
+        return dict(self._values)
+
+    def _take(self, name: str) -> Any:
+        return self._values.pop(name, _MISSING)
+
+
+def close_to(name: str, known: Iterable[str]) -> str:
+    """Return '; did you mean ~x?', or nothing."""
+    close = difflib.get_close_matches(name, list(known), n=1)
+    return f"; did you mean ~{close[0]}?" if close else ""
+
+
+def _shown(value: Any) -> str:
+    return f'"{value}"' if isinstance(value, str) else str(value)

@@ -1,0 +1,98 @@
+"""A rtcfd of an rt_runner's own: for the life of a launch, on a plain user's account.
+
+It lives in a folder that only its user may enter, loads components from that
+user's folders, keeps no state, and ends with rt_runner, however that ends.
+"""
+
+import contextlib
+import os
+import shutil
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+from rtcf_launch.codes import Code, Ending
+
+_START_S = 30.0
+_END_S = 3.5
+_POLL_S = 0.02
+_TAIL = 5  # lines
+
+
+def program(build_tree: Path | None) -> Path:
+    """Return the rtcfd that belongs to this rt_runner."""
+    return Path("/usr/bin/rtcfd") if build_tree is None else build_tree / "bin" / "rtcfd"
+
+
+class PrivateDaemon:
+    """The process and its folder."""
+
+    def __init__(self, build_tree: Path | None, log_file: str) -> None:
+        self._program = program(build_tree)
+        # Of XDG_RUNTIME_DIR it is certain that no other user enters it; mkdtemp sees to the rest.
+        runtime = os.environ.get("XDG_RUNTIME_DIR")
+        parent = runtime if runtime and os.access(runtime, os.W_OK) else None
+        self._folder = Path(tempfile.mkdtemp(prefix="rtcf-", dir=parent))
+        self.socket = self._folder / "control.sock"
+        self.log_file = (
+            Path(log_file.removesuffix(".log") + ".rtcfd.log")
+            if log_file
+            else self._folder / "rtcfd.log"
+        )
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        """Start it and wait until it serves."""
+        if not os.access(self._program, os.X_OK):
+            raise Ending(
+                Code.REFUSED, f"no rtcfd at {self._program}: install it (apt install rtcfd)"
+            )
+        self.log_file.parent.mkdir(parents=True, exist_ok=True)
+        with self.log_file.open("wb") as log:
+            self._process = subprocess.Popen(
+                [
+                    *(str(self._program), "--foreground", "--end-with-stdin"),
+                    *("--no-default-runner", "--socket", str(self.socket)),
+                ],
+                # It ends when this pipe does: with us.
+                stdin=subprocess.PIPE,
+                stdout=log,
+                stderr=log,
+                # Ctrl-C is for us; we end it in order.
+                start_new_session=True,
+            )
+        deadline = time.monotonic() + _START_S
+        while not self.socket.exists():
+            if self.ended:
+                raise Ending(Code.REFUSED, f"rtcfd did not start: {self.last_words()}")
+            if time.monotonic() > deadline:
+                raise Ending(Code.REFUSED, f"rtcfd does not serve {self.socket}")
+            time.sleep(_POLL_S)
+
+    @property
+    def ended(self) -> bool:
+        """Tell whether it runs no more."""
+        return self._process is None or self._process.poll() is not None
+
+    def last_words(self) -> str:
+        """Return the end of its log."""
+        with contextlib.suppress(OSError):
+            lines = self.log_file.read_text(errors="replace").splitlines()
+            return "; ".join(lines[-_TAIL:])
+        return "it has no log"
+
+    def end(self) -> None:
+        """End it, by force if it must be; remove its folder."""
+        process = self._process
+        if process is not None:
+            if process.stdin is not None:
+                process.stdin.close()
+            process.terminate()
+            try:
+                process.wait(_END_S)
+            except subprocess.TimeoutExpired:
+                # Its executors follow: they stop without a rtcfd.
+                process.kill()
+                process.wait()
+        shutil.rmtree(self._folder, ignore_errors=True)

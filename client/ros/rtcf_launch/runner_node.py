@@ -1,0 +1,302 @@
+"""rt_runner: holds a runner for the life of a launch, and starts its loop when it is time.
+
+Exit statuses: codes.py.
+"""
+
+import contextlib
+import os
+import re
+import secrets
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import rtcf
+from rtcf.client import DEFAULT_SOCKET
+from rtcf.v1 import control_pb2
+
+from rtcf_launch import arguments, rendezvous, runner_parameters
+from rtcf_launch.codes import Code, Ending
+from rtcf_launch.daemon_choice import choose
+from rtcf_launch.inbox import Asked, Inbox, Lost
+from rtcf_launch.master import Master, MasterSilent
+from rtcf_launch.private_daemon import PrivateDaemon
+from rtcf_launch.screen import Screen
+
+# rtcfd waits as long for us after its restart; a little more for the restart itself.
+_RETURN_S = 15.0
+_RETRY_S = 0.3
+_PREDECESSOR_S = 5.0
+_END_S = 3.0
+_LAST_CALL_S = 0.5
+
+USAGE = """\
+usage: rosrun rtcf rt_runner [__name:=NAME] [_PARAMETER:=VALUE]...
+
+Holds a real-time loop for the life of a launch; rt_launcher loads components into it.
+
+private parameters:
+  frequency                cycles per second, 0.1 to 20000 (default: 1000)
+  mode                     wait_for_components, no_wait or wait_for_trigger
+  num_components_expected  for wait_for_components: start when so many are loaded
+  ros_mapping_whitelist    regular expression: connections that become ROS topics
+  ros_mapping_blacklist    exceptions from it
+  ros_queue                messages kept for a slow subscriber (default: 1000)
+  wait_policy              after a late cycle: absolute (catch up) or relative
+  overrun                  the same with all choices: skip (default), catch_up, relative
+  max_overruns             stop the loop when a leaky bucket of so many is full; 0: never
+  cpu_affinity_mask, cpu   where the loop runs: a bit for each CPU (the last one counts), or one
+  priority                 of SCHED_FIFO, 1 to 98 (default: 80)
+  spin                     busy wait before each cycle, in us, or "auto" (default: 0)
+  realtime                 required, or preferred: may it run without real-time rights?
+  lock_memory, safe_heap_size_kB, safe_stack_size_kB
+                           memory that is locked and touched at the start
+  stall_timeout            end a cycle that makes no progress, in s; 0: never (default: 2)
+  warmup_cycles            first cycles, kept out of the statistics (default: 10)
+  on_crash                 hold, or resume without a component that is optional
+  on_fault                 when the loop ends by a fault: exit (default), or stay
+  daemon                   auto (default), system or private: whose rtcfd it is
+
+exit status: 0 asked to end, 1 refused, 2 wrong parameters, 3 the loop ended by a fault,
+4 rtcfd has gone
+"""
+
+
+class RunnerNode:
+    """One rt_runner."""
+
+    def __init__(self, given: arguments.Arguments, build_tree: Path | None) -> None:
+        self._given = given
+        self._build_tree = build_tree
+        self._node = given.full_name
+        self._runner = runner_name(self._node)
+        self._screen = Screen(self._node)
+        self._inbox = Inbox()
+        self._master = Master(given.master_uri, self._node)
+        self._daemon: PrivateDaemon | None = None
+        self._tenancy: rtcf.Tenancy | None = None
+        self._client: rtcf.Client | None = None
+        self._announced = False
+        self._lost_since: float | None = None
+
+    def run(self) -> Code:
+        """Serve until it is asked to end or something ends it."""
+        try:
+            self._parameters = self._read_parameters()
+            self._check_free()
+            self._take()
+            return self._serve()
+        except (Ending, MasterSilent, rtcf.RtcfError) as error:
+            code = error.code if isinstance(error, Ending) else Code.REFUSED
+            if code != Code.DONE:
+                self._screen.error(str(error))
+            return code
+        finally:
+            self._end()
+
+    # -- the begin ----------------------------------------------------------
+
+    def _read_parameters(self) -> runner_parameters.RunnerParameters:
+        for name, value in self._given.private.items():
+            self._master.set(f"{self._node}/{name}", value)
+        values = self._master.parameter(self._node, {})
+        parameters, lines = runner_parameters.read(values if isinstance(values, dict) else {})
+        for line in lines:
+            self._screen.warn(line)
+        parameters.settings.ros.master_uri = self._given.master_uri
+        parameters.settings.ros.hostname = self._given.hostname
+        return parameters
+
+    def _check_free(self) -> None:
+        there = rendezvous.find(self._master, self._node)
+        if there is not None and there.host == rendezvous.host() and rendezvous.alive(there):
+            raise Ending(
+                Code.REFUSED,
+                f"a runner {self._node} is there already at this ROS master: "
+                "end its launch, or give this one another name",
+            )
+
+    def _take(self) -> None:
+        wanted = self._parameters.daemon
+        socket = os.environ.get("RTCF_SOCKET") or DEFAULT_SOCKET
+        why = f"~daemon is {wanted}"
+        if wanted != "private":
+            self._await_predecessor(socket)
+        if wanted == "auto":
+            choice = choose(socket, self._runner, self._given.master_uri, self._build_tree)
+            wanted, why = ("system" if choice.system else "private"), choice.why
+        if wanted == "private":
+            self._daemon = PrivateDaemon(self._build_tree, self._given.log_file)
+            self._daemon.start()
+            socket = str(self._daemon.socket)
+            self._screen.info(f"private daemon at {socket}, log in {self._daemon.log_file} ({why})")
+        else:
+            self._screen.info(f"system daemon at {socket} ({why})")
+        self._client = rtcf.Client(socket)
+        self._token = secrets.token_hex(8)
+        self._hold()
+
+    def _await_predecessor(self, socket: str) -> None:
+        """Wait until rtcfd has taken the runner back from an rt_runner of our name that died."""
+        deadline = time.monotonic() + _PREDECESSOR_S
+        with rtcf.Client(socket) as client, contextlib.suppress(rtcf.RtcfError):
+            while time.monotonic() < deadline:
+                (status,) = client.get_status(self._runner).runners
+                if not status.holder.startswith(f"rt_runner {self._node} ("):
+                    return
+                if self._inbox.pause(_RETRY_S):
+                    raise Ending(Code.DONE)
+
+    def _hold(self, attach: bool = False) -> None:
+        assert self._client is not None
+        self._tenancy = self._client.hold_runner(
+            control_pb2.OpenHold(
+                runner=self._runner,
+                settings=self._parameters.settings,
+                holder=f"rt_runner {self._node} (pid {os.getpid()})",
+                token=self._token,
+                attach=attach,
+            )
+        )
+        self._inbox.read(self._tenancy)
+
+    # -- the loop's life ----------------------------------------------------
+
+    def _serve(self) -> Code:
+        self._was_running = False
+        self._fault = ""
+        self._complete = False
+        while True:
+            event = self._inbox.get()
+            if isinstance(event, Asked):
+                return Code.DONE
+            if isinstance(event, Lost):
+                self._reconnect(event.error)
+                continue
+            kind = event.WhichOneof("kind")
+            if kind == "taken":
+                self._taken(event.taken)
+            elif kind == "logs":
+                self._screen.records(event.logs)
+            elif kind == "report":
+                self._report(event.report)
+            elif kind == "ended":
+                raise Ending(Code.LOST, event.ended.message)
+
+    def _taken(self, status: Any) -> None:
+        if self._lost_since is not None:
+            self._lost_since = None
+            self._screen.info("rtcfd is back, the runner is kept")
+            return
+        assert self._client is not None
+        meeting = rendezvous.Meeting(
+            self._client.socket, self._runner, self._token, rendezvous.host()
+        )
+        rendezvous.announce(self._master, self._node, meeting)
+        self._announced = True
+        frequency = status.settings.frequency_hz
+        if self._parameters.mode == "wait_for_components":
+            what = f"waiting for {self._parameters.components} components"
+        elif self._parameters.mode == "wait_for_trigger":
+            what = f"waiting for `rtcfctl -r {self._runner} start` or the service activate_rt_loop"
+        else:
+            what = "starting"
+        self._screen.info(f"runner {self._runner} at {frequency:g} Hz: {what}")
+        if self._parameters.mode == "no_wait":
+            self._start()
+
+    def _report(self, report: control_pb2.HoldReport) -> None:
+        if report.running and not self._was_running:
+            self._screen.info(f"the loop runs with {report.components} components")
+        elif self._was_running and not report.running and not report.fault:
+            self._screen.info("the loop is stopped")
+        self._was_running = report.running
+        if report.fault and report.fault != self._fault:
+            if self._parameters.exit_on_fault:
+                raise Ending(Code.FAILED, f"the loop has ended: {report.fault}")
+            self._screen.error(f"the loop has ended: {report.fault}")
+        self._fault = report.fault
+        complete = report.components >= self._parameters.components
+        # Once for each time that it becomes complete: who stops the loop has his reasons.
+        due = self._parameters.mode == "wait_for_components" and complete and not self._complete
+        self._complete = complete
+        if due and not report.running:
+            self._start()
+
+    def _start(self) -> None:
+        assert self._client is not None
+        try:
+            result = self._client.start(self._runner)
+        except rtcf.RefusedError as refusal:
+            raise Ending(Code.REFUSED, f"the loop does not start: {refusal}") from None
+        for note in result.notes:
+            self._screen.warn(note)
+
+    def _reconnect(self, error: rtcf.RtcfError) -> None:
+        if isinstance(error, rtcf.RefusedError):
+            code = Code.REFUSED if self._lost_since is None else Code.LOST
+            raise Ending(code, str(error))
+        if self._daemon is not None:
+            time.sleep(_RETRY_S)  # for the reason to be in its log
+            raise Ending(Code.LOST, f"the private rtcfd has ended: {self._daemon.last_words()}")
+        now = time.monotonic()
+        if not self._announced:
+            raise Ending(Code.REFUSED, str(error))
+        if self._lost_since is None:
+            self._lost_since = now
+            self._screen.warn(f"{error}; the loop goes on, coming back")
+        if now - self._lost_since > _RETURN_S:
+            raise Ending(Code.LOST, str(error))
+        if not self._inbox.pause(_RETRY_S):
+            self._hold(attach=True)
+        else:
+            raise Ending(Code.DONE)
+
+    # -- the end ------------------------------------------------------------
+
+    def _end(self) -> None:
+        if self._announced:
+            try:
+                master = Master(self._given.master_uri, self._node, _LAST_CALL_S)
+                found = rendezvous.find(master, self._node)
+                if found is not None and found.token == self._token:
+                    rendezvous.withdraw(master, self._node)
+            except MasterSilent:
+                pass
+        if self._daemon is not None:
+            self._daemon.end()
+        elif self._tenancy is not None:
+            self._tenancy.end()
+            deadline = time.monotonic() + _END_S
+            while (left := deadline - time.monotonic()) > 0:
+                event = self._inbox.get(left)
+                if isinstance(event, Lost):
+                    break
+                if hasattr(event, "WhichOneof") and event.WhichOneof("kind") == "ended":
+                    break
+        if self._client is not None:
+            self._client.close()
+
+
+def runner_name(node: str) -> str:
+    """Return the name of a node's runner: /arm/rt_runner is arm_rt_runner."""
+    return re.sub(r"[^A-Za-z0-9_]", "_", node.strip("/"))
+
+
+def main(argv: Sequence[str] | None = None, build_tree: Path | None = None) -> int:
+    """Run rt_runner; return its exit status."""
+    words = sys.argv[1:] if argv is None else argv
+    if "-h" in words or "--help" in words:
+        print(USAGE, end="")
+        return Code.DONE
+    try:
+        given = arguments.parse(words, os.environ, "rt_runner")
+    except ValueError as error:
+        print(f"rt_runner: {error}", file=sys.stderr)
+        return Code.USAGE
+    if given.words:
+        print(f"rt_runner: unexpected argument {given.words[0]}\n{USAGE}", file=sys.stderr, end="")
+        return Code.USAGE
+    return RunnerNode(given, build_tree).run()

@@ -1,0 +1,139 @@
+"""The private parameters of rt_runner, and the settings of a runner they stand for."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rtcf.enums import choices
+from rtcf.v1 import runner_pb2
+
+from rtcf_launch.codes import Code, Ending
+from rtcf_launch.parameters import Parameters, close_to
+from rtcf_launch.rendezvous import NAME as RENDEZVOUS
+
+MODES = ("wait_for_components", "no_wait", "wait_for_trigger")
+DAEMONS = ("auto", "system", "private")
+# The paper's words for what follows a late cycle.
+_WAIT_POLICIES = {
+    "absolute": runner_pb2.OVERRUN_POLICY_CATCH_UP,
+    "relative": runner_pb2.OVERRUN_POLICY_RELATIVE,
+}
+_OVERRUNS = choices(runner_pb2.OverrunPolicy.DESCRIPTOR)
+_REALTIME = choices(runner_pb2.Realtime.DESCRIPTOR)
+_ON_CRASH = choices(runner_pb2.OnCrash.DESCRIPTOR)
+_LARGEST = 2**31 - 1  # XML-RPC has no larger integers
+
+_NAMES = (
+    *("frequency", "mode", "num_components_expected", "ros_mapping_whitelist"),
+    *("ros_mapping_blacklist", "ros_queue", "wait_policy", "overrun", "max_overruns"),
+    *("lock_memory", "safe_heap_size_kB", "safe_stack_size_kB", "cpu_affinity_mask", "cpu"),
+    *("priority", "spin", "realtime", "stall_timeout", "warmup_cycles", "on_crash"),
+    *("daemon", "on_fault"),
+)
+
+
+@dataclass
+class RunnerParameters:
+    """What an rt_runner is asked to do."""
+
+    settings: runner_pb2.RunnerSettings
+    mode: str
+    components: int  # expected, in the mode wait_for_components
+    daemon: str
+    exit_on_fault: bool
+
+
+def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
+    """Check all parameters; return what they say, and a line for each that is not known."""
+    given = Parameters(values)
+    settings = runner_pb2.RunnerSettings()
+
+    def put(field: str, value: Any, message: Any = settings) -> None:
+        if value is not None:
+            setattr(message, field, value)
+
+    put("frequency_hz", given.number("frequency", 0.1, 20000.0))
+    put("priority", given.integer("priority", 1, 98))
+    put("lock_memory", given.boolean("lock_memory"))
+    put("heap_kb", given.integer("safe_heap_size_kB", 0, 1024 * 1024))
+    put("stack_kb", given.integer("safe_stack_size_kB", 16, 64 * 1024))
+    put("max_overruns", given.integer("max_overruns", 0, _LARGEST))
+    put("warmup_cycles", given.integer("warmup_cycles", 0, _LARGEST))
+    stall_s = given.number("stall_timeout", 0.0, 3600.0)
+    put("stall_timeout_ms", None if stall_s is None else round(stall_s * 1000))
+    put("realtime", _value(_REALTIME, given.word("realtime", _REALTIME)))
+    put("on_crash", _value(_ON_CRASH, given.word("on_crash", _ON_CRASH)))
+    put("overrun", _overrun(given))
+    put("cpu", _cpu(given))
+    _spin(given, settings)
+    put("whitelist", given.text("ros_mapping_whitelist"), settings.ros)
+    put("blacklist", given.text("ros_mapping_blacklist"), settings.ros)
+    put("queue", given.integer("ros_queue", 1, 1_000_000), settings.ros)
+
+    components = given.integer("num_components_expected", 1, _LARGEST)
+    mode = given.word("mode", MODES) or ("no_wait" if components is None else MODES[0])
+    if mode == MODES[0] and components is None:
+        raise Ending(
+            Code.USAGE,
+            "~mode is wait_for_components: how many? Set ~num_components_expected",
+        )
+    result = RunnerParameters(
+        settings=settings,
+        mode=mode,
+        components=components or 0,
+        daemon=given.word("daemon", DAEMONS) or DAEMONS[0],
+        exit_on_fault=(given.word("on_fault", ("exit", "stay")) or "exit") == "exit",
+    )
+    # What is no word of ours may be somebody else's; a slip of the pen is not.
+    unknown = sorted(name for name in given.rest() if name != RENDEZVOUS)
+    for name in unknown:
+        if hint := close_to(name, _NAMES):
+            raise Ending(Code.USAGE, f"no parameter ~{name} is known{hint}")
+    return result, [f"parameter ~{name} is not known to rt_runner" for name in unknown]
+
+
+def _overrun(given: Parameters) -> int | None:
+    overrun = given.word("overrun", _OVERRUNS)
+    policy = given.word("wait_policy", _WAIT_POLICIES)
+    if overrun is not None and policy is not None:
+        raise Ending(Code.USAGE, "~wait_policy and ~overrun say the same thing: set one of them")
+    return _value(_OVERRUNS, overrun) or _value(_WAIT_POLICIES, policy)
+
+
+def _cpu(given: Parameters) -> int | None:
+    """Return the CPU: of a mask the last one, as a loop has one."""
+    cpu = given.integer("cpu", -1, 4095)
+    mask = given.raw("cpu_affinity_mask")
+    if mask is None:
+        return cpu
+    if cpu is not None:
+        raise Ending(Code.USAGE, "~cpu and ~cpu_affinity_mask say the same thing: set one of them")
+    if isinstance(mask, bool) or not isinstance(mask, int) or mask < 1:
+        raise Ending(
+            Code.USAGE, f"~cpu_affinity_mask must be an integer with a bit for each CPU, not {mask}"
+        )
+    allowed = [each for each in os.sched_getaffinity(0) if mask >> each & 1]
+    if not allowed:
+        raise Ending(
+            Code.USAGE,
+            f"~cpu_affinity_mask {mask:#x} has none of the CPUs that may be used: "
+            f"{', '.join(str(each) for each in sorted(os.sched_getaffinity(0)))}",
+        )
+    return max(allowed)
+
+
+def _spin(given: Parameters, settings: runner_pb2.RunnerSettings) -> None:
+    spin = given.raw("spin")
+    if spin is None:
+        return
+    if spin == "auto":
+        settings.spin_auto = True
+    elif isinstance(spin, int) and not isinstance(spin, bool) and 0 <= spin <= 1_000_000:
+        settings.spin_us = spin
+    else:
+        raise Ending(Code.USAGE, f'~spin must be a number of µs or "auto", not {spin}')
+
+
+def _value(words: Mapping[str, Any], word: str | None) -> int | None:
+    return None if word is None else int(words[word])

@@ -1,0 +1,321 @@
+"""Launch files with roslaunch: those that come with the examples, and larger ones."""
+
+import itertools
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import fig_1
+import pytest
+import rosgraph
+import rtcf
+from daemon_process import wait_for
+from launch_processes import Launching, Process, left_over
+from ros_processes import Master
+from rtcf.v1 import runner_pb2
+from values import iteration
+
+# What roscore itself has.
+ROSCORE_TOPICS = {"/rosout", "/rosout_agg"}
+
+
+@pytest.fixture
+def launching(tmp_path: Path, master: Master) -> Iterator[Launching]:
+    launching = Launching(master, tmp_path)
+    yield launching
+    launching.end()
+
+
+def running(client: rtcf.Client, runner: str) -> bool:
+    (status,) = client.get_status(runner).runners
+    return bool(status.state == runner_pb2.RUNNER_STATE_RUNNING)
+
+
+def wait_until_running(client: rtcf.Client, runner: str) -> None:
+    wait_for(lambda: running(client, runner), f"the loop of {runner}")
+
+
+def press_ctrl_c(launch: Process) -> None:
+    """End roslaunch; nothing had to be killed, and nothing is left."""
+    launch.end(signal.SIGINT)
+    output = launch.output()
+    assert "escalating" not in output
+    socket = output.partition("private daemon at ")[2].partition(",")[0]
+    wait_for(lambda: not left_over(socket), "the private daemon to end")
+    assert not Path(socket).parent.exists()
+
+
+def topics(master: Master) -> dict[str, str]:
+    """Return the types of the topics of the loops and their peers."""
+    graph = rosgraph.Master("/test", master.uri)
+    published, subscribed, _ = graph.getSystemState()
+    mapped = {topic for topic, _ in published} | {topic for topic, _ in subscribed}
+    types: dict[str, str] = dict(graph.getTopicTypes())
+    own = ("/rt_runner/", "/rtcfd/", "/diagnostics", "/left/rt_runner/", "/right/rt_runner/")
+    return {
+        topic: types[topic]
+        for topic in mapped - ROSCORE_TOPICS
+        if not topic.startswith(own) and "parameter_" not in topic
+    }
+
+
+def nodes(master: Master) -> set[str]:
+    """Return the nodes that publish or subscribe, without roscore's."""
+    state = rosgraph.Master("/test", master.uri).getSystemState()
+    found = {node for part in state for _, users in part for node in users}
+    return {node for node in found if node != "/rosout"}
+
+
+def test_the_papers_evaluation_runs_and_the_tools_find_it(
+    launching: Launching, master: Master
+) -> None:
+    launch = launching.roslaunch("rtcf_examples", "paper_evaluation.launch", "frequency:=500.0")
+    launch.wait_for_output("the loop runs with 5 components")
+    assert "/H1: rtcf_examples/Mimo loaded into runner rt_runner" in launch.output()
+    wait_for(lambda: len(topics(master)) == 3, "the topics")
+    wait_for(lambda: len(nodes(master)) == 3, "the nodes")
+    assert topics(master) == dict.fromkeys(("/R3_G2H1", "/R1_H1R2", "/G2_R2"), "std_msgs/Float64")
+    loop = next(name for name in nodes(master) if name.startswith("/rtcfd/"))
+    assert loop.endswith("/rt_runner")
+    assert nodes(master) == {loop, "/G1", "/G2"}
+
+    assert launching.tool("component_order").stdout.split() == fig_1.ORDER
+    listed = launching.tool("component_list").stdout
+    assert all(name in listed for name in fig_1.ORDER) and "rt_launcher /R2" in listed
+    assert "rtcf_examples/Mimo" in launching.tool("component_info", "R2").stdout
+    assert "/R1_H1R2" in launching.tool("connection_list").stdout
+    info = launching.tool("connection_info", "R1_H1R2")
+    assert "written by /R1.out1" in info.stdout and "published" in info.stdout
+    unknown = launching.tool("connection_info", "R1_H1R3")
+    assert (unknown.returncode, unknown.stderr) == (
+        1,
+        "connection_info: no connection /R1_H1R3; did you mean /R1_H1R2?\n",
+    )
+    with launching.client() as (client, runner):
+        # G2 answers: its value has come into the loop.
+        wait_for(
+            lambda: next(p for p in client.get_component("R2", runner).ports if p.name == "in4")
+            .count > 0,
+            "an answer of G2",
+        )  # fmt: skip
+    press_ctrl_c(launch)
+
+
+def test_listing_2_of_the_paper_runs(launching: Launching, master: Master) -> None:
+    launch = launching.roslaunch("rtcf_examples", "paper_example.launch")
+    launch.wait_for_output("the loop runs with 2 components")
+    wait_for(lambda: len(topics(master)) == 2, "the topics")
+    assert set(topics(master)) == {"/ros/in", "/ros/out"}
+    assert launching.tool("component_order").stdout.split() == ["/example1", "/example2"]
+    with launching.client() as (client, runner):
+        assert client.get_component("example1", runner).spec.first
+    press_ctrl_c(launch)
+
+
+def test_records_of_a_component_are_on_the_screen_and_a_killed_launcher_comes_back(
+    launching: Launching,
+) -> None:
+    launch = launching.roslaunch("rtcf_examples", "logging.launch")
+    launch.wait_for_output("/wave: configured: amplitude 1, rate 1 Hz")
+    launch.wait_for_output("/wave: up through zero in cycle")
+    launch.wait_for_output("the loop runs with 1 components")
+    os.kill(launch.children()["wave"], signal.SIGKILL)
+    # Its death stops the loop; when roslaunch has started it again, the loop is complete again.
+    wait_for(lambda: launch.output().count("the loop runs with 1 components") == 2, "the respawn")
+    press_ctrl_c(launch)
+    assert "/wave: stopped" in launch.output()
+
+
+def test_private_parameters_are_values_of_declared_ones(
+    launching: Launching, master: Master
+) -> None:
+    launch = launching.roslaunch("rtcf_examples", "parameters.launch")
+    with launching.client() as (client, runner):
+        wait_until_running(client, runner)
+
+        def values(name: str) -> dict[str, object]:
+            found = client.get_component(name, runner).parameters
+            return {
+                each.name: getattr(each.value, str(each.value.WhichOneof("kind"))) for each in found
+            }
+
+        left = {"amplitude": 2.5, "rate": 0.5, "shape": "sine", "silent": False}
+        right = {"amplitude": 1.0, "rate": 2.0, "shape": "square", "silent": False}
+        assert values("/left/generator") == left
+        assert values("/right/generator") == right
+    wait_for(lambda: len(topics(master)) == 2, "the topics")
+    assert set(topics(master)) == {"/left/wave", "/right/wave"}
+    press_ctrl_c(launch)
+
+
+# Ten components in four namespaces: a position loop around a velocity loop around a current
+# loop, twice, and a sum of both. The arrows are names; `~` is a component's own.
+TEN: dict[str, dict[str, str]] = {
+    "/drive": {"in1": "/l/effort", "in2": "/r/effort", "out1": "/state"},
+    "/l/position": {"in1": "/target", "in2": "/state", "out1": "wanted"},
+    "/l/velocity": {"in1": "wanted", "in2": "/state", "in3": "effort", "out1": "current"},
+    "/l/current": {"in1": "current", "in2": "felt", "out1": "effort"},
+    "/l/sensor": {"in1": "effort", "out1": "felt"},
+    "/r/position": {"in1": "/target", "in2": "/state", "out1": "wanted"},
+    "/r/velocity": {"in1": "wanted", "in2": "/state", "in3": "effort", "out1": "current"},
+    "/r/current": {"in1": "current", "in2": "felt", "out1": "effort"},
+    "/r/sensor": {"in1": "effort", "out1": "felt"},
+    "/watch/total": {"in1": "/l/effort", "in2": "/r/effort", "in3": "/state", "out1": "sum"},
+}
+TEN_ORDER = ["/drive", "/l/position", "/l/velocity", "/l/current", "/l/sensor",
+             "/r/position", "/r/velocity", "/r/current", "/r/sensor", "/watch/total"]  # fmt: skip
+
+
+TEN_RUNNER = """
+<node name="rt_runner" pkg="rtcf" type="rt_runner" output="screen">
+  <rosparam>
+    mode: wait_for_trigger
+    frequency: 1000.0
+    ros_queue: 100000
+    ros_mapping_whitelist: /.*
+    ros_mapping_blacklist: /state|/r/effort|/[lr]/(wanted|current|felt)|.*/(in|out)[0-9]
+  </rosparam>
+</node>
+"""
+
+
+def ten_components() -> str:
+    parts = ["<launch>", TEN_RUNNER]
+    for name, wires in TEN.items():
+        ns, _, base = name.rpartition("/")
+        parts.append(f'<group ns="{ns}">' if ns else "<group>")
+        parts.append(
+            f'<node name="{base}" pkg="rtcf" type="rt_launcher" args="rtcf_examples Mimo" '
+            'output="screen">'
+        )
+        if base == "drive":
+            parts.append('<param name="is_first" value="true"/>')
+        if base == "velocity":
+            parts.append(f'<param name="topics_ignore_for_graph" value="{ns}/effort"/>')
+        if base == "current":
+            parts.append(
+                f'<rosparam param="topics_ignore_for_graph">[{ns}/felt, /nothing]</rosparam>'
+            )
+        for port in fig_1.PORTS:
+            parts.append(f'<remap from="{port}" to="{wires.get(port, "~" + port)}"/>')
+        parts.append("</node></group>")
+    return "\n".join([*parts, "</launch>"])
+
+
+def simulate_ten(target: float) -> Iterator[float]:
+    """Yield what /watch/total writes; all inputs are new in each cycle but the target."""
+    add = fig_1.mimo_sum
+    effort: dict[str, float | None] = {"l": None, "r": None}
+    felt: dict[str, float | None] = {"l": None, "r": None}
+    wanted_target: float | None = target
+    while True:
+        state = add(effort["l"], effort["r"])
+        for side in ("l", "r"):
+            wanted = add(wanted_target, state)
+            current = add(wanted, state, effort[side])
+            effort[side] = add(current, felt[side])
+            felt[side] = add(effort[side], None)
+        wanted_target = None
+        yield add(effort["l"], effort["r"], state)
+
+
+def test_ten_components_in_nested_loops_and_namespaces_give_the_numbers_wanted(
+    launching: Launching, master: Master
+) -> None:
+    launch = launching.launch_text(ten_components())
+    with launching.client() as (client, runner):
+        wait_for(lambda: len(client.list_components(runner)) == 10, "ten components")
+        assert client.get_order(runner) == TEN_ORDER
+        record = master.node("record", "/watch/sum")
+        latched = master.node("latch", "/target", "0.1")
+        record.wait_until_connected()
+        latched.wait_until_connected()
+
+        def target_is_there() -> bool:
+            ports = client.get_component("/l/position", runner).ports
+            return bool(next(port for port in ports if port.name == "in1").HasField("value"))
+
+        wait_for(target_is_there, "the target")
+        assert topics(master) == dict.fromkeys(
+            ("/target", "/l/effort", "/watch/sum"), "std_msgs/Float64"
+        )
+        loop = next(name for name in nodes(master) if name.startswith("/rtcfd/"))
+        assert len(nodes(master) - {loop}) == 2  # ours
+        client.start(runner)
+        wait_for(lambda: iteration(client, runner) >= 500, "500 cycles")
+        client.stop(runner)
+        cycles = iteration(client, runner)
+        record.wait_for_values(cycles)
+        assert record.values() == list(itertools.islice(simulate_ten(0.1), cycles))
+        for node in (record, latched):
+            node.end()
+    press_ctrl_c(launch)
+
+
+TWO_RUNNERS = """
+<launch>
+  <group ns="left">
+    <node name="rt_runner" pkg="rtcf" type="rt_runner" output="screen">
+      <param name="num_components_expected" value="1"/>
+      <param name="frequency" value="100"/>
+    </node>
+    <node name="same" pkg="rtcf" type="rt_launcher" args="rtcf_examples Identity"/>
+  </group>
+  <node name="other" pkg="rtcf" type="rt_runner" output="screen">
+    <param name="num_components_expected" value="1"/>
+    <param name="frequency" value="200"/>
+  </node>
+  <node name="same" pkg="rtcf" type="rt_launcher" args="rtcf_examples Identity">
+    <param name="runner" value="other"/>
+  </node>
+</launch>
+"""
+
+
+def test_one_launch_file_has_several_runners(launching: Launching, master: Master) -> None:
+    launch = launching.launch_text(TWO_RUNNERS)
+    for node, frequency, component in (
+        ("/left/rt_runner", 100.0, "/left/same"),
+        ("/other", 200.0, "/same"),
+    ):
+        with launching.client(node) as (client, runner):
+            wait_until_running(client, runner)
+            (status,) = client.get_status(runner).runners
+            assert status.settings.frequency_hz == frequency
+            assert client.get_order(runner) == [component]
+    assert launching.tool("component_order", "-r", "/left/rt_runner").stdout == "/left/same\n"
+    press_ctrl_c(launch)
+
+
+REQUIRED = """
+<launch>
+  <node name="rt_runner" pkg="rtcf" type="rt_runner" output="screen">
+    <param name="num_components_expected" value="1"/>
+    <param name="on_fault" value="stay"/>
+  </node>
+  <node name="bad" pkg="rtcf" type="rt_launcher" args="rtcf_faults Throws" output="screen"
+        required="true"/>
+</launch>
+"""
+
+
+def test_a_required_component_that_fails_ends_the_launch(launching: Launching) -> None:
+    launch = launching.launch_text(REQUIRED)
+    launch.wait()
+    output = launch.output()
+    assert "threw: the encoder jumped" in output
+    assert "exit code 3" in output
+
+
+def test_a_launch_ends_in_order_after_its_master_has_gone(tmp_path: Path) -> None:
+    master = Master(tmp_path)
+    master.start()
+    launching = Launching(master, tmp_path)
+    try:
+        launch = launching.roslaunch("rtcf_examples", "logging.launch")
+        launch.wait_for_output("the loop runs with 1 components")
+        master.end()
+        press_ctrl_c(launch)
+    finally:
+        launching.end()

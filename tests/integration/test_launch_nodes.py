@@ -1,0 +1,233 @@
+"""rt_runner and rt_launcher as processes: which daemon they take, what they do when something
+ends, and the statuses they exit with."""
+
+import re
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rosgraph
+import rtcf
+from daemon_process import Daemon, wait_for, with_ros
+from launch_processes import Launching, Process
+from ros_processes import Master
+from rtcf.v1 import runner_pb2
+from values import iteration, wait_until_after
+
+DONE, REFUSED, USAGE, FAILED, LOST = range(5)
+
+
+@pytest.fixture
+def system(tmp_path: Path, master: Master) -> Iterator[Daemon]:
+    """Give a daemon that stands for the system's."""
+    daemon = Daemon(tmp_path, with_ros(master.uri, ""))
+    daemon.start()
+    yield daemon
+    daemon.end()
+
+
+@pytest.fixture
+def launching(tmp_path: Path, master: Master, system: Daemon) -> Iterator[Launching]:
+    """Start nodes that find `system` as the system's daemon."""
+    launching = Launching(master, tmp_path, system.socket)
+    launching.forget()
+    yield launching
+    launching.end()
+
+
+@pytest.fixture
+def alone(tmp_path: Path, master: Master) -> Iterator[Launching]:
+    """Start nodes where there is no system daemon."""
+    launching = Launching(master, tmp_path)
+    launching.forget()
+    yield launching
+    launching.end()
+
+
+def launcher(launching: Launching, name: str, *words: str) -> Process:
+    """Start a launcher of an Identity."""
+    return launching.node(
+        "rt_launcher", "rtcf_examples", "Identity", f"__name:={name}", "out:=~out", *words
+    )
+
+
+def loaded(launching: Launching, name: str, *words: str) -> Process:
+    process = launcher(launching, name, *words)
+    process.wait_for_output("loaded into runner")
+    return process
+
+
+def is_running(client: rtcf.Client) -> bool:
+    (status,) = client.get_status("rt_runner").runners
+    return bool(status.state == runner_pb2.RUNNER_STATE_RUNNING)
+
+
+def test_the_system_daemon_is_taken_where_it_may_be_and_given_back(
+    launching: Launching, system: Daemon, master: Master
+) -> None:
+    runner = launching.node("rt_runner", "_frequency:=321", ROS_HOSTNAME="127.0.0.1")
+    runner.wait_for_output("system daemon at")
+    runner.wait_for_output("the loop runs with 0 components")
+    with rtcf.Client(system.socket) as client:
+        (status,) = client.get_status("rt_runner").runners
+        assert status.settings.frequency_hz == 321.0
+        assert "rt_runner /rt_runner" in status.holder
+        # The name by which peers reach the loop's node is that of the launch.
+        graph = rosgraph.Master("/test", master.uri)
+        wait_for(lambda: client.get_status("rt_runner").runners[0].ros.connected, "the ROS node")
+        assert "127.0.0.1" in graph.lookupNode(status.ros.node)
+        assert runner.end() == DONE
+        (status,) = client.get_status("rt_runner").runners
+        assert (status.settings.frequency_hz, status.holder) == (1000.0, "")
+
+
+def test_a_private_daemon_is_taken_where_the_systems_has_another_master(
+    tmp_path: Path, master: Master
+) -> None:
+    daemon = Daemon(tmp_path, with_ros("http://localhost:1", ""))
+    daemon.start()
+    launching = Launching(master, tmp_path, daemon.socket)
+    launching.forget()
+    runner = launching.node("rt_runner")
+    runner.wait_for_output("the loop runs with 0 components")
+    assert "private daemon at" in runner.output()
+    assert "another ROS master: http://localhost:1, not" in runner.output()
+    assert runner.end() == DONE
+    daemon.end()
+
+
+def test_launchers_come_and_go_and_a_killed_one_stops_the_loop(
+    launching: Launching, system: Daemon
+) -> None:
+    runner = launching.node("rt_runner", "_num_components_expected:=2")
+    first, second = loaded(launching, "first"), loaded(launching, "second")
+    with rtcf.Client(system.socket) as client:
+        wait_for(lambda: is_running(client), "the loop")
+        # Ends by itself: its component leaves, the loop goes on.
+        assert first.end(signal.SIGTERM) == DONE
+        assert client.get_order() == ["/second"]
+        wait_until_after(client, iteration(client) + 10)
+        first = loaded(launching, "first")
+        # Dies: the loop is stopped; it starts again when all components are there again.
+        first.end(signal.SIGKILL)
+        runner.wait_for_output("the loop is stopped")
+        wait_for(lambda: client.get_order() == ["/second"], "the component to leave")
+        assert not is_running(client)
+        first = loaded(launching, "first", "_on_lease_lost:=keep")
+        wait_for(lambda: is_running(client), "the loop")
+        first.end(signal.SIGKILL)
+        wait_for(lambda: client.get_component("first").holder == "", "the component to be kept")
+        assert is_running(client)
+        assert second.end() == DONE
+        assert runner.end() == DONE
+        # What was kept is like any other component of that runner.
+        assert client.get_order() == ["/first"]
+
+
+def test_a_launch_outlives_the_restart_of_its_daemon(launching: Launching, system: Daemon) -> None:
+    runner = launching.node("rt_runner", "_num_components_expected:=1")
+    first = loaded(launching, "first")
+    runner.wait_for_output("the loop runs")
+    with rtcf.Client(system.socket) as client:
+        before = iteration(client)
+    system.end(signal.SIGKILL)
+    system.start()
+    runner.wait_for_output("rtcfd is back, the runner is kept")
+    first.wait_for_output("rtcfd is back, the component is kept")
+    with rtcf.Client(system.socket) as client:
+        wait_until_after(client, before + 10)
+    assert first.end() == DONE
+    assert runner.end() == DONE
+
+
+def test_a_runner_that_died_may_come_back_to_the_system_daemon(
+    launching: Launching, system: Daemon
+) -> None:
+    runner = launching.node("rt_runner", "_frequency:=321")
+    runner.wait_for_output("the loop runs")
+    runner.end(signal.SIGKILL)
+    again = launching.node("rt_runner", "_frequency:=123")
+    again.wait_for_output("the loop runs")
+    assert "system daemon at" in again.output()
+    assert again.end() == DONE
+    with rtcf.Client(system.socket) as client:
+        (status,) = client.get_status("rt_runner").runners
+        assert status.settings.frequency_hz == 1000.0
+
+
+def test_launchers_end_when_their_runner_has_died(alone: Launching) -> None:
+    runner = alone.node("rt_runner", "_num_components_expected:=1")
+    first = loaded(alone, "first")
+    match = re.search(r"private daemon at (\S+)/control.sock", runner.output())
+    assert match is not None
+    socket = Path(match[1], "control.sock")
+    runner.end(signal.SIGKILL)
+    # rtcfd ends with it, in order, and so says why to the launcher.
+    assert first.wait() == LOST
+    wait_for(lambda: not socket.exists(), "the private daemon to end")
+    # What the dead one has left on the parameter server misleads nobody.
+    waiting = launcher(alone, "waiting")
+    again = alone.node("rt_runner", "_num_components_expected:=1")
+    waiting.wait_for_output("loaded into runner")
+    again.wait_for_output("the loop runs with 1 components")
+    assert waiting.end() == DONE
+    assert again.end() == DONE
+
+
+def test_a_fault_ends_the_runner_and_the_launcher_of_the_culprit(alone: Launching) -> None:
+    runner = alone.node("rt_runner", "_num_components_expected:=1")
+    bad = alone.node("rt_launcher", "rtcf_faults", "Throws", "__name:=bad")
+    assert runner.wait() == FAILED
+    assert "the loop has ended" in runner.output() and "the encoder jumped" in runner.output()
+    assert bad.wait() == FAILED
+    assert "the encoder jumped" in bad.output()
+
+
+def test_a_component_that_is_refused_ends_its_launcher(alone: Launching) -> None:
+    runner = alone.node("rt_runner", "_num_components_expected:=3")
+    runner.wait_for_output("waiting for 3 components")
+    cases = {
+        ("rtcf_examples", "Mino"): (REFUSED, 'did you mean "Mimo"'),
+        ("rtcf_exmples", "Mimo"): (REFUSED, 'no package "rtcf_exmples"'),
+        ("rtcf_examples", "Wave", "_amplitude:=11"): (REFUSED, "amplitude"),
+        ("rtcf_examples", "Wave", "_amplitud:=1"): (USAGE, "did you mean ~amplitude?"),
+        ("rtcf_examples", "Wave", "_is_first:=3"): (USAGE, "~is_first must be true or false"),
+        ("rtcf_examples",): (USAGE, "name a package and a component"),
+    }
+    started = [
+        (alone.node("rt_launcher", *words, f"__name:=bad{i}"), words)
+        for i, words in enumerate(cases)
+    ]
+    for process, words in started:
+        status, message = cases[words]
+        assert process.wait() == status, process.output()
+        assert message in process.output()
+    second = alone.node("rt_runner")
+    assert second.wait() == REFUSED
+    assert "a runner /rt_runner is there already" in second.output()
+    assert runner.end() == DONE
+
+
+def test_a_runner_that_is_refused_says_why_in_one_line(alone: Launching) -> None:
+    cases = {
+        ("_ros_mapping_whitelist:=*.ros.*", "__name:=a"): (REFUSED, "*.ros.*"),
+        ("_frequency:=fast", "__name:=b"): (USAGE, '~frequency must be a number, not "fast"'),
+        ("_daemon:=system", "__name:=c"): (REFUSED, "rtcfd is not running at /nonexistent"),
+        ("__master:=http://localhost:1", "__name:=d"): (REFUSED, "no ROS master answers"),
+        ("word", "__name:=e"): (USAGE, "unexpected argument word"),
+    }
+    started = [(alone.node("rt_runner", *words), words) for words in cases]
+    for process, words in started:
+        status, message = cases[words]
+        assert process.wait() == status, process.output()
+        (line,) = (each for each in process.output().splitlines() if message in each)
+        assert "Traceback" not in process.output(), line
+
+
+def test_a_launcher_waits_for_its_runner_and_ends_at_once_if_it_is_asked_to(
+    alone: Launching,
+) -> None:
+    waiting = launcher(alone, "waiting")
+    waiting.wait_for_output("waiting for runner /rt_runner")
+    assert waiting.end() == DONE
