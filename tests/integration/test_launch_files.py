@@ -3,6 +3,7 @@
 import itertools
 import os
 import signal
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -38,7 +39,10 @@ def wait_until_running(client: rtcf.Client, runner: str) -> None:
 
 def press_ctrl_c(launch: Process) -> None:
     """End roslaunch; nothing had to be killed, and nothing is left."""
+    begin = time.monotonic()
     launch.end(signal.SIGINT)
+    # A figure to look at, not a limit: the machine may be busy.
+    print(f"Ctrl-C took {time.monotonic() - begin:.2f} s")
     output = launch.output()
     assert "escalating" not in output
     socket = output.partition("private daemon at ")[2].partition(",")[0]

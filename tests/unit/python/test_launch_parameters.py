@@ -1,0 +1,196 @@
+"""What rt_runner and rt_launcher make of their private parameters and arguments."""
+
+import os
+from typing import Any
+
+import pytest
+from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+from rtcf_launch import arguments, component_parameters, daemon_choice, runner_parameters
+from rtcf_launch.codes import Code, Ending
+from rtcf_launch.runner_node import runner_name
+
+
+def refusal_of(values: dict[str, Any]) -> str:
+    with pytest.raises(Ending) as found:
+        runner_parameters.read(values)
+    assert found.value.code == Code.USAGE
+    message = str(found.value)
+    assert "\n" not in message
+    return message
+
+
+def test_each_parameter_of_a_runner_is_a_setting() -> None:
+    last = max(os.sched_getaffinity(0))
+    found, lines = runner_parameters.read(
+        {
+            "frequency": 500,
+            "mode": "wait_for_components",
+            "num_components_expected": 3,
+            "ros_mapping_whitelist": "/a",
+            "ros_mapping_blacklist": "/b",
+            "ros_queue": 7,
+            "wait_policy": "absolute",
+            "max_overruns": 5,
+            "lock_memory": False,
+            "safe_heap_size_kB": 1000,
+            "safe_stack_size_kB": 100,
+            "cpu_affinity_mask": 1 << last | 1,
+            "priority": 50,
+            "spin": "auto",
+            "realtime": "preferred",
+            "stall_timeout": 1.5,
+            "warmup_cycles": 3,
+            "on_crash": "resume",
+            "daemon": "private",
+            "on_fault": "stay",
+        }
+    )
+    assert lines == []
+    assert (found.mode, found.components, found.daemon, found.exit_on_fault) == (
+        "wait_for_components",
+        3,
+        "private",
+        False,
+    )
+    assert found.settings == runner_pb2.RunnerSettings(
+        frequency_hz=500.0,
+        overrun=runner_pb2.OVERRUN_POLICY_CATCH_UP,
+        max_overruns=5,
+        lock_memory=False,
+        heap_kb=1000,
+        stack_kb=100,
+        cpu=last,
+        priority=50,
+        spin_auto=True,
+        realtime=runner_pb2.REALTIME_PREFERRED,
+        stall_timeout_ms=1500,
+        warmup_cycles=3,
+        on_crash=runner_pb2.ON_CRASH_RESUME,
+        ros=runner_pb2.RosSettings(whitelist="/a", blacklist="/b", queue=7),
+    )
+
+
+def test_what_is_not_said_is_left_to_the_daemon() -> None:
+    found, lines = runner_parameters.read({})
+    assert found.settings == runner_pb2.RunnerSettings()
+    assert (found.mode, found.daemon, found.exit_on_fault, lines) == ("no_wait", "auto", True, [])
+    found, _ = runner_parameters.read({"num_components_expected": 2})
+    assert found.mode == "wait_for_components"
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"frequency": 0}, "~frequency of 0 is out of range: 0.1 to 20000"),
+        ({"frequency": float("nan")}, "~frequency of nan is out of range"),
+        ({"frequency": True}, "~frequency must be a number, not True"),
+        ({"mode": "wait"}, "~mode must be one of wait_for_components, no_wait, wait_for_trigger"),
+        ({"mode": "wait_for_components"}, "how many? Set ~num_components_expected"),
+        ({"num_components_expected": 0}, "~num_components_expected of 0 is out of range"),
+        ({"num_components_expected": 2.0}, "~num_components_expected must be an integer, not 2.0"),
+        ({"ros_mapping_whitelist": 5}, "~ros_mapping_whitelist must be a string, not 5"),
+        (
+            {"wait_policy": "absolut"},
+            '~wait_policy must be one of absolute, relative, not "absolut',
+        ),
+        ({"wait_policy": "relative", "overrun": "skip"}, "say the same thing"),
+        ({"lock_memory": "yes"}, '~lock_memory must be true or false, not "yes"'),
+        ({"safe_heap_size_kB": -1}, "~safe_heap_size_kB of -1 is out of range"),
+        ({"safe_stack_size_kB": 8}, "~safe_stack_size_kB of 8 is out of range: 16 to"),
+        ({"cpu_affinity_mask": 0}, "~cpu_affinity_mask must be an integer with a bit"),
+        ({"cpu_affinity_mask": 1 << 30}, "has none of the CPUs that may be used"),
+        ({"cpu_affinity_mask": 1, "cpu": 0}, "say the same thing"),
+        ({"priority": 99}, "~priority of 99 is out of range: 1 to 98"),
+        ({"spin": "a lot"}, "~spin must be a number of µs or"),
+        ({"daemon": "mine"}, "~daemon must be one of auto, system, private"),
+        ({"on_fault": 1}, "~on_fault must be one of exit, stay, not 1"),
+        ({"freqency": 1000}, "no parameter ~freqency is known; did you mean ~frequency?"),
+    ],
+)
+def test_a_wrong_parameter_of_a_runner_is_one_clear_line(
+    values: dict[str, Any], message: str
+) -> None:
+    assert message in refusal_of(values)
+
+
+def test_a_parameter_that_resembles_none_is_somebody_elses() -> None:
+    _, lines = runner_parameters.read({"robot": "r1", "rtcf_runner": {"socket": "/s"}})
+    assert lines == ["parameter ~robot is not known to rt_runner"]
+
+
+def test_a_launcher_keeps_its_own_parameters_and_leaves_the_component_the_others() -> None:
+    found = component_parameters.read(
+        {
+            "runner": "arm",
+            "is_first": True,
+            "topics_ignore_for_graph": ["/a", "/b.*"],
+            "every": 4,
+            "phase": 1,
+            "optional": True,
+            "on_lease_lost": "keep",
+            "kp": 2,
+        }
+    )
+    assert (found.runner, found.first, found.ignore) == ("arm", True, "/a|/b.*")
+    assert (found.every, found.phase, found.optional) == (4, 1, True)
+    assert (found.on_lost, found.others) == (control_pb2.ON_LEASE_LOST_KEEP, {"kp": 2})
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"is_first": "yes"},
+        {"topics_ignore_for_graph": 3},
+        {"topics_ignore_for_graph": ["/a", 3]},
+        {"every": 0},
+        {"phase": -1},
+        {"on_lease_lost": "die"},
+        {"runner": 7},
+    ],
+)
+def test_a_wrong_parameter_of_a_launcher_is_named(values: dict[str, Any]) -> None:
+    with pytest.raises(Ending) as found:
+        component_parameters.read(values)
+    assert found.value.code == Code.USAGE
+    assert f"~{next(iter(values))} " in str(found.value)
+
+
+def test_declared_parameters_get_values_of_their_kind() -> None:
+    declared = {name: graph_pb2.ParameterInfo(name=name, type="double") for name in ("kp", "limit")}
+    settings, rest = component_parameters.settings({"kp": 2, "gains": {"a": 1}}, declared)
+    assert [(each.name, each.value.int_value) for each in settings] == [("kp", 2)]
+    assert rest == ["gains"]
+    with pytest.raises(Ending, match="no parameter ~limt; did you mean ~limit"):
+        component_parameters.settings({"limt": 1.0}, declared)
+    with pytest.raises(Ending, match="~kp must be one double, not a list"):
+        component_parameters.settings({"kp": [1, 2]}, declared)
+
+
+def test_arguments_are_those_of_a_ros_node() -> None:
+    given = arguments.parse(
+        ["pkg", "Type", "in:=/a", "_kp:=2.5", "_label:='7'", "__name:=H1", "__log:=/l/H1-2.log"],
+        {"ROS_NAMESPACE": "arm/left", "ROS_MASTER_URI": "http://m:1", "ROS_IP": "10.0.0.1"},
+        "",
+    )
+    assert given.words == ["pkg", "Type"]
+    assert given.full_name == "/arm/left/H1"
+    assert given.remaps == [("in", "/a")]
+    assert given.private == {"kp": 2.5, "label": "7"}
+    assert (given.master_uri, given.hostname) == ("http://m:1", "10.0.0.1")
+    assert given.log_file == "/l/H1-2.log"
+
+
+def test_a_relative_runner_is_looked_for_from_the_own_namespace_upward() -> None:
+    assert arguments.upward("rt_runner", "/arm/left") == [
+        "/arm/left/rt_runner",
+        "/arm/rt_runner",
+        "/rt_runner",
+    ]
+    assert arguments.upward("/rt_runner", "/arm") == ["/rt_runner"]
+    assert runner_name("/arm/left/rt_runner") == "arm_left_rt_runner"
+
+
+def test_masters_are_the_same_if_host_and_port_are() -> None:
+    assert daemon_choice.same_master("http://localhost:11311", "http://127.0.0.1:11311/")
+    assert not daemon_choice.same_master("http://localhost:11311", "http://localhost:11312")
+    assert not daemon_choice.same_master("http://localhost:11311", "http://robot.example:11311")
