@@ -11,6 +11,7 @@
 #include <memory>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "check/check.hpp"
 #include "faults/crash_handler.hpp"
@@ -33,12 +34,13 @@ struct Options {
     std::string socket;
     std::string describe;
     std::string package;
+    std::vector<uid_t> trusted;
     CheckRequest check;
 };
 
 constexpr const char* kUsage =
     "usage: rtcf-executor --runner NAME --socket PATH\n"
-    "       rtcf-executor --describe LIBRARY --package PACKAGE\n"
+    "       rtcf-executor --describe LIBRARY --package PACKAGE [--trust UID]...\n"
     "       rtcf-executor --check LIBRARY --package PACKAGE --type TYPE [--cycles N] [--param "
     "NAME:=VALUE]...\n"
     "       rtcf-executor --version\n"
@@ -57,6 +59,7 @@ int parse(int argc, char** argv, Options& options) {
         kType,
         kCycles,
         kParam,
+        kTrust,
         kVersion,
         kHelp
     };
@@ -68,6 +71,7 @@ int parse(int argc, char** argv, Options& options) {
                             {"type", required_argument, nullptr, kType},
                             {"cycles", required_argument, nullptr, kCycles},
                             {"param", required_argument, nullptr, kParam},
+                            {"trust", required_argument, nullptr, kTrust},
                             {"version", no_argument, nullptr, kVersion},
                             {"help", no_argument, nullptr, kHelp},
                             {nullptr, 0, nullptr, 0}};
@@ -97,6 +101,9 @@ int parse(int argc, char** argv, Options& options) {
                 break;
             case kParam:
                 options.check.parameters.emplace_back(optarg);
+                break;
+            case kTrust:
+                options.trusted.push_back(static_cast<uid_t>(std::strtoul(optarg, nullptr, 10)));
                 break;
             case kVersion:
                 std::puts("rtcf-executor " RTCF_VERSION);
@@ -175,7 +182,8 @@ int main(int argc, char** argv) {
     Options options;
     if (const int status = parse(argc, argv, options); status >= 0) return status;
     try {
-        if (!options.describe.empty()) return describeLibrary(options.describe, options.package);
+        if (!options.describe.empty())
+            return describeLibrary(options.describe, options.package, options.trusted);
         if (!options.check.library.empty()) return checkComponent(options.check);
         return run(options);
     } catch (const std::exception& error) {

@@ -19,6 +19,35 @@ from rtcfd.errors import FailedPrecondition, NotFound
 from rtcfd.names import check_base_name
 
 
+@dataclass(frozen=True)
+class Folder:
+    """A folder of packages; in one that the settings name, its owner's libraries are trusted."""
+
+    path: Path
+    named: bool = False
+
+    def owner(self) -> int | None:
+        """Return whose libraries are trusted besides root's and our own."""
+        if not self.named:
+            return None
+        try:
+            return self.path.stat().st_uid
+        except OSError:
+            return None
+
+
+@dataclass(frozen=True)
+class Found:
+    """A library that offers a type."""
+
+    path: str
+    owner: int | None
+
+    def load(self, spec: graph_pb2.ComponentSpec) -> wire.Load:
+        """Return the request to load a component from it."""
+        return wire.Load(component=spec, library=self.path, owner=self.owner)
+
+
 @dataclass
 class _Contents:
     """What the libraries of a package offer."""
@@ -30,21 +59,21 @@ class _Contents:
 class Catalog:
     """Finds component types along the search path."""
 
-    def __init__(self, folders: Sequence[Path], describer: Describer) -> None:
-        self._folders = list(folders)
+    def __init__(self, folders: Sequence[Folder], describer: Describer) -> None:
+        self.folders = list(folders)
         self._describer = describer
 
-    async def find(self, package: str, type_name: str) -> str:
-        """Return the path of the library that offers a type, or refuse and say why."""
+    async def find(self, package: str, type_name: str) -> Found:
+        """Return the library that offers a type, or refuse and say why."""
         check_base_name("package", package)
         check_base_name("type", type_name)
-        libraries = packages(self._folders).get(package)
+        libraries = self._packages().get(package)
         if libraries is None:
             raise NotFound(self._no_package(package))
         contents = await self._contents(package, libraries)
         found = contents.types.get(type_name)
         if found is not None:
-            return str(found.library)
+            return Found(str(found.library), self._owner(Path(found.library)))
         if contents.problems:
             raise FailedPrecondition(
                 f'no type "{type_name}" in package "{package}" (types: '
@@ -58,7 +87,7 @@ class Catalog:
 
     async def types(self, package: str = "") -> tuple[list[graph_pb2.ComponentType], list[str]]:
         """Return the types of one package or of all, by name, and what does not load."""
-        known = packages(self._folders)
+        known = self._packages()
         if package:
             check_base_name("package", package)
             if package not in known:
@@ -72,7 +101,10 @@ class Catalog:
     async def _contents(self, package: str, libraries: list[Path]) -> _Contents:
         contents = _Contents()
         descriptions = await asyncio.gather(
-            *(self._describer.describe(library, package) for library in libraries)
+            *(
+                self._describer.describe(library, package, self._owner(library))
+                for library in libraries
+            )
         )
         for library, description in zip(libraries, descriptions, strict=True):
             if description.problem:
@@ -85,23 +117,33 @@ class Catalog:
                 contents.types.setdefault(offered.type, offered)
         return contents
 
+    def _packages(self) -> dict[str, list[Path]]:
+        return packages([folder.path for folder in self.folders])
+
+    def _owner(self, library: Path) -> int | None:
+        """Return whose libraries are trusted in the folder that holds a package's library."""
+        for folder in self.folders:
+            if folder.path == library.parents[1]:
+                return folder.owner()
+        return None
+
     def _no_package(self, package: str) -> str:
-        folders = ", ".join(str(folder) for folder in self._folders)
+        folders = ", ".join(str(folder.path) for folder in self.folders)
         return (
             f'no package "{package}" with component libraries in {folders}'
-            f"{suggestion(package, packages(self._folders))}"
+            f"{suggestion(package, self._packages())}"
         )
 
 
 async def loads(catalog: Catalog, specs: Iterable[graph_pb2.ComponentSpec]) -> list[wire.Load]:
     """Return components with their libraries; each type is looked for once."""
-    libraries: dict[tuple[str, str], str] = {}
+    libraries: dict[tuple[str, str], Found] = {}
     result = []
     for spec in specs:
         key = (spec.package, spec.type)
         if key not in libraries:
             libraries[key] = await catalog.find(*key)
-        result.append(wire.Load(component=spec, library=libraries[key]))
+        result.append(libraries[key].load(spec))
     return result
 
 

@@ -19,7 +19,7 @@ TIMEOUT_S = 10.0
 _AT_ONCE = 2
 _MAX_STDERR_LINE = 300
 
-_Key = tuple[str, int, int, int]
+_Key = tuple[str, int | None, int, int, int]
 
 
 @dataclass
@@ -32,24 +32,29 @@ class Describer:
         self._known: dict[_Key, wire.LibraryDescription] = {}
         self._slots = asyncio.Semaphore(_AT_ONCE)
 
-    async def describe(self, library: Path, package: str) -> wire.LibraryDescription:
-        """Return the description; `problem` in it says why there is none."""
+    async def describe(
+        self, library: Path, package: str, owner: int | None = None
+    ) -> wire.LibraryDescription:
+        """Return the description; `problem` in it says why there is none.
+
+        `owner` is a user whose libraries are trusted besides root's and our own.
+        """
         try:
             found = library.stat()
         except OSError as error:
             return _problem(f"cannot read it: {error.strerror}")
-        key = (str(library), found.st_ino, found.st_mtime_ns, found.st_size)
+        key = (str(library), owner, found.st_ino, found.st_mtime_ns, found.st_size)
         known = self._known.get(key)
         if known is not None:
             return known
         async with self._slots:
-            description = await self._run(library, package)
+            description = await self._run(library, package, owner)
         # What does not load may do so later, when what it links against is there.
         if not description.problem:
             self._known[key] = description
         return description
 
-    async def _run(self, library: Path, package: str) -> wire.LibraryDescription:
+    async def _run(self, library: Path, package: str, owner: int | None) -> wire.LibraryDescription:
         try:
             process = await asyncio.create_subprocess_exec(
                 self.binary,
@@ -57,6 +62,7 @@ class Describer:
                 library,
                 "--package",
                 package,
+                *(() if owner is None else ("--trust", str(owner))),
                 stdin=asyncio.subprocess.DEVNULL,
                 stdout=asyncio.subprocess.PIPE,
                 stderr=asyncio.subprocess.PIPE,

@@ -1,7 +1,6 @@
 #include "plugins/library.hpp"
 
 #include <dlfcn.h>
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/mman.h>
 #include <sys/sendfile.h>
@@ -13,6 +12,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "plugins/trusted_file.hpp"
 #include "refusal.hpp"
 
 namespace rtcf::executor {
@@ -40,29 +40,31 @@ class FileDescriptor {
 
 std::string systemError() { return std::strerror(errno); }
 
-// A copy of the file that nobody else can change; in memory, as /run is often mounted noexec.
-int privateCopy(const std::string& path) {
-    const FileDescriptor source(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-    if (source.get() < 0) refuse(path, systemError());
+struct stat statusOf(const std::string& path, int file) {
     struct stat status {};
-    if (::fstat(source.get(), &status) != 0 || !S_ISREG(status.st_mode))
-        refuse(path, "not a regular file");
+    if (::fstat(file, &status) != 0) refuse(path, systemError());
+    return status;
+}
+
+// A copy of the file that nobody else can change; in memory, as /run is often mounted noexec.
+int privateCopy(const std::string& path, int source) {
+    const struct stat status = statusOf(path, source);
     const std::string name = std::filesystem::path(path).filename();
     FileDescriptor copy(::memfd_create(name.c_str(), MFD_CLOEXEC));
     if (copy.get() < 0) refuse(path, "no memory for a copy: " + systemError());
     for (off_t left = status.st_size; left > 0;) {
         const ssize_t moved =
-            ::sendfile(copy.get(), source.get(), nullptr, static_cast<std::size_t>(left));
+            ::sendfile(copy.get(), source, nullptr, static_cast<std::size_t>(left));
         if (moved <= 0) refuse(path, moved == 0 ? "it changed while it was read" : systemError());
         left -= moved;
     }
     return copy.release();
 }
 
-void* openCopy(const std::string& path) {
+void* openCopy(const std::string& path, int file) {
     // The descriptor stays open for the life of the process: debuggers and
     // sanitizers find the symbols by this name, and it keeps the name unique.
-    const int copy = privateCopy(path);
+    const int copy = privateCopy(path, file);
     const std::string copy_path = fmt::format("/proc/{}/fd/{}", ::getpid(), copy);
     void* handle = ::dlopen(copy_path.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (handle == nullptr) {
@@ -79,8 +81,8 @@ void* openCopy(const std::string& path) {
 
 }  // namespace
 
-Library::Library(const std::string& path) : path_(path) {
-    void* handle = openCopy(path);
+Library::Library(const std::string& path, int file) : path_(path) {
+    void* handle = openCopy(path, file);
     using EntryPoint = const PluginDescriptor* (*)();
     const auto entry = reinterpret_cast<EntryPoint>(::dlsym(handle, RTCF_ENTRY_POINT_NAME));
     if (entry == nullptr) {
@@ -110,16 +112,18 @@ const ComponentRecord* Library::find(const std::string& type) const noexcept {
     return nullptr;
 }
 
+LibraryStore::LibraryStore() : owners_{::geteuid()} {}
+
 std::shared_ptr<const Library> LibraryStore::open(const std::string& path) {
-    struct stat status {};
-    if (::stat(path.c_str(), &status) != 0) refuse(path, systemError());
+    const FileDescriptor file(openTrusted(path, owners_));
+    const struct stat status = statusOf(path, file.get());
     const std::string identity =
         fmt::format("{} {} {} {}.{:09} {}", path, status.st_dev, status.st_ino,
                     status.st_mtim.tv_sec, status.st_mtim.tv_nsec, status.st_size);
     for (const Entry& entry : entries_) {
         if (entry.identity == identity) return entry.library;
     }
-    entries_.push_back({identity, std::make_shared<const Library>(path)});
+    entries_.push_back({identity, std::make_shared<const Library>(path, file.get())});
     return entries_.back().library;
 }
 

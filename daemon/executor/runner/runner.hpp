@@ -88,6 +88,8 @@ class Runner final : private RunnerView {
     /// @name By jobs, on the graph thread. All throw Refusal and have then changed nothing.
     /// @{
     void configure(RunnerSettings settings);
+    /// Also loads libraries that belong to this user, from here on.
+    void trust(uid_t owner) { libraries_.trust(owner); }
     ChangeOutcome start(const Progress& progress);
     ChangeOutcome stop(const Progress& progress);
     /// Runs cycles without real time on a simulated clock, as fast as they go; then pauses.

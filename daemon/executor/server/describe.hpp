@@ -3,11 +3,16 @@
 /// in this process, which does nothing else and then ends.
 #pragma once
 
+#include <sys/types.h>
+
 #include <string>
+#include <vector>
 
 namespace rtcf::executor {
 
 /// Writes a LibraryDescription to standard output. @return the process's exit status
-int describeLibrary(const std::string& library, const std::string& package);
+/// @param owners users whose libraries are trusted besides root's and our own
+int describeLibrary(const std::string& library, const std::string& package,
+                    const std::vector<uid_t>& owners);
 
 }  // namespace rtcf::executor

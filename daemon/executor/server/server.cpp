@@ -462,6 +462,12 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
     });
 }
 
+// What rtcfd says about the folder that it found a library in.
+template <typename Message>
+void Server::trustOwnerOf(const Message& message) {
+    if (message.has_owner()) runner_->trust(message.owner());
+}
+
 ChangeOutcome Server::change(const v1::Request& request, const Runner::Progress& progress) {
     switch (request.kind_case()) {
         case v1::Request::kStart:
@@ -473,6 +479,7 @@ ChangeOutcome Server::change(const v1::Request& request, const Runner::Progress&
                 throw Refusal(RefusalKind::InvalidArgument, "0 cycles to step: name a number");
             return runner_->step(request.step().cycles(), progress);
         case v1::Request::kLoad:
+            trustOwnerOf(request.load());
             return runner_->load(definitionFrom(request.load().component()),
                                  request.load().library(), progress);
         case v1::Request::kUnload: {
@@ -482,6 +489,7 @@ ChangeOutcome Server::change(const v1::Request& request, const Runner::Progress&
             return runner_->unload(names, progress);
         }
         case v1::Request::kReplace: {
+            trustOwnerOf(request.replace());
             const std::string name = fullNameOf(request.replace().component());
             for (const auto& component : runner_->snapshot()->components) {
                 if (component->full_name != name) continue;
@@ -494,6 +502,7 @@ ChangeOutcome Server::change(const v1::Request& request, const Runner::Progress&
         case v1::Request::kApply: {
             std::vector<WantedComponent> wanted;
             for (const v1::Load& load : request.apply().components()) {
+                trustOwnerOf(load);
                 wanted.push_back({definitionFrom(load.component()), load.library()});
             }
             return runner_->apply(wanted, request.apply().dry_run(), progress);

@@ -75,6 +75,8 @@ class Server {
     void submitProbe(std::uint64_t connection, const v1::Request& request);
     void expire();
     bool orphaned();
+    template <typename Message>
+    void trustOwnerOf(const Message& message);
     ChangeOutcome change(const v1::Request& request, const Runner::Progress& progress);
     ::rtcf::v1::RunnerStatus status() const;
     ::rtcf::v1::RunnerStatistics statistics() const;

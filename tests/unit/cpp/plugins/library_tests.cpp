@@ -17,7 +17,7 @@ const std::string kFolder = RTCF_UNIT_COMPONENTS "/";
 
 std::string refusalOf(const std::string& path) {
     try {
-        const Library library(path);
+        LibraryStore().open(path);
         return {};
     } catch (const Refusal& refused) {
         return refused.what();
@@ -32,7 +32,8 @@ std::int32_t versionOf(const Library& library) {
 }
 
 TEST(Library, ListsItsTypesByName) {
-    const Library library(RTCF_EXAMPLES);
+    LibraryStore store;
+    const Library& library = *store.open(RTCF_EXAMPLES);
     ASSERT_EQ(library.types().size(), 3U);
     EXPECT_STREQ(library.types()[0]->type, "Identity");
     EXPECT_STREQ(library.types()[1]->type, "Mimo");
