@@ -24,9 +24,10 @@ _OPTIONS = (
     ("grpc.use_local_subchannel_pool", 1),
     # After a restart of rtcfd a client is to be back soon, not in gRPC's 1 to 120 s.
     ("grpc.initial_reconnect_backoff_ms", 100),
+    # How long one attempt to connect may take: rtcfd may not be up yet when systemd takes the
+    # connection, or not have been scheduled on a busy machine.
+    ("grpc.min_reconnect_backoff_ms", 60_000),
     ("grpc.max_reconnect_backoff_ms", 1000),
-    # How long one attempt to connect may take: on a busy machine rtcfd may not have been scheduled.
-    ("grpc.min_reconnect_backoff_ms", 10_000),
 )
 
 OnProgress = Callable[[str], None]
@@ -69,6 +70,11 @@ class Client:
         """Return the status of rtcfd and of all runners, or of the one named."""
         request = control_pb2.GetStatusRequest(runner=runner)
         return self._ask(self._stub.GetStatus, request)  # type: ignore[no-any-return]
+
+    def reload(self) -> list[str]:
+        """Make rtcfd read its settings and graphs.d again; return a line for each change."""
+        response = self._ask(self._stub.Reload, control_pb2.ReloadRequest(), CHANGE_TIMEOUT_S)
+        return list(response.notes)
 
     def add_runner(
         self, runner: str, settings: runner_pb2.RunnerSettings | None = None

@@ -41,6 +41,11 @@ def from_grpc(error: Any, socket: str) -> RtcfError:
         return DaemonUnreachableError(f"rtcfd at {socket} does not answer in time")
     if code == "UNIMPLEMENTED":
         return RtcfError(f"rtcfd at {socket} is older than this client: {text}")
+    if code == "RESOURCE_EXHAUSTED" and "larger than max" in text:
+        return RtcfError(
+            "the request is larger than rtcfd accepts: send less at a time, or raise message_kb "
+            f"under [limits] in its settings ({text})"
+        )
     return RtcfError(f"{text} ({code})")
 
 

@@ -36,6 +36,8 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     output.line(
         f"rtcfd {response.version} (pid {response.pid}), up {hours}:{minutes:02}:{seconds:02}"
     )
+    for note in response.notes:
+        output.line(f"rtcfd: {note}", "yellow")
     for runner in response.runners:
         _alarms(runner, output)
     print_runners(list(response.runners), output)

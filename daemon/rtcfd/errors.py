@@ -31,3 +31,11 @@ class NoMaster(FailedPrecondition):
 
 class Unavailable(Refusal):
     """The executor does not answer."""
+
+
+class PermissionDenied(Refusal):
+    """The caller may not do that."""
+
+
+class ResourceExhausted(Refusal):
+    """A limit of the settings is reached."""

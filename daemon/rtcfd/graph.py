@@ -31,7 +31,8 @@ async def load(
     library = await runner.catalog.find(spec.package, spec.type)
 
     async def work() -> control_pb2.ChangeResult:
-        request = wire.Request(load=wire.Load(component=spec, library=library))
+        runner.limits.check_components(len(runner.desired.components) + 1)
+        request = wire.Request(load=library.load(spec))
         result = (await runner.ask(request, progress)).change
         runner.left_out.pop(result.component, None)
         runner.desired.put(result.component, spec)
@@ -97,9 +98,11 @@ async def replace(
     async def work() -> control_pb2.ChangeResult:
         spec = replacement(runner.desired.components.get(old), given)
         if old in runner.left_out:  # the executor does not have it
-            request = wire.Request(load=wire.Load(component=spec, library=library))
+            request = wire.Request(load=library.load(spec))
         else:
-            change = wire.Replace(component=old, replacement=spec, library=library)
+            change = wire.Replace(
+                component=old, replacement=spec, library=library.path, owner=library.owner
+            )
             request = wire.Request(replace=change)
         result = (await runner.ask(request, progress)).change
         runner.left_out.pop(old, None)
@@ -152,6 +155,7 @@ async def apply(
     """Make the graph, and the settings that are given, what a request says."""
     check_graph(request.components)
     settings.check(request.settings)
+    runner.limits.check_components(len(request.components))
 
     async def work() -> control_pb2.ChangeResult:
         before = runner.settings()

@@ -17,8 +17,8 @@ _DEBUG_PRIORITY = 7
 class JournalHandler(logging.Handler):
     """Sends records to systemd's journal.
 
-    Fields: RTCF_RUNNER, RTCF_COMPONENT, RTCF_ITERATION, CODE_FILE, CODE_LINE,
-    CODE_FUNC; the journal drops names that are not in capitals.
+    Fields: RTCF_RUNNER, RTCF_COMPONENT, RTCF_ITERATION, RTCF_USER, RTCF_UID, RTCF_PID,
+    CODE_FILE, CODE_LINE, CODE_FUNC; the journal drops names that are not in capitals.
     """
 
     def __init__(self) -> None:
@@ -69,6 +69,11 @@ def fields(record: logging.LogRecord) -> dict[str, str]:
         result["CODE_FUNC"] = record.funcName
     if runner := getattr(record, "runner", ""):
         result["RTCF_RUNNER"] = runner
+    peer = getattr(record, "peer", None)
+    if peer is not None:
+        result["RTCF_USER"] = peer.user
+        result["RTCF_UID"] = str(peer.uid)
+        result["RTCF_PID"] = str(peer.pid)
     if component := getattr(record, "component", ""):
         result["RTCF_COMPONENT"] = component
         result["RTCF_ITERATION"] = str(getattr(record, "iteration", 0))

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import grpc
+import rtcf
 from rtcf.v1 import control_pb2_grpc
 
 from rtcfd import VERSION, frames, journal, options
@@ -20,6 +21,8 @@ from rtcfd.desired import Desired
 from rtcfd.endpoint import Endpoint
 from rtcfd.errors import FailedPrecondition, Refusal
 from rtcfd.executor import left_overs
+from rtcfd.front import Front
+from rtcfd.gate import Gate
 from rtcfd.holds import await_holder
 from rtcfd.names import DEFAULT_RUNNER
 from rtcfd.notify import Notify
@@ -28,49 +31,56 @@ from rtcfd.runner import Surroundings
 from rtcfd.runners import Runners
 from rtcfd.service import Control
 from rtcfd.store import Store
+from rtcfd.upkeep import Upkeep
 
 log = logging.getLogger("rtcfd")
 
 REFUSED = 1
 _GRACE_S = 60.0  # for calls under way: the end of their executors ends them sooner
 _LAST_WORDS_S = 0.1  # for their answers
-_SERVER_OPTIONS = (
-    ("grpc.max_receive_message_length", frames.MAX_FRAME),
-    ("grpc.max_send_message_length", frames.MAX_FRAME),
-)
 
 
 class Daemon:
     """rtcfd from start to end."""
 
-    def __init__(self, given: options.Options) -> None:
+    def __init__(self, given: options.Options, read_options: Callable[[], options.Options]) -> None:
         self._options = given
         self._notify = Notify()
         self._command = ExecutorCommand(given.executor, given.runtime_dir / "executors")
         self._store = Store(given.state_dir)
-        catalog = Catalog(given.folders, Describer(given.executor))
-        self._runners = Runners(
-            Surroundings(
-                command=self._command,
-                catalog=catalog,
-                store=self._store,
-                defaults=given.defaults,
-                on_change=self._tell,
-                serve_ros=RosServices(given.ros_services).serve,
-            )
-        )
-        self._server = grpc.aio.server(options=_SERVER_OPTIONS)
         self._endpoint = Endpoint(given.socket)
+        self._private = given.runtime_dir / "executors" / "control"
+        self._front = Front(self._private, given.limits.clients)
+        gate = Gate(self._front, given.access)
+        catalog = Catalog(given.folders, Describer(given.executor))
+        shared = Surroundings(
+            command=self._command,
+            catalog=catalog,
+            store=self._store,
+            defaults=given.defaults,
+            on_change=self._tell,
+            serve_ros=RosServices(given.ros_services).serve,
+            limits=given.limits,
+        )
+        self._runners = Runners(shared)
+        self._upkeep = Upkeep(
+            given, read_options, shared, catalog, self._runners, self._front, gate
+        )
+        self._server = grpc.aio.server(options=_server_options(given), interceptors=[gate])
         self._left_over: list[str] = []  # runners of executors that outlived another rtcfd
         control_pb2_grpc.add_ControlServicer_to_server(  # type: ignore[no-untyped-call]
-            Control(self._runners, catalog), self._server
+            Control(self._runners, catalog, self._upkeep), self._server
         )
 
     async def run(self) -> None:
-        """Serve until SIGTERM, SIGINT or SIGHUP."""
+        """Serve until SIGTERM or SIGINT; SIGHUP ends what runs from a terminal, else reloads."""
         end = asyncio.Event()
-        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
-            asyncio.get_running_loop().add_signal_handler(number, end.set)
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.add_signal_handler(number, end.set)
+        loop.add_signal_handler(
+            signal.SIGHUP, end.set if self._options.foreground else self._reload
+        )
         if self._options.end_with_stdin:
             _when_stdin_ends(end.set)
         self._command.prepare()
@@ -80,14 +90,16 @@ class Daemon:
             raise FailedPrecondition(
                 f"cannot make the state folder {self._options.state_dir}: {error.strerror}"
             ) from None
-        self._endpoint.listen(self._server)
+        listener = self._endpoint.listen()
+        self._serve_privately()
         self._left_over = left_overs(self._command.folder)
         states = self._store.load()
         if self._options.default_runner and DEFAULT_RUNNER not in [s.runner for s in states]:
             states.append(Desired(DEFAULT_RUNNER))
-        self._runners.adopt(states)
+        self._runners.adopt(self._upkeep.boot(states, self._left_over))
         await self._server.start()
-        log.info("rtcfd %s serves %s", VERSION, self._options.socket)
+        await self._front.serve(listener)
+        log.info("rtcfd %s serves %s", VERSION, self._endpoint.path)
         starting = asyncio.create_task(self._start())
         await end.wait()
         log.info("stopping all loops")
@@ -96,6 +108,7 @@ class Daemon:
         await self._runners.close()
         await asyncio.wait({serving}, timeout=_LAST_WORDS_S)
         await self._server.stop(None)
+        self._front.close()
         starting.cancel()
         await asyncio.gather(starting, return_exceptions=True)
         self._clean_up()
@@ -107,6 +120,26 @@ class Daemon:
             await_holder(self._runners, runner)
         self._notify.ready(self._runners.summary())
         log.info("ready; runners: %s", self._runners.summary())
+
+    def _serve_privately(self) -> None:
+        """Let gRPC listen where only we may connect: the folder is 0700."""
+        try:
+            bound = self._server.add_insecure_port(f"unix:{self._private}")
+        except RuntimeError:
+            bound = 0
+        if not bound:
+            raise FailedPrecondition(
+                f"cannot listen on {self._private}: is its folder ours to write?"
+            )
+
+    def _reload(self) -> None:
+        async def reload() -> None:
+            try:
+                await self._upkeep.reload()
+            except Refusal as refusal:
+                log.error("not reloaded: %s", refusal)
+
+        self._reloading = asyncio.create_task(reload())
 
     def _tell(self) -> None:
         self._notify.status(self._runners.summary())
@@ -133,21 +166,42 @@ def _when_stdin_ends(do: Callable[[], None]) -> None:
     loop.add_reader(0, readable)
 
 
-async def _run(given: options.Options) -> None:
+def _server_options(given: options.Options) -> list[tuple[str, int]]:
+    return [
+        ("grpc.max_receive_message_length", given.limits.message_kb * 1024),
+        ("grpc.max_send_message_length", frames.MAX_FRAME),
+    ]
+
+
+async def _run(given: options.Options, read_options: Callable[[], options.Options]) -> None:
     if sys.version_info < (3, 12):
         # The default one starts a thread for each child.
         watcher = asyncio.PidfdChildWatcher()
         watcher.attach_loop(asyncio.get_running_loop())
         asyncio.set_child_watcher(watcher)
-    await Daemon(given).run()
+    await Daemon(given, read_options).run()
+
+
+def _reload(socket: Path) -> int:
+    """Make the rtcfd that runs read its settings again; what came of it is printed."""
+    try:
+        with rtcf.Client(socket) as client:
+            for line in client.reload():
+                print(line)
+    except rtcf.RtcfError as error:
+        print(f"rtcfd: not reloaded: {error}", file=sys.stderr)
+        return REFUSED
+    return 0
 
 
 def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None) -> int:
     """Run rtcfd; return its exit status: 0 after an orderly end, 1 if it cannot start."""
     try:
+        if socket := options.reload_wanted(arguments):
+            return _reload(socket)
         given = options.parse(arguments, build_tree)
         journal.set_up(given.verbose)
-        asyncio.run(_run(given))
+        asyncio.run(_run(given, lambda: options.parse(arguments, build_tree)))
     except Refusal as refusal:
         print(f"rtcfd: {refusal}", file=sys.stderr)
         return REFUSED

@@ -12,6 +12,9 @@ from rtcf.folders import component_folders
 from rtcf.v1 import runner_pb2
 
 from rtcfd import VERSION, config, paths, settings
+from rtcfd.access import Access, Level
+from rtcfd.catalog import Folder
+from rtcfd.limits import Limits
 
 _REALTIME = {
     "required": runner_pb2.REALTIME_REQUIRED,
@@ -28,11 +31,15 @@ class Options:
     own_runtime_dir: bool  # made for this run: removed at its end
     state_dir: Path | None
     executor: Path
-    folders: list[Path]
+    graphs_dir: Path | None
+    folders: list[Folder]
+    access: Access
+    limits: Limits
     defaults: runner_pb2.RunnerSettings
     default_runner: bool
-    ros_services: str  # one of ros_services.LEVELS
+    ros_services: Level
     end_with_stdin: bool
+    foreground: bool
     verbose: bool
 
 
@@ -51,20 +58,25 @@ def parse(arguments: Sequence[str] | None, build_tree: Path | None) -> Options:
     realtime = args.realtime or file.realtime or ("preferred" if args.foreground else "required")
     runtime_dir = args.runtime_dir or file.runtime_dir
     state_dir = args.state_dir or file.state_dir
+    graphs_dir = args.graphs_dir or file.graphs_dir
     own_runtime_dir = False
     if args.foreground:
         own_runtime_dir = runtime_dir is None
         runtime_dir = runtime_dir or socket.with_name(socket.name + ".d")
     else:
-        runtime_dir = runtime_dir or _from_systemd("RUNTIME_DIRECTORY", paths.RUNTIME_DIR)
+        runtime_dir = runtime_dir or paths.RUNTIME_DIR
         state_dir = state_dir or _from_systemd("STATE_DIRECTORY", paths.STATE_DIR)
+        graphs_dir = graphs_dir or paths.GRAPHS_DIR
     return Options(
         socket=socket,
         runtime_dir=_absolute(runtime_dir),
         own_runtime_dir=own_runtime_dir,
         state_dir=_absolute(state_dir) if state_dir else None,
         executor=_absolute(args.executor or file.executor or paths.executor(build_tree)),
-        folders=component_folders([*args.path, *file.path], build_tree),
+        graphs_dir=_absolute(graphs_dir) if graphs_dir else None,
+        folders=_folders([*args.path, *file.path], build_tree),
+        access=file.access,
+        limits=file.limits,
         defaults=settings.merged(
             settings.defaults(
                 _REALTIME[realtime],
@@ -74,8 +86,11 @@ def parse(arguments: Sequence[str] | None, build_tree: Path | None) -> Options:
         ),
         default_runner=args.default_runner,
         # Privately, its ROS is as much its user's as its socket.
-        ros_services=file.ros_services or ("admin" if args.foreground else "observe"),
+        ros_services=file.ros_services
+        if file.ros_services is not None
+        else (Level.ADMIN if args.foreground else Level.OBSERVE),
         end_with_stdin=args.end_with_stdin,
+        foreground=args.foreground,
         verbose=args.verbose,
     )
 
@@ -115,7 +130,7 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
         "--runtime-dir",
         type=Path,
         metavar="DIR",
-        help="for the executors' sockets (default: $RUNTIME_DIRECTORY, else /run/rtcfd; "
+        help="for the executors' sockets (default: /run/rtcfd; "
         "with --foreground: the control socket's path and .d, removed at the end)",
     )
     parser.add_argument(
@@ -124,6 +139,12 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
         metavar="DIR",
         help="for what is to outlive rtcfd (default: $STATE_DIRECTORY, else /var/lib/rtcfd; "
         "with --foreground: none)",
+    )
+    parser.add_argument(
+        "--graphs-dir",
+        type=Path,
+        metavar="DIR",
+        help=f"graphs to apply at the start (default: {paths.GRAPHS_DIR}; with --foreground: none)",
     )
     parser.add_argument(
         "--config",
@@ -162,8 +183,28 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
         action="store_true",
         help="end in order when standard input ends: with the process at its other end",
     )
+    parser.add_argument(
+        "--reload",
+        action="store_true",
+        help="make the rtcfd that runs read its settings and graphs again, and exit",
+    )
     parser.add_argument("--verbose", action="store_true", help="log debugging messages too")
     return parser
+
+
+def reload_wanted(arguments: Sequence[str] | None) -> Path | None:
+    """Return the socket of the rtcfd that is to reload, if the command line says so."""
+    args = _parser(None).parse_args(arguments)
+    if not args.reload:
+        return None
+    return Path(args.socket or os.environ.get("RTCF_SOCKET") or paths.SOCKET)
+
+
+def _folders(named: Sequence[Path], build_tree: Path | None) -> list[Folder]:
+    """Return where packages are; libraries in folders that are named may be of the folder's
+    owner."""
+    chosen = {Path(os.path.abspath(folder)) for folder in named}
+    return [Folder(path, path in chosen) for path in component_folders(named, build_tree)]
 
 
 def _from_systemd(variable: str, default: Path) -> Path:

@@ -5,6 +5,7 @@ from pathlib import Path
 SOCKET = Path("/run/rtcfd/control.sock")
 RUNTIME_DIR = Path("/run/rtcfd")
 STATE_DIR = Path("/var/lib/rtcfd")
+GRAPHS_DIR = Path("/etc/rtcfd/graphs.d")
 EXECUTOR = Path("/usr/lib/rtcf/rtcf-executor")
 
 

@@ -8,6 +8,9 @@ from typing import Protocol
 
 from rtcf.executor.v1 import executor_pb2 as wire
 
+from rtcfd.budget import Budget
+from rtcfd.limits import Limits
+
 log = logging.getLogger("rtcf-executor")
 
 _LEVELS: dict[int, int] = {
@@ -45,9 +48,11 @@ class Audience(Protocol):
 class Relay:
     """The unasked frames of one runner's executor."""
 
-    def __init__(self, runner: str, audience: Audience) -> None:
+    def __init__(self, runner: str, audience: Audience, limits: Callable[[], Limits]) -> None:
         self._runner = runner
         self._audience = audience
+        self._limits = limits
+        self._budget = Budget(limits().log_records_per_s)
 
     def take(self, response: wire.Response) -> None:
         """Take one unasked frame."""
@@ -66,6 +71,18 @@ class Relay:
         level = _LEVELS.get(record.level, logging.INFO)
         if not log.isEnabledFor(level):
             return
+        # A component that logs in each cycle must not fill the disk.
+        self._budget.per_s = self._limits().log_records_per_s
+        if not self._budget.take():
+            return
+        if lost := self._budget.take_lost():
+            log.warning(
+                "%d log records of its components were dropped: more than %d a second; see "
+                "log_records_per_s under [limits]",
+                lost,
+                self._budget.per_s,
+                extra={"runner": self._runner},
+            )
         entry = log.makeRecord(
             log.name,
             level,

@@ -10,19 +10,24 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2
 
 from rtcfd import graph
+from rtcfd.access import Level
 from rtcfd.errors import FailedPrecondition, Refusal
 from rtcfd.runner import Runner
 
-LEVELS = ("observe", "operate", "admin")  # each may do what those before it may
-_NEEDED = {"start": "operate", "stop": "operate", "load": "admin", "unload": "admin"}
+_NEEDED = {
+    "start": Level.OPERATE,
+    "stop": Level.OPERATE,
+    "load": Level.ADMIN,
+    "unload": Level.ADMIN,
+}
 
 log = logging.getLogger(__name__)
 
 
 class RosServices:
-    """Does what is called for, or refuses it.  `access` is one of LEVELS."""
+    """Does what is called for, or refuses it; `access` is what all callers may do."""
 
-    def __init__(self, access: str) -> None:
+    def __init__(self, access: Level) -> None:
         self._access = access
 
     async def serve(self, runner: Runner, call: wire.ServiceCall) -> wire.ServiceAnswer:
@@ -50,10 +55,10 @@ class RosServices:
                 "the same version"
             )
         needed = _NEEDED[kind]
-        if LEVELS.index(self._access) < LEVELS.index(needed):
+        if self._access < needed:
             raise FailedPrecondition(
-                f"rtcfd lets callers on ROS only {self._access}, and `{kind}` needs {needed}: "
-                f'set ros_services = "{needed}" in [daemon] of /etc/rtcfd/rtcfd.toml, or use '
+                f"rtcfd lets callers on ROS only {self._access.word}, and `{kind}` needs "
+                f'{needed.word}: set ros_services = "{needed.word}" in [daemon] of /etc/rtcfd/rtcfd.toml, or use '
                 f"rtcfctl -r {runner.name} {kind}"
             )
         return str(kind)

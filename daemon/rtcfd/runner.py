@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 import time
 from collections.abc import Awaitable, Callable, Coroutine
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from rtcf.executor.v1 import executor_pb2 as wire
@@ -23,6 +23,7 @@ from rtcfd.desired import Desired
 from rtcfd.errors import Refusal, Unavailable
 from rtcfd.executor import CONNECT_TIMEOUT_S, Executor
 from rtcfd.leases import Leases
+from rtcfd.limits import Limits
 from rtcfd.link import Progress
 from rtcfd.outbox import Outbox
 from rtcfd.process import End
@@ -41,9 +42,9 @@ _Ended = control_pb2.LeaseEnded
 Result = TypeVar("Result")
 
 
-@dataclass(frozen=True)
+@dataclass
 class Surroundings:
-    """What all runners share."""
+    """What all runners share; a reload of rtcfd changes it."""
 
     command: ExecutorCommand
     catalog: Catalog
@@ -52,6 +53,7 @@ class Surroundings:
     on_change: Callable[[], None]  # what summary() says may have changed
     # Answers what ROS peers ask of a runner.
     serve_ros: Callable[["Runner", wire.ServiceCall], Awaitable[wire.ServiceAnswer]]
+    limits: Limits = field(default_factory=Limits)
 
 
 class Runner:
@@ -69,7 +71,7 @@ class Runner:
         self.leases = Leases(self)
         self.hold_outbox: Outbox | None = None  # of the holder, if it is there
         self.fault = ""  # why the loop ended by itself
-        self._relay = Relay(self.name, self)
+        self._relay = Relay(self.name, self, lambda: self.limits)
         self._executor: Executor | None = None
         self._trouble = "its executor is not started"  # why there is none
         self._saving = asyncio.Lock()
@@ -300,6 +302,11 @@ class Runner:
         return self.desired.complete(self._shared.defaults)
 
     @property
+    def limits(self) -> Limits:
+        """What may be asked for."""
+        return self._shared.limits
+
+    @property
     def defaults(self) -> runner_pb2.RunnerSettings:
         """What settings are unless chosen."""
         return self._shared.defaults
@@ -363,6 +370,25 @@ class Runner:
 
         await self.change("a change of settings", work)
         self.log.info("settings changed")
+
+    async def follow_defaults(self, before: runner_pb2.RunnerSettings) -> list[str]:
+        """Take over defaults that are others than `before`; return a line for each setting."""
+        change: runner_pb2.RunnerSettings = settings.changed(
+            self.desired.complete(before), self.settings()
+        )
+        lines = settings.differences(self.desired.complete(before), change)
+        if not lines:
+            return []
+
+        async def work() -> None:
+            if self.up:
+                await self.ask(wire.Request(configure=change))
+
+        try:
+            await self.change("a change of defaults", work)
+        except Refusal as refusal:
+            return [f"{self.name}: not changed: {refusal}"]
+        return [f"{self.name}: {line}" for line in lines]
 
     async def start(self, progress: Progress) -> control_pb2.ChangeResult:
         """Start the loop; an executor that is down is brought back first."""

@@ -106,6 +106,7 @@ class Runners:
             raise AlreadyExists(
                 f"runner {name} is there already; `rtcfctl runner set {name}` changes it"
             )
+        self._shared.limits.check_runners(len(self._runners) + 1)
         settings.check(chosen)
         desired = Desired(name)
         desired.choose(chosen)
@@ -131,6 +132,7 @@ class Runners:
         check_base_name("runner", name)
         settings.check(request.settings)
         graph.check_graph(request.components)
+        self._shared.limits.check_components(len(request.components))
         if request.dry_run:
             await loads(self._shared.catalog, request.components)
             return control_pb2.ChangeResult(

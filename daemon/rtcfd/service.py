@@ -5,53 +5,29 @@ No logic: names and values are checked by what is called.
 
 import asyncio
 import functools
-import logging
 import os
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any, Protocol
 
-import grpc
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, control_pb2_grpc, graph_pb2, runner_pb2
 
-from rtcfd import VERSION, errors, graph
+from rtcfd import VERSION, graph
 from rtcfd.catalog import Catalog
 from rtcfd.holds import Hold
 from rtcfd.leases import Lease
 from rtcfd.link import Progress
 from rtcfd.names import absolute
 from rtcfd.outbox import Outbox
+from rtcfd.refusal import abort
 from rtcfd.runner import Runner
 from rtcfd.runners import Runners
 
-log = logging.getLogger(__name__)
-
-# The one place where refusals become gRPC status codes.
-STATUS_CODES: dict[type[errors.Refusal], grpc.StatusCode] = {
-    errors.InvalidArgument: grpc.StatusCode.INVALID_ARGUMENT,
-    errors.NotFound: grpc.StatusCode.NOT_FOUND,
-    errors.AlreadyExists: grpc.StatusCode.ALREADY_EXISTS,
-    errors.FailedPrecondition: grpc.StatusCode.FAILED_PRECONDITION,
-    errors.Unavailable: grpc.StatusCode.UNAVAILABLE,
-}
 _WATCH_MS = 1000
 _SHORTEST_WATCH_MS = 100
-# Tells a client that rtcfd itself spoke, and not gRPC about a lost connection.
-REFUSAL_KEY = "rtcf-refusal"
 
 Changes = AsyncIterator[control_pb2.ChangeResponse]
-
-
-async def _abort(context: Any, error: Exception) -> None:
-    if isinstance(error, errors.Refusal):
-        code = STATUS_CODES.get(type(error), grpc.StatusCode.FAILED_PRECONDITION)
-        text = " ".join(str(error).split())
-    else:
-        log.error("internal error", exc_info=error)
-        code = grpc.StatusCode.INTERNAL
-        text = f"internal error of rtcfd ({type(error).__name__}: {error}); its log has more"
-    await context.abort(code, text, ((REFUSAL_KEY, "1"),))
 
 
 def _answering(method: Callable[..., Awaitable[Any]]) -> Any:
@@ -62,7 +38,7 @@ def _answering(method: Callable[..., Awaitable[Any]]) -> Any:
         try:
             return await method(self, request)
         except Exception as error:
-            await _abort(context, error)
+            await abort(context, error)
 
     return wrapper
 
@@ -84,7 +60,7 @@ def _changing(
                 yield control_pb2.ChangeResponse(progress=line)
             yield control_pb2.ChangeResponse(result=task.result())
         except Exception as error:
-            await _abort(context, error)
+            await abort(context, error)
         finally:
             if task is not None:
                 task.cancel()  # a change that has begun goes on: see turns.py
@@ -116,14 +92,14 @@ def _holding(method: Callable[..., tuple[Outbox, _Tenancy]]) -> Any:
         try:
             first = await anext(messages, None)
             if first is None or first.WhichOneof("kind") != "open":
-                raise errors.InvalidArgument("the first message of such a call is `open`")
+                raise InvalidArgument("the first message of such a call is `open`")
             outbox, tenancy = method(self, first.open)
             opening = asyncio.ensure_future(_open(tenancy, outbox))
             tasks = [opening, asyncio.ensure_future(_listen(messages, opening, tenancy, outbox))]
             async for response in outbox:
                 yield response
         except Exception as error:
-            await _abort(context, error)
+            await abort(context, error)
         finally:
             if tenancy is not None and not outbox.ended:
                 tenancy.lost()
@@ -152,12 +128,23 @@ async def _listen(
             return
 
 
+class Upkeep(Protocol):
+    """What the daemon itself does for its clients."""
+
+    def notes(self) -> list[str]:
+        """Return what is to be said about rtcfd itself, a line each."""
+
+    async def reload(self) -> list[str]:
+        """Read settings and graphs.d again; return a line for each thing that has changed."""
+
+
 class Control(control_pb2_grpc.ControlServicer):
     """Serves one connection or many; owned by the daemon."""
 
-    def __init__(self, runners: Runners, catalog: Catalog) -> None:
+    def __init__(self, runners: Runners, catalog: Catalog, upkeep: Upkeep) -> None:
         self._runners = runners
         self._catalog = catalog
+        self._upkeep = upkeep
         self._begin_ns = time.monotonic_ns()
 
     @_answering
@@ -169,7 +156,13 @@ class Control(control_pb2_grpc.ControlServicer):
             pid=os.getpid(),
             uptime_ns=time.monotonic_ns() - self._begin_ns,
             runners=await asyncio.gather(*(runner.status() for runner in chosen)),
+            notes=self._upkeep.notes(),
         )
+
+    @_answering
+    async def Reload(self, request: control_pb2.ReloadRequest) -> Any:
+        """Read the settings and graphs.d again."""
+        return control_pb2.ReloadResponse(notes=await self._upkeep.reload())
 
     @_answering
     async def AddRunner(self, request: control_pb2.AddRunnerRequest) -> Any:
@@ -321,7 +314,7 @@ class Control(control_pb2_grpc.ControlServicer):
                 yield await self._statistics(request.runner)
                 await asyncio.sleep(interval_s)
         except Exception as error:
-            await _abort(context, error)
+            await abort(context, error)
 
     @_answering
     async def ResetStatistics(self, request: control_pb2.ResetStatisticsRequest) -> Any:

@@ -313,7 +313,7 @@ async def run(runner: str, socket: str) -> None:
 
 def main() -> int:
     parser = argparse.ArgumentParser()
-    for option in ("--runner", "--socket", "--package"):
+    for option in ("--runner", "--socket", "--package", "--trust"):
         parser.add_argument(option)
     parser.add_argument("--describe", type=Path)
     args = parser.parse_args()

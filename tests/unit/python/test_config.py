@@ -1,13 +1,16 @@
 """Settings: defaults, the configuration file, what is allowed."""
 
 import os
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 from rtcf.v1 import runner_pb2
 from rtcfd import config, options, settings
+from rtcfd.access import Access
 from rtcfd.errors import Refusal
+from rtcfd.limits import Limits
 
 
 def written(tmp_path: Path, text: str) -> Path:
@@ -72,6 +75,15 @@ def test_a_file_is_read(tmp_path: Path) -> None:
         ('[runner]\nlock_memory = "yes"', "runner.lock_memory must be true or false"),
         ("[runner]\nros = 1", "runner.ros must be a table"),
         ("[runner]\n!", "line 2"),
+        ("[runner]\npriority = 5\n\nspin_us = -1", "rtcfd.toml:4: runner.spin_us is out of"),
+        ("[daemon]\n[runner.ros]\nmaster_uri = 'x'", ':3: ROS master URI "x" is not valid'),
+        ("[access]\ndefault = 'root'", "access.default must be one of none, observe, operate"),
+        ("[access]\nobserve = 'alice'", "access.observe must be a list of users and @groups"),
+        ("[access]\nobserve = ['a b']", "'a b' is no user's name, nor @ and a group's"),
+        ("[access]\nobserve=['a']\nadmin=['a']", ":3: access.admin: a is in access.observe"),
+        ("[limits]\nclients = 0", ":2: limits.clients of 0 is out of range: 1 to 4096"),
+        ("[limits]\nclients = 1.5", "limits.clients must be an integer"),
+        ("[limits]\nclient = 1", 'unknown key "limits.client"; did you mean "clients"'),
     ],
 )
 def test_a_bad_file_is_refused_by_name(tmp_path: Path, text: str, said: str) -> None:
@@ -109,7 +121,7 @@ def test_the_command_line_goes_before_the_file(
     assert given.state_dir is None
     assert given.executor == Path("/build/bin/rtcf-executor")
     assert given.defaults.realtime == runner_pb2.REALTIME_REQUIRED
-    assert [str(folder) for folder in given.folders[:5]] == [
+    assert [str(folder.path) for folder in given.folders[:5]] == [
         "/o/lib",
         "/f/lib",
         "/build/lib/rtcf",
@@ -119,10 +131,24 @@ def test_the_command_line_goes_before_the_file(
     assert options.parse(["--foreground"], None).socket == Path("/e")
 
 
-def test_the_service_takes_systemds_folders(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("RUNTIME_DIRECTORY", "/run/here")
-    monkeypatch.delenv("STATE_DIRECTORY", raising=False)
+def test_the_service_takes_systemds_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("STATE_DIRECTORY", "/var/lib/here")
     given = options.parse([], None)
-    assert given.runtime_dir == Path("/run/here")
-    assert given.state_dir == Path("/var/lib/rtcfd")
+    assert given.runtime_dir == Path("/run/rtcfd")
+    assert given.state_dir == Path("/var/lib/here")
     assert given.defaults.realtime == runner_pb2.REALTIME_REQUIRED
+
+
+def test_every_line_of_the_shipped_file_is_a_setting_that_is_accepted(tmp_path: Path) -> None:
+    shipped = Path(__file__).parents[3] / "systemd" / "rtcfd.toml"
+    lines = [line[1:] if re.match(r"#[a-z_]+ = ", line) else line
+             for line in shipped.read_text().splitlines()]  # fmt: skip
+    file = written(tmp_path, "\n".join(lines))
+    found = config.read(file)
+    defaults = settings.defaults(runner_pb2.REALTIME_REQUIRED)
+    assert settings.differences(defaults, found.runner) == []
+    assert (found.access, found.limits) == (Access(), Limits())
+    known = {field.name for field in [*runner_pb2.RunnerSettings.DESCRIPTOR.fields,
+                                      *runner_pb2.RosSettings.DESCRIPTOR.fields]}  # fmt: skip
+    named = {line.partition(" =")[0] for line in lines}
+    assert known - named == {"ros", "realtime"} - named

@@ -1,0 +1,151 @@
+"""The control socket: who owns it, how many it serves, what it does with nonsense."""
+
+import os
+import random
+import signal
+import socket
+import subprocess
+from pathlib import Path
+
+import grpc
+import pytest
+import rtcf
+from daemon_under_test import BUILD_TREE, DaemonUnderTest, wait_for
+from rtcf.v1 import control_pb2
+
+TIMES = [300, pytest.param(10_000, marks=pytest.mark.long)]
+
+
+def test_a_socket_that_another_took_is_left_to_it(daemon: DaemonUnderTest) -> None:
+    daemon.socket.unlink()
+    with socket.socket(socket.AF_UNIX) as other:
+        other.bind(str(daemon.socket))
+        assert daemon.end() == 0
+        assert daemon.socket.is_socket()
+
+
+def test_a_file_in_the_way_is_refused_and_kept(stopped_daemon: DaemonUnderTest) -> None:
+    stopped_daemon.socket.write_text("mine")
+    stopped_daemon.start()
+    assert "is in the way and is no socket" in stopped_daemon.log()
+    assert stopped_daemon.socket.read_text() == "mine"
+
+
+def test_a_link_in_the_way_is_refused_and_kept(stopped_daemon: DaemonUnderTest) -> None:
+    target = stopped_daemon.folder / "target"
+    with socket.socket(socket.AF_UNIX) as stale:
+        stale.bind(str(target))
+    stopped_daemon.socket.symlink_to(target)
+    stopped_daemon.start()
+    assert "is in the way and is no socket" in stopped_daemon.log()
+    assert target.is_socket()
+
+
+def test_a_socket_that_was_passed_is_adopted_and_left_behind(tmp_path: Path) -> None:
+    path = tmp_path / "passed"
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(path))
+        listener.listen()
+        # A client that comes before rtcfd does.
+        early = subprocess.Popen(
+            [BUILD_TREE / "bin" / "rtcfctl", "--socket", path, "status"],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        launcher = (
+            "import os, sys\n"
+            "os.dup2(int(sys.argv[1]), 3)\n"
+            "os.environ |= {'LISTEN_PID': str(os.getpid()), 'LISTEN_FDS': '1'}\n"
+            "os.execv(sys.argv[2], sys.argv[2:])\n"
+        )
+        process = subprocess.Popen(
+            ["/usr/bin/python3", "-c", launcher, str(listener.fileno()),
+             str(BUILD_TREE / "bin" / "rtcfd"), "--foreground", "--runtime-dir",
+             str(tmp_path / "run"), "--no-default-runner"],
+            pass_fds=(listener.fileno(), 3) if listener.fileno() != 3 else (3,),
+            stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+    assert early.communicate(timeout=60)[0].startswith("rtcfd ")
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(60) == 0
+    assert path.is_socket()
+
+
+def test_one_client_too_many_is_told_so(stopped_daemon: DaemonUnderTest) -> None:
+    config = stopped_daemon.folder / "rtcfd.toml"
+    config.write_text("[limits]\nclients = 2\n")
+    daemon = stopped_daemon.start("--config", str(config))
+    with daemon.client() as one, daemon.client() as two, daemon.client() as three:
+        one.get_status()
+        two.get_status()
+        with pytest.raises(rtcf.RefusedError, match="serves 2 clients already.*raise clients"):
+            three.get_status()
+    # Those that have left make room.
+    with daemon.client() as four:
+        wait_for(lambda: _answers(four), "an answer")
+
+
+def _answers(client: rtcf.Client) -> bool:
+    try:
+        client.get_status()
+    except rtcf.RefusedError:
+        return False
+    return True
+
+
+def test_a_request_that_is_too_large_is_refused(stopped_daemon: DaemonUnderTest) -> None:
+    config = stopped_daemon.folder / "rtcfd.toml"
+    config.write_text("[limits]\nmessage_kb = 16\n")
+    daemon = stopped_daemon.start("--config", str(config))
+    with daemon.client() as client:
+        with pytest.raises(rtcf.RtcfError, match="larger than rtcfd accepts.*message_kb"):
+            client.load(rtcf.component("demo", "Fine", name="x" * 20_000))
+        client.get_status()
+
+
+def _messages() -> list[tuple[str, str]]:
+    service = control_pb2.DESCRIPTOR.services_by_name["Control"]
+    return [(method.name, method.input_type.name) for method in service.methods]
+
+
+@pytest.mark.parametrize("times", TIMES)
+def test_malformed_requests_change_nothing_and_end_nothing(
+    daemon: DaemonUnderTest, times: int
+) -> None:
+    with daemon.client() as client:
+        client.load(rtcf.component("demo", "Fine", name="kept"))
+        pid = client.get_status().runners[0].pid
+    noise = random.Random(times)
+    names = [name for name, _ in _messages() if name not in ("Stop", "Unload", "RemoveRunner")]
+    with grpc.insecure_channel(f"unix:{daemon.socket}") as channel:
+        for _ in range(times):
+            method = noise.choice([*names, "NoSuchMethod"])
+            call = channel.unary_stream(f"/rtcf.v1.Control/{method}")
+            # Never a valid message: there is no wire type 7.
+            data = b"\x0f" + noise.randbytes(noise.randrange(64))
+            with pytest.raises(grpc.RpcError) as refused:
+                list(call(data, timeout=60))
+            assert refused.value.code().name in ("INVALID_ARGUMENT", "UNIMPLEMENTED")
+    with daemon.client() as client:
+        status = client.get_status().runners[0]
+        assert status.pid == pid
+        assert client.get_order() == ["/kept"]
+    assert "Traceback" not in daemon.log()
+
+
+@pytest.mark.parametrize("times", TIMES)
+def test_noise_on_the_socket_ends_nothing(daemon: DaemonUnderTest, times: int) -> None:
+    noise = random.Random(times)
+    for number in range(times):
+        with socket.socket(socket.AF_UNIX) as client:
+            client.connect(str(daemon.socket))
+            try:
+                if number % 2:  # a connection of HTTP/2, and then noise
+                    client.sendall(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n")
+                client.sendall(noise.randbytes(noise.randrange(200)))
+            except OSError:
+                pass  # it was hung up on
+    with daemon.client() as client:
+        wait_for(lambda: _answers(client), "an answer")
+    assert "Traceback" not in daemon.log()
+    assert len(os.listdir(f"/proc/{daemon.process.pid}/fd")) < 200  # type: ignore[union-attr]
