@@ -4,6 +4,7 @@ Owned by the Runner; called by its Link on rtcfd's one thread.
 """
 
 import logging
+from collections.abc import Callable
 from typing import Protocol
 
 from rtcf.executor.v1 import executor_pb2 as wire

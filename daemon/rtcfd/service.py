@@ -15,6 +15,7 @@ from rtcf.v1 import control_pb2, control_pb2_grpc, graph_pb2, runner_pb2
 
 from rtcfd import VERSION, graph
 from rtcfd.catalog import Catalog
+from rtcfd.errors import InvalidArgument
 from rtcfd.holds import Hold
 from rtcfd.leases import Lease
 from rtcfd.link import Progress

@@ -1,23 +1,56 @@
-"""The tests of installed packages. They run as root, where tests/system/run put them."""
+"""The booted machine of the system tests, with our packages installed."""
 
 import os
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from installed import Daemon
+from machine import Machine
+from rtcf_service import Service
+
+DEBS = Path(os.environ.get("RTCF_DEBS", Path(__file__).parents[2] / "build" / "deb"))
+# What changes the packages themselves comes last, in this order.
+_LAST = ("test_upgrade", "test_purge")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Refuse to change the machine itself."""
-    if os.environ.get("RTCF_SYSTEM_TEST") != "inside":
-        raise pytest.UsageError("these tests install packages: run them by tests/system/run")
+    """Refuse to run elsewhere, and order the files."""
+    if "RTCF_SYSTEM_ROOT" not in os.environ:
+        raise pytest.UsageError("these tests boot a Debian: run them by tests/system/run")
+    order = {name: place for place, name in enumerate(_LAST, start=1)}
+    items.sort(key=lambda item: order.get(item.path.stem, 0))
+
+
+@pytest.fixture(scope="session")
+def bare(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
+    """Give a booted Debian without our packages, but with what they depend on."""
+    folder = tmp_path_factory.mktemp("machine")
+    root = Path(os.environ["RTCF_SYSTEM_ROOT"])
+    machine = Machine(root, os.environ["RTCF_SYSTEM_NAME"], folder)
+    machine.boot()
+    yield machine
+    machine.stop()
+
+
+@pytest.fixture(scope="session")
+def machine(bare: Machine) -> Machine:
+    """Give the Debian with our packages installed as a person would."""
+    bare.path("/debs").mkdir()
+    for deb in DEBS.glob("*.deb"):
+        if "-dbgsym_" not in deb.name:
+            bare.path(f"/debs/{deb.name}").write_bytes(deb.read_bytes())
+    bare.shell("apt-get install --yes --quiet /debs/*.deb >/var/log/rtcf-install.log 2>&1")
+    for user in ("alice", "bob", "carol", "mallory"):
+        bare.run("useradd", "--create-home", user)
+    for user in ("alice", "bob", "carol"):
+        bare.run("adduser", "--quiet", user, "rtcf")
+    return bare
 
 
 @pytest.fixture
-def daemon(tmp_path: Path) -> Iterator[Daemon]:
-    """Give an rtcfd of this test's own."""
-    daemon = Daemon(tmp_path)
-    daemon.wait_until_it_serves()
-    yield daemon
-    assert daemon.end() == 0
+def service(machine: Machine) -> Iterator[Service]:
+    """Give the running service, as it is after its installation; its settings are put back."""
+    service = Service(machine)
+    service.reset()
+    yield service
+    service.reset()

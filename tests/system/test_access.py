@@ -1,0 +1,153 @@
+"""Who may do what: group rtcf, [access], trusted component folders, limits."""
+
+import pytest
+from rtcf_service import Service
+
+LEVELS = '[access]\ndefault = "none"\nobserve = ["alice"]\noperate = ["bob"]\nadmin = ["@boss"]\n'
+CHANGES = (
+    ("start",),
+    ("stop",),
+    ("load", "rtcf_examples", "Mimo", "--name", "X"),
+    ("unload", "M"),
+    ("replace", "M", "rtcf_examples", "Identity"),
+    ("break", "M.in1"),
+    ("runner", "add", "other"),
+    ("runner", "set", "--frequency", "10"),
+    ("runner", "remove", "rt_runner"),
+    ("stats", "--reset"),
+)
+QUERIES = (("status",), ("list",), ("order",), ("info", "M"), ("connections",), ("stats",),
+           ("types",), ("runner", "list"))  # fmt: skip
+
+
+@pytest.fixture
+def levels(service: Service) -> Service:
+    service.machine.shell("getent group boss || groupadd boss; gpasswd -a carol boss >/dev/null")
+    service.configure(LEVELS)
+    service.systemctl("restart", "rtcfd.service")
+    service.load_and_start()
+    return service
+
+
+def test_a_user_outside_the_group_is_told_what_to_do(service: Service) -> None:
+    done = service.ctl("status", user="mallory", check=False)
+    assert done.returncode == 3
+    assert done.stderr == (
+        "rtcfctl: permission denied on /run/rtcfd/control.sock: join its group "
+        "(`sudo adduser mallory rtcf`) and log in again\n"
+    )
+
+
+def test_an_observer_sees_everything_and_changes_nothing(levels: Service) -> None:
+    before = levels.status()
+    for query in QUERIES:
+        levels.ctl(*query, user="alice")
+    for change in CHANGES:
+        done = levels.ctl(*change, user="alice", check=False)
+        assert done.returncode == 1, change
+        assert "user alice has only the right to observe" in done.stderr, change
+        assert "under [access]" in done.stderr, change
+    after = levels.status()
+    assert (after["pid"], after["state"], after["generation"]) == (
+        before["pid"], before["state"], before["generation"],
+    )  # fmt: skip
+    levels.wait_until_said("Load by alice (uid ")
+
+
+def test_an_operator_runs_loops_but_loads_no_code(levels: Service) -> None:
+    levels.ctl("stop", user="bob")
+    levels.ctl("start", user="bob")
+    for change in (("load", "rtcf_examples", "Mimo", "--name", "X"), ("runner", "add", "other")):
+        done = levels.ctl(*change, user="bob", check=False)
+        assert done.returncode == 1
+        assert "takes the right to administer" in done.stderr
+
+
+def test_a_member_of_an_admin_group_does_everything(levels: Service) -> None:
+    levels.ctl("load", "rtcf_examples", "Identity", "--name", "X", user="carol")
+
+
+def test_rights_follow_a_reload(levels: Service) -> None:
+    levels.configure('[access]\nadmin = ["alice"]\n')
+    levels.systemctl("reload", "rtcfd.service")
+    levels.ctl("unload", "M", user="alice")
+
+
+def untrusted(service: Service, make: str) -> str:
+    """Load from a package folder that was made by a line of shell; return the refusal."""
+    service.machine.shell(
+        "d=$(echo /usr/lib/*-linux-gnu/rtcf); rm -rf $d/evil; mkdir $d/evil; "
+        f"s=$(ls $d/rtcf_examples/*.so); t=$d/evil/evil.so; {make}"
+    )
+    try:
+        done = service.ctl("load", "evil", "Mimo", check=False)
+        assert done.returncode == 1, done.stdout
+        return done.stderr
+    finally:
+        service.machine.shell("rm -rf /usr/lib/*-linux-gnu/rtcf/evil /var/tmp/evil.so")
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        ("cp $s $t; chown alice $t", "evil.so belongs to user alice"),
+        ("cp $s $t; chmod o+w $t", "evil.so can be written by everybody"),
+        ("cp $s $t; chown :rtcf $t; chmod g+w $t", "evil.so can be written by its group"),
+        ("cp $s $t; chown alice $d/evil", "rtcf/evil belongs to user alice"),
+        ("cp $s $t; chmod o+w $d/evil", "rtcf/evil can be written by everybody"),
+        ("cp $s /var/tmp/evil.so; chown alice /var/tmp/evil.so; ln -s /var/tmp/evil.so $t",
+         "/var/tmp/evil.so belongs to user alice"),
+        ("mkfifo $t", "not a regular file"),
+        ("mkdir $t", "not a regular file"),
+    ],
+)  # fmt: skip
+def test_code_that_others_can_write_is_refused(service: Service, make: str, said: str) -> None:
+    refusal = untrusted(service, make)
+    assert said in refusal
+    assert len(refusal.splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["../etc", "/etc", "..", "rtcf_examples/../x", "a b", "a\n"])
+def test_names_are_no_paths(service: Service, name: str) -> None:
+    done = service.ctl("load", name, "Mimo", check=False)
+    assert done.returncode != 0
+    assert "is not valid" in done.stderr
+
+
+def test_a_workspace_that_is_named_is_trusted_as_its_owner_is(service: Service) -> None:
+    service.machine.shell(
+        "install -d -o alice -g alice /srv/ws /srv/ws/evil; "
+        "install -o alice -g alice /usr/lib/*-linux-gnu/rtcf/rtcf_examples/*.so /srv/ws/evil/e.so"
+    )
+    assert service.ctl("load", "evil", "Mimo", check=False).returncode == 1
+    settings = service.machine.path("/etc/rtcfd/rtcfd.toml")
+    settings.write_text(settings.read_text().replace("[daemon]", '[daemon]\npath = ["/srv/ws"]'))
+    service.systemctl("reload", "rtcfd.service")
+    service.ctl("load", "evil", "Mimo", "--name", "E")
+    service.machine.run("chown", "bob", "/srv/ws/evil/e.so")
+    done = service.ctl("load", "evil", "Mimo", "--name", "F", check=False)
+    assert "belongs to user bob" in done.stderr
+    service.machine.run("rm", "-r", "/srv/ws")
+
+
+def test_limits_are_refused_with_what_to_do(service: Service) -> None:
+    service.configure("[limits]\nrunners = 1\ncomponents = 1\nclients = 2\n")
+    service.systemctl("restart", "rtcfd.service")
+    service.load_and_start()
+    done = service.ctl("runner", "add", "other", check=False)
+    assert "2 runners are more than the 1 allowed: raise runners under [limits]" in done.stderr
+    done = service.ctl("load", "rtcf_examples", "Identity", check=False)
+    assert "raise components under [limits]" in done.stderr
+    watching = [service.machine.start("rtcfctl", "stats", "--watch") for _ in range(2)]
+    try:
+        for each in watching:
+            assert each.stdout is not None
+            each.stdout.readline()  # it is served
+        done = service.ctl("status", check=False)
+        assert done.returncode == 1
+        assert "rtcfd serves 2 clients already" in done.stderr
+    finally:
+        for each in watching:
+            each.kill()
+            each.wait()
+    service.ctl("status")
