@@ -8,12 +8,24 @@ from pathlib import Path
 
 import rtcf
 
-from rtcfctl import check, component, files, graph, loop, parameter, runner, stats, status, types
+from rtcfctl import (
+    check,
+    component,
+    doctor,
+    files,
+    graph,
+    loop,
+    parameter,
+    runner,
+    stats,
+    status,
+    types,
+)
 from rtcfctl.output import Output
 
 DONE, REFUSED, USAGE, UNREACHABLE = range(4)
 
-_NOUNS = (status, runner, loop, component, graph, files, parameter, types, stats, check)
+_NOUNS = (status, runner, loop, component, graph, files, parameter, types, stats, check, doctor)
 
 
 def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None) -> int:

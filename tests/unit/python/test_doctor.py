@@ -1,0 +1,146 @@
+"""`rtcfctl doctor`: each finding follows the machine, here of files made for it; and for real."""
+
+import json
+from pathlib import Path
+
+import pytest
+from daemon_under_test import DaemonUnderTest
+from rtcf.diagnosis import Finding, Grade, Host, Loop, cpus, diagnose
+
+PID = 42
+CPU = "/sys/devices/system/cpu"
+
+# A machine on which nothing stands in the way, and what changes one finding of it:
+# topic, file, its content, the grade then, and a part of what is said to mend it.
+FIT = {
+    "/sys/kernel/realtime": "1",
+    "/proc/version": "Linux version 6.1.0 SMP PREEMPT_RT",
+    "/proc/sys/kernel/sched_rt_runtime_us": "-1",
+    "/proc/sys/kernel/sched_rt_period_us": "1000000",
+    "/proc/sys/kernel/osrelease": "6.1.0",
+    "/boot/config-6.1.0": "CONFIG_PREEMPT_RT=y",
+    f"/proc/{PID}/status": "CapEff:\t0000000000804000\nVmLck:\t  45000 kB\nCpus_allowed_list:\t0-3",
+    f"/proc/{PID}/limits": "Max realtime priority     0      0\nMax locked memory   8   8  bytes",
+    f"{CPU}/isolated": "3",
+    f"{CPU}/nohz_full": "2-3",
+    f"{CPU}/online": "0-3",
+    f"{CPU}/cpu3/cpufreq/scaling_governor": "performance",
+    f"{CPU}/cpu3/cpuidle/state0/name": "POLL",
+    f"{CPU}/cpu3/cpuidle/state0/latency": "0",
+    f"{CPU}/cpu3/topology/thread_siblings_list": "3",
+    "/sys/devices/system/clocksource/clocksource0/current_clocksource": "tsc",
+    "/proc/irq/9/smp_affinity_list": "0-2",
+    "/proc/irq/9/acpi/x": "",
+    "/proc/swaps": "Filename Type Size Used Priority",
+    "/sys/kernel/mm/transparent_hugepage/enabled": "always [madvise] never",
+    "/proc/sys/vm/compact_unevictable_allowed": "0",
+    "/proc/sys/kernel/numa_balancing": "0",
+    "/etc/hosts": "127.0.0.1 localhost",
+    "/var/log/journal/x": "",
+}
+LOOP = Loop(3, 80, PID)
+STAT = "7 (spinner) S " + " ".join(["0"] * 36) + " 90 1 0 0"
+CHANGES = [
+    ("kernel preemption", "/sys/kernel/realtime", "0", Grade.BAD, "linux-image-rt-amd64"),
+    ("real-time throttling", "/proc/sys/kernel/sched_rt_runtime_us", "950000", Grade.WARNING,
+     "sched_rt_runtime_us=-1"),
+    ("capabilities and limits", f"/proc/{PID}/status", "CapEff:\t0", Grade.BAD, "rtcfd.service"),
+    ("locked memory", f"/proc/{PID}/status", "CapEff:\tffffffff\nVmLck:\t0 kB", Grade.WARNING,
+     "rtcfctl start"),
+    ("isolated CPU", f"{CPU}/isolated", "1", Grade.WARNING, "isolcpus=managed_irq,domain,3"),
+    ("CPU without ticks", f"{CPU}/nohz_full", "", Grade.WARNING, "nohz_full=3"),
+    ("interrupts", "/proc/irq/9/smp_affinity_list", "0-3", Grade.WARNING, "irqaffinity=0,1,2"),
+    ("real-time competitors", "/proc/7/task/7/stat", STAT, Grade.WARNING, "taskset"),
+    ("CPU frequency", f"{CPU}/cpu3/cpufreq/scaling_governor", "powersave", Grade.WARNING,
+     "echo performance"),
+    ("CPU idle states", f"{CPU}/cpu3/cpuidle/state0/latency", "133", Grade.WARNING, "udevadm"),
+    ("SMT", f"{CPU}/cpu3/topology/thread_siblings_list", "1,3", Grade.WARNING, "cpu1/online"),
+    ("clock source", "/sys/devices/system/clocksource/clocksource0/current_clocksource", "hpet",
+     Grade.WARNING, "dmesg"),
+    ("transparent huge pages", "/sys/kernel/mm/transparent_hugepage/enabled",
+     "[always] madvise never", Grade.WARNING, "echo madvise"),
+    ("memory compaction", "/proc/sys/vm/compact_unevictable_allowed", "1", Grade.WARNING,
+     "sysctl -w vm.compact_unevictable_allowed=0"),
+    ("NUMA balancing", "/proc/sys/kernel/numa_balancing", "1", Grade.WARNING,
+     "sysctl -w kernel.numa_balancing=0"),
+    ("ROS environment", "/etc/hosts", "10.0.0.1 robot", Grade.WARNING, "127.0.0.1 localhost"),
+    ("ROS environment", "/etc/default/rtcfd", "ROS_MASTER_URI=http://arm:11311", Grade.WARNING,
+     "ROS_IP="),
+]  # fmt: skip
+
+
+def findings(root: Path, changes: dict[str, str], loop: Loop = LOOP) -> dict[str, Finding]:
+    for name, text in (FIT | changes).items():
+        file = root / name.lstrip("/")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+    return {finding.topic: finding for finding in diagnose(Host(root), loop)}
+
+
+def test_a_fit_machine_has_nothing_to_mend(tmp_path: Path) -> None:
+    found = findings(tmp_path, {})
+    assert {topic: each.found for topic, each in found.items() if each.grade != Grade.GOOD} == {}
+
+
+@pytest.mark.parametrize(("topic", "file", "text", "grade", "remedy"), CHANGES)
+def test_each_finding_follows_the_machine(
+    tmp_path: Path, topic: str, file: str, text: str, grade: Grade, remedy: str
+) -> None:
+    found = findings(tmp_path, {file: text})
+    assert found[topic].grade == grade, found[topic]
+    assert remedy in found[topic].remedy
+    assert found[topic].wanted
+    assert {other for other, each in found.items() if each.grade > Grade.UNKNOWN} == {topic}
+
+
+def test_swap_matters_to_a_loop_that_is_not_locked(tmp_path: Path) -> None:
+    swaps = {"/proc/swaps": "Filename Type\n/dev/sda2 partition"}
+    assert findings(tmp_path, swaps)["swap"].grade == Grade.GOOD
+    loose = Loop(3, 80, PID, lock_memory=False)
+    assert findings(tmp_path, swaps, loose)["swap"].grade == Grade.BAD
+
+
+def test_a_competitor_on_another_cpu_is_none(tmp_path: Path) -> None:
+    changes = {"/proc/7/task/7/stat": STAT, "/proc/7/task/7/status": "Cpus_allowed_list:\t0-2"}
+    assert findings(tmp_path, changes)["real-time competitors"].grade == Grade.GOOD
+
+
+def test_a_group_without_real_time_run_time_is_found(tmp_path: Path) -> None:
+    changes = {
+        "/sys/fs/cgroup/cpu/cpu.rt_runtime_us": "950000",
+        "/sys/fs/cgroup/cpu/box/cpu.rt_runtime_us": "0",
+        f"/proc/{PID}/cgroup": "4:cpu,cpuacct:/box",
+    }
+    found = findings(tmp_path, changes)["RT_GROUP_SCHED"]
+    assert (found.grade, "/box has no real-time run time" in found.found) == (Grade.BAD, True)
+
+
+def test_what_cannot_be_read_is_said_to_be_unknown_or_absent(tmp_path: Path) -> None:
+    for finding in diagnose(Host(tmp_path), Loop(0, 80)):
+        assert finding.found
+
+
+def test_lists_of_cpus_are_understood() -> None:
+    assert cpus("0-2,5\n") == {0, 1, 2, 5}
+    assert cpus("") == cpus("(null)") == set()
+
+
+def test_it_measures_and_judges_for_real_and_leaves_nothing_behind(
+    daemon: DaemonUnderTest,
+) -> None:
+    done = daemon.ctl("-o", "json", "doctor", "--seconds", "0.2")
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    grades = {each["topic"]: each["grade"] for each in document["findings"]}
+    assert {"kernel preemption", "wake-up latency", "runner rt_runner"} <= set(grades)
+    assert document["verdict"]["grade"] in ("good", "warning", "bad")
+    with daemon.client() as client:
+        assert [each.runner for each in client.get_status().runners] == ["rt_runner"]
+
+
+def test_without_rtcfd_it_looks_all_the_same(tmp_path: Path, daemon: DaemonUnderTest) -> None:
+    done = daemon.ctl("--socket", str(tmp_path / "none"), "doctor")
+    assert done.returncode == 0
+    assert "bad      rtcfd: rtcfd is not running" in done.stdout
+    assert "kernel preemption" in done.stdout
+    assert "not measured: rtcfd does not answer" in done.stdout
