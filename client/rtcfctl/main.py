@@ -10,6 +10,7 @@ import rtcf
 
 from rtcfctl import (
     check,
+    completion,
     component,
     doctor,
     files,
@@ -30,7 +31,11 @@ _NOUNS = (status, runner, loop, component, graph, files, parameter, types, stats
 
 def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None) -> int:
     """Run one command; return its exit code."""
-    args = parser().parse_args(arguments)
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    if words[:1] == [completion.REQUEST]:
+        print("\n".join(completion.candidates(parser(), words[1:])))
+        return DONE
+    args = parser().parse_args(words)
     args.build_tree = build_tree
     output = Output(args.output, args.verbose)
     try:

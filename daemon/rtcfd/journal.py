@@ -56,15 +56,16 @@ class LineFormatter(logging.Formatter):
         return line
 
 
-def fields(record: logging.LogRecord) -> dict[str, str]:
+def fields(record: logging.LogRecord) -> dict[str, str | int]:
     """Return the journal's fields of a record, besides its message."""
     priority = next(
         (value for level, value in _JOURNAL_PRIORITIES if record.levelno >= level), _DEBUG_PRIORITY
     )
-    result = {"PRIORITY": str(priority), "SYSLOG_IDENTIFIER": "rtcfd"}
+    result: dict[str, str | int] = {"PRIORITY": str(priority), "SYSLOG_IDENTIFIER": "rtcfd"}
     if record.pathname:
         result["CODE_FILE"] = record.pathname
-        result["CODE_LINE"] = str(record.lineno)
+        # A number: systemd.journal.send() takes no other, alone of all fields.
+        result["CODE_LINE"] = record.lineno
     if record.funcName:
         result["CODE_FUNC"] = record.funcName
     if runner := getattr(record, "runner", ""):

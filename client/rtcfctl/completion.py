@@ -1,0 +1,120 @@
+"""Completes command lines for shells: verbs and options from the parser, names from rtcfd.
+
+The shell calls `rtcfctl __complete WORD...` with the words after rtcfctl, the
+last one being completed (see completion/rtcfctl); answers are lines.
+"""
+
+import argparse
+import contextlib
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+import rtcf
+from rtcf.v1 import graph_pb2
+
+REQUEST = "__complete"
+
+
+def candidates(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str]:
+    """Return what the last word may become; nothing where that is a file or a free value."""
+    *before, prefix = words or [""]
+    line = _Line(parser)
+    for word in before:
+        line.take(word)
+    try:
+        return sorted({word for word in line.next(prefix) if word.startswith(prefix)})
+    except rtcf.RtcfError:
+        return []  # a shell's prompt is no place for errors
+
+
+class _Line:
+    """What the words before the one that is completed mean."""
+
+    def __init__(self, parser: argparse.ArgumentParser) -> None:
+        self._parser = parser
+        self._verbs: list[str] = []
+        self._given: list[str] = []  # positional words of the verb
+        self._option: argparse.Action | None = None  # waits for its value
+        self._values: dict[str, str] = {}
+
+    def take(self, word: str) -> None:
+        """Take one word."""
+        if self._option is not None:
+            self._values[self._option.dest] = word
+            self._option = None
+        elif word.startswith("-"):
+            name, equals, value = word.partition("=")
+            action = self._parser._option_string_actions.get(name)
+            if action is not None and action.nargs != 0:
+                if equals:
+                    self._values[action.dest] = value
+                else:
+                    self._option = action
+        elif (below := self._sub_parsers()) is not None:
+            self._verbs.append(word)
+            if word in below:
+                self._parser = below[word]
+        else:
+            self._given.append(word)
+
+    def next(self, prefix: str) -> Iterator[str]:
+        """Yield all that may follow."""
+        if self._option is not None:
+            yield from self._of(self._option)
+        elif prefix.startswith("-"):
+            yield from self._parser._option_string_actions
+        elif (below := self._sub_parsers()) is not None:
+            yield from below
+        elif (action := self._positional()) is not None:
+            yield from self._of(action)
+
+    def _sub_parsers(self) -> dict[str, argparse.ArgumentParser] | None:
+        for action in self._parser._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                return dict(action.choices)
+        return None
+
+    def _positional(self) -> argparse.Action | None:
+        left = len(self._given)
+        for action in self._parser._actions:
+            if action.option_strings:
+                continue
+            if action.nargs in ("+", "*") or left == 0:
+                return action
+            left -= 1
+        return None
+
+    def _of(self, action: argparse.Action) -> Iterable[Any]:
+        if action.choices is not None:
+            return action.choices
+        source = action.metavar if isinstance(action.metavar, str) else ""
+        if source == "NAME" and ("runner" in self._verbs or action.dest == "runner"):
+            source = "RUNNER"
+        with rtcf.Client(self._values.get("socket")) as client:
+            return list(self._live(client, source))
+
+    def _live(self, client: rtcf.Client, source: str) -> Iterator[str]:
+        """Yield names that rtcfd knows."""
+        runner = self._values.get("runner", "")
+        if source == "RUNNER":
+            yield from (str(each.runner) for each in client.get_status().runners)
+        elif source == "NAME":
+            yield from client.get_order(runner)
+            yield from (name.removeprefix("/") for name in client.get_order(runner))
+        elif source == "PKG":
+            yield from (str(each.package) for each in client.list_types().types)
+        elif source == "COMPONENT" and self._given:
+            types = client.list_types(self._given[-1]).types
+            yield from (str(each.type) for each in types)
+        elif source == "COMPONENT.PORT":
+            for component in client.list_components(runner):
+                name = component.full_name.removeprefix("/")
+                yield from (
+                    f"{name}.{port.name}"
+                    for port in component.ports
+                    if port.direction == graph_pb2.DIRECTION_INPUT
+                )
+        elif source == "PARAMETER:=VALUE" and self._given:
+            with contextlib.suppress(rtcf.RefusedError):
+                info = client.get_component(self._given[0], runner)
+                yield from (f"{parameter.name}:=" for parameter in info.parameters)

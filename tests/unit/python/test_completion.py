@@ -1,0 +1,68 @@
+"""What the shell offers: verbs, options, and the names that rtcfd knows at that moment."""
+
+import subprocess
+from pathlib import Path
+
+import pytest
+import rtcf
+from daemon_under_test import BUILD_TREE, DaemonUnderTest
+
+SCRIPT = Path(__file__).parents[3] / "client" / "completion" / "rtcfctl"
+
+
+@pytest.fixture
+def offered(daemon: DaemonUnderTest) -> DaemonUnderTest:
+    with daemon.client() as client:
+        client.load(rtcf.component("demo", "Fine", name="alpha"))
+        client.add_runner("other")
+    return daemon
+
+
+@pytest.mark.parametrize(
+    ("line", "among"),
+    [
+        ("sta", ["start", "stats", "status"]),
+        ("runner ", ["add", "list", "remove", "set"]),
+        ("runner remove ", ["other", "rt_runner"]),
+        ("-r ", ["other", "rt_runner"]),
+        ("-o ", ["json", "table", "yaml"]),
+        ("status --so", ["--socket"]),
+        ("info al", ["alpha"]),
+        ("unload /", ["/alpha"]),
+        ("load ", ["demo"]),
+        ("load demo F", ["Fine"]),
+        ("-r other info ", [""]),
+        ("load demo Fine --param ", [""]),
+        ("nonsense ", [""]),
+    ],
+)
+def test_the_last_word_is_completed(offered: DaemonUnderTest, line: str, among: list[str]) -> None:
+    done = offered.ctl("__complete", *line.split(" "))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.removesuffix("\n").split("\n") == among
+
+
+def test_bash_asks_rtcfctl(offered: DaemonUnderTest) -> None:
+    test = (
+        f"source {SCRIPT}; COMP_WORDS=(rtcfctl info al); COMP_CWORD=2; _rtcfctl; "
+        "echo ${COMPREPLY[@]}"
+    )
+    done = subprocess.run(
+        ["bash", "-c", test],
+        env={"PATH": f"{BUILD_TREE}/bin:/usr/bin:/bin", "RTCF_SOCKET": str(offered.socket)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split() == ["alpha"]
+
+
+def test_without_rtcfd_there_is_nothing_to_offer_and_nothing_is_said(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [BUILD_TREE / "bin" / "rtcfctl", "__complete", "info", ""],
+        env={"RTCF_SOCKET": str(tmp_path / "none")},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert (done.stdout.strip(), done.stderr) == ("", "")
