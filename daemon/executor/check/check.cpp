@@ -21,6 +21,7 @@ namespace rtcf::executor {
 namespace {
 
 constexpr std::uint64_t kCyclesPerValue = 10;
+constexpr std::int64_t kStallTimeout = 120'000'000'000;
 
 // Stands where the ROS node would: a value comes on every input, every output is read.
 class ValueSource final : public Bridge {
@@ -83,6 +84,8 @@ void run(const CheckRequest& request, Runner& runner, ValueSource& values) {
     RunnerSettings settings = runner.settings();
     settings.whitelist = ".*";
     settings.loop.warmup_cycles = 0;
+    // A report is made inside the cycle, and finding its source lines may take seconds.
+    settings.stall_timeout_ns = kStallTimeout;
     runner.configure(settings);
     runner.load(definitionOf(request), request.library, silent);
     for (std::uint64_t done = 0; done < request.cycles; done += kCyclesPerValue) {
