@@ -6,7 +6,7 @@ from processes import output_of
 from result import Budget, Result
 from setting import Setting
 
-HAL_FIG_1 = 315.0  # LinuxCNC HAL 2.9 on the same graph, see docs of `make bench-rt`
+FIG_1_INSTRUCTIONS = 315.0  # LinuxCNC HAL takes 240 for plain sums, 348 for what Mimo does
 PER_MAPPED_PORT = 100.0
 _MAPPED_PORTS = 3
 
@@ -33,7 +33,7 @@ def run(setting: Setting) -> Result:
         result.rows.append([title, found["instructions"], found["max"]])
     ports = (counts["mapped"] - counts["fig1"]) / _MAPPED_PORTS
     result.budgets = [
-        Budget("Fig. 1", counts["fig1"], HAL_FIG_1, "instructions"),
+        Budget("Fig. 1", counts["fig1"], FIG_1_INSTRUCTIONS, "instructions"),
         Budget("each mapped port on top", ports, PER_MAPPED_PORT, "instructions"),
     ]
     return result
