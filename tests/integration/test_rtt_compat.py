@@ -119,7 +119,8 @@ def _set_parameter(master: Master, name: str, value: str) -> None:
 def _dynparam(master: Master, *arguments: str) -> str:
     """Call dynparam, as rosrun would."""
     done = subprocess.run(
-        ["/usr/lib/dynamic_reconfigure/dynparam", *arguments],
+        # By Debian's Python, not by the first on PATH.
+        ["/usr/bin/python3", "/usr/lib/dynamic_reconfigure/dynparam", *arguments],
         env=master.environment(),
         capture_output=True,
         text=True,
