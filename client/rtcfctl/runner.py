@@ -16,11 +16,12 @@ _CHOICES = {
     "overrun": choices(runner_pb2.OverrunPolicy.DESCRIPTOR),
     "on_boot": choices(runner_pb2.OnBoot.DESCRIPTOR),
     "on_crash": choices(runner_pb2.OnCrash.DESCRIPTOR),
+    "sim_time": choices(runner_pb2.SimTime.DESCRIPTOR),
 }
 # Options that are fields of RunnerSettings and of RosSettings.
 _FIELDS = ("frequency_hz", "cpu", "priority", "spin_us", "spin_auto", "max_overruns",
            "warmup_cycles", "stall_timeout_ms", "orphan_timeout_s", "lock_memory", "heap_kb",
-           "stack_kb")  # fmt: skip
+           "stack_kb", "max_clock_jump_s")  # fmt: skip
 _ROS_FIELDS = ("enabled", "master_uri", "hostname", "whitelist", "blacklist", "queue")
 
 
@@ -142,6 +143,16 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
     )
     to.add_argument(
         "--on-crash", choices=_CHOICES["on_crash"], help="of a loop whose executor crashed"
+    )
+    to.add_argument(
+        "--sim-time", choices=_CHOICES["sim_time"], help="follow /clock; auto: if /use_sim_time"
+    )
+    to.add_argument(
+        "--max-clock-jump",
+        dest="max_clock_jump_s",
+        type=float,
+        metavar="S",
+        help="a simulated clock that goes further at once begins anew",
     )
     to.add_argument("--lock-memory", action=switch, help="lock the executor's memory")
     to.add_argument("--heap-kb", type=int, metavar="KIB", help="heap touched at start")

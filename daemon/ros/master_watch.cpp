@@ -51,6 +51,7 @@ void MasterWatch::attach(executor::RunnerView& runner, const executor::AskSuperv
 void MasterWatch::configure(const executor::BridgeSettings& settings) {
     {
         const std::lock_guard lock(mutex_);
+        if (!settings_ || !(*settings_ == settings)) status_.simulated_time.reset();
         settings_ = settings;
         status_.enabled = settings.enabled;
         status_.master_uri = masterUri(settings);
@@ -63,6 +64,15 @@ void MasterWatch::configure(const executor::BridgeSettings& settings) {
 void MasterWatch::setTable(const executor::BridgeTable& table) {
     publishing_.setTaps(table.outputs);
     subscribing_.setInjectors(table.inputs);
+    {
+        const std::lock_guard lock(mutex_);
+        due_ = true;
+    }
+    changed_.notify_all();
+}
+
+void MasterWatch::setClock(std::shared_ptr<executor::SimulatedClock> clock) {
+    subscribing_.setClock(std::move(clock));
     {
         const std::lock_guard lock(mutex_);
         due_ = true;
@@ -318,6 +328,7 @@ void MasterWatch::openAndClose(std::uint32_t queue) {
     // If it has gone meanwhile, do it again later.
     if (node_.calls().takeMissed()) registered_ = false;
     setConnected();
+    askForSimulation(master);
     for (const std::string& refusal : refusals_->take()) say(refusal);
 }
 
@@ -345,12 +356,26 @@ void MasterWatch::setProblem(const std::string& problem) {
     const std::lock_guard lock(mutex_);
     status_.connected = false;
     status_.problem = problem;
+    status_.simulated_time.reset();
 }
 
 void MasterWatch::setConnected() {
     const std::lock_guard lock(mutex_);
     status_.connected = true;
     status_.problem = refusals_->recent();
+}
+
+// As it may be set at any time before a loop starts, it is asked for again and again.
+void MasterWatch::askForSimulation(MasterClient& master) {
+    XmlRpc::XmlRpcValue arguments;
+    arguments[0] = name_.full();
+    arguments[1] = "/use_sim_time";
+    MasterAnswer answer = master.call("getParam", arguments);
+    if (answer.silent()) return;
+    const bool set = answer && answer.value.getType() == XmlRpc::XmlRpcValue::TypeBoolean &&
+                     static_cast<bool&>(answer.value);
+    const std::lock_guard lock(mutex_);
+    status_.simulated_time = set;
 }
 
 void MasterWatch::say(const std::string& message) {

@@ -34,6 +34,7 @@ class MasterWatch {
     /// @{
     void configure(const executor::BridgeSettings& settings);
     void setTable(const executor::BridgeTable& table);
+    void setClock(std::shared_ptr<executor::SimulatedClock> clock);
     executor::BridgeStatus status() const;
     /// Lets run() end, soon whatever the master does.
     void stop();
@@ -66,6 +67,7 @@ class MasterWatch {
 
     void setProblem(const std::string& problem);
     void setConnected();
+    void askForSimulation(MasterClient& master);
     void say(const std::string& message);
 
     const NodeName name_;

@@ -26,6 +26,10 @@ void RosNode::setTable(std::shared_ptr<const executor::BridgeTable> table) {
     watch_->setTable(table ? *table : executor::BridgeTable{});
 }
 
+void RosNode::setClock(std::shared_ptr<executor::SimulatedClock> clock) {
+    watch_->setClock(std::move(clock));
+}
+
 executor::BridgeStatus RosNode::status() const { return watch_->status(); }
 
 executor::HookGate* RosNode::hooks() noexcept { return &watch_->hooks(); }

@@ -32,6 +32,7 @@ class RosNode final : public executor::Bridge {
     bool attach(executor::RunnerView& runner) override;
     void configure(const executor::BridgeSettings& settings) override;
     void setTable(std::shared_ptr<const executor::BridgeTable> table) override;
+    void setClock(std::shared_ptr<executor::SimulatedClock> clock) override;
     executor::BridgeStatus status() const override;
     executor::HookGate* hooks() noexcept override;
 

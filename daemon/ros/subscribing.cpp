@@ -82,7 +82,8 @@ bool Subscribing::reconcile(ros::NodeHandle& handle, bool master) {
         if (!subscriber->open(handle, queue_)) break;
     }
     for (const auto& subscriber : closing) subscriber->close();
-    return !(closing_first.empty() && opening.empty() && closing.empty());
+    const bool clock = master && clock_.reconcile(handle, queue_);
+    return clock || !(closing_first.empty() && opening.empty() && closing.empty());
 }
 
 void Subscribing::closeAll() {
@@ -92,6 +93,7 @@ void Subscribing::closeAll() {
         closing.swap(subscribers_);
     }
     for (const auto& [injector, subscriber] : closing) subscriber->close();
+    clock_.close();
 }
 
 std::uint32_t Subscribing::open() const {

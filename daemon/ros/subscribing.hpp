@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "bridge/injector.hpp"
+#include "ros/clock_subscription.hpp"
 
 namespace ros {
 class NodeHandle;
@@ -35,6 +36,10 @@ class Subscribing {
 
     /// The injectors to feed from now on; others get nothing more. Any thread; returns at once.
     void setInjectors(Injectors injectors);
+    /// Who gets the ticks of /clock from now on; null = nobody. Any thread; returns at once.
+    void setClock(std::shared_ptr<executor::SimulatedClock> clock) {
+        clock_.setClock(std::move(clock));
+    }
 
     /// Subscribes and unsubscribes until the topics are those of the injectors. Watch thread.
     /// @param master false: only what needs no master, a new injector of a topic that is subscribed
@@ -55,6 +60,7 @@ class Subscribing {
     void run();
 
     ros::CallbackQueue queue_;
+    ClockSubscription clock_;
     std::atomic<bool> stop_{false};
     mutable std::mutex mutex_;  // injectors_ and subscribers_
     Injectors injectors_;

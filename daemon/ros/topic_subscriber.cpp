@@ -19,7 +19,9 @@ bool TopicSubscriber::open(ros::NodeHandle& handle, ros::CallbackQueueInterface&
     };
     ros::SubscribeOptions options;
     options.topic = injector_->topic();
-    options.queue_size = 1;  // only the newest value counts
+    // The injector knows if only the newest counts; here none is lost before it gets there.
+    constexpr std::uint32_t kQueue = 1000;
+    options.queue_size = kQueue;
     options.md5sum = injector_->type().ros_md5;
     options.datatype = injector_->type().ros_type;
     options.helper = boost::make_shared<ros::SubscriptionCallbackHelperT<const Message&>>(deliver);

@@ -27,6 +27,7 @@ _EVENT_LEVELS: dict[int, int] = {
     wire.Event.KIND_ROS: logging.INFO,
     wire.Event.KIND_COMPONENT_FAILED: logging.WARNING,
     wire.Event.KIND_OVERRUNS: logging.WARNING,
+    wire.Event.KIND_CLOCK: logging.INFO,
 }
 
 

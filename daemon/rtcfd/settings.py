@@ -47,6 +47,8 @@ def defaults(
         spin_auto=False,
         on_boot=runner_pb2.ON_BOOT_HOLD,
         on_crash=runner_pb2.ON_CRASH_HOLD,
+        sim_time=runner_pb2.SIM_TIME_AUTO,
+        max_clock_jump_s=10.0,
         ros=runner_pb2.RosSettings(
             enabled=True,
             master_uri=os.environ.get("ROS_MASTER_URI") or _DEFAULT_MASTER,
@@ -64,7 +66,7 @@ def merged(
     """Return `base` with what `change` sets; what is UNSPECIFIED there counts as unset."""
     effective = runner_pb2.RunnerSettings()
     effective.CopyFrom(change)
-    for field in ("realtime", "overrun", "on_boot", "on_crash"):
+    for field in ("realtime", "overrun", "on_boot", "on_crash", "sim_time"):
         if not getattr(effective, field):
             effective.ClearField(field)
     result = runner_pb2.RunnerSettings()
@@ -143,6 +145,12 @@ def check(settings: runner_pb2.RunnerSettings) -> None:
         if not (math.isfinite(value) and 0.0 <= value <= _LONGEST_S):
             raise InvalidArgument(
                 f"orphan timeout of {value:g} s is out of range: 0 to {_LONGEST_S:g} s"
+            )
+    if settings.HasField("max_clock_jump_s"):
+        value = settings.max_clock_jump_s
+        if not (math.isfinite(value) and 0.0 <= value <= _LONGEST_S):
+            raise InvalidArgument(
+                f"max clock jump of {value:g} s is out of range: 0 to {_LONGEST_S:g} s"
             )
     if settings.HasField("ros") and settings.ros.HasField("master_uri"):
         uri = settings.ros.master_uri

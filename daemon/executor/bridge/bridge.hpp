@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,8 @@
 #include "bridge/tap.hpp"
 
 namespace rtcf::executor {
+
+class SimulatedClock;
 
 /// All mapped connections of one generation of the graph. The topic's name and
 /// type are the tap's and the injector's.
@@ -42,7 +45,8 @@ struct BridgeStatus {
     std::string master_uri;
     std::uint32_t publications = 0;
     std::uint32_t subscriptions = 0;
-    std::string problem;  ///< one line; empty = none
+    std::string problem;                 ///< one line; empty = none
+    std::optional<bool> simulated_time;  ///< of the peers; nothing = they have not been asked yet
 };
 
 class RunnerView;
@@ -67,6 +71,9 @@ class Bridge {
     /// The connections to serve from now on; what is not in it any more is
     /// closed, what stays in it (the same object) goes on undisturbed.
     virtual void setTable(std::shared_ptr<const BridgeTable> table) = 0;
+
+    /// Ticks of the peers' simulated clock go there from now on; null = nobody wants them.
+    virtual void setClock(std::shared_ptr<SimulatedClock> clock) = 0;
 
     virtual BridgeStatus status() const = 0;
 

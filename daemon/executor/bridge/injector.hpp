@@ -2,12 +2,16 @@
 /// An injector brings values into the loop: one thread deserialises a message
 /// into the free slot of a triple buffer, the real-time thread takes the newest
 /// at the next cycle boundary. Neither ever waits; only the newest value counts.
+/// Under a simulated clock, where cycles come in bursts, all values count: they
+/// queue up, and each cycle is given one.
 #pragma once
 
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -31,6 +35,13 @@ class Injector {
     /// @return false if the bytes are not a message of this type; nothing has changed then
     bool deliver(const std::uint8_t* bytes, std::uint32_t size);
 
+    /// Whether messages wait for a deliverNext() each. What still waits when that ends is
+    /// delivered. Any thread; not real-time safe.
+    void setQueueing(bool queueing);
+
+    /// Delivers the oldest message that waits, if any. Any thread; not real-time safe.
+    void deliverNext();
+
     /// Messages delivered and refused so far. Any thread.
     std::uint64_t delivered() const noexcept { return delivered_.load(std::memory_order_relaxed); }
     std::uint64_t refused() const noexcept { return refused_.load(std::memory_order_relaxed); }
@@ -51,6 +62,11 @@ class Injector {
     }
 
    private:
+    // A loop that cannot keep up with its simulation loses the oldest beyond this.
+    static constexpr std::size_t kMaxWaiting = 10000;
+
+    bool store(const std::uint8_t* bytes, std::uint32_t size);
+
     static constexpr std::uint32_t kFresh =
         4;  // set in middle_ by deliver(), beside an index 0 to 2
 
@@ -60,7 +76,10 @@ class Injector {
     std::uint32_t front_ = 0;     // loop side
     std::uint64_t sequence_ = 0;  // loop side
     std::atomic<std::uint32_t> middle_{1};
-    std::uint32_t back_ = 2;  // delivering side
+    std::mutex mutex_;  // of the delivering side: back_ and what waits
+    std::uint32_t back_ = 2;
+    bool queueing_ = false;
+    std::deque<std::vector<std::uint8_t>> waiting_;
     std::atomic<std::uint64_t> delivered_{0};
     std::atomic<std::uint64_t> refused_{0};
 };

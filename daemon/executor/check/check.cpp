@@ -28,6 +28,7 @@ class ValueSource final : public Bridge {
    public:
     void configure(const BridgeSettings& /*settings*/) override {}
     void setTable(std::shared_ptr<const BridgeTable> table) override { table_ = std::move(table); }
+    void setClock(std::shared_ptr<SimulatedClock> /*clock*/) override {}
     BridgeStatus status() const override { return {}; }
 
     // Graph thread, as all calls.

@@ -8,9 +8,11 @@
 #include <algorithm>
 #include <cstring>
 #include <exception>
+#include <optional>
 
 #include "faults/crash_handler.hpp"
 #include "logging/log.hpp"
+#include "loop/simulated_clock.hpp"
 #include "refusal.hpp"
 
 namespace rtcf::executor {
@@ -96,9 +98,12 @@ RealtimeProblems Loop::start(const LoopSettings& settings) {
     RealtimeProblems problems;
     retune(settings);
     reset(settings);
-    refreshWallClock();
-    idle_guard_ = std::make_unique<IdleStateGuard>();
-    if (!idle_guard_->problem().empty()) problems.push_back({idle_guard_->problem(), false});
+    simulation_ = settings.clock;
+    if (simulation_ == nullptr) {
+        refreshWallClock();
+        idle_guard_ = std::make_unique<IdleStateGuard>();
+        if (!idle_guard_->problem().empty()) problems.push_back({idle_guard_->problem(), false});
+    }
 
     running_.store(true, std::memory_order_release);
     joinable_.store(true, std::memory_order_release);
@@ -165,10 +170,12 @@ RealtimeProblems Loop::retune(const LoopSettings& settings) {
     spin_ns_.store(settings.spin_ns, std::memory_order_relaxed);
     overrun_policy_.store(settings.overrun, std::memory_order_relaxed);
     max_overruns_.store(settings.max_overruns, std::memory_order_relaxed);
-    return joinable() ? applyToThread(thread_, settings.realtime) : RealtimeProblems{};
+    if (!joinable() || simulation_ != nullptr) return {};
+    return applyToThread(thread_, settings.realtime);
 }
 
 void Loop::refreshWallClock() noexcept {
+    if (joinable() && simulation_ != nullptr) return;  // stamps are the simulation's
     stamp_offset_ns_.store(clockNow(CLOCK_REALTIME) - clockNow(CLOCK_MONOTONIC),
                            std::memory_order_relaxed);
 }
@@ -201,6 +208,17 @@ void Loop::run() noexcept {
     thread_id_.store(static_cast<int>(syscall(SYS_gettid)), std::memory_order_relaxed);
     prefaultStack(stack_bytes_);
     recorder_.setRunning(true);
+    if (simulation_ == nullptr) {
+        followRealTime();
+    } else {
+        followClock();
+    }
+    makeSafe();
+    recorder_.setRunning(false);
+    running_.store(false, std::memory_order_release);
+}
+
+void Loop::followRealTime() noexcept {
     std::int64_t deadline = clockNow(CLOCK_MONOTONIC) + clock_.period_ns;
     while (!stop_requested_.load(std::memory_order_acquire) &&
            fault_.kind == LoopFault::Kind::None) {
@@ -219,9 +237,25 @@ void Loop::run() noexcept {
         if (end >= limit) blameOverrun(begin, begin + counter_.toTicks(limit - wake));
         deadline = nextDeadline(deadline, end);
     }
-    makeSafe();
-    recorder_.setRunning(false);
-    running_.store(false, std::memory_order_release);
+}
+
+// Components' time() goes on by a period each cycle, whatever the simulated clock does; stamps are
+// the clock's.
+void Loop::followClock() noexcept {
+    constexpr auto kPatience = std::chrono::milliseconds(10);
+    while (!stop_requested_.load(std::memory_order_acquire) &&
+           fault_.kind == LoopFault::Kind::None) {
+        const std::optional<std::int64_t> stamp = simulation_->next(clock_.period_ns, kPatience);
+        if (!stamp) {
+            takeProbe();
+            takeAdoption();
+            continue;
+        }
+        for (const Feed& feed : schedule_->feeds) feed.injector->deliverNext();
+        const std::int64_t now = clock_.iteration == 0 ? 0 : clock_.time_ns + clock_.period_ns;
+        stamp_offset_ns_.store(*stamp - now, std::memory_order_relaxed);
+        cycle(now, now);
+    }
 }
 
 // The device says when a cycle begins. Changes are taken over and a request to stop is seen

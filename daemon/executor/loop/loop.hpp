@@ -24,6 +24,7 @@
 namespace rtcf::executor {
 
 class Log;
+class SimulatedClock;
 
 /// What to do after a cycle that ended when the next should have begun.
 enum class OverrunPolicy { Skip, CatchUp, Relative };
@@ -35,12 +36,14 @@ struct LoopSettings {
     std::uint32_t max_overruns = 0;    ///< leaky bucket; 0 = never stop for overruns
     std::uint64_t warmup_cycles = 10;  ///< first cycles, kept out of the figures
     RealtimeSettings realtime;
+    /// Followed instead of real time, in a thread that is not real-time; null = real time.
+    std::shared_ptr<SimulatedClock> clock;
 };
 
 /// One executed cycle.
 struct CycleRecord {
     std::uint64_t iteration;
-    std::int64_t stamp_ns;     ///< CLOCK_REALTIME of the deadline
+    std::int64_t stamp_ns;     ///< CLOCK_REALTIME of the deadline, or the simulated clock's time
     std::int64_t latency_ns;   ///< wake-up after the deadline; may be negative
     std::int64_t duration_ns;  ///< calculation
 };
@@ -150,6 +153,8 @@ class Loop {
     void reset(const LoopSettings& settings);
     static void* threadMain(void* self);
     void run() noexcept;
+    void followRealTime() noexcept;
+    void followClock() noexcept;
     void cycle(std::int64_t deadline_ns, std::int64_t wake_ns) noexcept RTCF_NONBLOCKING;
     template <bool Plain>
     bool update(const Schedule& schedule, FlightRecorder::RealtimeNotes notes,
@@ -192,6 +197,7 @@ class Loop {
     CycleCounter counter_;
     pthread_t thread_{};
     std::unique_ptr<IdleStateGuard> idle_guard_;
+    std::shared_ptr<SimulatedClock> simulation_;  // that the thread follows; null = real time
 
     // As above: of whoever runs cycles.
     std::int64_t elapsed_ns_ = 0;        // whole periods since the last cycle

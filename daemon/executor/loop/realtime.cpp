@@ -137,6 +137,7 @@ RealtimeProblems checkScheduling(const RealtimeSettings& settings) {
 RealtimeAttributes::RealtimeAttributes(const RealtimeSettings& settings) {
     pthread_attr_init(&attributes_);
     pthread_attr_setstacksize(&attributes_, settings.stack_bytes + kStackReserve + kThreadStack);
+    if (!settings.wanted) return;
     if (tryFifo(settings.priority) == 0) {
         sched_param wanted{};
         wanted.sched_priority = static_cast<int>(settings.priority);

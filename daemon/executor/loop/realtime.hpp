@@ -24,6 +24,7 @@ using RealtimeProblems = std::vector<RealtimeProblem>;
 struct RealtimeSettings {
     int cpu = -1;            ///< -1 = the last one this process may use
     unsigned priority = 80;  ///< SCHED_FIFO, 1 to 98
+    bool wanted = true;      ///< false: an ordinary thread, for a simulated clock
     bool lock_memory = true;
     std::size_t heap_bytes = 8192 * 1024;
     std::size_t stack_bytes = 256 * 1024;

@@ -96,6 +96,7 @@ void Runner::tick() {
     }
     noteComponentFaults();
     noteOverruns(false);
+    noteClockJumps();
     CycleRecord record{};
     while (discards_cycles_ && loop_.popRecord(record)) {
     }
@@ -109,6 +110,7 @@ void Runner::noticeEnd() {
 
 void Runner::loopEnded() {
     loop_.join(INT64_MAX);
+    simulate(false);
     noteOverruns(true);
     noteLoopFault();
     stopAll();
@@ -228,11 +230,13 @@ ChangeOutcome Runner::start(const Progress& progress) {
     if (state_ == RunnerState::Stepping) endStepping();
     startAll(progress);
     try {
+        simulate(wantsSimulation(progress));
         progress("starting the loop");
         degraded_.clear();
         for (RealtimeProblem& problem : lockAndStart())
             degraded_.push_back(std::move(problem.text));
     } catch (const Refusal&) {
+        simulate(false);
         stopAll();
         throw;
     }
@@ -248,8 +252,52 @@ ChangeOutcome Runner::start(const Progress& progress) {
     return result;
 }
 
+// A bridge that has just been told where its peers are is given a moment to ask them.
+bool Runner::wantsSimulation(const Progress& progress) {
+    constexpr auto kPatience = std::chrono::seconds(2);
+    if (!bridge_ || !settings_.bridge.enabled || settings_.sim_time == SimTime::Never) return false;
+    if (settings_.sim_time == SimTime::Always) return true;
+    progress("asking the ROS master for /use_sim_time");
+    const auto until = std::chrono::steady_clock::now() + kPatience;
+    while (std::chrono::steady_clock::now() < until && !ending_) {
+        const BridgeStatus status = bridge_->status();
+        if (status.simulated_time) return *status.simulated_time;
+        if (!status.connected && !status.problem.empty()) return false;  // there is none
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return false;
+}
+
+void Runner::simulate(bool simulated) {
+    if (simulated) clock_->reset(settings_.max_clock_jump_ns);
+    simulated_ = simulated;
+    settings_.loop.clock = simulated ? clock_ : nullptr;
+    settings_.loop.realtime.wanted = !simulated;
+    if (!bridge_) return;
+    for (const auto& injector : plan_->bridgeTable().inputs) injector->setQueueing(simulated);
+    bridge_->setClock(settings_.loop.clock);
+}
+
+void Runner::noteClockJumps() {
+    while (const std::optional<ClockJump> jump = clock_->takeJump()) {
+        const double to = static_cast<double>(jump->to_ns) / 1e9;
+        std::string message = fmt::format("the simulated clock begins at {:.9f} s", to);
+        if (jump->from_ns) {
+            message = fmt::format(
+                "the simulated clock went from {:.9f} s to {:.9f} s: time goes on "
+                "from there with one cycle",
+                static_cast<double>(*jump->from_ns) / 1e9, to);
+        }
+        events_({RunnerEvent::Kind::Clock,
+                 message,
+                 {},
+                 loop_.figures().iteration.load(std::memory_order_relaxed)});
+    }
+}
+
 RealtimeProblems Runner::lockAndStart() {
     lacks_realtime_ = false;
+    if (simulated_) return loop_.start(loopSettings());
     RealtimeProblems problems = lockMemory(settings_.loop.realtime);
     for (RealtimeProblem& problem : checkScheduling(settings_.loop.realtime))
         problems.push_back(std::move(problem));
@@ -405,6 +453,9 @@ void Runner::adopt(Change change, const Progress& progress) {
     }
     plan->noteKept(adoption, *plan_);
     std::swap(plan_, plan);
+    if (simulated_) {
+        for (const auto& injector : plan_->bridgeTable().inputs) injector->setQueueing(true);
+    }
     if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>(plan_->bridgeTable()));
     publish(change.changed);
     if (!adoption.values.empty()) {
@@ -599,8 +650,9 @@ void Runner::publish(const std::set<std::string>& changed) {
 }
 
 void Runner::publishPicture() {
-    RunnerPicture next{state_, settings_, degraded_, status_,
-                       bridge_ ? bridge_->status() : BridgeStatus{}};
+    RunnerPicture next{
+        state_,    settings_, degraded_, status_, bridge_ ? bridge_->status() : BridgeStatus{},
+        simulated_};
     if (settings_.spin_auto && tuned_spin_ns_ >= 0) next.settings.loop.spin_ns = tuned_spin_ns_;
     const std::lock_guard<std::mutex> lock(published_mutex_);
     picture_ = std::move(next);

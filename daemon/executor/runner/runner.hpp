@@ -25,6 +25,7 @@
 #include "graph/plan.hpp"
 #include "logging/log.hpp"
 #include "loop/loop.hpp"
+#include "loop/simulated_clock.hpp"
 #include "plugins/library.hpp"
 #include "runner/overrun_report.hpp"
 #include "runner/runner_view.hpp"
@@ -46,7 +47,7 @@ struct ChangeOutcome {
 
 /// Something that happened without a request.
 struct RunnerEvent {
-    enum class Kind { LoopEnded, Degraded, Ros, ComponentFailed, Overruns };
+    enum class Kind { LoopEnded, Degraded, Ros, ComponentFailed, Overruns, Clock };
     Kind kind;
     std::string message;
     std::string component;
@@ -60,6 +61,7 @@ struct RunnerPicture {
     std::vector<std::string> degraded;
     std::string status;
     BridgeStatus bridge;
+    bool simulated = false;  ///< the loop follows a simulated clock
 };
 
 class Runner final : private RunnerView {
@@ -161,6 +163,9 @@ class Runner final : private RunnerView {
     ChangeOutcome outcome(std::string component = {}) const;
     RealtimeProblems lockAndStart();
     LoopSettings loopSettings() const;
+    bool wantsSimulation(const Progress& progress);
+    void simulate(bool simulated);
+    void noteClockJumps();
     MappingFilter filter() const;
     void publish(const std::set<std::string>& changed = {});
     void publishPicture();
@@ -187,6 +192,8 @@ class Runner final : private RunnerView {
     OverrunReport overrun_report_;
     std::int64_t tuned_spin_ns_ = -1;  // by tuneSpin(); -1 = not yet
     HistogramSnapshot tuned_from_;     // wake-up latency at the last tuneSpin()
+    std::shared_ptr<SimulatedClock> clock_ = std::make_shared<SimulatedClock>();
+    bool simulated_ = false;        // the loop follows clock_
     std::int64_t tuned_at_ns_ = 0;
 
     // Published for queries.

@@ -58,6 +58,8 @@ void validate(RunnerSettings& settings) {
                  std::int64_t{3'600'000}, "ms");
     requireRange("orphan timeout", static_cast<double>(settings.orphan_timeout_ns) / 1e9, 0.0, 1e6,
                  "s");
+    requireRange("max clock jump", static_cast<double>(settings.max_clock_jump_ns) / 1e9, 0.0, 1e6,
+                 "s");
     requireRange("queue", settings.bridge.queue, 1U, 1'000'000U, "messages");
     (void)NamePattern("whitelist", settings.whitelist);
     (void)NamePattern("blacklist", settings.blacklist);

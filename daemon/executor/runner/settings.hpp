@@ -9,6 +9,13 @@
 
 namespace rtcf::executor {
 
+/// Whether a loop follows the simulated clock of its peers.
+enum class SimTime {
+    Auto,  ///< if they do
+    Never,
+    Always
+};
+
 struct RunnerSettings {
     double frequency_hz = 1000.0;
     LoopSettings loop;  ///< its period follows frequency_hz
@@ -19,7 +26,9 @@ struct RunnerSettings {
     int on_boot = 0;                                  ///< rtcfd's, kept for it
     int on_crash = 0;                                 ///< rtcfd's, kept for it
     BridgeSettings bridge;
-    std::string whitelist;  ///< regular expressions over mapped names
+    SimTime sim_time = SimTime::Auto;
+    std::int64_t max_clock_jump_ns = 10'000'000'000;  ///< further forward, a simulation begins anew
+    std::string whitelist;                            ///< regular expressions over mapped names
     std::string blacklist;
 };
 

@@ -114,6 +114,29 @@ pb::Difference::Kind differenceKindTo(Difference::Kind kind) {
     return pb::Difference::KIND_PARAMETERS;
 }
 
+SimTime simTimeFrom(pb::SimTime choice) {
+    switch (choice) {
+        case pb::SIM_TIME_NEVER:
+            return SimTime::Never;
+        case pb::SIM_TIME_ALWAYS:
+            return SimTime::Always;
+        default:
+            return SimTime::Auto;
+    }
+}
+
+pb::SimTime simTimeTo(SimTime choice) {
+    switch (choice) {
+        case SimTime::Never:
+            return pb::SIM_TIME_NEVER;
+        case SimTime::Always:
+            return pb::SIM_TIME_ALWAYS;
+        case SimTime::Auto:
+            break;
+    }
+    return pb::SIM_TIME_AUTO;
+}
+
 pb::OverrunPolicy overrunTo(OverrunPolicy policy) {
     if (policy == OverrunPolicy::CatchUp) return pb::OVERRUN_POLICY_CATCH_UP;
     if (policy == OverrunPolicy::Relative) return pb::OVERRUN_POLICY_RELATIVE;
@@ -228,6 +251,10 @@ RunnerSettings settingsFrom(const pb::RunnerSettings& message, RunnerSettings ba
     if (message.has_spin_auto()) base.spin_auto = message.spin_auto();
     if (message.has_on_boot()) base.on_boot = message.on_boot();
     if (message.has_on_crash()) base.on_crash = message.on_crash();
+    if (message.has_sim_time()) base.sim_time = simTimeFrom(message.sim_time());
+    if (message.has_max_clock_jump_s()) {
+        base.max_clock_jump_ns = static_cast<std::int64_t>(message.max_clock_jump_s() * 1e9);
+    }
     const pb::RosSettings& ros = message.ros();
     if (ros.has_enabled()) base.bridge.enabled = ros.enabled();
     if (ros.has_master_uri()) base.bridge.master_uri = ros.master_uri();
@@ -257,6 +284,8 @@ pb::RunnerSettings settingsTo(const RunnerSettings& settings) {
     message.set_spin_auto(settings.spin_auto);
     message.set_on_boot(static_cast<pb::OnBoot>(settings.on_boot));
     message.set_on_crash(static_cast<pb::OnCrash>(settings.on_crash));
+    message.set_sim_time(simTimeTo(settings.sim_time));
+    message.set_max_clock_jump_s(static_cast<double>(settings.max_clock_jump_ns) / 1e9);
     pb::RosSettings& ros = *message.mutable_ros();
     ros.set_enabled(settings.bridge.enabled);
     ros.set_master_uri(settings.bridge.master_uri);
@@ -345,6 +374,9 @@ v1::Event eventTo(const RunnerEvent& event) {
             break;
         case RunnerEvent::Kind::Overruns:
             message.set_kind(v1::Event::KIND_OVERRUNS);
+            break;
+        case RunnerEvent::Kind::Clock:
+            message.set_kind(v1::Event::KIND_CLOCK);
             break;
         case RunnerEvent::Kind::Ros:
             message.set_kind(v1::Event::KIND_ROS);

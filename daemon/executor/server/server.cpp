@@ -560,6 +560,7 @@ pb::RunnerStatus Server::status() const {
     status.set_runner(runner_->name());
     status.set_state(stateTo(picture.state));
     status.set_status(picture.status);
+    status.set_simulated(picture.simulated);
     if (const std::string where = stuck(); !where.empty()) {
         status.set_state(pb::RUNNER_STATE_STUCK);
         status.set_status(fmt::format("stuck in {}()", where));

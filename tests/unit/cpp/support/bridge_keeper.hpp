@@ -31,6 +31,7 @@ class BridgeKeeper final : public executor::Bridge {
     void setTable(std::shared_ptr<const executor::BridgeTable> table) override {
         record_->set(std::move(table));
     }
+    void setClock(std::shared_ptr<executor::SimulatedClock>) override {}
     executor::BridgeStatus status() const override { return {}; }
 
    private:

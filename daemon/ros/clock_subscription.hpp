@@ -1,0 +1,39 @@
+/// @file
+/// The subscription of /clock, by which a simulation gives its time.
+#pragma once
+
+#include <ros/subscriber.h>
+
+#include <memory>
+#include <mutex>
+
+#include "loop/simulated_clock.hpp"
+
+namespace ros {
+class CallbackQueueInterface;
+class NodeHandle;
+}  // namespace ros
+
+namespace rtcf::ros1 {
+
+/// Owned by Subscribing, whose thread delivers the ticks: in the order in which they came among
+/// the other messages.
+class ClockSubscription {
+   public:
+    /// Who gets the ticks from now on; null = nobody. Any thread; returns at once.
+    void setClock(std::shared_ptr<executor::SimulatedClock> clock);
+
+    /// Subscribes or unsubscribes, as is wanted. Speaks to the master.
+    /// @return true if anything was opened or closed
+    bool reconcile(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue);
+    void close();
+
+   private:
+    void deliver(std::int64_t now_ns);
+
+    std::mutex mutex_;
+    std::shared_ptr<executor::SimulatedClock> clock_;
+    ros::Subscriber subscriber_;  // the watch thread's
+};
+
+}  // namespace rtcf::ros1

@@ -1,0 +1,43 @@
+"""The clock of a simulation; the tests start it as a program of its own.
+
+clock_peer.py tick      publishes /clock: each line of its input, in ns, is a tick
+clock_peer.py record    prints each tick of /clock it receives, in ns
+
+Both print `connected` when they have met a peer; `tick` waits for one first.
+"""
+
+import sys
+import time
+
+import rospy
+from rosgraph_msgs.msg import Clock
+
+_POLL_S = 0.01
+
+
+def _tick() -> None:
+    publisher = rospy.Publisher("/clock", Clock, queue_size=100000)
+    while publisher.get_num_connections() == 0:
+        time.sleep(_POLL_S)
+    print("connected", flush=True)
+    for line in sys.stdin:
+        publisher.publish(Clock(clock=rospy.Time(0, int(line))))
+
+
+def _record() -> None:
+    subscriber = rospy.Subscriber(
+        "/clock", Clock, lambda tick: print(tick.clock.to_nsec(), flush=True)
+    )
+    while not rospy.is_shutdown() and subscriber.get_num_connections() == 0:
+        time.sleep(_POLL_S)
+    print("connected", flush=True)
+    while not rospy.is_shutdown():
+        time.sleep(_POLL_S)
+
+
+if __name__ == "__main__":
+    rospy.init_node("clock_peer", anonymous=True, disable_rostime=True)
+    if sys.argv[1] == "tick":
+        _tick()
+    else:
+        _record()

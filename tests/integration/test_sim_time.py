@@ -1,0 +1,183 @@
+"""A loop that follows /clock: its cycles, their times, and what it reads."""
+
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rosbag
+import rosgraph
+import rospy
+import rtcf
+from daemon_process import DEADLINE_S, Daemon, wait_for, with_ros
+from ros_processes import Master
+from rtcf.v1 import runner_pb2
+from std_msgs.msg import Float64
+from values import iteration
+
+SECOND = 1_000_000_000
+_PEER = Path(__file__).with_name("clock_peer.py")
+
+
+class Clock:
+    """A node that publishes /clock."""
+
+    def __init__(self, master: Master, folder: Path) -> None:
+        self._process = subprocess.Popen(
+            ["/usr/bin/python3", str(_PEER), "tick"],
+            env=master.environment(),
+            cwd=folder,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def wait_until_connected(self) -> None:
+        """Return when somebody listens."""
+        assert self._process.stdout is not None
+        assert self._process.stdout.readline() == "connected\n"
+
+    def tick(self, *ticks_ns: int) -> None:
+        """Let the clock show these times, one after another."""
+        assert self._process.stdin is not None
+        self._process.stdin.write("".join(f"{tick}\n" for tick in ticks_ns))
+        self._process.stdin.flush()
+
+    def end(self) -> None:
+        """End it."""
+        self._process.kill()
+        self._process.communicate(timeout=DEADLINE_S)
+
+
+@pytest.fixture
+def simulated(master: Master) -> Iterator[Master]:
+    """Give a master whose nodes are to follow /clock."""
+    parameters = rosgraph.Master("/test", master.uri)
+    parameters.setParam("/use_sim_time", True)
+    yield master
+    parameters.deleteParam("/use_sim_time")
+
+
+@pytest.fixture
+def client(tmp_path: Path, simulated: Master) -> Iterator[rtcf.Client]:
+    """Give a daemon whose loop counts its cycles and passes on /in."""
+    daemon = Daemon(tmp_path, with_ros(simulated.uri, "/in|/out"))
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=1000.0, max_clock_jump_s=2.0))
+        client.load(
+            rtcf.component(
+                "rtcf_examples", "Identity", name="pass", remaps=["in:=/in", "out:=/out"]
+            )
+        )
+        yield client
+    daemon.end()
+
+
+@pytest.fixture
+def clock(tmp_path: Path, simulated: Master, client: rtcf.Client) -> Iterator[Clock]:
+    """Give a clock that a running loop listens to."""
+    client.start()
+    clock = Clock(simulated, tmp_path)
+    clock.wait_until_connected()
+    yield clock
+    clock.end()
+
+
+def _status(client: rtcf.Client) -> runner_pb2.RunnerStatus:
+    status: runner_pb2.RunnerStatus = client.get_status("rt_runner").runners[0]
+    return status
+
+
+def _wait_for_exactly(client: rtcf.Client, cycles: int) -> None:
+    wait_for(lambda: iteration(client) >= cycles, f"cycle {cycles}")
+    assert iteration(client) == cycles
+
+
+@pytest.mark.parametrize("rate_hz", [100, 999, 1001])
+def test_a_clock_of_any_rate_makes_the_exact_number_of_cycles(
+    client: rtcf.Client, clock: Clock, rate_hz: int
+) -> None:
+    status = _status(client)
+    assert status.simulated
+    assert status.iteration == 0
+    seconds = 5
+    clock.tick(*(k * SECOND // rate_hz for k in range(1, seconds * rate_hz + 1)))
+    # From the first tick to the last, both included.
+    first, last = SECOND // rate_hz, seconds * SECOND
+    _wait_for_exactly(client, (last - first) // 1_000_000 + 1)
+
+
+def test_a_clock_that_stands_stops_the_loop_and_nothing_else(
+    client: rtcf.Client, clock: Clock
+) -> None:
+    clock.tick(5 * SECOND, 5 * SECOND, 5 * SECOND + 10_000_000)
+    _wait_for_exactly(client, 11)
+    # Changes and queries do not wait for the clock.
+    client.load(rtcf.component("rtcf_examples", "Identity", name="more"))
+    client.unload(["more"])
+    assert [info.full_name for info in client.list_components()] == ["/pass"]
+    clock.tick(5 * SECOND + 20_000_000)
+    _wait_for_exactly(client, 21)
+    client.stop()
+    assert _status(client).state == runner_pb2.RUNNER_STATE_STOPPED
+
+
+def test_a_jump_begins_anew_with_one_cycle_and_is_said(
+    client: rtcf.Client, clock: Clock, tmp_path: Path
+) -> None:
+    clock.tick(SECOND, SECOND + 5_000_000)
+    _wait_for_exactly(client, 6)
+    clock.tick(0, 3_000_000)  # a bag that begins again
+    _wait_for_exactly(client, 10)
+    clock.tick(60 * SECOND)  # further than max_clock_jump_s
+    _wait_for_exactly(client, 11)
+    log = tmp_path / "log"
+    wait_for(lambda: "went from 0.003000000 s to 60.0" in log.read_text(), "the jump's event")
+    assert log.read_text().count("the simulated clock went from") == 2
+    assert log.read_text().count("the simulated clock begins at 1.000000000 s") == 1
+
+
+def test_a_loop_that_is_not_to_follow_the_clock_does_not(client: rtcf.Client) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(sim_time=runner_pb2.SIM_TIME_NEVER))
+    client.start()
+    wait_for(lambda: iteration(client) > 10, "cycles in real time")
+    assert not _status(client).simulated
+
+
+def test_a_bag_that_is_played_loses_no_input_and_no_cycle(
+    client: rtcf.Client, simulated: Master, tmp_path: Path
+) -> None:
+    values = [float(k) for k in range(1, 201)]
+    bag_file = tmp_path / "in.bag"
+    with rosbag.Bag(str(bag_file), "w") as bag:
+        for index, value in enumerate(values):
+            bag.write("/in", Float64(value), rospy.Time.from_sec(1000.0 + index / 100.0))
+    client.start()
+    out = simulated.node("record", "/out")
+    ticks = subprocess.Popen(
+        ["/usr/bin/python3", str(_PEER), "record"],
+        env=simulated.environment(),
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    played = subprocess.run(
+        ["/usr/bin/rosbag", "play", "--clock", "--hz=50", "--delay=2", "--quiet", str(bag_file)],
+        env=simulated.environment(),
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE_S,
+        check=False,
+    )
+    assert played.returncode == 0, played.stderr
+    out.wait_for_values(len(values))
+    assert out.values() == values
+    out.end()
+    ticks.terminate()
+    shown = [int(line) for line in ticks.communicate(timeout=DEADLINE_S)[0].split() if line.isdigit()]
+    begin = re.search(r"clock begins at (\d+)\.(\d{9}) s", (tmp_path / "log").read_text())
+    assert begin
+    first = int(begin[1] + begin[2])
+    assert first in shown
+    _wait_for_exactly(client, (shown[-1] - first) // 1_000_000 + 1)
