@@ -118,6 +118,10 @@ class Client:
         request = control_pb2.StepRequest(runner=runner, cycles=cycles)
         return self._change(self._stub.Step, request, on_progress, timeout_s=None)
 
+    def replay(self, request: control_pb2.ReplayRequest) -> control_pb2.ReplayResponse:
+        """Run a piece of a recording through a loop; see rtcf.replay for whole ones."""
+        return self._ask(self._stub.Replay, request, None)  # type: ignore[no-any-return]
+
     def load(
         self,
         component: graph_pb2.ComponentSpec,
@@ -267,7 +271,7 @@ class Client:
         """Begin the figures anew."""
         self._ask(self._stub.ResetStatistics, control_pb2.ResetStatisticsRequest(runner=runner))
 
-    def _ask(self, method: Any, request: Any, timeout_s: float = QUERY_TIMEOUT_S) -> Any:
+    def _ask(self, method: Any, request: Any, timeout_s: float | None = QUERY_TIMEOUT_S) -> Any:
         try:
             return method(request, timeout=timeout_s)
         except grpc.RpcError as error:

@@ -17,6 +17,7 @@ from rtcfctl import (
     graph,
     loop,
     parameter,
+    replay,
     runner,
     stats,
     status,
@@ -26,7 +27,20 @@ from rtcfctl.output import Output
 
 DONE, REFUSED, USAGE, UNREACHABLE = range(4)
 
-_NOUNS = (status, runner, loop, component, graph, files, parameter, types, stats, check, doctor)
+_NOUNS = (
+    status,
+    runner,
+    loop,
+    replay,
+    component,
+    graph,
+    files,
+    parameter,
+    types,
+    stats,
+    check,
+    doctor,
+)
 
 
 def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None) -> int:

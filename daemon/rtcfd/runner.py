@@ -436,6 +436,16 @@ class Runner:
         self.log.info("%d cycles stepped", cycles)
         return result
 
+    async def replay(self, request: control_pb2.ReplayRequest) -> control_pb2.ReplayResponse:
+        """Run a piece of a recording through the loop; takes as long as its cycles take."""
+
+        async def work() -> control_pb2.ReplayResponse:
+            if request.begin:
+                await self._need_executor(lambda _: None)
+            return (await self.ask(wire.Request(replay=request))).replay
+
+        return await self.change("a replay", work, timeout_s=None)
+
     async def _need_executor(self, progress: Progress) -> None:
         if not self.up:
             progress("starting the executor")

@@ -200,6 +200,11 @@ class Control(control_pb2_grpc.ControlServicer):
         runner = self._runners.get(request.runner)
         return lambda progress: runner.step(request.cycles, progress)
 
+    @_answering
+    async def Replay(self, request: control_pb2.ReplayRequest) -> Any:
+        """Run a piece of a recording."""
+        return await self._runners.get(request.runner).replay(request)
+
     @_changing
     def Load(self, request: control_pb2.LoadRequest) -> Any:
         """Load a component."""

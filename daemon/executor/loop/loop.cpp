@@ -74,9 +74,9 @@ void Loop::reset(const LoopSettings& settings) {
     stop_requested_.store(false, std::memory_order_release);
 }
 
-void Loop::beginStepping(const LoopSettings& settings) {
+void Loop::beginStepping(const LoopSettings& settings, std::int64_t stamp_ns) {
     reset(settings);
-    stamp_offset_ns_.store(0, std::memory_order_relaxed);
+    stamp_offset_ns_.store(stamp_ns, std::memory_order_relaxed);
 }
 
 std::uint64_t Loop::step(std::uint64_t cycles) noexcept {

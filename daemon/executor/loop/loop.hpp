@@ -100,8 +100,8 @@ class Loop {
     /// while the loop does not run. The same graph and inputs give the same values, bit by bit.
     /// @return cycles done; fewer if a component failed, or after requestStop()
     std::uint64_t step(std::uint64_t cycles) noexcept;
-    /// Sets counters and clock as start() does, for step().
-    void beginStepping(const LoopSettings& settings);
+    /// Sets counters and clock as start() does, for step(). @param stamp_ns of the first cycle
+    void beginStepping(const LoopSettings& settings, std::int64_t stamp_ns = 0);
     /// Calls safe() of all components, as at the end of a running loop.
     void endStepping() noexcept { makeSafe(); }
     /// Makes a change at the next boundary, or at once if the loop does not run.

@@ -371,7 +371,90 @@ ChangeOutcome Runner::step(std::uint64_t cycles, const Progress& progress) {
     return outcome();
 }
 
+ReplayOutcome Runner::replay(const ReplayChunk& chunk, const Progress& progress) {
+    ReplayOutcome outcome;
+    if (chunk.begin) {
+        outcome = beginReplay(chunk, progress);
+    } else if (!replay_) {
+        throw Refusal(RefusalKind::FailedPrecondition,
+                      fmt::format("no replay of {} is under way: it was stopped", name_));
+    } else {
+        try {
+            outcome = replay_->run(chunk);
+        } catch (const Refusal&) {
+            endStepping();
+            throw;
+        }
+    }
+    log_.drain();
+    note({});
+    const bool ended = loop_.fault().kind != LoopFault::Kind::None || loop_.stopRequested();
+    if ((chunk.end && !outcome.more) || ended) endStepping();
+    if (ended) throw Refusal(RefusalKind::FailedPrecondition, status_);
+    return outcome;
+}
+
+ReplayOutcome Runner::beginReplay(const ReplayChunk& chunk, const Progress& progress) {
+    noticeEnd();
+    if (loop_.joinable()) {
+        throw Refusal(
+            RefusalKind::FailedPrecondition,
+            fmt::format("the loop of {0} runs in real time: stop it first: rtcfctl -r {0} stop",
+                        name_));
+    }
+    if (state_ == RunnerState::Stepping) endStepping();
+    Replay::check(plan_->bridgeTable(), chunk.topics);
+    renewComponents(progress);
+    if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>());
+    try {
+        startAll(progress);
+    } catch (const Refusal&) {
+        if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>(plan_->bridgeTable()));
+        throw;
+    }
+    loop_.beginStepping(settings_.loop, chunk.start_ns);
+    state_ = RunnerState::Stepping;
+    status_.clear();
+    replay_ = std::make_unique<Replay>(plan_->bridgeTable(), loop_, chunk.start_ns);
+    publish();
+    ReplayOutcome outcome;
+    replay_->describe(outcome);
+    return outcome;
+}
+
+// The same components with the same parameters, but nothing that they or their inputs remember.
+void Runner::renewComponents(const Progress& progress) {
+    Change renewed;
+    Change previous;
+    previous.graph = plan_->graph;
+    for (const GraphNode& node : plan_->graph.nodes()) {
+        const Instance& old = *node.instance;
+        ComponentDefinition definition = old.definition();
+        definition.parameters.clear();
+        const auto& parameters = old.component().parameters();
+        for (std::size_t i = 0; i < parameters.size(); ++i) {
+            definition.parameters.emplace_back(parameters[i]->declaration().name,
+                                               old.parameterValues()[i]);
+        }
+        auto instance = makeInstance(std::move(definition), old.library().path(), progress);
+        if (old.hasPhase()) instance->setPhase(old.phase());
+        renewed.graph.add({instance, node.breaks});
+        renewed.leaving.push_back(node.instance);
+    }
+    adopt({}, progress);  // so that no connection's value stays
+    try {
+        adopt(std::move(renewed), progress);
+    } catch (const Refusal&) {
+        adopt(std::move(previous), progress);
+        throw;
+    }
+}
+
 void Runner::endStepping() {
+    if (replay_) {
+        replay_.reset();
+        if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>(plan_->bridgeTable()));
+    }
     loop_.endStepping();
     noteLoopFault();
     stopAll();
@@ -427,6 +510,12 @@ std::shared_ptr<Instance> Runner::makeInstance(ComponentDefinition definition,
 
 void Runner::adopt(Change change, const Progress& progress) {
     noticeEnd();
+    if (replay_) {
+        throw Refusal(RefusalKind::FailedPrecondition,
+                      fmt::format("a replay of {0} is under way: wait for its end, or stop it: "
+                                  "rtcfctl -r {0} stop",
+                                  name_));
+    }
     const Graph graph = change.graph;
     Wiring wiring = wire(graph, filter(), change.loading);
     Adoption adoption;

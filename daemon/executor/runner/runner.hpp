@@ -28,6 +28,7 @@
 #include "loop/simulated_clock.hpp"
 #include "plugins/library.hpp"
 #include "runner/overrun_report.hpp"
+#include "runner/replay.hpp"
 #include "runner/runner_view.hpp"
 #include "runner/settings.hpp"
 #include "runner/snapshot.hpp"
@@ -96,6 +97,9 @@ class Runner final : private RunnerView {
     ChangeOutcome stop(const Progress& progress);
     /// Runs cycles without real time on a simulated clock, as fast as they go; then pauses.
     ChangeOutcome step(std::uint64_t cycles, const Progress& progress);
+    /// Runs a piece of a replay. With its beginning all components are made anew, and ROS sees
+    /// nothing of the loop until its end.
+    ReplayOutcome replay(const ReplayChunk& chunk, const Progress& progress);
     ChangeOutcome load(ComponentDefinition definition, const std::string& library,
                        const Progress& progress);
     ChangeOutcome unload(const std::vector<std::string>& names, const Progress& progress);
@@ -150,6 +154,8 @@ class Runner final : private RunnerView {
     void tuneSpin();
     const GraphNode* nodeOf(const Component* component) const noexcept;
     void endStepping();
+    ReplayOutcome beginReplay(const ReplayChunk& chunk, const Progress& progress);
+    void renewComponents(const Progress& progress);
     std::shared_ptr<Instance> makeInstance(ComponentDefinition definition,
                                            const std::string& library, const Progress& progress,
                                            bool configure = true);
@@ -191,9 +197,10 @@ class Runner final : private RunnerView {
     bool lacks_realtime_ = false;  // the loop runs without something essential
     OverrunReport overrun_report_;
     std::int64_t tuned_spin_ns_ = -1;  // by tuneSpin(); -1 = not yet
-    HistogramSnapshot tuned_from_;     // wake-up latency at the last tuneSpin()
+    std::unique_ptr<Replay> replay_;  // while one is under way
     std::shared_ptr<SimulatedClock> clock_ = std::make_shared<SimulatedClock>();
     bool simulated_ = false;        // the loop follows clock_
+    HistogramSnapshot tuned_from_;     // wake-up latency at the last tuneSpin()
     std::int64_t tuned_at_ns_ = 0;
 
     // Published for queries.

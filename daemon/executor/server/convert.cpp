@@ -305,6 +305,48 @@ std::vector<std::pair<std::string, ParameterValue>> parametersFrom(
     return parameters;
 }
 
+ReplayChunk replayFrom(const pb::ReplayRequest& request) {
+    ReplayChunk chunk;
+    chunk.begin = request.begin();
+    chunk.start_ns = request.start_ns();
+    for (const pb::RecordedTopic& topic : request.topics())
+        chunk.topics.push_back({topic.topic(), topic.type(), topic.md5(), {}});
+    for (const pb::RecordedMessage& message : request.messages()) {
+        if (!chunk.messages.empty() && message.time_ns() < chunk.messages.back().time_ns) {
+            throw Refusal(RefusalKind::InvalidArgument,
+                          fmt::format("a message of {} is before the one that precedes it: "
+                                      "messages of a replay come in order of time",
+                                      message.topic()));
+        }
+        chunk.messages.push_back({message.topic(), message.time_ns(), message.data()});
+    }
+    chunk.until_ns = request.until_ns();
+    chunk.end = request.end();
+    return chunk;
+}
+
+pb::ReplayResponse replayTo(ReplayOutcome outcome) {
+    const auto describe = [](const RecordedTopic& topic, pb::RecordedTopic& message) {
+        message.set_topic(topic.topic);
+        message.set_type(topic.type);
+        message.set_md5(topic.md5);
+        message.set_definition(topic.definition);
+    };
+    pb::ReplayResponse response;
+    response.set_cycles(outcome.cycles);
+    response.set_consumed(static_cast<std::uint32_t>(outcome.consumed));
+    response.set_more(outcome.more);
+    for (RecordedMessage& output : outcome.outputs) {
+        pb::RecordedMessage& message = *response.add_outputs();
+        message.set_topic(output.topic);
+        message.set_time_ns(output.time_ns);
+        message.set_data(std::move(output.bytes));
+    }
+    for (const RecordedTopic& topic : outcome.inputs) describe(topic, *response.add_inputs());
+    for (const RecordedTopic& topic : outcome.written) describe(topic, *response.add_written());
+    return response;
+}
+
 v1::Error errorTo(RefusalKind kind, const std::string& message) {
     v1::Error error;
     switch (kind) {

@@ -24,6 +24,7 @@ ComponentDefinition replacementFrom(const ::rtcf::v1::ComponentSpec& spec,
 RunnerSettings settingsFrom(const ::rtcf::v1::RunnerSettings& message, RunnerSettings base);
 std::vector<std::pair<std::string, ParameterValue>> parametersFrom(
     const google::protobuf::RepeatedPtrField<::rtcf::v1::ParameterSetting>& settings);
+ReplayChunk replayFrom(const ::rtcf::v1::ReplayRequest& request);
 /// @}
 
 /// @name To the wire
@@ -41,6 +42,7 @@ v1::ListConnectionsResult connectionsTo(const GraphSnapshot& snapshot);
 /// Of a component that is not loaded: its ports have no mapped names.
 ::rtcf::v1::ComponentType typeTo(const std::string& package, const std::string& library,
                                  const ComponentRecord& record, const Component& component);
+::rtcf::v1::ReplayResponse replayTo(ReplayOutcome outcome);
 ::rtcf::v1::RunnerSettings settingsTo(const RunnerSettings& settings);
 /// @}
 

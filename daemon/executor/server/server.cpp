@@ -417,11 +417,13 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
     }
     // Statistics are of one run of the loop, which has not begun yet.
     const bool begins = request.kind_case() == v1::Request::kStart ||
+                        (request.kind_case() == v1::Request::kReplay && request.replay().begin()) ||
                         (request.kind_case() == v1::Request::kStep &&
                          runner_->picture().state != RunnerState::Stepping);
     if (begins && !runner_->loop().running()) resetStatistics();
     // Steps take as long as they take; they report progress.
-    const bool endless = request.kind_case() == v1::Request::kStep;
+    const bool endless =
+        request.kind_case() == v1::Request::kStep || request.kind_case() == v1::Request::kReplay;
     const auto given_up = std::make_shared<std::atomic<bool>>(false);
     const auto otherwise = [this, id] {
         return errorResponse(id, RefusalKind::Unavailable,
@@ -449,6 +451,9 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
             if (request.kind_case() == v1::Request::kConfigure) {
                 runner_->configure(settingsFrom(request.configure(), runner_->settings()));
                 *response.mutable_status() = status();
+            } else if (request.kind_case() == v1::Request::kReplay) {
+                *response.mutable_replay() =
+                    replayTo(runner_->replay(replayFrom(request.replay()), progress));
             } else {
                 *response.mutable_change() = outcomeTo(change(request, progress));
             }

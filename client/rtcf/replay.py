@@ -1,0 +1,207 @@
+"""Replays of recordings: the messages of a bag through a loop, on the time at which they were
+recorded, as fast as its cycles go.
+
+Each message is read by the first cycle whose time is not before its own. The loop's mapped
+outputs can be written to another bag; the same bag gives the same outputs, bit by bit.
+"""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rtcf.client import Client
+from rtcf.errors import RtcfError
+from rtcf.v1 import control_pb2
+
+# Of one request; far below what a frame takes.
+_MAX_MESSAGES = 2000
+_MAX_BYTES = 2 * 1024 * 1024
+
+OnProgress = Callable[[str], None]
+
+
+class RecordingError(RtcfError):
+    """A bag cannot be read or written."""
+
+
+@dataclass
+class Summary:
+    """What came of a replay; times in ns since 1970."""
+
+    start_ns: int = 0
+    end_ns: int = 0
+    cycles: int = 0
+    injected: int = 0  # messages given to the loop
+    outputs: int = 0  # messages it wrote
+    unread: list[str] = field(default_factory=list)  # topics of the bag that no component reads
+    missing: list[str] = field(default_factory=list)  # topics components read, not in the bag
+
+
+def replay(
+    client: Client,
+    recording: Path,
+    runner: str = "",
+    output: Path | None = None,
+    on_progress: OnProgress | None = None,
+) -> Summary:
+    """Run a bag through a stopped loop, whose components are made anew for it.
+
+    `output`: a bag to write, at the times of the cycles. Raises RefusedError,
+    and RecordingError for files.
+    """
+    if output is not None and output.resolve() == recording.resolve():
+        raise RecordingError(f"{output} is the recording itself: write to another file")
+    with _reader(recording) as bag:
+        topics = [
+            control_pb2.RecordedTopic(topic=each.topic, type=each.datatype, md5=each.md5sum)
+            for each in bag._get_connections()
+        ]
+        messages = bag.read_messages(raw=True)
+        first = next(messages, None)
+        if first is None:
+            raise RecordingError(f"{recording} holds no message")
+        start_ns = int(first.timestamp.to_nsec())
+        request = control_pb2.ReplayRequest(
+            runner=runner, begin=True, start_ns=start_ns, topics=topics
+        )
+        begun = client.replay(request)
+        session = _Session(client, runner, {each.topic for each in begun.inputs})
+        session.summary.start_ns = session.summary.end_ns = start_ns
+        recorded = {each.topic for each in topics}
+        session.summary.unread = sorted(recorded - session.inputs)
+        session.summary.missing = sorted(session.inputs - recorded)
+        try:
+            with _Writer(output, begun.written) as writer:
+                session.take(first, writer)
+                for message in messages:
+                    session.take(message, writer)
+                    if on_progress is not None and session.due:
+                        seconds = (session.summary.end_ns - start_ns) / 1e9
+                        on_progress(f"{seconds:.1f} s, {session.summary.cycles} cycles")
+                session.run(writer, end=True)
+        except BaseException:
+            with contextlib.suppress(RtcfError):
+                client.stop(runner)
+            raise
+        return session.summary
+
+
+class _Session:
+    """A replay that is under way."""
+
+    def __init__(self, client: Client, runner: str, inputs: set[str]) -> None:
+        self.inputs = inputs
+        self.summary = Summary()
+        self.due = False  # cycles have just been run
+        self._client = client
+        self._runner = runner
+        self._waiting: list[control_pb2.RecordedMessage] = []
+        self._bytes = 0
+
+    def take(self, message: Any, writer: "_Writer") -> None:
+        """Take the bag's next message; run cycles when there are enough."""
+        self.due = False
+        self.summary.end_ns = int(message.timestamp.to_nsec())
+        if message.topic not in self.inputs:
+            return
+        data = bytes(message.message[1])
+        self._waiting.append(
+            control_pb2.RecordedMessage(
+                topic=message.topic, time_ns=self.summary.end_ns, data=data
+            )
+        )
+        self._bytes += len(data)
+        self.summary.injected += 1
+        if len(self._waiting) >= _MAX_MESSAGES or self._bytes >= _MAX_BYTES:
+            self.run(writer)
+            self.due = True
+
+    def run(self, writer: "_Writer", end: bool = False) -> None:
+        """Run all cycles up to the last message's time."""
+        more = True
+        while more:
+            response = self._client.replay(
+                control_pb2.ReplayRequest(
+                    runner=self._runner,
+                    messages=self._waiting,
+                    until_ns=self.summary.end_ns,
+                    end=end,
+                )
+            )
+            del self._waiting[: response.consumed]
+            self.summary.cycles = response.cycles
+            self.summary.outputs += len(response.outputs)
+            writer.write(response.outputs)
+            more = response.more
+        self._bytes = sum(len(each.data) for each in self._waiting)
+
+
+class _Writer:
+    """The bag of the outputs; none if nobody wants it."""
+
+    def __init__(self, path: Path | None, topics: Any) -> None:
+        self._path = path
+        # What rosbag wants of a message class.
+        self._types = {
+            each.topic: type(
+                each.type.replace("/", "_"),
+                (),
+                {"_type": each.type, "_md5sum": each.md5, "_full_text": each.definition},
+            )
+            for each in topics
+        }
+        self._bag: Any = None
+
+    def __enter__(self) -> "_Writer":
+        if self._path is not None:
+            try:
+                self._bag = _rosbag().Bag(str(self._path), "w")
+            except OSError as error:
+                raise RecordingError(
+                    f"{self._path} cannot be written: {error.strerror or error}"
+                ) from None
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bag is not None:
+            self._bag.close()
+
+    def write(self, outputs: Any) -> None:
+        """Append messages."""
+        if self._bag is None:
+            return
+        genpy = _module("genpy", "python3-genpy")
+        for each in outputs:
+            kind: Any = self._types[each.topic]
+            raw = (kind._type, each.data, kind._md5sum, None, kind)
+            self._bag.write(each.topic, raw, genpy.Time(0, each.time_ns), raw=True)
+
+
+@contextlib.contextmanager
+def _reader(path: Path) -> Iterator[Any]:
+    rosbag = _rosbag()
+    try:
+        bag = rosbag.Bag(str(path))
+    except rosbag.ROSBagUnindexedException:
+        raise RecordingError(
+            f"{path} has no index, its recording was cut off: rosbag reindex {path}"
+        ) from None
+    except rosbag.ROSBagException as error:
+        raise RecordingError(f"{path} is no bag: {error}") from None
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read: {error.strerror or error}") from None
+    with bag:
+        yield bag
+
+
+def _rosbag() -> Any:
+    return _module("rosbag", "python3-rosbag")
+
+
+def _module(name: str, package: str) -> Any:
+    try:
+        return __import__(name)
+    except ImportError:
+        raise RecordingError(f"bags need {name}: sudo apt install {package}") from None

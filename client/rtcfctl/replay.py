@@ -1,0 +1,43 @@
+"""`rtcfctl replay`: a recording through the loop."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import rtcf
+from rtcf.replay import Summary, replay
+
+from rtcfctl.output import Output
+
+
+def register(verbs: Any, common: argparse.ArgumentParser) -> None:
+    """Add the verb."""
+    replaying = verbs.add_parser(
+        "replay", parents=[common], help="run a bag through a stopped loop, on its recorded time"
+    )
+    replaying.add_argument("bag", metavar="BAG", type=Path)
+    replaying.add_argument(
+        "--write", metavar="BAG", type=Path, help="write what the mapped outputs give"
+    )
+    replaying.set_defaults(run=run)
+
+
+def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Replay a bag."""
+    summary = replay(client, args.bag, args.runner, args.write, output.progress)
+    if not output.for_people:
+        output.data(vars(summary))
+        return
+    print(_sentence(summary))
+    if summary.unread:
+        output.line(f"read by no component: {', '.join(summary.unread)}")
+    if summary.missing:
+        output.line(f"not in the bag: {', '.join(summary.missing)}", "yellow")
+
+
+def _sentence(summary: Summary) -> str:
+    seconds = (summary.end_ns - summary.start_ns) / 1e9
+    return (
+        f"replayed {seconds:.3f} s in {summary.cycles} cycles: "
+        f"{summary.injected} messages in, {summary.outputs} out"
+    )

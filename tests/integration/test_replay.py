@@ -1,0 +1,144 @@
+"""`rtcfctl replay`: what a recording makes of a loop, and that it does so again."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import fig_1
+import pytest
+import rosbag
+import rospy
+import rtcf
+from daemon_process import Daemon
+from rtcf.v1 import control_pb2, runner_pb2
+from std_msgs.msg import Float64, String
+
+START_NS = 1_700_000_000_000_000_000
+PERIOD_NS = 1_000_000
+
+
+@pytest.fixture
+def daemon(tmp_path: Path) -> Iterator[Daemon]:
+    """Give a daemon without ROS, whose loop has Fig. 1 and its mapped connections."""
+    daemon = Daemon(tmp_path, f"[runner.ros]\nenabled = false\nwhitelist = '{fig_1.WHITELIST}'\n")
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=1e9 / PERIOD_NS))
+        fig_1.load(client)
+    yield daemon
+    if not daemon.ended:
+        daemon.end()
+
+
+def _write(path: Path, messages: list[tuple[str, int, object]]) -> Path:
+    with rosbag.Bag(str(path), "w") as bag:
+        for topic, after_ns, message in messages:
+            bag.write(topic, message, rospy.Time(0, START_NS + after_ns))
+    return path
+
+
+def _read(path: Path) -> dict[str, list[tuple[int, bytes]]]:
+    content: dict[str, list[tuple[int, bytes]]] = {}
+    with rosbag.Bag(str(path)) as bag:
+        for topic, raw, time in bag.read_messages(raw=True):
+            content.setdefault(topic, []).append((time.to_nsec(), raw[1]))
+    return content
+
+
+def _simulate(inputs: dict[int, float], cycles: int) -> Iterator[float]:
+    """Yield R3's output of each cycle; `inputs` are what R2 finds new at in4, by cycle."""
+    r1 = r3 = None
+    for cycle in range(cycles):
+        h1 = fig_1.mimo_sum(r3, r1)
+        f1 = fig_1.mimo_sum(h1, None)
+        r1 = fig_1.mimo_sum(h1, None)
+        r2 = fig_1.mimo_sum(f1, h1, r1, inputs.get(cycle))
+        r3 = fig_1.mimo_sum(f1, r2)
+        yield r3
+
+
+def test_each_message_is_read_by_the_first_cycle_that_is_not_before_it(
+    daemon: Daemon, tmp_path: Path
+) -> None:
+    # On a cycle, just after one, just before one, two for the same one, many at once.
+    messages: list[tuple[str, int, object]] = [
+        ("/other", 0, String("is read by nobody")),
+        ("/G2_R2", 3 * PERIOD_NS, Float64(0.1)),
+        ("/G2_R2", 7 * PERIOD_NS + 1, Float64(0.2)),
+        ("/G2_R2", 11 * PERIOD_NS - 1, Float64(0.3)),
+        ("/G2_R2", 20 * PERIOD_NS + 1, Float64(9.0)),
+        ("/G2_R2", 20 * PERIOD_NS + 2, Float64(0.4)),
+        *(("/G2_R2", k * PERIOD_NS, Float64(k / 7.0)) for k in range(30, 5000)),
+    ]
+    expected = {3: 0.1, 8: 0.2, 11: 0.3, 21: 0.4} | {k: k / 7.0 for k in range(30, 5000)}
+    bag = _write(tmp_path / "in.bag", messages)
+    outputs = [tmp_path / "one.bag", tmp_path / "two.bag"]
+    for output in outputs:
+        done = daemon.ctl("replay", str(bag), "--write", str(output), "-o", "json")
+        assert (done.returncode, done.stderr) == (0, "")
+        summary = json.loads(done.stdout)
+        assert summary["cycles"] == 5000
+        assert summary["injected"] == len(messages) - 1
+        assert summary["outputs"] == 10000
+        assert summary["unread"] == ["/other"]
+        # Between the two, the loop is left with other values than it began with.
+        assert daemon.ctl("step", "17").returncode == 0
+    first, second = (_read(output) for output in outputs)
+    assert first == second
+    assert set(first) == {"/R1_H1R2", "/R3_G2H1"}
+    times = [START_NS + k * PERIOD_NS for k in range(5000)]
+    values = [Float64().deserialize(data).data for _, data in first["/R3_G2H1"]]
+    assert [time for time, _ in first["/R3_G2H1"]] == times
+    assert values == list(_simulate(expected, 5000))
+
+
+def test_what_is_printed_can_be_read(daemon: Daemon, tmp_path: Path) -> None:
+    bag = _write(tmp_path / "in.bag", [("/x", 0, Float64(1)), ("/x", 2_500_000, Float64(1))])
+    done = daemon.ctl("replay", str(bag))
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines() == [
+        "replayed 0.003 s in 3 cycles: 0 messages in, 6 out",
+        "read by no component: /x",
+        "not in the bag: /G2_R2",
+    ]
+    status = json.loads(daemon.ctl("status", "-o", "json").stdout)
+    assert status["runners"][0]["state"] == "stopped"
+
+
+def test_a_bag_that_cannot_be_replayed_is_refused_in_one_line(
+    daemon: Daemon, tmp_path: Path
+) -> None:
+    text = tmp_path / "text.bag"
+    text.write_text("no bag")
+    empty = _write(tmp_path / "empty.bag", [])
+    other = _write(tmp_path / "other.bag", [("/G2_R2", 0, String("?"))])
+    good = _write(tmp_path / "good.bag", [("/G2_R2", 0, Float64(1))])
+    for arguments, words in [
+        ([str(tmp_path / "none.bag")], "none.bag cannot be read: No such file"),
+        ([str(text)], "text.bag is no bag"),
+        ([str(empty)], "empty.bag holds no message"),
+        ([str(other)], "/G2_R2 is recorded as std_msgs/String"),
+        ([str(good), "--write", str(good)], "is the recording itself"),
+        ([str(good), "--write", str(tmp_path / "no" / "x.bag")], "x.bag cannot be written"),
+    ]:
+        done = daemon.ctl("replay", *arguments)
+        assert (done.returncode, done.stdout) == (1, ""), arguments
+        assert words in done.stderr
+        assert done.stderr.count("\n") == 1
+    assert daemon.ctl("start").returncode == 0
+    done = daemon.ctl("replay", str(good))
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert "runs in real time: stop it first" in done.stderr
+
+
+def test_a_graph_is_not_changed_while_it_replays(daemon: Daemon) -> None:
+    with rtcf.Client(daemon.socket) as client:
+        client.replay(control_pb2.ReplayRequest(begin=True, start_ns=START_NS))
+        begun = client.replay(control_pb2.ReplayRequest(until_ns=START_NS + 9 * PERIOD_NS))
+        assert begun.cycles == 10
+        with pytest.raises(rtcf.RefusedError, match="a replay of rt_runner is under way"):
+            client.unload(["H1"])
+        client.stop()
+        with pytest.raises(rtcf.RefusedError, match="no replay of rt_runner is under way"):
+            client.replay(control_pb2.ReplayRequest(until_ns=START_NS + 20 * PERIOD_NS))
+        client.unload(["H1"])
