@@ -108,9 +108,7 @@ class _Session:
             return
         data = bytes(message.message[1])
         self._waiting.append(
-            control_pb2.RecordedMessage(
-                topic=message.topic, time_ns=self.summary.end_ns, data=data
-            )
+            control_pb2.RecordedMessage(topic=message.topic, time_ns=self.summary.end_ns, data=data)
         )
         self._bytes += len(data)
         self.summary.injected += 1

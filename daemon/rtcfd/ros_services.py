@@ -58,7 +58,8 @@ class RosServices:
         if self._access < needed:
             raise FailedPrecondition(
                 f"rtcfd lets callers on ROS only {self._access.word}, and `{kind}` needs "
-                f'{needed.word}: set ros_services = "{needed.word}" in [daemon] of /etc/rtcfd/rtcfd.toml, or use '
+                f'{needed.word}: set ros_services = "{needed.word}" in [daemon] of '
+                "/etc/rtcfd/rtcfd.toml, or use "
                 f"rtcfctl -r {runner.name} {kind}"
             )
         return str(kind)

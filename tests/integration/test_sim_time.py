@@ -175,7 +175,9 @@ def test_a_bag_that_is_played_loses_no_input_and_no_cycle(
     assert out.values() == values
     out.end()
     ticks.terminate()
-    shown = [int(line) for line in ticks.communicate(timeout=DEADLINE_S)[0].split() if line.isdigit()]
+    shown = [
+        int(line) for line in ticks.communicate(timeout=DEADLINE_S)[0].split() if line.isdigit()
+    ]
     begin = re.search(r"clock begins at (\d+)\.(\d{9}) s", (tmp_path / "log").read_text())
     assert begin
     first = int(begin[1] + begin[2])

@@ -197,10 +197,10 @@ class Runner final : private RunnerView {
     bool lacks_realtime_ = false;  // the loop runs without something essential
     OverrunReport overrun_report_;
     std::int64_t tuned_spin_ns_ = -1;  // by tuneSpin(); -1 = not yet
-    std::unique_ptr<Replay> replay_;  // while one is under way
+    std::unique_ptr<Replay> replay_;   // while one is under way
     std::shared_ptr<SimulatedClock> clock_ = std::make_shared<SimulatedClock>();
     bool simulated_ = false;        // the loop follows clock_
-    HistogramSnapshot tuned_from_;     // wake-up latency at the last tuneSpin()
+    HistogramSnapshot tuned_from_;  // wake-up latency at the last tuneSpin()
     std::int64_t tuned_at_ns_ = 0;
 
     // Published for queries.

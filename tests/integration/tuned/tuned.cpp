@@ -13,8 +13,9 @@ OROCOS_HEADERS_END
 #include <rtcf/rtcf_extension.hpp>
 
 class Tuned : public RTT::TaskContext, public RtcfExtension {
-public:
-    explicit Tuned(std::string const& name) : TaskContext(name), value_("value"), changes_("changes") {}
+   public:
+    explicit Tuned(std::string const& name)
+        : TaskContext(name), value_("value"), changes_("changes") {}
 
     bool configureHook() override {
         ports()->addPort(value_);
@@ -30,10 +31,11 @@ public:
         changes_.write(count_);
     }
 
-private:
+   private:
     struct Tuning {
         using ConfigType = tuned::TuningConfig;
-        Tuning(const ConfigType& config) : gain(config.gain), steps(config.steps), enabled(config.enabled) {}
+        Tuning(const ConfigType& config)
+            : gain(config.gain), steps(config.steps), enabled(config.enabled) {}
         double gain;
         int steps;
         bool enabled;
