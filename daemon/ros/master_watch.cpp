@@ -194,6 +194,7 @@ void MasterWatch::step() {
         return;
     }
     openAndClose(settings.queue);
+    askForSimulation(master);
 }
 
 bool MasterWatch::startNode(const std::string& uri, const std::string& hostname) {
@@ -328,7 +329,6 @@ void MasterWatch::openAndClose(std::uint32_t queue) {
     // If it has gone meanwhile, do it again later.
     if (node_.calls().takeMissed()) registered_ = false;
     setConnected();
-    askForSimulation(master);
     for (const std::string& refusal : refusals_->take()) say(refusal);
 }
 
