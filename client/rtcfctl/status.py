@@ -81,6 +81,8 @@ def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
     """Print what a table has no room for."""
     if runner.status:
         output.line(f"{runner.runner}: {runner.status}", "yellow")
+    if runner.holder:
+        output.line(f"{runner.runner}: held by {runner.holder}")
     ros = runner.ros
     if ros.enabled:
         state = (

@@ -210,7 +210,7 @@ class Leases:
             await runner.save()
             return
         if terms.on_lost != control_pb2.ON_LEASE_LOST_UNLOAD and runner.running:
-            runner.log.error("%s: %s: stopping the loop", name, lost)
+            runner.alarm(f"{name}: {lost}: stopping the loop")
             try:
                 await runner.stop(lambda _: None)
             except Refusal as refusal:

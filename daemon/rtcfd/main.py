@@ -153,6 +153,10 @@ class Daemon:
         if self._options.own_runtime_dir:
             with contextlib.suppress(OSError):
                 self._options.runtime_dir.rmdir()
+        if self._options.end_with_stdin:
+            # Who made it for us may have died.
+            with contextlib.suppress(OSError):
+                self._options.socket.parent.rmdir()
 
 
 def _when_stdin_ends(do: Callable[[], None]) -> None:

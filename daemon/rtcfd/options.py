@@ -181,7 +181,8 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
     parser.add_argument(
         "--end-with-stdin",
         action="store_true",
-        help="end in order when standard input ends: with the process at its other end",
+        help="end in order when standard input ends: with the process at its other end; "
+        "then remove the control socket's folder too, if nothing else is in it",
     )
     parser.add_argument(
         "--reload",

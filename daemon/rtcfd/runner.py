@@ -234,6 +234,14 @@ class Runner:
         elif self.hold_outbox is not None:
             self.hold_outbox.log(copy)
 
+    def alarm(self, text: str) -> None:
+        """Say what went wrong, to the holder of the runner too."""
+        self.log.error("%s", text)
+        if self.hold_outbox is not None:
+            self.hold_outbox.log(
+                control_pb2.LogRecord(level="LEVEL_ERROR", time_ns=time.time_ns(), message=text)
+            )
+
     def tell(self) -> None:
         """After any change: tell who wants to know."""
         self._shared.on_change()

@@ -21,7 +21,9 @@ DONE, REFUSED, USAGE, FAILED, LOST = range(5)
 @pytest.fixture
 def system(tmp_path: Path, master: Master) -> Iterator[Daemon]:
     """Give a daemon that stands for the system's."""
-    daemon = Daemon(tmp_path, with_ros(master.uri, ""))
+    # Its executors wait for its restart as those of the system's do.
+    orphans = "[runner]\norphan_timeout_s = 60.0\n"
+    daemon = Daemon(tmp_path, orphans + with_ros(master.uri, ""))
     daemon.start()
     yield daemon
     daemon.end()
@@ -111,6 +113,7 @@ def test_launchers_come_and_go_and_a_killed_one_stops_the_loop(
         first = loaded(launching, "first")
         # Dies: the loop is stopped; it starts again when all components are there again.
         first.end(signal.SIGKILL)
+        runner.wait_for_output(f"/first: rt_launcher /first (pid {first.pid}) has died")
         runner.wait_for_output("the loop is stopped")
         wait_for(lambda: client.get_order() == ["/second"], "the component to leave")
         assert not is_running(client)
@@ -165,7 +168,7 @@ def test_launchers_end_when_their_runner_has_died(alone: Launching) -> None:
     runner.end(signal.SIGKILL)
     # rtcfd ends with it, in order, and so says why to the launcher.
     assert first.wait() == LOST
-    wait_for(lambda: not socket.exists(), "the private daemon to end")
+    wait_for(lambda: not socket.parent.exists(), "the private daemon to end")
     # What the dead one has left on the parameter server misleads nobody.
     waiting = launcher(alone, "waiting")
     again = alone.node("rt_runner", "_num_components_expected:=1")
@@ -216,6 +219,7 @@ def test_a_runner_that_is_refused_says_why_in_one_line(alone: Launching) -> None
         ("_daemon:=system", "__name:=c"): (REFUSED, "rtcfd is not running at /nonexistent"),
         ("__master:=http://localhost:1", "__name:=d"): (REFUSED, "no ROS master answers"),
         ("word", "__name:=e"): (USAGE, "unexpected argument word"),
+        ("__log:=/proc/no/f.log", "__name:=f"): (REFUSED, "cannot write rtcfd's log /proc/no/f"),
     }
     started = [(alone.node("rt_runner", *words), words) for words in cases]
     for process, words in started:

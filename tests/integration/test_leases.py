@@ -158,8 +158,9 @@ def test_a_load_that_is_refused_leaves_nothing_behind(client: rtcf.Client, daemo
 def test_a_loop_outlives_rtcfd_and_those_who_come_back_keep_what_they_held(
     client: rtcf.Client, daemon: Daemon
 ) -> None:
-    held(client, "back", "1")
-    held(client, "away", "2")
+    patient = runner_pb2.RunnerSettings(orphan_timeout_s=60.0)
+    held(client, "back", "1", patient)
+    held(client, "away", "2", patient)
     leased(client, counter("comes_back"), runner="back")
     leased(client, counter("stays_away"), UNLOAD, runner="back")
     assert saved(daemon, "back")["components"] == []
@@ -195,6 +196,7 @@ def test_a_runner_that_is_held_gets_its_own_settings_back(
     status = state(client)
     assert (status.settings.frequency_hz, status.settings.priority) == (500.0, 11)
     assert (status.holder, status.hold) == ("holder token", "token")
+    assert "rt_runner: held by holder token" in daemon.ctl("status").stdout
     assert saved(daemon)["settings"]["frequency_hz"] == 100.0
     member = leased(client, counter("member"), hold="token")
     client.start()

@@ -226,13 +226,12 @@ class GraphMachine(stateful.RuleBasedStateMachine):
 
     def _change(self, expect: Callable[[], Graph], change: Callable[[], object]) -> None:
         """Make a change that the model accepts; or see it refused, with nothing changed."""
-        soak = self.soak
-        soak.changes += 1
-        before = self._generation()
+        self.soak.changes += 1
         try:
             graph = expect()
         except model.Refused:
-            soak.refusals += 1
+            self.soak.refusals += 1
+            before = self._generation()
             with pytest.raises(rtcf.RefusedError) as refused:
                 change()
             assert "\n" not in str(refused.value)

@@ -85,6 +85,17 @@ def test_figures_are_watched_while_they_grow(daemon: Daemon, client: rtcf.Client
     assert json.loads(daemon.ctl("stats", "-o", "json").stdout)["iterations"] > 0
 
 
+def test_what_a_change_takes_of_its_cycle_is_measured(daemon: Daemon, client: rtcf.Client) -> None:
+    client.start()
+    assert "adoption" not in daemon.ctl("stats").stdout
+    client.load(rtcf.component("rtcf_test", "Counter"))
+    client.unload(["Counter"])
+    adoption = client.get_statistics().adoption
+    assert adoption.count == 2
+    assert 0 < adoption.min_ns <= adoption.max_ns
+    assert "adoption of a change" in daemon.ctl("stats").stdout
+
+
 def test_a_component_that_left_leaves_the_figures(client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Counter", name="a", remaps=["out:=/a"]))
     client.load(rtcf.component("rtcf_test", "Counter", name="b", remaps=["out:=/b"]))

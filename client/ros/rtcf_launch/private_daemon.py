@@ -11,6 +11,7 @@ import subprocess
 import tempfile
 import time
 from pathlib import Path
+from typing import BinaryIO
 
 from rtcf_launch.codes import Code, Ending
 
@@ -35,11 +36,7 @@ class PrivateDaemon:
         parent = runtime if runtime and os.access(runtime, os.W_OK) else None
         self._folder = Path(tempfile.mkdtemp(prefix="rtcf-", dir=parent))
         self.socket = self._folder / "control.sock"
-        self.log_file = (
-            Path(log_file.removesuffix(".log") + ".rtcfd.log")
-            if log_file
-            else self._folder / "rtcfd.log"
-        )
+        self.log_file = Path(log_file.removesuffix(".log") + ".rtcfd.log")
         self._process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
@@ -48,8 +45,7 @@ class PrivateDaemon:
             raise Ending(
                 Code.REFUSED, f"no rtcfd at {self._program}: install it (apt install rtcfd)"
             )
-        self.log_file.parent.mkdir(parents=True, exist_ok=True)
-        with self.log_file.open("wb") as log:
+        with self._open_log() as log:
             self._process = subprocess.Popen(
                 [
                     *(str(self._program), "--foreground", "--end-with-stdin"),
@@ -69,6 +65,15 @@ class PrivateDaemon:
             if time.monotonic() > deadline:
                 raise Ending(Code.REFUSED, f"rtcfd does not serve {self.socket}")
             time.sleep(_POLL_S)
+
+    def _open_log(self) -> BinaryIO:
+        try:
+            self.log_file.parent.mkdir(parents=True, exist_ok=True)
+            return self.log_file.open("wb")
+        except OSError as error:
+            raise Ending(
+                Code.REFUSED, f"cannot write rtcfd's log {self.log_file}: {error.strerror}"
+            ) from None
 
     @property
     def ended(self) -> bool:

@@ -128,7 +128,8 @@ class RunnerNode:
             choice = choose(socket, self._runner, self._given.master_uri, self._build_tree)
             wanted, why = ("system" if choice.system else "private"), choice.why
         if wanted == "private":
-            self._daemon = PrivateDaemon(self._build_tree, self._given.log_file)
+            log_file = self._given.log_file or f"{_log_folder()}/{self._runner}.log"
+            self._daemon = PrivateDaemon(self._build_tree, log_file)
             self._daemon.start()
             socket = str(self._daemon.socket)
             self._screen.info(f"private daemon at {socket}, log in {self._daemon.log_file} ({why})")
@@ -278,6 +279,12 @@ class RunnerNode:
                     break
         if self._client is not None:
             self._client.close()
+
+
+def _log_folder() -> str:
+    """Return where ROS nodes log without roslaunch."""
+    home = os.environ.get("ROS_HOME") or os.path.expanduser("~/.ros")
+    return os.environ.get("ROS_LOG_DIR") or f"{home}/log"
 
 
 def runner_name(node: str) -> str:

@@ -23,7 +23,8 @@ std::string OverrunReport::take(const Loop& loop, const Graph& graph, bool last)
     if (!last && told_at_ns_ != 0 && now - told_at_ns_ < kInterval) return {};
     std::string line = fmt::format("{} ended late", cycles(overruns - told_overruns_));
     if (missed != told_missed_) line += fmt::format(", {} missed", cycles(missed - told_missed_));
-    if (told_at_ns_ != 0) line += fmt::format(" in {:.0f} s", double(now - told_at_ns_) / 1e9);
+    if (told_at_ns_ != 0)
+        line += fmt::format(" in {:.0f} s", static_cast<double>(now - told_at_ns_) / 1e9);
     if (const std::string name = latestComponent(graph); !name.empty())
         line += ", most of them in " + name;
     told_at_ns_ = now;

@@ -25,19 +25,19 @@ class Third : public RTT::TaskContext, public RtcfExtension {
         if (getIteration() % 3 != 0) return;
         number_.data = static_cast<double>(getIteration());
         status_ = out_.write(number_);
-        connected_number_.data = out_.connected() ? 1.0 : 0.0;
-        connected_.write(connected_number_);
+        heard_number_.data = out_.connected() ? 1.0 : 0.0;
+        heard_.write(heard_number_);
     }
     bool configureHook() override {
-        ports()->addPort("connected", connected_).doc("whether `out` has a peer");
+        ports()->addPort("heard", heard_).doc("whether `out` has a peer");
         return true;
     }
 
    private:
     RTT::OutputPort<std_msgs::Float64> out_{"out"};
-    RTT::OutputPort<std_msgs::Float64> connected_;
+    RTT::OutputPort<std_msgs::Float64> heard_;
     std_msgs::Float64 number_;
-    std_msgs::Float64 connected_number_;
+    std_msgs::Float64 heard_number_;
     RTT::WriteStatus status_ = RTT::NotConnected;
 };
 

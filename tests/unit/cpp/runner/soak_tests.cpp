@@ -139,7 +139,7 @@ class Soak : public RunnerFixture {
         });
         helpers_.emplace_back([this] {
             while (!over_.load()) {
-                for (char letter = 'A'; letter <= 'A' + kNames + 1; ++letter) exchange(letter);
+                for (int i = 0; i < kNames + 2; ++i) exchange(static_cast<char>('A' + i));
                 (void)logged();
                 std::this_thread::yield();
             }
