@@ -1,0 +1,26 @@
+"""Removal and purge; the last file, as nothing is left for others."""
+
+from machine import Machine
+from rtcf_service import Service
+
+PACKAGES = ("librtcf-dev", "python3-rtcf", "ros-rtcf", "rtcf-check", "rtcf-components", "rtcfctl",
+            "rtcfd")  # fmt: skip
+
+
+def test_removal_ends_everything_and_keeps_settings_and_state(service: Service) -> None:
+    machine = service.machine
+    service.ctl("load", "rtcf_examples", "Mimo", "--name", "M")
+    machine.run("apt-get", "remove", "--yes", "--quiet", *PACKAGES)
+    assert machine.run("pgrep", "-u", "rtcf", check=False).stdout == ""
+    assert machine.path("/etc/rtcfd/rtcfd.toml").is_file()
+    assert machine.path("/var/lib/rtcfd/rt_runner.json").is_file()
+    assert machine.run("systemctl", "is-failed", "rtcfd.service", check=False).returncode != 0
+
+
+def test_purge_leaves_nothing(machine: Machine) -> None:
+    machine.run("apt-get", "purge", "--yes", "--quiet", *PACKAGES)
+    left = machine.shell(
+        "find /usr /etc /var/lib /run -xdev -name '*rtcf*' -not -path '*/dpkg/*' "
+        "-not -path '/var/lib/systemd/*' -not -path '/usr/share/doc/*'"
+    )
+    assert left.stdout == ""
