@@ -137,8 +137,11 @@ def _parse(runner: str, text: bytes) -> Desired:
     document = json.loads(text)
     if not isinstance(document, dict):
         raise ValueError("it is not a JSON object")
-    if document.get("version") != VERSION:
-        raise ValueError(f"its version is {document.get('version')!r}, not {VERSION}")
+    version = document.get("version")
+    if type(version) is int and version > VERSION:
+        raise ValueError(f"its version is {version}, of a newer rtcfd; this one knows {VERSION}")
+    if version != VERSION:
+        raise ValueError(f"its version is {version!r}, not {VERSION}")
     if document.get("runner") != runner:
         raise ValueError(f"it is the state of {document.get('runner')!r}")
     desired = Desired(check_base_name("runner", runner))
