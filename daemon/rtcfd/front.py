@@ -10,6 +10,7 @@ import contextlib
 import logging
 import secrets
 import socket
+from collections import deque
 from pathlib import Path
 
 from rtcfd import peer
@@ -20,7 +21,7 @@ log = logging.getLogger(__name__)
 
 _CHUNK = 65536
 _BACKLOG = 256
-# Connections above the limit that get a word of refusal; more are closed at once.
+# Connections above the limit that get a word of refusal; more wait until others leave.
 _MOST_WAITING = 64
 _SHOWN_PREFIX = "unix-abstract:"  # of an abstract name, as grpcio shows it
 
@@ -33,6 +34,7 @@ class Front:
         self._private = private
         self._peers: dict[str, Peer] = {}  # by the name of the relaying socket
         self._waiting: dict[str, Peer] = {}  # one too many; served when there is room
+        self._queue: deque[asyncio.Future[None]] = deque()  # those that wait to be looked at
         self._server: asyncio.Server | None = None
         self._relays: set[asyncio.Task[None]] = set()
 
@@ -68,8 +70,9 @@ class Front:
         self._relays.add(task)
         name = f"rtcfd-client-{secrets.token_hex(16)}"
         try:
-            if self._admit(name, writer.get_extra_info("socket")):
-                await self._relay(name, reader, writer)
+            await self._turn()
+            self._admit(name, writer.get_extra_info("socket"))
+            await self._relay(name, reader, writer)
         except OSError as error:
             log.warning("a client is lost: %s", error.strerror or error)
         finally:
@@ -77,16 +80,31 @@ class Front:
             self._waiting.pop(name, None)
             self._relays.discard(task)
             writer.close()
+            self._next()
 
-    def _admit(self, name: str, connection: socket.socket) -> bool:
+    async def _turn(self) -> None:
+        """Wait as long as there are too many even to be refused."""
+        while len(self._peers) >= self.limit and len(self._waiting) >= _MOST_WAITING:
+            turn: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+            self._queue.append(turn)
+            await turn
+
+    def _next(self) -> None:
+        """Let the first of those that wait look again: somebody has left."""
+        while self._queue:
+            turn = self._queue.popleft()
+            if not turn.done():
+                turn.set_result(None)
+                return
+
+    def _admit(self, name: str, connection: socket.socket) -> None:
         who = peer.of(connection)
         if len(self._peers) < self.limit:
             self._peers[name] = who
-            return True
+            return
         if not self._waiting:
             log.warning("%d clients, the limit: %s and others are refused", self.limit, who)
         self._waiting[name] = who
-        return len(self._waiting) <= _MOST_WAITING
 
     async def _relay(
         self, name: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
