@@ -69,6 +69,8 @@ class Gate(grpc.aio.ServerInterceptor):  # type: ignore[misc]
     def _stream(self, method: str, inner: Callable[..., Any]) -> Any:
         async def call(request: Any, context: Any) -> AsyncIterator[Any]:
             peer = await self._admit(method, request, context)
+            if isinstance(request, AsyncIterator):
+                request = _formed(method, request)
             with self._noted(method, request, context, peer):
                 async for response in inner(request, context):
                     yield response
@@ -80,8 +82,7 @@ class Gate(grpc.aio.ServerInterceptor):  # type: ignore[misc]
         peer = None
         try:
             peer = self._front.peer(context.peer())
-            if isinstance(request, _Malformed):
-                raise InvalidArgument(f"the request of {method} is malformed: {request.problem}")
+            _require_formed(method, request)
             self.access.check(peer, method)
             return peer
         except Refusal as refusal:
@@ -112,6 +113,17 @@ class Gate(grpc.aio.ServerInterceptor):  # type: ignore[misc]
         if lost := self._budget.take_lost():
             text += f" ({lost} more were refused since the last such line)"
         log.log(level, "%s", text, extra={"runner": getattr(request, "runner", ""), "peer": peer})
+
+
+def _require_formed(method: str, request: Any) -> None:
+    if isinstance(request, _Malformed):
+        raise InvalidArgument(f"the request of {method} is malformed: {request.problem}")
+
+
+async def _formed(method: str, requests: AsyncIterator[Any]) -> AsyncIterator[Any]:
+    async for request in requests:
+        _require_formed(method, request)
+        yield request
 
 
 def _forgiving(deserialize: Callable[[bytes], Any]) -> Callable[[bytes], Any]:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from rtcf.v1 import runner_pb2
 from rtcfd import config, options, settings
-from rtcfd.access import Access
+from rtcfd.access import Access, Level
 from rtcfd.errors import Refusal
 from rtcfd.limits import Limits
 
@@ -46,7 +46,7 @@ def test_a_file_is_read(tmp_path: Path) -> None:
     )
     found = config.read(file)
     assert (found.socket, found.realtime) == (Path("/run/x.sock"), "preferred")
-    assert found.ros_services == "operate"
+    assert found.ros_services is Level.OPERATE
     assert found.path == [Path("/opt/a/lib/rtcf")]
     assert found.runner == runner_pb2.RunnerSettings(
         frequency_hz=2000.0,
@@ -66,7 +66,7 @@ def test_a_file_is_read(tmp_path: Path) -> None:
         ('[daemon]\nrealtime = "no"', "daemon.realtime must be one of required, preferred"),
         (
             '[daemon]\nros_services = "all"',
-            "daemon.ros_services must be one of observe, operate, admin, not 'all'",
+            "daemon.ros_services must be one of none, observe, operate, admin, not 'all'",
         ),
         ("daemon = 1", "daemon must be a table"),
         ("[runner]\npriority = true", "runner.priority must be an integer"),
