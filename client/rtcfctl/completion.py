@@ -52,8 +52,8 @@ class _Line:
                     self._option = action
         elif (below := self._sub_parsers()) is not None:
             self._verbs.append(word)
-            if word in below:
-                self._parser = below[word]
+            # After a verb that is not known nothing can follow.
+            self._parser = below.get(word, argparse.ArgumentParser(add_help=False))
         else:
             self._given.append(word)
 

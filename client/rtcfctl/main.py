@@ -47,7 +47,8 @@ def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None)
     """Run one command; return its exit code."""
     words = sys.argv[1:] if arguments is None else list(arguments)
     if words[:1] == [completion.REQUEST]:
-        print("\n".join(completion.candidates(parser(), words[1:])))
+        for candidate in completion.candidates(parser(), words[1:]):
+            print(candidate)
         return DONE
     args = parser().parse_args(words)
     args.build_tree = build_tree
