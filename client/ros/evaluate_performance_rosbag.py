@@ -140,7 +140,7 @@ def plot(cycles: Cycles, frequency: float, title: str, file: Path) -> None:
 
     figure, axes = pyplot.subplots(1, 2, figsize=(10, 4), layout="constrained")
     figure.suptitle(title)
-    panels = (
+    panels: tuple[tuple[Sequence[float], str], ...] = (
         (cycles.durations, "(a) calculation duration [µs]"),
         (jitter(cycles, 1e9 / frequency), "(b) scheduling jitter [µs]"),
     )

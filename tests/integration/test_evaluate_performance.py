@@ -24,7 +24,7 @@ def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
 def _info(iteration: int, duration_ns: int, latency_ns: int) -> IterationInfo:
     stamp = genpy.Time()
     stamp.secs, stamp.nsecs = divmod(1_700_000_000_000_000_000 + iteration * PERIOD_NS, 10**9)
-    return IterationInfo(
+    return IterationInfo(  # type: ignore[no-untyped-call]
         stamp=stamp, iteration=iteration, duration_ns=duration_ns, latency_ns=latency_ns
     )
 
