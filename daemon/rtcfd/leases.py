@@ -86,6 +86,7 @@ class Leases:
             if outbox.gone:
                 raise Unavailable(f"the caller that wanted {name} has left")
             self._check_hold(request.hold)
+            runner.limits.check_components(len(runner.desired.components) + 1)
             if name in runner.desired.components:
                 raise AlreadyExists(
                     f"component {name} is there already in runner {runner.name}: "
@@ -99,7 +100,7 @@ class Leases:
             self._loading.add(name)
             await runner.save()
             try:
-                load = wire.Request(load=wire.Load(component=spec, library=library))
+                load = wire.Request(load=library.load(spec))
                 result = (await runner.ask(load, outbox.progress)).change
                 runner.desired.put(name, spec)
             except BaseException:

@@ -1,51 +1,39 @@
-"""roslaunch with the installed packages: no folder is sourced, no daemon runs."""
+"""roslaunch with the installed packages, by a user who has no right to the system's daemon."""
 
-import os
 import signal
-import socket
-import subprocess
-import time
-from pathlib import Path
 
 import pytest
-from installed import run
+from machine import Machine, wait_for
 
-DEADLINE_S = 120.0
+PORT = 11400
+# As a shell of that user would have it.
+ROS = f"export ROS_MASTER_URI=http://localhost:{PORT} ROS_HOSTNAME=localhost; "
 
 
-def test_the_papers_evaluation_runs_from_the_packages(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with socket.socket() as probe:
-        probe.bind(("localhost", 0))
-        port = probe.getsockname()[1]
-    for name in ("ROS_PACKAGE_PATH", "CMAKE_PREFIX_PATH", "PYTHONPATH", "RTCF_SOCKET"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{port}")
-    monkeypatch.setenv("ROS_HOSTNAME", "localhost")
-    monkeypatch.setenv("ROS_HOME", str(tmp_path / "ros"))
-    output = tmp_path / "output"
-    with output.open("wb") as stream:
-        launch = subprocess.Popen(
-            ["/usr/bin/roslaunch", "-p", str(port), "rtcf_examples", "paper_evaluation.launch"],
-            stdout=stream,
-            stderr=stream,
-            env=os.environ | {"PYTHONUNBUFFERED": "1"},
-            start_new_session=True,
-        )
+@pytest.mark.parametrize("user", ["root", "mallory"])
+def test_the_papers_evaluation_runs_from_the_packages(machine: Machine, user: str) -> None:
+    log = f"/var/tmp/launch-{user}"
+    roslaunch = f"roslaunch -p {PORT} rtcf_examples paper_evaluation.launch"
+    home = f"export HOME=~{user}; cd ~{user}"
+    script = f"{ROS} {home}; export PYTHONUNBUFFERED=1; exec {roslaunch} >{log} 2>&1"
+    launch = machine.start("bash", "-c", script, user=user)
+    output = machine.path(log)
     try:
-        deadline = time.monotonic() + DEADLINE_S
-        while "the loop runs with 5 components" not in output.read_text():
-            assert launch.poll() is None and time.monotonic() < deadline, output.read_text()
-            time.sleep(0.05)
-        order = run("/usr/lib/rtcf/component_order").stdout
-        assert order.split() == ["/H1", "/F1", "/R1", "/R2", "/R3"]
+
+        def running() -> bool:
+            assert launch.poll() is None, output.read_text()
+            return output.exists() and "the loop runs with 5 components" in output.read_text()
+
+        wait_for(running, "the loop of the launch file")
+        done = machine.shell(f"{ROS} /usr/lib/rtcf/component_order", user=user)
+        assert done.stdout.split() == ["/H1", "/F1", "/R1", "/R2", "/R3"]
     finally:
-        launch.send_signal(signal.SIGINT)
-        launch.wait(DEADLINE_S)
+        machine.shell(f"pkill -INT -u {user} -o -f '[r]oslaunch -p {PORT}'", check=False)
+        launch.wait(60.0)
+    assert launch.returncode in (0, -signal.SIGINT)
     assert "escalating" not in output.read_text()
 
 
 @pytest.mark.parametrize("program", ["rt_runner", "rt_launcher", "component_list"])
-def test_each_node_and_tool_explains_itself(program: str) -> None:
-    assert "usage: rosrun rtcf " in run(f"/usr/lib/rtcf/{program}", "--help").stdout
+def test_each_node_and_tool_explains_itself(machine: Machine, program: str) -> None:
+    assert "usage: rosrun rtcf " in machine.run(f"/usr/lib/rtcf/{program}", "--help").stdout
