@@ -22,7 +22,8 @@ _CHOICES = {
 _FIELDS = ("frequency_hz", "cpu", "priority", "spin_us", "spin_auto", "max_overruns",
            "warmup_cycles", "stall_timeout_ms", "orphan_timeout_s", "lock_memory", "heap_kb",
            "stack_kb", "max_clock_jump_s")  # fmt: skip
-_ROS_FIELDS = ("enabled", "master_uri", "hostname", "whitelist", "blacklist", "queue")
+_ROS_FIELDS = ("enabled", "master_uri", "hostname", "whitelist", "blacklist", "queue", "latch",
+               "decimation", "decimate", "largest_message_kb")  # fmt: skip
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
@@ -180,6 +181,32 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
         type=int,
         metavar="N",
         help="messages kept for a slow subscriber",
+    )
+    to.add_argument(
+        "--latch",
+        dest="ros_latch",
+        metavar="REGEX",
+        help="published connections whose last message late subscribers get",
+    )
+    to.add_argument(
+        "--decimation",
+        dest="ros_decimation",
+        type=int,
+        metavar="N",
+        help="of the values of outputs, publish each n-th",
+    )
+    to.add_argument(
+        "--decimate",
+        dest="ros_decimate",
+        metavar="REGEX",
+        help="published connections that --decimation holds for (default: .*)",
+    )
+    to.add_argument(
+        "--largest-message",
+        dest="ros_largest_message_kb",
+        type=int,
+        metavar="KIB",
+        help="of variable size, in both directions; 1 to 65536",
     )
 
 

@@ -94,6 +94,13 @@ def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
         output.line(f"{runner.runner}: ROS node {ros.node}: {state}")
     if ros.problem:
         output.line(f"{runner.runner}: ROS: {ros.problem}", "yellow")
+    if ros.too_large:
+        output.line(
+            f"{runner.runner}: {ros.too_large} messages were larger than "
+            f"{runner.settings.ros.largest_message_kb} KiB: allow more by "
+            "`rtcfctl runner set --largest-message`",
+            "yellow",
+        )
     for count, what in ((runner.log_dropped, "log records"), (runner.tap_dropped, "mapped values")):
         if count:
             output.line(f"{runner.runner}: {count} {what} lost in full rings", "yellow")

@@ -5,6 +5,7 @@
 #include <getopt.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -20,6 +21,7 @@
 #include "logging/log.hpp"
 #include "loop/realtime.hpp"
 #include "ros/ros_node.hpp"
+#include "ros/rosout.hpp"
 #include "rtcf/version.hpp"
 #include "runner/runner.hpp"
 #include "server/describe.hpp"
@@ -28,6 +30,7 @@
 namespace {
 
 using namespace rtcf::executor;
+using rtcf::LogLevel;
 
 struct Options {
     std::string runner;
@@ -148,27 +151,57 @@ class LogDrain {
     std::thread thread_;
 };
 
+LogLevel levelOf(RunnerEvent::Kind kind) {
+    switch (kind) {
+        case RunnerEvent::Kind::LoopEnded:
+            return LogLevel::Error;
+        case RunnerEvent::Kind::Degraded:
+        case RunnerEvent::Kind::ComponentFailed:
+            return LogLevel::Warn;
+        case RunnerEvent::Kind::ParametersChanged:
+        case RunnerEvent::Kind::Ros:
+            break;
+    }
+    return LogLevel::Info;
+}
+
 int run(const Options& options) {
     prepareProcess();
     // Takes the signals first, so that every thread made from here on has them blocked.
     Server server(options.socket);
-    Log log([&server](LogEntry&& entry) { server.publish(entry); });
+    rtcf::ros1::Rosout rosout;
+    Log log([&](LogEntry&& entry) {
+        server.publish(entry);
+        rosout.publish(entry);
+    });
+    const auto publish = [&](const RunnerEvent& event) {
+        server.publish(event);
+        if (event.message.empty()) return;
+        LogEntry entry;
+        entry.level = levelOf(event.kind);
+        entry.time_ns =
+            std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
+        entry.iteration = event.iteration;
+        entry.component = event.component;
+        entry.message = event.message;
+        rosout.publish(entry);
+    };
     {
         FlightRecorder recorder;
         installCrashHandler(recorder);
         const CrashContext crash_context(ThreadRole::Other);
         const LogDrain drain(log);
-        Runner runner(
-            options.runner, log, [&server](const RunnerEvent& event) { server.publish(event); },
-            std::make_unique<rtcf::ros1::RosNode>(
-                options.runner,
-                [&server](const std::string& message) {
-                    server.publish(RunnerEvent{RunnerEvent::Kind::Ros, message, {}, 0});
-                },
-                [&server](const OutsideCall& call, const std::atomic<bool>& cancel) {
-                    return server.ask(call, cancel);
-                }),
-            recorder);
+        Runner runner(options.runner, log, publish,
+                      std::make_unique<rtcf::ros1::RosNode>(
+                          options.runner,
+                          [&](const std::string& message) {
+                              publish(RunnerEvent{RunnerEvent::Kind::Ros, message, {}, 0});
+                          },
+                          log, rosout,
+                          [&server](const OutsideCall& call, const std::atomic<bool>& cancel) {
+                              return server.ask(call, cancel);
+                          }),
+                      recorder);
         server.serve(runner, log);
     }
     log.drain();

@@ -28,9 +28,12 @@ MasterClient clientOf(const std::string& uri, std::chrono::milliseconds timeout,
 
 }  // namespace
 
-MasterWatch::MasterWatch(const std::string& runner, executor::BridgeReport report)
+MasterWatch::MasterWatch(const std::string& runner, executor::BridgeReport report,
+                         executor::Log& log, Rosout& rosout)
     : name_(nodeName(runner)),
       report_(std::move(report)),
+      console_(log),
+      rosout_(rosout),
       node_(name_, [this](const std::string& reason) {
           {
               const std::lock_guard lock(mutex_);
@@ -51,7 +54,8 @@ void MasterWatch::attach(executor::RunnerView& runner, const executor::AskSuperv
 void MasterWatch::configure(const executor::BridgeSettings& settings) {
     {
         const std::lock_guard lock(mutex_);
-        if (!settings_ || !(*settings_ == settings)) status_.simulated_time.reset();
+        if (!settings_ || settings_->master_uri != settings.master_uri)
+            status_.simulated_time.reset();
         settings_ = settings;
         status_.enabled = settings.enabled;
         status_.master_uri = masterUri(settings);
@@ -64,6 +68,7 @@ void MasterWatch::configure(const executor::BridgeSettings& settings) {
 void MasterWatch::setTable(const executor::BridgeTable& table) {
     publishing_.setTaps(table.outputs);
     subscribing_.setInjectors(table.inputs);
+    reconfiguring_.setSets(table.parameters);
     {
         const std::lock_guard lock(mutex_);
         due_ = true;
@@ -90,11 +95,17 @@ executor::BridgeStatus MasterWatch::status() const {
     status.subscriptions = subscribing_.open();
     if (status.problem.empty()) status.problem = publishing_.problem();
     if (status.problem.empty()) status.problem = subscribing_.problem();
+    if (status.problem.empty()) status.problem = reconfiguring_.problem();
     return status;
+}
+
+void MasterWatch::serveParameters(executor::ParameterRequest request) {
+    reconfiguring_.serve(std::move(request));
 }
 
 void MasterWatch::stop() {
     stop_ = true;
+    reconfiguring_.end();
     node_.leaveMaster();
     {
         const std::lock_guard lock(mutex_);
@@ -193,15 +204,24 @@ void MasterWatch::step() {
         if (off_ == Off::No) subscribing_.reconcile(node_.handle(), false);
         return;
     }
-    openAndClose(settings.queue);
+    openAndClose(master, settings);
     askForSimulation(master);
+}
+
+// Nothing if it does not answer.
+std::optional<int> MasterWatch::pidOf(MasterClient& master) const {
+    XmlRpc::XmlRpcValue arguments;
+    arguments[0] = name_.full();
+    MasterAnswer answer = master.call("getPid", arguments);
+    if (answer.silent()) return std::nullopt;
+    const bool is_number = answer.value.getType() == XmlRpc::XmlRpcValue::TypeInt;
+    return is_number ? static_cast<int&>(answer.value) : 0;
 }
 
 bool MasterWatch::startNode(const std::string& uri, const std::string& hostname) {
     MasterClient master = clientOf(uri, kCallTimeout, stop_);
-    XmlRpc::XmlRpcValue arguments;
-    arguments[0] = name_.full();
-    if (master.call("getPid", arguments).silent()) {
+    master_pid_ = pidOf(master);
+    if (!master_pid_) {
         setProblem("no ROS master answers at " + uri);
         say("no ROS master answers at " + uri + ": waiting for one");
         return false;
@@ -269,6 +289,8 @@ bool MasterWatch::leaveTopics(MasterClient& master) {
     if (introspection_) introspection_->close();
     publishing_.closeAll();
     subscribing_.closeAll();
+    reconfiguring_.closeAll();
+    rosout_.close();
     MasterClient node = self();
     withdrawAll(master, node, node_, std::chrono::steady_clock::now() + kCallTimeout);
     registered_ = false;
@@ -308,13 +330,18 @@ bool MasterWatch::watchMaster(MasterClient& master) {
     }
     if (nameIsTaken(found)) return false;
     const bool returned = std::exchange(was_silent_, false);
-    if (found.kind != Lookup::Kind::Ours || !registered_) {
+    // A hook may have registered something at a new master before we have looked.
+    const std::optional<int> pid = pidOf(master);
+    const bool is_new = pid && master_pid_ != pid;
+    if (found.kind != Lookup::Kind::Ours || !registered_ || is_new) {
         MasterClient node = self();
+        reconfiguring_.forgetUploads();
         registered_ = registerAll(master, node, node_);
         if (!registered_) {
             setProblem("the ROS master at " + master_uri_ + " did not take all registrations");
             return false;
         }
+        master_pid_ = pid;
         say("ROS node " + name_.full() + " is registered again at " + master_uri_);
     } else if (returned) {
         say("the ROS master at " + master_uri_ + " answers again");
@@ -322,10 +349,15 @@ bool MasterWatch::watchMaster(MasterClient& master) {
     return true;
 }
 
-void MasterWatch::openAndClose(std::uint32_t queue) {
+void MasterWatch::openAndClose(MasterClient& master, const executor::BridgeSettings& settings) {
     if (introspection_) introspection_->open(node_.handle());
-    publishing_.reconcile(node_.handle(), queue);
+    if (!rosout_.isOpen()) rosout_.open(node_.handle(), name_.full());
+    publishing_.reconcile(node_.handle(), settings);
     subscribing_.reconcile(node_.handle(), true);
+    if (!reconfiguring_.reconcile(node_.handle(), master, name_.full())) {
+        const std::lock_guard lock(mutex_);
+        due_ = true;  // the rest at the next step, without waiting for it
+    }
     // If it has gone meanwhile, do it again later.
     if (node_.calls().takeMissed()) registered_ = false;
     setConnected();
@@ -348,6 +380,8 @@ void MasterWatch::end() {
     publishing_.setTaps({});
     publishing_.closeAll();
     subscribing_.closeAll();
+    reconfiguring_.closeAll();
+    rosout_.close();
     refusals_.reset();
     node_.stop();
 }

@@ -12,20 +12,26 @@
 #include <string>
 
 #include "bridge/bridge.hpp"
+#include "ros/console_backend.hpp"
 #include "ros/hooks.hpp"
 #include "ros/introspection.hpp"
 #include "ros/master_client.hpp"
 #include "ros/publishing.hpp"
+#include "ros/reconfiguring.hpp"
 #include "ros/refusals.hpp"
 #include "ros/registration.hpp"
 #include "ros/roscpp_node.hpp"
+#include "ros/rosout.hpp"
 #include "ros/subscribing.hpp"
 
 namespace rtcf::ros1 {
 
 class MasterWatch {
    public:
-    MasterWatch(const std::string& runner, executor::BridgeReport report);
+    /// @param log what is said by ROS_* macros goes there; outlives this
+    /// @param rosout opened and closed with the node; outlives this
+    MasterWatch(const std::string& runner, executor::BridgeReport report, executor::Log& log,
+                Rosout& rosout);
 
     /// Once, before configure(): the runner to show, and whom to ask for changes of it.
     void attach(executor::RunnerView& runner, const executor::AskSupervisor& ask);
@@ -36,6 +42,7 @@ class MasterWatch {
     void setTable(const executor::BridgeTable& table);
     void setClock(std::shared_ptr<executor::SimulatedClock> clock);
     executor::BridgeStatus status() const;
+    void serveParameters(executor::ParameterRequest request);
     /// Lets run() end, soon whatever the master does.
     void stop();
     /// @}
@@ -58,10 +65,11 @@ class MasterWatch {
     void changeMaster(const std::string& uri);
     void obeyShutdownRequest(MasterClient& master);
     bool watchMaster(MasterClient& master);
-    void openAndClose(std::uint32_t queue);
+    void openAndClose(MasterClient& master, const executor::BridgeSettings& settings);
     bool leaveTopics(MasterClient& master);
     bool nameIsTaken(const Lookup& found);
     std::string whyOff() const;
+    std::optional<int> pidOf(MasterClient& master) const;
     void end();
     MasterClient self() const;
 
@@ -87,17 +95,21 @@ class MasterWatch {
     Hooks hooks_{*this};
 
     // The watch thread's alone, but for what is thread-safe in itself.
+    const ConsoleBackend console_;
+    Rosout& rosout_;
     RoscppNode node_;
     Publishing publishing_;
     Subscribing subscribing_;
+    Reconfiguring reconfiguring_;
     std::unique_ptr<Introspection> introspection_;  // null without a runner
     std::unique_ptr<Refusals> refusals_;
-    std::string master_uri_;   // of the running node
-    std::string hostname_;     // as it was at the node's start
-    bool registered_ = false;  // everything that is open, as far as we know
-    bool was_silent_ = false;  // the master, at the last step
-    int taken_ = 0;            // steps since another node got our name, or does not answer
-    bool failed_ = false;      // the node cannot be started in this process
+    std::string master_uri_;         // of the running node
+    std::string hostname_;           // as it was at the node's start
+    std::optional<int> master_pid_;  // of the master that has our registrations
+    bool registered_ = false;        // everything that is open, as far as we know
+    bool was_silent_ = false;        // the master, at the last step
+    int taken_ = 0;                  // steps since another node got our name, or does not answer
+    bool failed_ = false;            // the node cannot be started in this process
     Off off_ = Off::No;
     std::string said_;
 };

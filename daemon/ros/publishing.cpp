@@ -2,6 +2,7 @@
 
 #include <chrono>
 
+#include "graph/name_pattern.hpp"
 #include "ros/quiet_thread.hpp"
 
 namespace rtcf::ros1 {
@@ -28,20 +29,23 @@ void Publishing::setTaps(Taps taps) {
     changed_.notify_all();
 }
 
-bool Publishing::reconcile(ros::NodeHandle& handle, std::uint32_t queue) {
+bool Publishing::reconcile(ros::NodeHandle& handle, const executor::BridgeSettings& settings) {
+    const executor::NamePattern latched("latch", settings.latch);
     std::vector<std::shared_ptr<TopicPublisher>> opening;
     std::vector<std::shared_ptr<TopicPublisher>> closing;
     {
         const std::lock_guard lock(mutex_);
         std::map<std::string, std::shared_ptr<TopicPublisher>> wanted;
         for (const auto& tap : taps_) {
+            const bool latch = latched.matches(tap->topic());
             const auto found = publishers_.find(tap->topic());
             if (found != publishers_.end() && found->second->serves(tap->type()) &&
-                found->second->queue() == queue) {
+                found->second->queue() == settings.queue && found->second->latch() == latch) {
                 wanted[tap->topic()] = found->second;
                 continue;
             }
-            auto publisher = std::make_shared<TopicPublisher>(tap->topic(), tap->type(), queue);
+            auto publisher =
+                std::make_shared<TopicPublisher>(tap->topic(), tap->type(), settings.queue, latch);
             wanted[tap->topic()] = publisher;
             opening.push_back(std::move(publisher));
         }

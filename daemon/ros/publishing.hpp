@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "bridge/bridge.hpp"
 #include "bridge/tap.hpp"
 #include "ros/topic_publisher.hpp"
 
@@ -33,7 +34,7 @@ class Publishing {
 
     /// Opens and closes topics until they are those of the taps. Watch thread, with a master.
     /// @return true if anything was opened or closed
-    bool reconcile(ros::NodeHandle& handle, std::uint32_t queue);
+    bool reconcile(ros::NodeHandle& handle, const executor::BridgeSettings& settings);
     /// Closes all topics; reconcile() opens them again. Watch thread.
     void closeAll();
 

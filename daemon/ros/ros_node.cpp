@@ -5,9 +5,10 @@
 
 namespace rtcf::ros1 {
 
-RosNode::RosNode(std::string runner, executor::BridgeReport report, executor::AskSupervisor ask)
+RosNode::RosNode(const std::string& runner, executor::BridgeReport report, executor::Log& log,
+                 Rosout& rosout, executor::AskSupervisor ask)
     : ask_(std::move(ask)),
-      watch_(std::make_unique<MasterWatch>(runner, std::move(report))),
+      watch_(std::make_unique<MasterWatch>(runner, std::move(report), log, rosout)),
       thread_(quietThread("ros-watch", [this] { watch_->run(); })) {}
 
 RosNode::~RosNode() {
@@ -31,6 +32,10 @@ void RosNode::setClock(std::shared_ptr<executor::SimulatedClock> clock) {
 }
 
 executor::BridgeStatus RosNode::status() const { return watch_->status(); }
+
+void RosNode::serveParameters(executor::ParameterRequest request) {
+    watch_->serveParameters(std::move(request));
+}
 
 executor::HookGate* RosNode::hooks() noexcept { return &watch_->hooks(); }
 

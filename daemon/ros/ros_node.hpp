@@ -8,10 +8,12 @@
 
 #include "bridge/bridge.hpp"
 #include "bridge/outside_call.hpp"
+#include "logging/log.hpp"
 
 namespace rtcf::ros1 {
 
 class MasterWatch;
+class Rosout;
 
 /// One per process, and one in its life: roscpp cannot be started again. All
 /// work is done in threads of its own; none is real-time. With no master it
@@ -20,8 +22,12 @@ class RosNode final : public executor::Bridge {
    public:
     /// @param runner names the node, `/rtcfd/<host>/<runner>`
     /// @param report hears of what changes; not called after the destructor
+    /// @param log    what is said by ROS_* macros goes there; its levels are the loggers'; outlives
+    /// this
+    /// @param rosout opened and closed with the node; outlives this
     /// @param ask who decides on changes that ROS peers ask for by services
-    RosNode(std::string runner, executor::BridgeReport report, executor::AskSupervisor ask);
+    RosNode(const std::string& runner, executor::BridgeReport report, executor::Log& log,
+            Rosout& rosout, executor::AskSupervisor ask);
 
     /// Withdraws from the master and closes all topics, in less than two seconds whatever the
     /// master does. Taps and injectors are not used any more afterwards.
@@ -35,6 +41,7 @@ class RosNode final : public executor::Bridge {
     void setClock(std::shared_ptr<executor::SimulatedClock> clock) override;
     executor::BridgeStatus status() const override;
     executor::HookGate* hooks() noexcept override;
+    void serveParameters(executor::ParameterRequest request) override;
 
    private:
     const executor::AskSupervisor ask_;

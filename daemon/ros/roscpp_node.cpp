@@ -3,9 +3,7 @@
 #include <ros/callback_queue.h>
 #include <ros/init.h>
 #include <ros/master.h>
-#include <ros/names.h>
 #include <ros/node_handle.h>
-#include <ros/service_manager.h>
 #include <ros/xmlrpc_manager.h>
 #include <xmlrpcpp/XmlRpcException.h>
 
@@ -37,10 +35,6 @@ void RoscppNode::start(const std::string& master_uri, const std::string& hostnam
     } catch (const XmlRpc::XmlRpcException& error) {  // not a std::exception
         throw std::runtime_error("the master's answer is not understood: " + error.getMessage());
     }
-
-    // Debian 12's get_loggers() corrupts log4cxx: the next log call would crash.
-    const auto& services = ros::ServiceManager::instance();
-    services->unadvertiseService(ros::names::resolve("~get_loggers"));
 
     // roscpp's own answer to a request to shut down cannot be undone in this process.
     const auto& server = ros::XMLRPCManager::instance();

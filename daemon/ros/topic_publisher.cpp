@@ -6,12 +6,14 @@
 
 namespace rtcf::ros1 {
 
-TopicPublisher::TopicPublisher(std::string topic, const TypeInfo& type, std::uint32_t queue)
+TopicPublisher::TopicPublisher(std::string topic, const TypeInfo& type, std::uint32_t queue,
+                               bool latch)
     : topic_(std::move(topic)),
       type_(type.ros_type),
       md5_(type.ros_md5),
       definition_(type.ros_definition),
-      queue_(queue) {}
+      queue_(queue),
+      latch_(latch) {}
 
 bool TopicPublisher::serves(const TypeInfo& type) const {
     return type_ == type.ros_type && md5_ == type.ros_md5;
@@ -30,6 +32,7 @@ std::string TopicPublisher::problem() const {
 void TopicPublisher::open(ros::NodeHandle& handle) {
     ros::AdvertiseOptions options(topic_, queue_, md5_, type_, definition_);
     options.has_header = startsWithHeader(definition_);
+    options.latch = latch_;
     ros::Publisher publisher;
     std::string problem;
     try {

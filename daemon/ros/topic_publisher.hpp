@@ -20,11 +20,13 @@ namespace rtcf::ros1 {
 /// comes from another thread and never waits for them.
 class TopicPublisher {
    public:
-    TopicPublisher(std::string topic, const TypeInfo& type, std::uint32_t queue);
+    /// @param latch whether subscribers that come later get the last message
+    TopicPublisher(std::string topic, const TypeInfo& type, std::uint32_t queue, bool latch);
 
     /// True if it takes messages of such a type.
     bool serves(const TypeInfo& type) const;
     std::uint32_t queue() const { return queue_; }
+    bool latch() const { return latch_; }
     bool isOpen() const;
     /// Why it could not be opened, one line; empty if it could.
     std::string problem() const;
@@ -41,6 +43,7 @@ class TopicPublisher {
     std::string md5_;
     std::string definition_;
     std::uint32_t queue_;
+    bool latch_;
     mutable std::mutex mutex_;  // all below
     std::string problem_;
     ros::Publisher publisher_;

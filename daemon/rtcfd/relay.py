@@ -13,6 +13,8 @@ from rtcfd.budget import Budget
 from rtcfd.limits import Limits
 
 log = logging.getLogger("rtcf-executor")
+# What a component logs is chosen where it is logged, by its logger's level.
+log.setLevel(logging.DEBUG)
 
 _LEVELS: dict[int, int] = {
     wire.LogRecord.LEVEL_DEBUG: logging.DEBUG,
@@ -46,6 +48,9 @@ class Audience(Protocol):
     def called(self, call: wire.ServiceCall) -> None:
         """Somebody calls a service of the executor's ROS node."""
 
+    def parameters_changed(self, changed: wire.ParametersChanged) -> None:
+        """A peer on ROS has changed parameters of a component."""
+
 
 class Relay:
     """The unasked frames of one runner's executor."""
@@ -65,14 +70,14 @@ class Relay:
             self._event(response.event)
         elif kind == "service_call":
             self._audience.called(response.service_call)
+        elif kind == "parameters_changed":
+            self._audience.parameters_changed(response.parameters_changed)
         elif kind == "error":
             log.error("%s", response.error.message, extra={"runner": self._runner})
 
     def _log(self, record: wire.LogRecord) -> None:
         self._audience.take_log(record)
         level = _LEVELS.get(record.level, logging.INFO)
-        if not log.isEnabledFor(level):
-            return
         # A component that logs in each cycle must not fill the disk.
         self._budget.per_s = self._limits().log_records_per_s
         if not self._budget.take():

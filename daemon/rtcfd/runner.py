@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import control_pb2, runner_pb2
+from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 
 from rtcfd import revival, settings
 from rtcfd.catalog import Catalog
@@ -263,6 +263,28 @@ class Runner:
         # An executor that has ended since has told its caller so.
         with contextlib.suppress(Refusal):
             await self._alive().request(wire.Request(service_answer=answer))
+
+    def parameters_changed(self, changed: wire.ParametersChanged) -> None:
+        """A peer on ROS has changed parameters of a component."""
+        names = ", ".join(changed.parameters)
+        self.log.info("%s: %s set by dynamic_reconfigure", changed.component, names)
+        self.in_background(self._follow_parameters(changed))
+
+    async def _follow_parameters(self, changed: wire.ParametersChanged) -> None:
+        async def work() -> None:
+            # Not what was told: more may have happened since.
+            request = control_pb2.GetComponentRequest(component=changed.component)
+            response = await self.ask(wire.Request(get_component=request))
+            settings = [
+                graph_pb2.ParameterSetting(name=each.name, value=each.value)
+                for each in response.component.parameters
+                if each.name in changed.parameters
+            ]
+            self.desired.set_parameters(changed.component, settings)
+            await self.save()
+
+        with contextlib.suppress(Refusal):  # gone since, and its parameters with it
+            await self.change("a change of parameters by ROS", work)
 
     def _note_running(self, running: bool) -> None:
         self.running = running

@@ -56,6 +56,10 @@ def defaults(
             blacklist="",
             queue=1000,
             hostname="",
+            latch="",
+            decimation=1,
+            decimate=".*",
+            largest_message_kb=256,
         ),
     )
 

@@ -55,16 +55,16 @@ class Daemon:
         self.socket = folder / "s"
         self.log_file = folder / "log"
         self.pid = 0
-        self._folder = folder
+        self.folder = folder
         self._settings = settings
         self._arguments = arguments
         self._wrapper = wrapper
-        self._environment = environment or {}
+        self._environment = {"ROS_HOSTNAME": "localhost"} | dict(environment or {})
         self._process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
         """Start it and wait until it is ready."""
-        settings = self._folder / "rtcfd.toml"
+        settings = self.folder / "rtcfd.toml"
         settings.write_text(self._settings)
         with self.log_file.open("ab") as log:
             begin = log.tell()
@@ -74,10 +74,10 @@ class Daemon:
                     *self._wrapper,
                     *(str(BUILD_TREE / "bin" / "rtcfd"), "--foreground"),
                     *("--socket", str(self.socket), "--config", str(settings)),
-                    *("--state-dir", str(self._folder / "state")),
+                    *("--state-dir", str(self.folder / "state")),
                     *self._arguments,
                 ],
-                env=clean_environment() | {"ROS_HOSTNAME": "localhost"} | self._environment,
+                env=clean_environment() | self._environment,
                 stderr=log,
                 start_new_session=True,
             )

@@ -2,16 +2,23 @@
 
 peer.py record TOPIC       prints each std_msgs/Float64 it receives, exactly (hexadecimal)
 peer.py latch TOPIC VALUE  publishes one std_msgs/Float64, latched
+peer.py text TOPIC SIZE    publishes one std_msgs/String of so many characters, latched
+peer.py sizes TOPIC        prints the length in characters of each std_msgs/String it receives
+peer.py count TOPIC         prints 0 for each std_msgs/Int64 it receives
+peer.py rosout NODE        prints each record that NODE publishes on /rosout, as JSON
+peer.py any TOPIC...       receives messages of any type of all these topics
 
-Both print `connected` when they have met a peer.
+All print `connected` when they have met their peers.
 """
 
+import json
 import sys
 import time
 from typing import Any
 
 import rospy
-from std_msgs.msg import Float64
+from rosgraph_msgs.msg import Log
+from std_msgs.msg import Float64, Int64, String
 
 _POLL_S = 0.01
 
@@ -21,8 +28,33 @@ def _print(message: Any) -> None:
     sys.stdout.write(f"{float(message.data).hex()}\n")
 
 
-def _stay(peer: Any) -> None:
-    while not rospy.is_shutdown() and peer.get_num_connections() == 0:
+def _print_size(message: Any) -> None:
+    sys.stdout.write(f"{float(len(message.data)).hex()}\n")
+
+
+def _print_record(message: Any, node: str) -> None:
+    if message._connection_header["callerid"] != node:
+        return
+    record = {key: getattr(message, key) for key in ("level", "name", "msg", "file", "line")}
+    record["stamp"] = message.header.stamp.to_sec()
+    sys.stdout.write(json.dumps(record) + "\n")
+
+
+class _Records:
+    """The records of one node; every node publishes on /rosout, we too."""
+
+    def __init__(self, node: str) -> None:
+        self._node = node
+        self._subscriber = rospy.Subscriber("/rosout", Log, _print_record, node, tcp_nodelay=True)
+
+    def get_num_connections(self) -> int:
+        """Return 1 when that node is connected."""
+        impl = self._subscriber.impl
+        return sum(each.callerid_pub == self._node for each in impl.connections if impl)
+
+
+def _stay(*peers: Any) -> None:
+    while not rospy.is_shutdown() and any(peer.get_num_connections() == 0 for peer in peers):
         time.sleep(_POLL_S)
     print("connected", flush=True)
     while not rospy.is_shutdown():
@@ -33,9 +65,22 @@ def _stay(peer: Any) -> None:
 def main() -> None:
     """Do what the command line says until the end of the node."""
     action, topic, *values = sys.argv[1:]
+    publisher: Any
     rospy.init_node("peer", anonymous=True)
     if action == "record":
         _stay(rospy.Subscriber(topic, Float64, _print, tcp_nodelay=True))
+    elif action == "sizes":
+        _stay(rospy.Subscriber(topic, String, _print_size, tcp_nodelay=True))
+    elif action == "count":
+        _stay(rospy.Subscriber(topic, Int64, lambda _: sys.stdout.write("0x0p0\n")))
+    elif action == "rosout":
+        _stay(_Records(topic))
+    elif action == "any":
+        _stay(*(rospy.Subscriber(each, rospy.AnyMsg) for each in [topic, *values]))
+    elif action == "text":
+        publisher = rospy.Publisher(topic, String, latch=True, queue_size=1)
+        publisher.publish("x" * int(values[0]))
+        _stay(publisher)
     else:
         publisher = rospy.Publisher(topic, Float64, latch=True, queue_size=1)
         publisher.publish(float(values[0]))

@@ -1,13 +1,17 @@
 """A private ROS master, and nodes at it; each a process of its own."""
 
+import json
+import os
 import signal
 import socket
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import rosgraph
+import yaml
 from daemon_process import DEADLINE_S, clean_environment, wait_for
 
 _PEER = Path(__file__).with_name("peer.py")
@@ -60,6 +64,34 @@ class Master:
             "ROS_LOG_DIR": str(self._folder / "ros" / "log"),
         }
 
+    def run(self, *command: str, ok: bool = True) -> str:
+        """Run a command of ROS; return what it prints."""
+        done = subprocess.run(
+            command,
+            # dynparam takes the first python3 there is, which must be Debian's.
+            env=self.environment() | {"PATH": f"/usr/bin:{os.environ['PATH']}"},
+            cwd=self._folder,
+            capture_output=True,
+            text=True,
+            timeout=DEADLINE_S,
+            check=False,
+        )
+        assert (done.returncode == 0) == ok, done.stdout + done.stderr
+        return done.stdout
+
+    def call(self, service: str, request: str = "{}") -> Any:
+        """Call a service; return its answer."""
+        return yaml.safe_load(self.run("rosservice", "call", service, request))
+
+    def services(self) -> set[str]:
+        """Return the services there are."""
+        return {name for name, _ in rosgraph.Master("/test", self.uri).getSystemState()[2]}
+
+    def parameter(self, name: str) -> Any:
+        """Return a parameter's value; None if there is none."""
+        master = rosgraph.Master("/test", self.uri)
+        return master.getParam(name) if master.hasParam(name) else None
+
     def topics(self) -> tuple[set[str], set[str]]:
         """Return the topics that are published and those that are subscribed."""
         state = rosgraph.Master("/test", self.uri).getSystemState()
@@ -96,6 +128,10 @@ class Node:
     def values(self) -> list[float]:
         """Return what it has received so far."""
         return [float.fromhex(line) for line in self._lines() if line != "connected"]
+
+    def records(self) -> list[dict[str, Any]]:
+        """Return the log records it has received so far."""
+        return [json.loads(line) for line in self._lines() if line.startswith("{")]
 
     def end(self) -> None:
         """End it."""

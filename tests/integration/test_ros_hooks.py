@@ -40,7 +40,7 @@ def test_hooks_have_node_handles_with_the_components_names(tmp_path: Path, maste
     daemon.start()
     try:
         with rtcf.Client(daemon.socket) as client:
-            ros("rosparam", "set", "/arm/user/gain", "2.5", master=master)
+            master.run("rosparam", "set", "/arm/user/gain", "2.5")
             client.load(user())
             client.start()
             wait_for(lambda: port_value(client, "/arm/user", "gain") == 2.5, "the parameter")
@@ -115,14 +115,6 @@ def test_a_master_call_that_fails_in_a_hook_fails_the_hook(
     client.unload(["/arm/user"])
     client.start()
     wait_for(lambda: iteration(client) > 10, "the loop without it")
-
-
-def ros(*command: str, master: Master) -> str:
-    """Run a command of ROS; return what it prints."""
-    done = subprocess.run(
-        command, env=master.environment(), capture_output=True, text=True, timeout=60, check=True
-    )
-    return done.stdout
 
 
 def _ros(client: rtcf.Client) -> runner_pb2.RosStatus:

@@ -8,33 +8,57 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bridge/hook_gate.hpp"
 #include "bridge/injector.hpp"
 #include "bridge/tap.hpp"
+#include "rtcf/parameter.hpp"
 
 namespace rtcf::executor {
 
 class SimulatedClock;
 
-/// All mapped connections of one generation of the graph. The topic's name and
-/// type are the tap's and the injector's.
-struct BridgeTable {
-    std::vector<std::shared_ptr<Tap>> outputs;      ///< to be published
-    std::vector<std::shared_ptr<Injector>> inputs;  ///< to be subscribed
+/// A parameter as it was declared, and its value.
+struct ParameterSnapshot {
+    ParameterDeclaration declaration;
+    ParameterValue value;
 };
+
+/// The parameters of a component. Never changed: a new value makes a new one.
+struct ParameterSet {
+    std::string full_name;  ///< of the component
+    std::vector<ParameterSnapshot> parameters;
+};
+
+/// All mapped connections of one generation of the graph. The topic's name and
+/// type are the tap's and the injector's. And the components that have parameters.
+struct BridgeTable {
+    std::vector<std::shared_ptr<Tap>> outputs;                    ///< to be published
+    std::vector<std::shared_ptr<Injector>> inputs;                ///< to be subscribed
+    std::vector<std::shared_ptr<const ParameterSet>> parameters;  ///< to be offered for change
+};
+
+/// A batch of parameters on its way in.
+using ParameterBatch = std::vector<std::pair<std::string, ParameterValue>>;
+
+/// By which a bridge asks for a change of a component's parameters. Any thread; returns at once.
+/// @param done called once by the graph thread, with the reason if it is refused, else empty; not
+/// called any more if the runner ends
+using ParameterRequest = std::function<void(const std::string& component, ParameterBatch batch,
+                                            std::function<void(const std::string&)> done)>;
 
 /// What a bridge needs to know to find its peers.
 struct BridgeSettings {
     bool enabled = true;
-    std::string master_uri;      ///< empty: of the environment
-    std::string hostname;        ///< by which peers reach us; empty: of the environment
-    std::uint32_t queue = 1000;  ///< messages kept for a slow subscriber
-    bool operator==(const BridgeSettings& other) const {
-        return enabled == other.enabled && master_uri == other.master_uri &&
-               hostname == other.hostname && queue == other.queue;
-    }
+    std::string master_uri;        ///< empty: of the environment
+    std::string hostname;          ///< by which peers reach us; empty: of the environment
+    std::uint32_t queue = 1000;    ///< messages kept for a slow subscriber
+    std::string latch;             ///< outputs whose last value late subscribers get; an expression
+    std::uint32_t decimation = 1;  ///< each n-th value of an output is published,
+    std::string decimate = ".*";   ///< if its name matches this expression
+    std::uint32_t largest_message = 256 * 1024;  ///< of a type of variable size, bytes
 };
 
 /// How a bridge fares.
@@ -76,6 +100,9 @@ class Bridge {
     virtual void setClock(std::shared_ptr<SimulatedClock> clock) = 0;
 
     virtual BridgeStatus status() const = 0;
+
+    /// How parameters are to be changed. Called once, before all else.
+    virtual void serveParameters(ParameterRequest request) { (void)request; }
 
     /// What hooks reach the outside by; null if they do not. As long as the bridge.
     virtual HookGate* hooks() noexcept { return nullptr; }

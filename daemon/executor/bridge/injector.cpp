@@ -8,6 +8,10 @@ Injector::Injector(std::string topic, const TypeInfo& type)
 }
 
 bool Injector::deliver(const std::uint8_t* bytes, std::uint32_t size) {
+    if (size > largest_.load(std::memory_order_relaxed)) {
+        too_large_.fetch_add(1, std::memory_order_relaxed);
+        return false;
+    }
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!queueing_) return store(bytes, size);
     waiting_.emplace_back(bytes, bytes + size);

@@ -32,7 +32,8 @@ class Injector {
     const TypeInfo& type() const noexcept { return type_; }
 
     /// Takes one serialised message. One thread at a time; not real-time safe.
-    /// @return false if the bytes are not a message of this type; nothing has changed then
+    /// @return false if the bytes are not a message of this type or too many; nothing has changed
+    /// then
     bool deliver(const std::uint8_t* bytes, std::uint32_t size);
 
     /// Whether messages wait for a deliverNext() each. What still waits when that ends is
@@ -41,6 +42,12 @@ class Injector {
 
     /// Delivers the oldest message that waits, if any. Any thread; not real-time safe.
     void deliverNext();
+    /// Bytes that a message of a type of variable size may have. Any thread.
+    void setLargest(std::uint32_t bytes) noexcept {
+        largest_.store(type_.fixed_size ? UINT32_MAX : bytes, std::memory_order_relaxed);
+    }
+    /// Messages refused as they were larger. Any thread.
+    std::uint64_t tooLarge() const noexcept { return too_large_.load(std::memory_order_relaxed); }
 
     /// Messages delivered and refused so far. Any thread.
     std::uint64_t delivered() const noexcept { return delivered_.load(std::memory_order_relaxed); }
@@ -82,6 +89,8 @@ class Injector {
     std::deque<std::vector<std::uint8_t>> waiting_;
     std::atomic<std::uint64_t> delivered_{0};
     std::atomic<std::uint64_t> refused_{0};
+    std::atomic<std::uint64_t> too_large_{0};
+    std::atomic<std::uint32_t> largest_{UINT32_MAX};
 };
 
 }  // namespace rtcf::executor

@@ -6,8 +6,12 @@
 namespace rtcf::executor {
 
 Tap::Tap(std::string topic, const TypeInfo& type, std::shared_ptr<const SlotHeader> source,
-         std::size_t capacity)
-    : topic_(std::move(topic)), type_(type), source_(std::move(source)) {
+         std::size_t capacity, std::size_t largest)
+    : topic_(std::move(topic)),
+      type_(type),
+      source_(std::move(source)),
+      passed_over_(UINT32_MAX - 1),  // the first value is taken
+      largest_(type.fixed_size ? SIZE_MAX : largest) {
     // Of a value of its own: the loop may be writing the source's.
     const std::size_t one = kAlign + padded(type_.length(*type_.make_slot(nullptr)));
     // A power of two, so that a place in the ring is found without a division.
@@ -26,7 +30,13 @@ std::uint32_t Tap::lengthAt(std::size_t offset) const noexcept {
 void Tap::push() noexcept RTCF_NONBLOCKING {
     if (source_->sequence == last_sequence_) return;
     last_sequence_ = source_->sequence;
+    if (++passed_over_ < decimation_.load(std::memory_order_relaxed)) return;
+    passed_over_ = 0;
     const std::uint32_t length = type_.length(*source_);
+    if (length > largest_) {
+        too_large_.store(too_large_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+        return;
+    }
     const std::size_t record = kAlign + padded(length);
     std::size_t head = head_.load(std::memory_order_relaxed);
     const std::size_t free = mask_ + 1 - (head - tail_.load(std::memory_order_acquire));

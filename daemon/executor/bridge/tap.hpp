@@ -22,12 +22,20 @@ class Tap {
     /// @param type     of the output
     /// @param source   the output's slot, kept alive by the tap
     /// @param capacity bytes of the ring; at least one value of fixed-size types always fits
+    /// @param largest bytes that a value of a type of variable size may have
     Tap(std::string topic, const TypeInfo& type, std::shared_ptr<const SlotHeader> source,
-        std::size_t capacity);
+        std::size_t capacity, std::size_t largest = SIZE_MAX);
 
     const std::string& topic() const noexcept { return topic_; }
     const TypeInfo& type() const noexcept { return type_; }
     const SlotHeader* source() const noexcept { return source_.get(); }
+
+    /// Bytes that a value may have.
+    std::size_t largest() const noexcept { return largest_; }
+    /// Of the values that are written, takes each n-th from now on. Any thread.
+    void setDecimation(std::uint32_t every) noexcept {
+        decimation_.store(every, std::memory_order_relaxed);
+    }
 
     /// Copies the source's value if it was written since the last call. Producer only; real-time
     /// safe.
@@ -38,7 +46,9 @@ class Tap {
     template <typename Use>
     bool pop(Use&& use);
 
-    /// Values lost because the ring was full or the value larger than it. Any thread.
+    /// Values lost as they were larger than allowed. Any thread.
+    std::uint64_t tooLarge() const noexcept { return too_large_.load(std::memory_order_relaxed); }
+    /// Values lost because the ring was full. Any thread.
     std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
 
    private:
@@ -55,11 +65,15 @@ class Tap {
     const TypeInfo& type_;
     std::shared_ptr<const SlotHeader> source_;
     std::uint64_t last_sequence_ = 0;
+    std::uint32_t passed_over_ = 0;  // values since the last one that was taken
+    std::atomic<std::uint32_t> decimation_{1};
+    std::size_t largest_;
     std::vector<std::uint8_t> ring_;
     std::size_t mask_ = 0;              // the ring's size minus 1
     std::atomic<std::size_t> head_{0};  // bytes ever written, by the producer
     std::atomic<std::size_t> tail_{0};  // bytes ever read, by the consumer
     std::atomic<std::uint64_t> dropped_{0};
+    std::atomic<std::uint64_t> too_large_{0};
 };
 
 template <typename Use>

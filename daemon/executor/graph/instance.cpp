@@ -79,6 +79,7 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
     context_.period_ns = clock.period_ns * definition_.every;
     context_.elapsed_ns = context_.period_ns;
     context_.log = &log;
+    log_.levels().attach(context_.full_name, context_.log_level);
     context_.gate = gate;
     for (const auto& [from, to] : definition_.remaps) {
         context_.remaps.emplace_back(resolveName(from, context_.ns, context_.full_name),
@@ -96,6 +97,7 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
         for (StagedValue* value : stageParameters(definition_.parameters)) value->commit();
         releaseStaged();
     } catch (const Refusal&) {
+        log_.levels().detach(context_.log_level);
         recorder_.removeSlot(slot_);
         throw;
     }
@@ -105,6 +107,7 @@ Instance::~Instance() {
     stop();
     cleanup();
     component_.reset();
+    log_.levels().detach(context_.log_level);
     log_.drain();  // pending records refer to its name
     recorder_.removeSlot(slot_);
 }

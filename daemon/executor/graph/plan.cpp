@@ -9,18 +9,24 @@ namespace {
 // A tap holds what is written in half a second: its reader is a thread that
 // has to share the machine with everything else.
 constexpr double kTapSeconds = 0.5;
-constexpr std::size_t kVariableTapBytes = 256 * 1024;
+constexpr std::size_t kVariableTapValues = 2;  // of the largest
 
-std::size_t tapCapacity(const TypeInfo& type, double frequency_hz) {
-    if (!type.fixed_size) return kVariableTapBytes;
+std::size_t tapCapacity(const TypeInfo& type, double frequency_hz, std::size_t largest) {
+    if (!type.fixed_size) return kVariableTapValues * (largest + 16);
     const std::size_t record = 16 + type.length(*type.make_slot(nullptr));
     return record * static_cast<std::size_t>(std::clamp(frequency_hz * kTapSeconds, 64.0, 16384.0));
 }
 
 class Builder {
    public:
-    Builder(Plan& plan, const Plan& previous, double frequency_hz, Adoption& adoption)
-        : plan_(plan), previous_(previous), frequency_hz_(frequency_hz), adoption_(adoption) {}
+    Builder(Plan& plan, const Plan& previous, double frequency_hz, Adoption& adoption,
+            const BridgeSettings& bridge)
+        : plan_(plan),
+          previous_(previous),
+          frequency_hz_(frequency_hz),
+          adoption_(adoption),
+          bridge_(bridge),
+          decimated_("decimate", bridge.decimate) {}
 
     void build() {
         plan_.schedule.generation = previous_.schedule.generation + 1;
@@ -52,12 +58,16 @@ class Builder {
         const OutputBase& output = *connection.writer->output;
         std::shared_ptr<Tap> tap;
         if (const auto found = previous_.taps.find(name);
-            found != previous_.taps.end() && found->second->source() == output.slot().get()) {
+            found != previous_.taps.end() && found->second->source() == output.slot().get() &&
+            (output.type().fixed_size || found->second->largest() == bridge_.largest_message)) {
             tap = found->second;
         } else {
-            tap = std::make_shared<Tap>(name, output.type(), output.slot(),
-                                        tapCapacity(output.type(), frequency_hz_));
+            tap = std::make_shared<Tap>(
+                name, output.type(), output.slot(),
+                tapCapacity(output.type(), frequency_hz_, bridge_.largest_message),
+                bridge_.largest_message);
         }
+        tap->setDecimation(decimated_.matches(name) ? bridge_.decimation : 1);
         plan_.schedule.taps.push_back(tap.get());
         plan_.taps.emplace(name, std::move(tap));
     }
@@ -71,6 +81,7 @@ class Builder {
         } else {
             injector = std::make_shared<Injector>(name, *connection.type);
         }
+        injector->setLargest(bridge_.largest_message);
         Feed feed{injector.get(), {}};
         for (const Reader& reader : connection.readers) {
             feed.readers.push_back(reader.input);
@@ -154,6 +165,8 @@ class Builder {
     const Plan& previous_;
     double frequency_hz_;
     Adoption& adoption_;
+    const BridgeSettings& bridge_;
+    NamePattern decimated_;
     std::vector<std::size_t> positions_;  // in the order, by node
 };
 
@@ -185,11 +198,12 @@ BridgeTable Plan::bridgeTable() const {
 }
 
 std::unique_ptr<Plan> buildPlan(Graph graph, Wiring wiring, const Plan& previous,
-                                double frequency_hz, Adoption& adoption) {
+                                double frequency_hz, Adoption& adoption,
+                                const BridgeSettings& bridge) {
     auto plan = std::make_unique<Plan>();
     plan->graph = std::move(graph);
     plan->wiring = std::move(wiring);
-    Builder(*plan, previous, frequency_hz, adoption).build();
+    Builder(*plan, previous, frequency_hz, adoption, bridge).build();
     return plan;
 }
 

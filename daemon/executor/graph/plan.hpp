@@ -44,7 +44,9 @@ struct Plan {
 /// @param previous the plan that the loop executes
 /// @param frequency_hz of the loop; sizes the taps' rings
 /// @param adoption gets the schedule and the inputs to rewire
+/// @param bridge decimation and sizes of what leaves and enters the loop
 std::unique_ptr<Plan> buildPlan(Graph graph, Wiring wiring, const Plan& previous,
-                                double frequency_hz, Adoption& adoption);
+                                double frequency_hz, Adoption& adoption,
+                                const BridgeSettings& bridge = {});
 
 }  // namespace rtcf::executor

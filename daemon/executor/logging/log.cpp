@@ -29,7 +29,7 @@ LogRecord* Log::claim() noexcept {
         return nullptr;
     }
     record->time_ns = wallClockNow();
-    record->iteration = iteration_ != nullptr ? iteration_->load(std::memory_order_relaxed) : 0;
+    record->iteration = iterationNow();
     record->realtime = on_realtime_thread;
     return record;
 }
@@ -47,23 +47,52 @@ void Log::write(LogLevel level, const std::string& component, std::string messag
     LogEntry entry;
     entry.level = level;
     entry.time_ns = wallClockNow();
-    entry.iteration = iteration_ != nullptr ? iteration_->load(std::memory_order_relaxed) : 0;
+    entry.iteration = iterationNow();
     entry.component = component;
     entry.message = std::move(message);
     const std::lock_guard<std::mutex> lock(drain_mutex_);
     consumer_(std::move(entry));
 }
 
+std::uint64_t Log::iterationNow() const noexcept {
+    return iteration_ != nullptr ? iteration_->load(std::memory_order_relaxed) : 0;
+}
+
+void Log::post(LogEntry entry) {
+    entry.time_ns = wallClockNow();
+    entry.iteration = iterationNow();
+    const std::lock_guard<std::mutex> lock(posted_mutex_);
+    if (posted_.size() >= kCapacity) {
+        posted_dropped_.fetch_add(1, std::memory_order_relaxed);
+        return;
+    }
+    posted_.push_back(std::move(entry));
+}
+
 void Log::drain() {
     const std::lock_guard<std::mutex> lock(drain_mutex_);
+    std::deque<LogEntry> posted;
+    {
+        const std::lock_guard<std::mutex> posted_lock(posted_mutex_);
+        posted.swap(posted_);
+    }
+    // In order of time with what comes out of the rings.
+    const auto handOnUntil = [&](std::int64_t time_ns) {
+        while (!posted.empty() && posted.front().time_ns <= time_ns) {
+            consumer_(std::move(posted.front()));
+            posted.pop_front();
+        }
+    };
     for (;;) {
         const LogRecord* other = others_.front();
         const LogRecord* realtime = realtime_.front();
         if (other == nullptr && realtime == nullptr) break;
         const bool is_realtime =
             other == nullptr || (realtime != nullptr && realtime->time_ns < other->time_ns);
+        handOnUntil((is_realtime ? realtime : other)->time_ns);
         drainOne(is_realtime ? realtime_ : others_);
     }
+    handOnUntil(INT64_MAX);
     reportDrops();
 }
 

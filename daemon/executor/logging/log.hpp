@@ -5,11 +5,14 @@
 /// come and hands them on.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <mutex>
 #include <string>
 
+#include "logging/levels.hpp"
 #include "rtcf/logging.hpp"
 #include "spsc_ring.hpp"
 
@@ -26,6 +29,7 @@ struct LogEntry {
     std::uint32_t line = 0;
     std::string function;
     bool realtime = false;
+    std::string logger;  ///< of what came by ROS_* macros; empty = that of the component
 };
 
 class Log final : public LogSink {
@@ -41,13 +45,23 @@ class Log final : public LogSink {
     /// A record of the executor's own. Not real-time safe.
     void write(LogLevel level, const std::string& component, std::string message);
 
+    /// As write(), of what has been said already; handed on by the next drain(), so that the caller
+    /// may hold locks. Time and iteration are noted here.
+    void post(LogEntry entry);
+
+    /// Which records are wanted.
+    LogLevels& levels() noexcept { return levels_; }
+
     /// Hands all pending records to the consumer, the oldest first. Any
     /// thread that is not real-time. Called before a component goes away, as
     /// records refer to its name and library.
     void drain();
 
     /// Records lost in full rings.
-    std::uint64_t dropped() const noexcept { return realtime_.dropped() + others_.dropped(); }
+    std::uint64_t dropped() const noexcept {
+        return realtime_.dropped() + others_.dropped() +
+               posted_dropped_.load(std::memory_order_relaxed);
+    }
 
     /// Marks the calling thread as the one real-time thread (or not any more).
     /// @param iteration the loop's counter, read at each claim of any thread
@@ -60,6 +74,7 @@ class Log final : public LogSink {
     static constexpr std::size_t kCapacity = 1024;
     using Ring = SpscRing<LogRecord, kCapacity>;
 
+    std::uint64_t iterationNow() const noexcept;
     void drainOne(Ring& ring);
     void reportDrops();
 
@@ -69,6 +84,10 @@ class Log final : public LogSink {
     std::mutex others_mutex_;  // held from claim() to commit() by threads that are not real-time
     std::mutex drain_mutex_;
     std::uint64_t reported_drops_ = 0;
+    LogLevels levels_;
+    std::mutex posted_mutex_;  // posted_
+    std::deque<LogEntry> posted_;
+    std::atomic<std::uint64_t> posted_dropped_{0};
     const std::atomic<std::uint64_t>* iteration_ = nullptr;
 };
 

@@ -31,7 +31,17 @@ Runner::Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr
       recorder_(recorder),
       loop_(log, recorder),
       stall_monitor_(loop_),
-      bridge_(std::move(bridge)) {
+      bridge_(std::move(bridge)),
+      size_watch_(name_,
+                  [this](const std::string& line) { log_.write(LogLevel::Warn, {}, line); }) {
+    if (bridge_) {
+        bridge_->serveParameters([this](const std::string& component, ParameterBatch batch,
+                                        std::function<void(const std::string&)> done) {
+            post([this, component, batch = std::move(batch), done = std::move(done)] {
+                changeByBridge(component, batch, done);
+            });
+        });
+    }
     validate(settings_);
     stall_monitor_.setTimeout(settings_.stall_timeout_ns);
     publishPicture();
@@ -82,7 +92,6 @@ void Runner::threadMain() {
     if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>());
     // Components may reach for ROS until they are gone.
     plan_ = std::make_unique<Plan>();
-    snapshot_ = std::make_shared<GraphSnapshot>();
     bridge_.reset();
     log_.drain();
 }
@@ -97,6 +106,7 @@ void Runner::tick() {
     noteComponentFaults();
     noteOverruns(false);
     noteClockJumps();
+    noteSizes();
     CycleRecord record{};
     while (discards_cycles_ && loop_.popRecord(record)) {
     }
@@ -176,6 +186,36 @@ void Runner::noteOverruns(bool last) {
     if (lacks_realtime_ && settings_.loop.max_overruns != 0)
         line += "; max_overruns ends no loop that runs degraded";
     events_({RunnerEvent::Kind::Overruns, std::move(line), {}, loop_.figures().iteration.load()});
+}
+
+void Runner::noteSizes() {
+    const std::int64_t now = monotonicNow();
+    if (now < sizes_due_ns_) return;
+    sizes_due_ns_ = now + kSecond / 2;
+    size_watch_.look(plan_->taps, plan_->injectors, settings_.bridge.largest_message, now);
+}
+
+void Runner::changeByBridge(const std::string& component, const ParameterBatch& batch,
+                            const std::function<void(const std::string&)>& done) {
+    std::string refusal;
+    try {
+        setParameters(component, batch);
+        RunnerEvent event{RunnerEvent::Kind::ParametersChanged, {}, component, 0};
+        for (const auto& [name, value] : batch) event.parameters.push_back(name);
+        events_(event);
+    } catch (const Refusal& error) {
+        refusal = error.what();
+        log_.write(LogLevel::Warn, component, "dynamic_reconfigure: refused: " + refusal);
+    }
+    done(refusal);
+}
+
+std::shared_ptr<const BridgeTable> Runner::bridgeTable() const {
+    auto table = std::make_shared<BridgeTable>(plan_->bridgeTable());
+    for (const auto& component : snapshot_->components) {
+        if (!component->parameters.empty()) table->parameters.push_back(component);
+    }
+    return table;
 }
 
 // spin = auto: as long as 99 of 100 wake-ups of the last second were late, at most a tenth of the
@@ -409,7 +449,7 @@ ReplayOutcome Runner::beginReplay(const ReplayChunk& chunk, const Progress& prog
     try {
         startAll(progress);
     } catch (const Refusal&) {
-        if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>(plan_->bridgeTable()));
+        if (bridge_) bridge_->setTable(bridgeTable());
         throw;
     }
     loop_.beginStepping(settings_.loop, chunk.start_ns);
@@ -453,7 +493,7 @@ void Runner::renewComponents(const Progress& progress) {
 void Runner::endStepping() {
     if (replay_) {
         replay_.reset();
-        if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>(plan_->bridgeTable()));
+        if (bridge_) bridge_->setTable(bridgeTable());
     }
     loop_.endStepping();
     noteLoopFault();
@@ -519,8 +559,8 @@ void Runner::adopt(Change change, const Progress& progress) {
     const Graph graph = change.graph;
     Wiring wiring = wire(graph, filter(), change.loading);
     Adoption adoption;
-    std::unique_ptr<Plan> plan =
-        buildPlan(graph, std::move(wiring), *plan_, settings_.frequency_hz, adoption);
+    std::unique_ptr<Plan> plan = buildPlan(graph, std::move(wiring), *plan_, settings_.frequency_hz,
+                                           adoption, settings_.bridge);
     adoption.values = std::move(change.values);
     adoption.hand_overs = std::move(change.hand_overs);
     adoption.period_ns = change.period_ns;
@@ -545,8 +585,8 @@ void Runner::adopt(Change change, const Progress& progress) {
     if (simulated_) {
         for (const auto& injector : plan_->bridgeTable().inputs) injector->setQueueing(true);
     }
-    if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>(plan_->bridgeTable()));
     publish(change.changed);
+    if (bridge_) bridge_->setTable(bridgeTable());
     if (!adoption.values.empty()) {
         for (const GraphNode& node : plan_->graph.nodes()) node.instance->releaseStaged();
     }
@@ -739,9 +779,13 @@ void Runner::publish(const std::set<std::string>& changed) {
 }
 
 void Runner::publishPicture() {
-    RunnerPicture next{
-        state_,    settings_, degraded_, status_, bridge_ ? bridge_->status() : BridgeStatus{},
-        simulated_};
+    RunnerPicture next{state_,
+                       settings_,
+                       degraded_,
+                       status_,
+                       bridge_ ? bridge_->status() : BridgeStatus{},
+                       simulated_,
+                       size_watch_.total()};
     if (settings_.spin_auto && tuned_spin_ns_ >= 0) next.settings.loop.spin_ns = tuned_spin_ns_;
     const std::lock_guard<std::mutex> lock(published_mutex_);
     picture_ = std::move(next);

@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "bridge/size_watch.hpp"
 #include "faults/flight_recorder.hpp"
 #include "faults/stall_monitor.hpp"
 #include "graph/definition.hpp"
@@ -48,11 +49,20 @@ struct ChangeOutcome {
 
 /// Something that happened without a request.
 struct RunnerEvent {
-    enum class Kind { LoopEnded, Degraded, Ros, ComponentFailed, Overruns, Clock };
+    enum class Kind {
+        LoopEnded,
+        Degraded,
+        Ros,
+        ComponentFailed,
+        Overruns,
+        Clock,
+        ParametersChanged
+    };
     Kind kind;
     std::string message;
     std::string component;
     std::uint64_t iteration = 0;
+    std::vector<std::string> parameters = {};  ///< that were changed, other than by a request
 };
 
 /// Counters and state for a status query; any thread.
@@ -62,7 +72,8 @@ struct RunnerPicture {
     std::vector<std::string> degraded;
     std::string status;
     BridgeStatus bridge;
-    bool simulated = false;  ///< the loop follows a simulated clock
+    bool simulated = false;       ///< the loop follows a simulated clock
+    std::uint64_t too_large = 0;  ///< messages lost for their size
 };
 
 class Runner final : private RunnerView {
@@ -151,6 +162,11 @@ class Runner final : private RunnerView {
     void noteLoopFault();
     void noteComponentFaults();
     void noteOverruns(bool last);
+    void noteSizes();
+    /// A change of parameters that the bridge asks for.
+    void changeByBridge(const std::string& component, const ParameterBatch& batch,
+                        const std::function<void(const std::string&)>& done);
+    std::shared_ptr<const BridgeTable> bridgeTable() const;
     void tuneSpin();
     const GraphNode* nodeOf(const Component* component) const noexcept;
     void endStepping();
@@ -187,6 +203,7 @@ class Runner final : private RunnerView {
     StallMonitor stall_monitor_;
     std::unique_ptr<Bridge> bridge_;
     bool discards_cycles_ = true;  // nobody else takes the cycle records
+    SizeWatch size_watch_;
 
     // Graph thread only.
     RunnerSettings settings_;
@@ -202,6 +219,7 @@ class Runner final : private RunnerView {
     bool simulated_ = false;        // the loop follows clock_
     HistogramSnapshot tuned_from_;  // wake-up latency at the last tuneSpin()
     std::int64_t tuned_at_ns_ = 0;
+    std::int64_t sizes_due_ns_ = 0;
 
     // Published for queries.
     mutable std::mutex published_mutex_;

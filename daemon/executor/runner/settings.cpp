@@ -61,6 +61,10 @@ void validate(RunnerSettings& settings) {
     requireRange("max clock jump", static_cast<double>(settings.max_clock_jump_ns) / 1e9, 0.0, 1e6,
                  "s");
     requireRange("queue", settings.bridge.queue, 1U, 1'000'000U, "messages");
+    requireRange("decimation", settings.bridge.decimation, 1U, 1'000'000U, "values");
+    requireRange("largest message", settings.bridge.largest_message / 1024, 1U, 64U * 1024, "KiB");
+    (void)NamePattern("latch", settings.bridge.latch);
+    (void)NamePattern("decimate", settings.bridge.decimate);
     (void)NamePattern("whitelist", settings.whitelist);
     (void)NamePattern("blacklist", settings.blacklist);
 }

@@ -24,22 +24,15 @@ struct PortSnapshot {
     std::string unit;
 };
 
-struct ParameterSnapshot {
-    ParameterDeclaration declaration;
-    ParameterValue value;
-};
-
 /// One component. What its pointers point to is never unloaded (types) or is
 /// shared (figures), so a snapshot may outlive the component.
-struct ComponentSnapshot {
+struct ComponentSnapshot : ParameterSet {
     const Instance* instance;  ///< for comparison only
     std::shared_ptr<const ComponentFigures> figures;
     ComponentDefinition definition;  ///< with the breaks of now
-    std::string full_name;
     std::string library;
     std::string doc;
     std::vector<PortSnapshot> ports;
-    std::vector<ParameterSnapshot> parameters;
     std::string fault;
 };
 

@@ -260,6 +260,14 @@ RunnerSettings settingsFrom(const pb::RunnerSettings& message, RunnerSettings ba
     if (ros.has_master_uri()) base.bridge.master_uri = ros.master_uri();
     if (ros.has_hostname()) base.bridge.hostname = ros.hostname();
     if (ros.has_queue()) base.bridge.queue = ros.queue();
+    if (ros.has_latch()) base.bridge.latch = ros.latch();
+    if (ros.has_decimation()) base.bridge.decimation = ros.decimation();
+    if (ros.has_decimate()) base.bridge.decimate = ros.decimate();
+    if (ros.has_largest_message_kb()) {
+        // What does not fit is out of range anyway.
+        base.bridge.largest_message =
+            std::min(ros.largest_message_kb(), UINT32_MAX / 1024) * std::uint32_t{1024};
+    }
     if (ros.has_whitelist()) base.whitelist = ros.whitelist();
     if (ros.has_blacklist()) base.blacklist = ros.blacklist();
     return base;
@@ -291,6 +299,10 @@ pb::RunnerSettings settingsTo(const RunnerSettings& settings) {
     ros.set_master_uri(settings.bridge.master_uri);
     ros.set_hostname(settings.bridge.hostname);
     ros.set_queue(settings.bridge.queue);
+    ros.set_latch(settings.bridge.latch);
+    ros.set_decimation(settings.bridge.decimation);
+    ros.set_decimate(settings.bridge.decimate);
+    ros.set_largest_message_kb(settings.bridge.largest_message / 1024);
     ros.set_whitelist(settings.whitelist);
     ros.set_blacklist(settings.blacklist);
     return message;
@@ -420,6 +432,7 @@ v1::Event eventTo(const RunnerEvent& event) {
         case RunnerEvent::Kind::Clock:
             message.set_kind(v1::Event::KIND_CLOCK);
             break;
+        case RunnerEvent::Kind::ParametersChanged:  // has a message of its own
         case RunnerEvent::Kind::Ros:
             message.set_kind(v1::Event::KIND_ROS);
             break;

@@ -160,7 +160,13 @@ void Server::publish(const LogEntry& entry) {
 
 void Server::publish(const RunnerEvent& event) {
     v1::Response response;
-    *response.mutable_event() = eventTo(event);
+    if (event.kind == RunnerEvent::Kind::ParametersChanged) {
+        v1::ParametersChanged& changed = *response.mutable_parameters_changed();
+        changed.set_component(event.component);
+        for (const std::string& name : event.parameters) changed.add_parameters(name);
+    } else {
+        *response.mutable_event() = eventTo(event);
+    }
     post(0, std::move(response), false);
 }
 
@@ -587,6 +593,7 @@ pb::RunnerStatus Server::status() const {
     ros.set_publications(picture.bridge.publications);
     ros.set_subscriptions(picture.bridge.subscriptions);
     ros.set_problem(picture.bridge.problem);
+    ros.set_too_large(picture.too_large);
     status.set_log_dropped(log_->dropped());
     std::uint64_t dropped = 0;
     for (const auto& tap : graph->taps) dropped += tap->dropped();

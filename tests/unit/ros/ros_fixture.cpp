@@ -107,6 +107,7 @@ void RosFixture::startNode() {
             const std::lock_guard lock(mutex_);
             reports_.push_back(message);
         },
+        log_, rosout_,
         [](const rtcf::executor::OutsideCall&, const std::atomic<bool>&) {
             return rtcf::executor::OutsideAnswer{};
         });

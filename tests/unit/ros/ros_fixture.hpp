@@ -19,6 +19,7 @@
 #include "bridge/tap.hpp"
 #include "child_process.hpp"
 #include "ros/ros_node.hpp"
+#include "ros/rosout.hpp"
 
 using namespace std::chrono_literals;
 
@@ -108,5 +109,7 @@ class RosFixture : public ::testing::Test {
     std::unique_ptr<ChildProcess> master_;
     mutable std::mutex mutex_;  // reports_
     std::vector<std::string> reports_;
+    rtcf::ros1::Rosout rosout_;
+    rtcf::executor::Log log_{[this](rtcf::executor::LogEntry&& entry) { rosout_.publish(entry); }};
     std::unique_ptr<rtcf::ros1::RosNode> node_;
 };

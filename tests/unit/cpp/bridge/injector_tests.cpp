@@ -36,6 +36,20 @@ TEST(Injector, HasNothingAtFirst) {
     EXPECT_EQ(injector.front()->sequence, 0U);
 }
 
+TEST(Injector, CountsAndRefusesWhatIsLargerThanAllowed) {
+    Injector injector("/x", typeInfo<std_msgs::String>());
+    injector.setLargest(6);
+    const std::vector<std::uint8_t> fits{2, 0, 0, 0, 'h', 'i'};
+    const std::vector<std::uint8_t> large{3, 0, 0, 0, 'h', 'e', 'y'};
+    EXPECT_TRUE(injector.deliver(fits.data(), 6));
+    EXPECT_FALSE(injector.deliver(large.data(), 7));
+    EXPECT_EQ(injector.tooLarge(), 1U);
+    EXPECT_EQ(injector.delivered(), 1U);
+    EXPECT_TRUE(injector.adopt(LoopClock{}));
+    const auto* slot = static_cast<const Slot<std_msgs::String>*>(injector.front());
+    EXPECT_EQ(slot->value.data, "hi");
+}
+
 TEST(Injector, GivesTheNewestOfSeveral) {
     Injector injector("/x", typeInfo<double>());
     for (int i = 1; i <= 5; ++i) deliver(injector, i);

@@ -49,6 +49,39 @@ TEST(Tap, PassesEachWrittenValueOnce) {
     EXPECT_FALSE(tap.pop([](const std::uint8_t*, std::uint32_t) {}));
 }
 
+TEST(Tap, TakesTheFirstValueAndThenEachNth) {
+    const auto slot = std::make_shared<Slot<double>>();
+    Tap tap("/x", typeInfo<double>(), slot, 1024);
+    tap.setDecimation(3);
+    for (int i = 1; i <= 8; ++i) {
+        write(slot, static_cast<double>(i));
+        tap.push();
+    }
+    EXPECT_EQ(takeAll(tap), (std::vector<double>{1.0, 4.0, 7.0}));
+    tap.setDecimation(1);
+    write(slot, 9.0);
+    tap.push();
+    EXPECT_EQ(takeAll(tap), (std::vector<double>{9.0}));
+    EXPECT_EQ(tap.dropped(), 0U);
+}
+
+TEST(Tap, CountsWhatIsLargerThanAllowed) {
+    const auto slot = std::make_shared<Slot<std_msgs::String>>();
+    Tap tap("/x", typeInfo<std_msgs::String>(), slot, 1024, 104);
+    std_msgs::String text;
+    text.data.assign(100, 'x');  // and its length, 4 bytes
+    write(slot, text);
+    tap.push();
+    EXPECT_EQ(tap.tooLarge(), 0U);
+    text.data.assign(101, 'x');
+    write(slot, text);
+    tap.push();
+    EXPECT_EQ(tap.tooLarge(), 1U);
+    EXPECT_EQ(tap.dropped(), 0U);
+    EXPECT_TRUE(tap.pop([](const std::uint8_t*, std::uint32_t size) { EXPECT_EQ(size, 104U); }));
+    EXPECT_FALSE(tap.pop([](const std::uint8_t*, std::uint32_t) {}));
+}
+
 TEST(Tap, GoesOnWhereItsRingEnds) {
     for (const std::size_t capacity : {32, 40, 48, 56, 104}) {
         const auto slot = std::make_shared<Slot<double>>();

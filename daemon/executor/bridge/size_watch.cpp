@@ -1,0 +1,42 @@
+#include "bridge/size_watch.hpp"
+
+#include <fmt/format.h>
+
+namespace rtcf::executor {
+
+namespace {
+
+constexpr std::int64_t kQuiet = 10'000'000'000;  // ns
+constexpr std::size_t kKilo = 1024;
+
+}  // namespace
+
+void SizeWatch::look(const std::map<std::string, std::shared_ptr<Tap>>& taps,
+                     const std::map<std::string, std::shared_ptr<Injector>>& injectors,
+                     std::size_t largest, std::int64_t now_ns) {
+    for (const auto& [topic, tap] : taps) {
+        if (const std::uint64_t count = tap->tooLarge(); count != 0)
+            note(topic, tap.get(), count, "not published", largest, now_ns);
+    }
+    for (const auto& [topic, injector] : injectors) {
+        if (const std::uint64_t count = injector->tooLarge(); count != 0)
+            note(topic, injector.get(), count, "not taken", largest, now_ns);
+    }
+}
+
+void SizeWatch::note(const std::string& topic, const void* connection, std::uint64_t count,
+                     const char* what, std::size_t largest, std::int64_t now_ns) {
+    Known& known = known_[connection];
+    if (count < known.counted) known = {};  // another one at the address of an old one
+    total_ += count - known.counted;
+    known.counted = count;
+    if (count == known.reported || now_ns < known.next_report_ns) return;
+    report_(
+        fmt::format("{}: {} messages of more than {} KiB {}: allow more: rtcfctl runner set {} "
+                    "--largest-message KIB",
+                    topic, count - known.reported, largest / kKilo, what, runner_));
+    known.reported = count;
+    known.next_report_ns = now_ns + kQuiet;
+}
+
+}  // namespace rtcf::executor

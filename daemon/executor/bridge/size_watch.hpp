@@ -1,0 +1,51 @@
+/// @file
+/// Notices messages that were lost as they are larger than a loop makes room
+/// for, and says so in one line per connection, not one per message.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "bridge/injector.hpp"
+#include "bridge/tap.hpp"
+
+namespace rtcf::executor {
+
+/// Owned by the runner; graph thread only.
+class SizeWatch {
+   public:
+    using Report = std::function<void(const std::string& line)>;
+
+    /// @param runner for the advice
+    SizeWatch(std::string runner, Report report)
+        : runner_(std::move(runner)), report_(std::move(report)) {}
+
+    /// Looks at all connections of a plan; reports a connection once in ten seconds at most.
+    /// @param largest what is allowed now, bytes
+    void look(const std::map<std::string, std::shared_ptr<Tap>>& taps,
+              const std::map<std::string, std::shared_ptr<Injector>>& injectors,
+              std::size_t largest, std::int64_t now_ns);
+
+    /// All that were lost so far.
+    std::uint64_t total() const noexcept { return total_; }
+
+   private:
+    struct Known {
+        std::uint64_t counted = 0;
+        std::uint64_t reported = 0;
+        std::int64_t next_report_ns = 0;
+    };
+
+    void note(const std::string& topic, const void* connection, std::uint64_t count,
+              const char* what, std::size_t largest, std::int64_t now_ns);
+
+    std::string runner_;
+    Report report_;
+    std::map<const void*, Known> known_;
+    std::uint64_t total_ = 0;
+};
+
+}  // namespace rtcf::executor

@@ -1,0 +1,115 @@
+"""What components log, on /rosout and in rtcfd's log; levels, set as rqt_logger_level does."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rtcf
+from daemon_process import Daemon, wait_for, with_ros
+from ros_processes import Master, Node
+from rtcf.v1 import runner_pb2
+from values import iteration
+
+_INFO, _WARN, _DEBUG = 2, 4, 1
+
+
+@pytest.fixture
+def speaking(tmp_path: Path, master: Master) -> Iterator[tuple[Daemon, rtcf.Client, Node, str]]:
+    """Give a daemon, its client, a node that listens to /rosout, and the name of ours."""
+    daemon = Daemon(tmp_path, with_ros(master.uri, ""))
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=50.0))
+        wait_for(lambda: client.get_status("rt_runner").runners[0].ros.connected, "the node")
+        node = client.get_status("rt_runner").runners[0].ros.node
+        listener = master.node("rosout", node)
+        listener.wait_until_connected()
+        yield daemon, client, listener, node
+        listener.end()
+    daemon.end()
+
+
+def test_every_record_is_on_rosout_and_in_the_log_under_its_component(
+    speaking: tuple[Daemon, rtcf.Client, Node, str],
+) -> None:
+    daemon, client, listener, node = speaking
+    begin = time.time()
+    client.load(rtcf.component("rtcf_test_ros", "Speaker", name="speaker", ns="/arm"))
+    client.start()
+
+    def record(text: str) -> dict[str, object]:
+        found: dict[str, object] = wait_for(
+            lambda: next((each for each in listener.records() if each["msg"] == text), None), text
+        )
+        return found
+
+    for text, level in (("by macro at 1", _INFO), ("by rtcf at 1", _INFO), ("in the cycle", _WARN)):
+        found = record(text)
+        assert found["name"] == "ros.rtcf.arm.speaker"
+        assert found["level"] == level
+        assert str(found["file"]).endswith("tests/components/speaker.cpp")
+        assert found["line"] != 0
+        assert begin - 1.0 < float(str(found["stamp"])) < time.time() + 1.0
+        line = next(line for line in daemon.log().splitlines() if text in line)
+        assert "/arm/speaker" in line
+        assert "speaker.cpp:" in line
+    assert "for those who debug" not in daemon.log()
+    # What the executor itself says is under the node's name, as for any node.
+    client.stop()
+    assert all(each["name"] in ("ros.rtcf.arm.speaker", node) for each in listener.records())
+
+
+def test_levels_are_set_as_rqt_logger_level_does(
+    speaking: tuple[Daemon, rtcf.Client, Node, str], master: Master
+) -> None:
+    daemon, client, listener, node = speaking
+    client.load(rtcf.component("rtcf_test_ros", "Speaker", name="speaker"))
+    client.load(rtcf.component("rtcf_test_ros", "Speaker", name="other"))
+    client.start()
+
+    def levels() -> dict[str, str]:
+        answer = master.call(f"{node}/get_loggers")
+        return {each["name"]: each["level"] for each in answer["loggers"]}
+
+    before = levels()
+    assert before["ros.rtcf.speaker"] == before["ros.rtcf"] == before["ros"] == "info"
+    master.call(f"{node}/set_logger_level", "{logger: ros.rtcf.speaker, level: debug}")
+    # Of a component in the cycle, and of that one only.
+    debug = wait_for(
+        lambda: [each for each in listener.records() if each["msg"] == "each cycle"], "a record"
+    )
+    assert {(each["name"], each["level"]) for each in debug} == {("ros.rtcf.speaker", _DEBUG)}
+    wait_for(lambda: "each cycle" in daemon.log(), "the record in the log")
+    assert levels()["ros.rtcf.speaker"] == "debug"
+    assert levels()["ros.rtcf.other"] == "info"
+    # And back.
+    master.call(f"{node}/set_logger_level", "{logger: ros.rtcf.speaker, level: error}")
+    quiet_from = iteration(client)
+    wait_for(lambda: iteration(client) > quiet_from + 25, "cycles")
+    count = len(listener.records())
+    wait_for(lambda: iteration(client) > quiet_from + 50, "more cycles")
+    assert len(listener.records()) == count
+    # For macros in hooks too; the parent's level holds for those that have none of their own.
+    master.call(f"{node}/set_logger_level", "{logger: ros.rtcf, level: debug}")
+    client.load(rtcf.component("rtcf_test_ros", "Speaker", name="late"))
+    wait_for(lambda: "by macro, for those who debug" in daemon.log(), "the macro's record")
+    # Debian 12's log4cxx would have crashed by now.
+    assert client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_RUNNING
+
+
+def test_levels_of_a_rosconsole_config_file_are_honoured(tmp_path: Path, master: Master) -> None:
+    config = tmp_path / "rosconsole.conf"
+    config.write_text(
+        "# levels\nlog4j.logger.ros=INFO\nlog4j.logger.ros.rtcf.speaker=DEBUG\n"
+        "log4j.logger.ros.rtcf.other=LOUD\n"
+    )
+    daemon = Daemon(tmp_path, with_ros(master.uri, ""), {"ROSCONSOLE_CONFIG_FILE": str(config)})
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            client.load(rtcf.component("rtcf_test_ros", "Speaker", name="speaker"))
+            wait_for(lambda: "by macro, for those who debug" in daemon.log(), "the record")
+            assert f"{config}:4: 'LOUD' is no level" in daemon.log()
+    finally:
+        daemon.end()

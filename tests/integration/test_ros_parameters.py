@@ -1,0 +1,140 @@
+"""Parameters by dynamic_reconfigure, as dynparam and rqt_reconfigure use it."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rtcf
+import yaml
+from daemon_process import Daemon, wait_for, with_ros
+from ros_processes import Master
+from rtcf.v1 import runner_pb2
+from values import port_value
+
+_NAME = "/arm/knobs"
+
+
+@pytest.fixture
+def knobs(tmp_path: Path, master: Master) -> Iterator[tuple[Daemon, rtcf.Client]]:
+    """Give a daemon whose loop runs with Knobs, a parameter of each type, on ROS."""
+    daemon = Daemon(tmp_path, with_ros(master.uri, ""))
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0))
+        client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", ns="/arm"))
+        client.start()
+        wait_for(lambda: f"{_NAME}/set_parameters" in master.services(), "the service")
+        yield daemon, client
+    daemon.end()
+
+
+def dynparam(master: Master, *arguments: str) -> str:
+    """Run dynparam."""
+    return master.run("rosrun", "dynamic_reconfigure", "dynparam", *arguments)
+
+
+def values(client: rtcf.Client) -> dict[str, Any]:
+    """Return the values as rtcf has them."""
+    result = {}
+    for each in client.get_component(_NAME).parameters:
+        kind = each.value.WhichOneof("kind")
+        assert kind is not None
+        result[each.name] = getattr(each.value, kind)
+    return result
+
+
+def test_dynparam_sets_parameters_of_all_types_in_a_running_loop(
+    knobs: tuple[Daemon, rtcf.Client], master: Master
+) -> None:
+    daemon, client = knobs
+    assert _NAME in dynparam(master, "list").split()
+    assert port_value(client, _NAME, "product") == 3.0
+
+    change = {"count": 4, "rate": 2.5, "label": "abcdef", "enabled": True, "mode": "run"}
+    dynparam(master, "set", _NAME, json.dumps(change))
+    # Once it has returned, all holds everywhere.
+    assert values(client) == change
+    wait_for(lambda: port_value(client, _NAME, "product") == 10.0, "the loop to use them")
+    assert port_value(client, _NAME, "length") == 6
+    shown = yaml.safe_load(dynparam(master, "get", _NAME))
+    assert {name: shown[name] for name in change} == change
+    # The parameter server follows, and so does the saved state.
+    wait_for(lambda: master.parameter(f"{_NAME}/rate") == 2.5, "the parameter server")
+    assert master.parameter(f"{_NAME}/label") == "abcdef"
+    state = wait_for(
+        lambda: [
+            file
+            for file in (daemon.folder / "state").rglob("*")
+            if file.is_file() and "abcdef" in file.read_text()
+        ],
+        "the saved state",
+    )
+    assert state
+
+    # And the other way round.
+    daemon.ctl("set", _NAME, "rate:=7", "mode:=idle")
+    shown = yaml.safe_load(dynparam(master, "get", _NAME))
+    assert (shown["rate"], shown["mode"]) == (7.0, "idle")
+    wait_for(lambda: master.parameter(f"{_NAME}/rate") == 7.0, "the parameter server")
+
+
+def test_the_description_has_what_was_declared(
+    knobs: tuple[Daemon, rtcf.Client], master: Master
+) -> None:
+    text = master.run("rostopic", "echo", "-n1", f"{_NAME}/parameter_descriptions")
+    message = yaml.safe_load(text.split("---")[0])
+    (group,) = message["groups"]
+    described = {each["name"]: each for each in group["parameters"]}
+    assert {name: each["type"] for name, each in described.items()} == {
+        "enabled": "bool", "count": "int", "rate": "double", "label": "str", "mode": "str",
+    }  # fmt: skip
+    assert described["label"]["description"] == "its length is an output"
+    assert described["rate"]["description"] == "[m/s]"
+    # rqt_reconfigure takes it for a Python literal.
+    enum = yaml.safe_load(described["mode"]["edit_method"])
+    assert [each["value"] for each in enum["enum"]] == ["idle", "run"]
+
+    def of(part: str, kind: str) -> dict[str, Any]:
+        return {each["name"]: each["value"] for each in message[part][kind]}
+
+    assert (of("min", "ints")["count"], of("max", "ints")["count"]) == (0, 10)
+    assert (of("min", "doubles")["rate"], of("max", "doubles")["rate"]) == (-1.0, 1000.0)
+    assert of("dflt", "doubles")["rate"] == 1.5
+
+
+def test_a_refused_batch_changes_nothing_and_the_reply_says_what_holds(
+    knobs: tuple[Daemon, rtcf.Client], master: Master
+) -> None:
+    _, client = knobs
+    node = client.get_status("rt_runner").runners[0].ros.node
+    listener = master.node("rosout", node)
+    listener.wait_until_connected()
+    before = values(client)
+    request = "{config: {doubles: [{name: rate, value: 2.0}], ints: [{name: count, value: 11}]}}"
+    answer = master.call(f"{_NAME}/set_parameters", request)
+    assert {each["name"]: each["value"] for each in answer["config"]["doubles"]} == {"rate": 1.5}
+    assert {each["name"]: each["value"] for each in answer["config"]["ints"]} == {"count": 2}
+    assert values(client) == before
+    record = wait_for(
+        lambda: next((each for each in listener.records() if "refused" in each["msg"]), None),
+        "the record",
+    )
+    assert record["name"] == "ros.rtcf.arm.knobs"
+    assert "count = 11 is above its maximum 10" in record["msg"]
+    listener.end()
+
+
+def test_a_component_that_leaves_takes_its_server_along(
+    knobs: tuple[Daemon, rtcf.Client], master: Master
+) -> None:
+    _, client = knobs
+    client.unload([_NAME])
+
+    def gone() -> bool:
+        published, _ = master.topics()
+        names = published | master.services()
+        return not any(name.startswith(f"{_NAME}/") for name in names)
+
+    wait_for(gone, "its topics and its service to go")
