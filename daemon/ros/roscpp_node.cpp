@@ -4,6 +4,7 @@
 #include <ros/init.h>
 #include <ros/master.h>
 #include <ros/node_handle.h>
+#include <ros/this_node.h>
 #include <ros/xmlrpc_manager.h>
 #include <xmlrpcpp/XmlRpcException.h>
 
@@ -15,6 +16,18 @@
 namespace ros::master {
 void init(const M_string& remappings);
 }
+
+// Takes the place of roscpp's own: what components do without a namespace of
+// theirs is to be in "/", not in the one that our node's name needs. roscpp
+// resolves even NodeHandle("/") against this.
+namespace ros::this_node {
+
+const std::string& getNamespace() {
+    static const std::string root = "/";
+    return root;
+}
+
+}  // namespace ros::this_node
 
 namespace rtcf::ros1 {
 
