@@ -93,11 +93,11 @@ class RosFixture : public ::testing::Test {
 
     /// True as soon as `condition` is; false if it is not in time.
     static bool eventually(const std::function<bool()>& condition,
-                           std::chrono::milliseconds timeout = 10s);
+                           std::chrono::milliseconds timeout = 30s);
     /// Writes rising values, 1 ms apart, until the listener prints one. @return its line, "" if
     /// none
     static std::string flow(Source& source, ChildProcess& listener,
-                            std::chrono::milliseconds timeout = 10s);
+                            std::chrono::milliseconds timeout = 30s);
     bool reported(const std::string& part) const;
 
    private:

@@ -56,8 +56,8 @@ TEST_F(RosNodeTest, WaitsForAMaster) {
     }
     EXPECT_EQ(source.tap()->dropped(), 0U);
     startMaster();
-    EXPECT_TRUE(eventually([&] { return rosNode().status().publications == 1; }, 2s));
-    EXPECT_TRUE(eventually([&] { return rosNode().status().connected; }, 1s));
+    EXPECT_TRUE(eventually([&] { return rosNode().status().publications == 1; }));
+    EXPECT_TRUE(eventually([&] { return rosNode().status().connected; }));
     const auto listener = listen("/out");
     EXPECT_NE(flow(source, *listener), "");
 }
@@ -77,7 +77,7 @@ TEST_F(RosNodeTest, RegistersAgainWithARestartedMaster) {
     }
     EXPECT_NE(flow(source, *old_listener), "");
     startMaster();
-    EXPECT_TRUE(eventually([&] { return rosNode().status().connected; }, 2s));
+    EXPECT_TRUE(eventually([&] { return rosNode().status().connected; }));
     EXPECT_TRUE(reported("registered again"));
     const auto listener = listen("/out");
     const auto sender = send("/in", 7.0);
@@ -157,13 +157,13 @@ TEST_F(RosNodeTest, ANewInjectorOfATopicGetsTheLatchedValue) {
     ASSERT_TRUE(eventually([&] { return before.value() == 4.0; }));
     Sink after("/in");
     serve({}, {&after});
-    EXPECT_TRUE(eventually([&] { return after.value() == 4.0; }, 2s));
+    EXPECT_TRUE(eventually([&] { return after.value() == 4.0; }));
     // Nor does it take a master.
     stopMaster();
     ASSERT_TRUE(eventually([&] { return !rosNode().status().connected; }));
     Sink late("/in");
     serve({}, {&late});
-    EXPECT_TRUE(eventually([&] { return late.value() == 4.0; }, 2s));
+    EXPECT_TRUE(eventually([&] { return late.value() == 4.0; }));
 }
 
 TEST_F(RosNodeTest, ARefusedConnectionShowsInTheStatus) {
