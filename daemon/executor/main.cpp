@@ -157,7 +157,9 @@ LogLevel levelOf(RunnerEvent::Kind kind) {
             return LogLevel::Error;
         case RunnerEvent::Kind::Degraded:
         case RunnerEvent::Kind::ComponentFailed:
+        case RunnerEvent::Kind::Overruns:
             return LogLevel::Warn;
+        case RunnerEvent::Kind::Clock:
         case RunnerEvent::Kind::ParametersChanged:
         case RunnerEvent::Kind::Ros:
             break;
