@@ -32,7 +32,11 @@ class BridgeKeeper final : public executor::Bridge {
         record_->set(std::move(table));
     }
     void setClock(std::shared_ptr<executor::SimulatedClock>) override {}
-    executor::BridgeStatus status() const override { return {}; }
+    executor::BridgeStatus status() const override {
+        executor::BridgeStatus status;
+        status.simulated_time = false;
+        return status;
+    }
 
    private:
     std::shared_ptr<BridgeRecord> record_;
