@@ -32,10 +32,14 @@ bool ClockSubscription::reconcile(ros::NodeHandle& handle, ros::CallbackQueueInt
     options.callback_queue = &queue;
     options.transport_hints = ros::TransportHints().tcpNoDelay();
     subscriber_ = handle.subscribe(options);
+    open_ = static_cast<bool>(subscriber_);
     return true;
 }
 
-void ClockSubscription::close() { subscriber_.shutdown(); }
+void ClockSubscription::close() {
+    open_ = false;
+    subscriber_.shutdown();
+}
 
 void ClockSubscription::deliver(std::int64_t now_ns) {
     std::shared_ptr<executor::SimulatedClock> clock;

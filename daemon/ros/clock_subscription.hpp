@@ -4,6 +4,7 @@
 
 #include <ros/subscriber.h>
 
+#include <atomic>
 #include <memory>
 #include <mutex>
 
@@ -28,9 +29,13 @@ class ClockSubscription {
     bool reconcile(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue);
     void close();
 
+    /// Ticks are delivered from now on. Any thread.
+    bool isOpen() const noexcept { return open_; }
+
    private:
     void deliver(std::int64_t now_ns);
 
+    std::atomic<bool> open_{false};
     std::mutex mutex_;
     std::shared_ptr<executor::SimulatedClock> clock_;
     ros::Subscriber subscriber_;  // the watch thread's

@@ -93,6 +93,7 @@ executor::BridgeStatus MasterWatch::status() const {
     }
     status.publications = publishing_.open();
     status.subscriptions = subscribing_.open();
+    status.follows_clock = subscribing_.followsClock();
     if (status.problem.empty()) status.problem = publishing_.problem();
     if (status.problem.empty()) status.problem = subscribing_.problem();
     if (status.problem.empty()) status.problem = reconfiguring_.problem();

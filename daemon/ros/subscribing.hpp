@@ -41,6 +41,9 @@ class Subscribing {
         clock_.setClock(std::move(clock));
     }
 
+    /// Ticks of /clock are delivered. Any thread.
+    bool followsClock() const noexcept { return clock_.isOpen(); }
+
     /// Subscribes and unsubscribes until the topics are those of the injectors. Watch thread.
     /// @param master false: only what needs no master, a new injector of a topic that is subscribed
     /// @return true if anything was opened or closed

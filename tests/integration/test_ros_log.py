@@ -104,7 +104,11 @@ def test_levels_of_a_rosconsole_config_file_are_honoured(tmp_path: Path, master:
         "# levels\nlog4j.logger.ros=INFO\nlog4j.logger.ros.rtcf.speaker=DEBUG\n"
         "log4j.logger.ros.rtcf.other=LOUD\n"
     )
-    daemon = Daemon(tmp_path, with_ros(master.uri, ""), {"ROSCONSOLE_CONFIG_FILE": str(config)})
+    daemon = Daemon(
+        tmp_path,
+        with_ros(master.uri, ""),
+        environment={"ROSCONSOLE_CONFIG_FILE": str(config)},
+    )
     daemon.start()
     try:
         with rtcf.Client(daemon.socket) as client:

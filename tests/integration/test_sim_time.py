@@ -115,7 +115,7 @@ def test_a_clock_that_stands_stops_the_loop_and_nothing_else(
     clock.tick(5 * SECOND, 5 * SECOND, 5 * SECOND + 10_000_000)
     _wait_for_exactly(client, 11)
     # Changes and queries do not wait for the clock.
-    client.load(rtcf.component("rtcf_examples", "Identity", name="more"))
+    client.load(rtcf.component("rtcf_examples", "Identity", name="more", remaps=["out:=/more"]))
     client.unload(["more"])
     assert [info.full_name for info in client.list_components()] == ["/pass"]
     clock.tick(5 * SECOND + 20_000_000)

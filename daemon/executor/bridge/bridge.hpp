@@ -71,6 +71,7 @@ struct BridgeStatus {
     std::uint32_t subscriptions = 0;
     std::string problem;                 ///< one line; empty = none
     std::optional<bool> simulated_time;  ///< of the peers; nothing = they have not been asked yet
+    bool follows_clock = false;          ///< ticks go to the clock of setClock()
 };
 
 class RunnerView;

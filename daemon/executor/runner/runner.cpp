@@ -12,6 +12,7 @@ namespace rtcf::executor {
 
 namespace {
 
+constexpr auto kBridgePatience = std::chrono::seconds(2);
 constexpr auto kTick = std::chrono::milliseconds(20);
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kProbeTimeout = 100'000'000;
@@ -294,11 +295,10 @@ ChangeOutcome Runner::start(const Progress& progress) {
 
 // A bridge that has just been told where its peers are is given a moment to ask them.
 bool Runner::wantsSimulation(const Progress& progress) {
-    constexpr auto kPatience = std::chrono::seconds(2);
     if (!bridge_ || !settings_.bridge.enabled || settings_.sim_time == SimTime::Never) return false;
     if (settings_.sim_time == SimTime::Always) return true;
     progress("asking the ROS master for /use_sim_time");
-    const auto until = std::chrono::steady_clock::now() + kPatience;
+    const auto until = std::chrono::steady_clock::now() + kBridgePatience;
     while (std::chrono::steady_clock::now() < until && !ending_) {
         const BridgeStatus status = bridge_->status();
         if (status.simulated_time) return *status.simulated_time;
@@ -316,6 +316,11 @@ void Runner::simulate(bool simulated) {
     if (!bridge_) return;
     for (const auto& injector : plan_->bridgeTable().inputs) injector->setQueueing(simulated);
     bridge_->setClock(settings_.loop.clock);
+    if (!simulated) return;
+    // Whoever starts the loop and then the simulation is to lose no tick.
+    const auto until = std::chrono::steady_clock::now() + kBridgePatience;
+    while (!bridge_->status().follows_clock && std::chrono::steady_clock::now() < until && !ending_)
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
 }
 
 void Runner::noteClockJumps() {
