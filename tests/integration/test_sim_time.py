@@ -154,6 +154,8 @@ def test_a_bag_that_is_played_loses_no_input_and_no_cycle(
     with rosbag.Bag(str(bag_file), "w") as bag:
         for index, value in enumerate(values):
             bag.write("/in", Float64(value), rospy.Time.from_sec(1000.0 + index / 100.0))
+        # A tick is to come after the last value.
+        bag.write("/end", Float64(), rospy.Time.from_sec(1003.0))
     client.start()
     out = simulated.node("record", "/out")
     ticks = subprocess.Popen(
