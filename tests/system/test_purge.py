@@ -7,8 +7,10 @@ PACKAGES = ("librtcf-dev", "python3-rtcf", "ros-rtcf", "rtcf-check", "rtcf-compo
             "rtcfd")  # fmt: skip
 
 
-def test_removal_ends_everything_and_keeps_settings_and_state(service: Service) -> None:
-    machine = service.machine
+def test_removal_ends_everything_and_keeps_settings_and_state(machine: Machine) -> None:
+    # Not by its fixture: afterwards there is no service to put back.
+    service = Service(machine)
+    service.reset()
     service.ctl("load", "rtcf_examples", "Mimo", "--name", "M")
     machine.run("apt-get", "remove", "--yes", "--quiet", *PACKAGES)
     assert machine.run("pgrep", "-u", "rtcf", check=False).stdout == ""
@@ -18,6 +20,7 @@ def test_removal_ends_everything_and_keeps_settings_and_state(service: Service) 
 
 
 def test_purge_leaves_nothing(machine: Machine) -> None:
+    machine.shell("apt-get install --yes --quiet /debs/*.deb")
     machine.run("apt-get", "purge", "--yes", "--quiet", *PACKAGES)
     left = machine.shell(
         "find /usr /etc /var/lib /run -xdev -name '*rtcf*' -not -path '*/dpkg/*' "
