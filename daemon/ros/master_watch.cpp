@@ -205,6 +205,11 @@ void MasterWatch::step() {
         if (off_ == Off::No) subscribing_.reconcile(node_.handle(), false);
         return;
     }
+    {
+        // Starting a node takes its time: topics are opened as is wanted by now.
+        const std::lock_guard lock(mutex_);
+        settings = *settings_;
+    }
     openAndClose(master, settings);
     askForSimulation(master);
 }
