@@ -143,9 +143,7 @@ def test_a_latched_topic_gives_its_last_value_to_those_who_come_late(
     client.load(
         rtcf.component("rtcf_test_ros", "Text", name="text", ns="/l", parameters=["size:=17"])
     )
-    wait_for(
-        lambda: client.get_status("rt_runner").runners[0].ros.publications == 3, "the topics"
-    )
+    wait_for(lambda: client.get_status("rt_runner").runners[0].ros.publications == 3, "the topics")
     client.step(1)
     listener = master.node("sizes", "/l/said")
     listener.wait_for_values(1)
