@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "graph/footprint.hpp"
+
 namespace rtcf::executor {
 
 namespace {
@@ -36,6 +38,7 @@ class Builder {
         for (const auto& [name, connection] : plan_.wiring.connections)
             addConnection(name, connection);
         addSteps();
+        plan_.schedule.footprint = footprint(plan_);
         adoption_.schedule = &plan_.schedule;
     }
 

@@ -279,6 +279,7 @@ std::int64_t Loop::waitFor(std::int64_t deadline_ns) noexcept {
     // Absolute, so that a preemption before the call does not add up (clock_nanosleep(2)).
     while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
     }
+    for (const void* line : schedule_->footprint) __builtin_prefetch(line);
     std::int64_t now = monotonicNow();
     figures_.wake_up.add(now - deadline_ns + spin);
     while (now < deadline_ns) now = monotonicNow();

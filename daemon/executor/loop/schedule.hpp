@@ -64,6 +64,7 @@ struct Schedule {
     std::vector<Tap*> taps;
     Source* source = nullptr;  ///< paces the loop instead of the clock
     bool plain = true;         ///< all components run every cycle and no output is checked
+    std::vector<const void*> footprint;  ///< cache lines to fetch before a cycle
 };
 
 /// An input that reads from another place. Either `source` or `injector` is
