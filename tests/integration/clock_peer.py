@@ -3,12 +3,14 @@
 clock_peer.py tick      publishes /clock: each line of its input, in ns, is a tick
 clock_peer.py record    prints each tick of /clock it receives, in ns
 
-Both print `connected` when they have met a peer; `tick` waits for one first.
+Both print `connected`: `tick` when all who have subscribed hear it (/rosout is one of them),
+`record` when it hears a clock.
 """
 
 import sys
 import time
 
+import rosgraph
 import rospy
 from rosgraph_msgs.msg import Clock
 
@@ -17,11 +19,16 @@ _POLL_S = 0.01
 
 def _tick() -> None:
     publisher = rospy.Publisher("/clock", Clock, queue_size=100000)
-    while publisher.get_num_connections() == 0:
+    while publisher.get_num_connections() < max(1, _subscribers()):
         time.sleep(_POLL_S)
     print("connected", flush=True)
     for line in sys.stdin:
         publisher.publish(Clock(clock=rospy.Time(0, int(line))))
+
+
+def _subscribers() -> int:
+    _, subscribed, _ = rosgraph.Master("/clock_peer").getSystemState()
+    return sum(len(nodes) for topic, nodes in subscribed if topic == "/clock")
 
 
 def _record() -> None:

@@ -35,6 +35,7 @@ class Process:
     """A process in a session of its own."""
 
     def __init__(self, command: list[str], environment: dict[str, str], folder: Path) -> None:
+        self.command = " ".join(command)
         self._output = folder / f"output-{time.monotonic_ns()}"
         with self._output.open("wb") as output:
             self._process = subprocess.Popen(
@@ -154,9 +155,10 @@ class Launching:
             yield client, meeting.runner
 
     def end(self) -> None:
-        """End what is left."""
+        """End what is left; show for a test that failed what was printed."""
         for process in reversed(self._processes):
             process.make_sure()
+            print(f"--- {process.command}:\n{process.output()}")
 
 
 def left_over(marker: str) -> list[str]:

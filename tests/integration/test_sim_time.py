@@ -34,7 +34,7 @@ class Clock:
         )
 
     def wait_until_connected(self) -> None:
-        """Return when somebody listens."""
+        """Return when all who are to listen do."""
         assert self._process.stdout is not None
         assert self._process.stdout.readline() == "connected\n"
 
@@ -91,8 +91,10 @@ def _status(client: rtcf.Client) -> runner_pb2.RunnerStatus:
 
 
 def _wait_for_exactly(client: rtcf.Client, cycles: int) -> None:
-    wait_for(lambda: iteration(client) >= cycles, f"cycle {cycles}")
-    assert iteration(client) == cycles
+    try:
+        wait_for(lambda: iteration(client) >= cycles, f"cycle {cycles}")
+    finally:
+        assert iteration(client) == cycles
 
 
 @pytest.mark.parametrize("rate_hz", [100, 999, 1001])
