@@ -7,6 +7,7 @@ user's folders, keeps no state, and ends with rt_runner, however that ends.
 import contextlib
 import os
 import shutil
+import socket
 import subprocess
 import tempfile
 import time
@@ -59,12 +60,19 @@ class PrivateDaemon:
                 start_new_session=True,
             )
         deadline = time.monotonic() + _START_S
-        while not self.socket.exists():
+        while not self._listens():
             if self.ended:
                 raise Ending(Code.REFUSED, f"rtcfd did not start: {self.last_words()}")
             if time.monotonic() > deadline:
                 raise Ending(Code.REFUSED, f"rtcfd does not serve {self.socket}")
             time.sleep(_POLL_S)
+
+    def _listens(self) -> bool:
+        # The file is there a moment before anybody listens.
+        with socket.socket(socket.AF_UNIX) as probe, contextlib.suppress(OSError):
+            probe.connect(str(self.socket))
+            return True
+        return False
 
     def _open_log(self) -> BinaryIO:
         try:

@@ -241,7 +241,8 @@ class RunnerNode:
             raise Ending(code, str(error))
         if self._daemon is not None:
             time.sleep(_RETRY_S)  # for the reason to be in its log
-            raise Ending(Code.LOST, f"the private rtcfd has ended: {self._daemon.last_words()}")
+            what = "has ended" if self._daemon.ended else f"does not answer ({error})"
+            raise Ending(Code.LOST, f"the private rtcfd {what}: {self._daemon.last_words()}")
         now = time.monotonic()
         if not self._announced:
             raise Ending(Code.REFUSED, str(error))
