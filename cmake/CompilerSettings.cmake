@@ -27,3 +27,11 @@ if(RTCF_SANITIZE)
     add_compile_options(-fno-sanitize-recover=undefined)
   endif()
 endif()
+
+# Parses headers once for all files of a target, where only tests are built: the plain tree shows
+# which file lacks an #include.
+function(rtcf_precompile target)
+  if(RTCF_SANITIZE)
+    target_precompile_headers(${target} PRIVATE ${ARGN})
+  endif()
+endfunction()
