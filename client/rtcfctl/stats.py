@@ -80,6 +80,17 @@ def _print(found: runner_pb2.RunnerStatistics, output: Output) -> None:
         ((*_row(each.component, each.duration), each.overruns) for each in found.components),
         right=(*_COLUMNS, "overruns"),
     )
+    devices = [each for each in found.components if each.device_calls]
+    if devices:
+        columns = ("calls", "mean")
+        output.table(
+            ("device I/O in (µs)", *columns),
+            (
+                (each.component, each.device_calls, microseconds(each.device_mean_ns))
+                for each in devices
+            ),
+            right=columns,
+        )
 
 
 def _row(name: str, figures: runner_pb2.Distribution) -> tuple[Any, ...]:

@@ -52,6 +52,11 @@ def test_a_violation_is_shown_with_its_stack_and_line(
     assert found["violations"][0]["called"] == called
 
 
+def test_what_a_component_does_with_its_device_is_allowed() -> None:
+    done = check("rtcf_test", "Device", "--cycles", "50")
+    assert done.stdout == "rtcf_test/Device: clean in 50 cycles\n"
+
+
 def test_a_component_that_faults_is_refused() -> None:
     done = check("rtcf_faults", "NotFiniteStops")
     assert done.returncode == 1

@@ -46,6 +46,21 @@ def test_a_reset_begins_anew_and_touches_no_loop(client: rtcf.Client) -> None:
     assert client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_RUNNING
 
 
+def test_the_time_with_devices_is_counted(client: rtcf.Client) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(warmup_cycles=0))
+    client.load(rtcf.component("rtcf_test", "Device"))
+    client.load(rtcf.component("rtcf_test", "Counter"))
+    client.step(20)
+    figures = {each.component: each for each in client.get_statistics().components}
+    assert figures["/Device"].device_calls == 20
+    assert 0 < figures["/Device"].device_mean_ns <= figures["/Device"].duration.mean_ns
+    assert (figures["/Counter"].device_calls, figures["/Counter"].device_mean_ns) == (0, 0)
+    client.reset_statistics()
+    client.step(3)
+    (device,) = [each for each in client.get_statistics().components if each.device_calls]
+    assert (device.component, device.device_calls) == ("/Device", 3)
+
+
 def test_a_start_begins_anew(client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Counter"))
     for _ in range(2):

@@ -78,6 +78,7 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
     context_.clock = &clock;
     context_.period_ns = clock.period_ns * definition_.every;
     context_.elapsed_ns = context_.period_ns;
+    context_.device = &figures_->device;
     context_.log = &log;
     log_.levels().attach(context_.full_name, context_.log_level);
     context_.gate = gate;

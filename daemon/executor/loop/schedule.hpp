@@ -20,6 +20,7 @@ struct ComponentFigures {
     Histogram duration;  ///< of update(), in ticks of the cycle counter
     std::atomic<std::uint64_t> overruns{
         0};  ///< cycles that passed the next deadline during its update
+    DeviceFigures device;
 };
 
 /// One component's turn.

@@ -623,15 +623,22 @@ pb::RunnerStatistics Server::statistics() const {
     for (const auto& component : graph->components) {
         pb::ComponentStatistics& statistics = *message.add_components();
         statistics.set_component(component->full_name);
-        HistogramSnapshot present = component->figures->duration.snapshot();
-        std::uint64_t overruns = component->figures->overruns.load(std::memory_order_relaxed);
+        Baseline::Component present = figuresOf(*component->figures);
         if (const auto found = baseline_.components.find(component->figures);
             found != baseline_.components.end()) {
-            present = difference(present, found->second.first);
-            overruns -= found->second.second;
+            const Baseline::Component& past = found->second;
+            present.duration = difference(present.duration, past.duration);
+            present.overruns -= past.overruns;
+            present.device_calls -= past.device_calls;
+            present.device_time_ns -= past.device_time_ns;
         }
-        setDistribution(*statistics.mutable_duration(), summarize(present, ns_per_tick));
-        statistics.set_overruns(overruns);
+        setDistribution(*statistics.mutable_duration(), summarize(present.duration, ns_per_tick));
+        statistics.set_overruns(present.overruns);
+        statistics.set_device_calls(present.device_calls);
+        if (present.device_calls != 0) {
+            statistics.set_device_mean_ns(static_cast<double>(present.device_time_ns) /
+                                          static_cast<double>(present.device_calls));
+        }
     }
     const ThreadUsage usage = readThreadUsage(loop.threadId());
     message.set_minor_faults(usage.minor_faults);
@@ -644,13 +651,17 @@ pb::RunnerStatistics Server::statistics() const {
     return message;
 }
 
+Server::Baseline::Component Server::figuresOf(const ComponentFigures& figures) {
+    const auto relaxed = std::memory_order_relaxed;
+    return {figures.duration.snapshot(), figures.overruns.load(relaxed),
+            figures.device.calls.load(relaxed), figures.device.time_ns.load(relaxed)};
+}
+
 void Server::resetStatistics() {
     const Loop& loop = runner_->loop();
     baseline_.components.clear();
     for (const auto& component : runner_->snapshot()->components) {
-        baseline_.components[component->figures] = {
-            component->figures->duration.snapshot(),
-            component->figures->overruns.load(std::memory_order_relaxed)};
+        baseline_.components[component->figures] = figuresOf(*component->figures);
     }
     baseline_.duration = loop.figures().duration.snapshot();
     baseline_.latency = loop.figures().latency.snapshot();

@@ -52,10 +52,14 @@ class Server {
         bool last;  // ends its request
     };
     struct Baseline {  // what statistics count from
+        struct Component {
+            HistogramSnapshot duration;
+            std::uint64_t overruns = 0;
+            std::uint64_t device_calls = 0;
+            std::int64_t device_time_ns = 0;
+        };
         // Held, as another component's figures could come to the same address.
-        std::map<std::shared_ptr<const ComponentFigures>,
-                 std::pair<HistogramSnapshot, std::uint64_t>>
-            components;
+        std::map<std::shared_ptr<const ComponentFigures>, Component> components;
         HistogramSnapshot duration;
         HistogramSnapshot latency;
         HistogramSnapshot adoption;
@@ -63,6 +67,7 @@ class Server {
         std::uint64_t missed = 0;
     };
 
+    static Baseline::Component figuresOf(const ComponentFigures& figures);
     void post(std::uint64_t connection, v1::Response response, bool last);
     void handOn(const v1::Response& call);
     void accept();

@@ -27,6 +27,12 @@
 
 namespace rtcf {
 
+/// What a component's device has cost so far, see RTCF_DEVICE_IO. Written in the cycle.
+struct DeviceFigures {
+    std::atomic<std::uint64_t> calls{0};   ///< scopes
+    std::atomic<std::int64_t> time_ns{0};  ///< spent in them
+};
+
 /// What the executor lends to a component; outlives it.
 struct ComponentContext {
     std::string full_name;             ///< namespace and name, e.g. "/arm/H1"
@@ -39,8 +45,7 @@ struct ComponentContext {
     std::int64_t updated_ns =
         -1;                 ///< loop time in whole periods at its last update, ns; -1 = not yet
     bool disabled = false;  ///< taken out after a fault; written by the loop
-    std::atomic<std::uint64_t> device_calls{0};               ///< scopes of RTCF_DEVICE_IO so far
-    std::atomic<std::int64_t> device_time_ns{0};              ///< time spent in them, ns
+    DeviceFigures* device = nullptr;                          ///< never null once attached
     LogSink* log = nullptr;                                   ///< never null once attached
     NodeGate* gate = nullptr;                                 ///< to the ROS node; null without one
     std::vector<std::pair<std::string, std::string>> remaps;  ///< resolved names, from and to

@@ -21,19 +21,19 @@ __attribute__((weak)) void __rtsan_enable();   // NOLINT
 
 namespace rtcf {
 
-/// A scope that `rtcfctl check` does not complain about, timed and counted. Real-time safe.
+/// A scope that `rtcfctl check` does not complain about, and whose time `rtcfctl stats` shows.
+/// Real-time safe itself; what stands in it is the component's affair.
 class DeviceIo {
    public:
     explicit DeviceIo(Component* component) noexcept
-        : context_(component->context()), begin_ns_(now()) {
+        : figures_(*component->context().device), begin_ns_(now()) {
         if (__rtsan_disable != nullptr) __rtsan_disable();
     }
     ~DeviceIo() {
         if (__rtsan_enable != nullptr) __rtsan_enable();
         const auto relaxed = std::memory_order_relaxed;
-        context_.device_calls.store(context_.device_calls.load(relaxed) + 1, relaxed);
-        context_.device_time_ns.store(context_.device_time_ns.load(relaxed) + now() - begin_ns_,
-                                      relaxed);
+        figures_.calls.store(figures_.calls.load(relaxed) + 1, relaxed);
+        figures_.time_ns.store(figures_.time_ns.load(relaxed) + now() - begin_ns_, relaxed);
     }
     DeviceIo(const DeviceIo&) = delete;
     DeviceIo& operator=(const DeviceIo&) = delete;
@@ -45,7 +45,7 @@ class DeviceIo {
         return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
     }
 
-    ComponentContext& context_;
+    DeviceFigures& figures_;
     std::int64_t begin_ns_;
 };
 
