@@ -339,19 +339,19 @@ bool MasterWatch::watchMaster(MasterClient& master) {
     // A hook may have registered something at a new master before we have looked.
     const std::optional<int> pid = pidOf(master);
     const bool is_new = pid && master_pid_ != pid;
-    if (found.kind != Lookup::Kind::Ours || !registered_ || is_new) {
-        MasterClient node = self();
-        reconfiguring_.forgetUploads();
-        registered_ = registerAll(master, node, node_);
-        if (!registered_) {
-            setProblem("the ROS master at " + master_uri_ + " did not take all registrations");
-            return false;
-        }
-        master_pid_ = pid;
-        say("ROS node " + name_.full() + " is registered again at " + master_uri_);
-    } else if (returned) {
-        say("the ROS master at " + master_uri_ + " answers again");
+    const bool known = found.kind == Lookup::Kind::Ours && registered_ && !is_new;
+    if (known && !returned) return true;
+    // One that was out of reach has told us nothing of publishers that came or went meanwhile.
+    MasterClient node = self();
+    if (!known) reconfiguring_.forgetUploads();
+    registered_ = registerAll(master, node, node_);
+    if (!registered_) {
+        setProblem("the ROS master at " + master_uri_ + " did not take all registrations");
+        return false;
     }
+    master_pid_ = pid;
+    say(known ? "the ROS master at " + master_uri_ + " answers again"
+              : "ROS node " + name_.full() + " is registered again at " + master_uri_);
     return true;
 }
 

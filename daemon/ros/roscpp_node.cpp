@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "ros/quiet_thread.hpp"
+#include "ros/reconnection.hpp"
 
 // Exported by roscpp, and called by its ros::init(), but in none of its headers.
 namespace ros::master {
@@ -39,6 +40,7 @@ RoscppNode::~RoscppNode() { stop(); }
 void RoscppNode::start(const std::string& master_uri, const std::string& hostname) {
     if (ros::isShuttingDown()) throw std::runtime_error("ROS has been shut down in this process");
     calls_.useMaster(master_uri);
+    reconnectSoon();
     ros::M_string settings{{"__master", master_uri}, {"__ns", name_.name_space}};
     if (!hostname.empty()) settings["__hostname"] = hostname;
     ros::init(settings, name_.base,
