@@ -1,5 +1,6 @@
 /// @file
-/// The subscription of /clock, by which a simulation gives its time.
+/// The subscription of /clock, by which a simulation gives its time: to the loop if that follows
+/// it, and to all in this process that asks for ros::Time.
 #pragma once
 
 #include <ros/subscriber.h>
@@ -25,18 +26,19 @@ class ClockSubscription {
     void setClock(std::shared_ptr<executor::SimulatedClock> clock);
 
     /// Subscribes or unsubscribes, as is wanted. Speaks to the master.
+    /// @param simulated whether the master says that time is simulated
     /// @return true if anything was opened or closed
-    bool reconcile(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue);
+    bool reconcile(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue, bool simulated);
     void close();
 
-    /// Ticks are delivered from now on. Any thread.
-    bool isOpen() const noexcept { return open_; }
+    /// Somebody gets the ticks from now on. Any thread.
+    bool delivers() const;
 
    private:
     void deliver(std::int64_t now_ns);
 
     std::atomic<bool> open_{false};
-    std::mutex mutex_;
+    mutable std::mutex mutex_;  // clock_
     std::shared_ptr<executor::SimulatedClock> clock_;
     ros::Subscriber subscriber_;  // the watch thread's
 };

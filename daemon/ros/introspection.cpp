@@ -14,13 +14,6 @@ std::string hostName() {
     return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
 }
 
-ros::Time wallTime() {
-    const auto now = std::chrono::system_clock::now().time_since_epoch();
-    ros::Time time;
-    time.fromNSec(static_cast<std::uint64_t>(std::chrono::nanoseconds(now).count()));
-    return time;
-}
-
 }  // namespace
 
 Introspection::Introspection(executor::RunnerView& runner, const executor::AskSupervisor& ask)
@@ -47,7 +40,7 @@ void Introspection::publishDiagnostics() {
     // The watch comes by twice a second.
     due_ = std::chrono::steady_clock::now() + std::chrono::milliseconds(900);
     diagnostic_msgs::DiagnosticArray array = report_.take();
-    array.header.stamp = wallTime();
+    array.header.stamp = ros::Time::now();
     diagnostics_.publish(array);
 }
 

@@ -202,7 +202,7 @@ void MasterWatch::step() {
     MasterClient master = clientOf(uri, kCallTimeout, stop_);
     obeyShutdownRequest(master);
     if (!watchMaster(master)) {
-        if (off_ == Off::No) subscribing_.reconcile(node_.handle(), false);
+        if (off_ == Off::No) subscribing_.reconcileWithoutMaster(node_.handle());
         return;
     }
     {
@@ -356,10 +356,12 @@ bool MasterWatch::watchMaster(MasterClient& master) {
 }
 
 void MasterWatch::openAndClose(MasterClient& master, const executor::BridgeSettings& settings) {
-    if (introspection_) introspection_->open(node_.handle());
+    if (introspection_)
+        introspection_->open(node_.handle(),
+                             settings.name_space.empty() ? "/" + name_.base : settings.name_space);
     if (!rosout_.isOpen()) rosout_.open(node_.handle(), name_.full());
     publishing_.reconcile(node_.handle(), settings);
-    subscribing_.reconcile(node_.handle(), true);
+    subscribing_.reconcile(node_.handle(), simulated_);
     if (!reconfiguring_.reconcile(node_.handle(), master, name_.full())) {
         const std::lock_guard lock(mutex_);
         due_ = true;  // the rest at the next step, without waiting for it
@@ -412,10 +414,10 @@ void MasterWatch::askForSimulation(MasterClient& master) {
     arguments[1] = "/use_sim_time";
     MasterAnswer answer = master.call("getParam", arguments);
     if (answer.silent()) return;
-    const bool set = answer && answer.value.getType() == XmlRpc::XmlRpcValue::TypeBoolean &&
-                     static_cast<bool&>(answer.value);
+    simulated_ = answer && answer.value.getType() == XmlRpc::XmlRpcValue::TypeBoolean &&
+                 static_cast<bool&>(answer.value);
     const std::lock_guard lock(mutex_);
-    status_.simulated_time = set;
+    status_.simulated_time = simulated_;
 }
 
 void MasterWatch::say(const std::string& message) {

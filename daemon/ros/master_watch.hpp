@@ -108,6 +108,7 @@ class MasterWatch {
     std::optional<int> master_pid_;  // of the master that has our registrations
     bool registered_ = false;        // everything that is open, as far as we know
     bool was_silent_ = false;        // the master, at the last step
+    bool simulated_ = false;         // time, as the master said last
     int taken_ = 0;                  // steps since another node got our name, or does not answer
     bool failed_ = false;            // the node cannot be started in this process
     Off off_ = Off::No;

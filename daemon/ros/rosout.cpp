@@ -27,11 +27,17 @@ std::uint8_t levelTo(LogLevel level) {
     return rosgraph_msgs::Log::FATAL;
 }
 
+ros::Time timeOf(const executor::LogEntry& entry) {
+    ros::Time time;
+    return time.fromNSec(static_cast<std::uint64_t>(entry.time_ns));
+}
+
 }  // namespace
 
 void Rosout::publish(const executor::LogEntry& entry) {
     rosgraph_msgs::Log message;
-    message.header.stamp.fromNSec(static_cast<std::uint64_t>(entry.time_ns));
+    // Of a simulation only the present is known, which is hardly later than the call.
+    message.header.stamp = ros::Time::isSimTime() ? ros::Time::now() : timeOf(entry);
     message.level = levelTo(entry.level);
     message.msg = entry.message;
     message.file = entry.file;

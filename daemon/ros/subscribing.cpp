@@ -38,7 +38,7 @@ void Subscribing::setInjectors(Injectors injectors) {
     }
 }
 
-bool Subscribing::reconcile(ros::NodeHandle& handle, bool master) {
+bool Subscribing::reconcileTopics(ros::NodeHandle& handle, bool master) {
     std::vector<std::shared_ptr<TopicSubscriber>> closing_first;
     std::vector<std::shared_ptr<TopicSubscriber>> opening;
     std::vector<std::shared_ptr<TopicSubscriber>> closing;
@@ -82,8 +82,7 @@ bool Subscribing::reconcile(ros::NodeHandle& handle, bool master) {
         if (!subscriber->open(handle, queue_)) break;
     }
     for (const auto& subscriber : closing) subscriber->close();
-    const bool clock = master && clock_.reconcile(handle, queue_);
-    return clock || !(closing_first.empty() && opening.empty() && closing.empty());
+    return !(closing_first.empty() && opening.empty() && closing.empty());
 }
 
 void Subscribing::closeAll() {

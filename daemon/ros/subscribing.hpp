@@ -42,12 +42,16 @@ class Subscribing {
     }
 
     /// Ticks of /clock are delivered. Any thread.
-    bool followsClock() const noexcept { return clock_.isOpen(); }
+    bool followsClock() const { return clock_.delivers(); }
 
     /// Subscribes and unsubscribes until the topics are those of the injectors. Watch thread.
-    /// @param master false: only what needs no master, a new injector of a topic that is subscribed
+    /// @param simulated whether the master says that time is simulated
     /// @return true if anything was opened or closed
-    bool reconcile(ros::NodeHandle& handle, bool master);
+    bool reconcile(ros::NodeHandle& handle, bool simulated) {
+        return reconcileTopics(handle, true) | clock_.reconcile(handle, queue_, simulated);
+    }
+    /// The same without a master: only new injectors of topics that are subscribed.
+    void reconcileWithoutMaster(ros::NodeHandle& handle) { reconcileTopics(handle, false); }
     /// Unsubscribes all; reconcile() subscribes them again. Watch thread.
     void closeAll();
 
@@ -60,6 +64,7 @@ class Subscribing {
     using Subscribers =
         std::map<std::shared_ptr<executor::Injector>, std::shared_ptr<TopicSubscriber>>;
 
+    bool reconcileTopics(ros::NodeHandle& handle, bool master);
     void run();
 
     ros::CallbackQueue queue_;

@@ -141,6 +141,25 @@ def test_a_jump_begins_anew_with_one_cycle_and_is_said(
     assert log.read_text().count("the simulated clock begins at 1.000000000 s") == 1
 
 
+def test_what_peers_are_told_has_the_simulations_time(
+    client: rtcf.Client, clock: Clock, simulated: Master
+) -> None:
+    listener = simulated.node("rosout", _status(client).ros.node)
+    listener.wait_until_connected()
+    clock.tick(SECOND, SECOND + 5_000_000, 60 * SECOND)
+    jump = wait_for(
+        lambda: [each for each in listener.records() if "the simulated clock went" in each["msg"]],
+        "the jump's record",
+    )
+    assert [each["stamp"] for each in jump] == [60.0]
+    listener.end()
+
+    def stamp() -> str:
+        return simulated.run("rostopic", "echo", "-n1", "/diagnostics/header/stamp")
+
+    wait_for(lambda: "secs: 60\n" in stamp(), "diagnostics of that second")
+
+
 def test_a_loop_that_is_not_to_follow_the_clock_does_not(client: rtcf.Client) -> None:
     client.set_runner(runner_pb2.RunnerSettings(sim_time=runner_pb2.SIM_TIME_NEVER))
     client.start()
