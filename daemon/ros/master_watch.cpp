@@ -180,6 +180,7 @@ void MasterWatch::step() {
         return setProblem("the ROS master's URI '" + uri +
                           "' is none; it has the form http://HOST:PORT");
     }
+    if (settings.enabled) publishing_.prepare(settings);
     if (!node_.started()) {
         if (!settings.enabled) return setProblem("");
         if (!startNode(uri, settings.hostname)) return;

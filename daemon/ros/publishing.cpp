@@ -29,6 +29,22 @@ void Publishing::setTaps(Taps taps) {
     changed_.notify_all();
 }
 
+void Publishing::prepare(const executor::BridgeSettings& settings) {
+    const executor::NamePattern latched("latch", settings.latch);
+    const std::lock_guard lock(mutex_);
+    bool any = false;
+    for (const auto& tap : taps_) {
+        std::shared_ptr<TopicPublisher>& publisher = publishers_[tap->topic()];
+        if (publisher != nullptr) continue;
+        publisher = std::make_shared<TopicPublisher>(tap->topic(), tap->type(), settings.queue,
+                                                     latched.matches(tap->topic()));
+        any = true;
+    }
+    if (!any) return;
+    ++generation_;
+    changed_.notify_all();
+}
+
 bool Publishing::reconcile(ros::NodeHandle& handle, const executor::BridgeSettings& settings) {
     const executor::NamePattern latched("latch", settings.latch);
     std::vector<std::shared_ptr<TopicPublisher>> opening;
@@ -42,6 +58,8 @@ bool Publishing::reconcile(ros::NodeHandle& handle, const executor::BridgeSettin
             if (found != publishers_.end() && found->second->serves(tap->type()) &&
                 found->second->queue() == settings.queue && found->second->latch() == latch) {
                 wanted[tap->topic()] = found->second;
+                if (!found->second->isOpen() && found->second->problem().empty())
+                    opening.push_back(found->second);
                 continue;
             }
             auto publisher =

@@ -32,6 +32,9 @@ class Publishing {
     /// its new tap at once. Any thread; returns at once.
     void setTaps(Taps taps);
 
+    /// Makes ready for topics that are to be opened once there is a master: of those that are
+    /// latched, the last message is kept. Watch thread.
+    void prepare(const executor::BridgeSettings& settings);
     /// Opens and closes topics until they are those of the taps. Watch thread, with a master.
     /// @return true if anything was opened or closed
     bool reconcile(ros::NodeHandle& handle, const executor::BridgeSettings& settings);

@@ -43,6 +43,9 @@ void TopicPublisher::open(ros::NodeHandle& handle) {
     }
     const std::lock_guard lock(mutex_);
     publisher_ = publisher;
+    if (publisher_ && !kept_.empty())
+        publisher_.publish(RawView{kept_.data(), static_cast<std::uint32_t>(kept_.size())});
+    kept_.clear();
     if (!problem.empty()) problem_ = "cannot publish " + topic_ + " as " + type_ + ": " + problem;
 }
 
@@ -57,7 +60,11 @@ void TopicPublisher::close() {
 
 void TopicPublisher::publish(const std::uint8_t* bytes, std::uint32_t size) {
     const std::lock_guard lock(mutex_);
-    if (publisher_) publisher_.publish(RawView{bytes, size});
+    if (publisher_) {
+        publisher_.publish(RawView{bytes, size});
+    } else if (latch_) {
+        kept_.assign(bytes, bytes + size);
+    }
 }
 
 }  // namespace rtcf::ros1

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "rtcf/port_type.hpp"
 
@@ -34,7 +35,8 @@ class TopicPublisher {
     void open(ros::NodeHandle& handle);
     void close();
 
-    /// Sends one message, or nothing while closed. The bytes are copied only for a subscriber.
+    /// Sends one message. While it is closed none is sent; of a latched topic the last one is
+    /// kept, and sent when it opens. The bytes are copied only for that, or for a subscriber.
     void publish(const std::uint8_t* bytes, std::uint32_t size);
 
    private:
@@ -46,6 +48,7 @@ class TopicPublisher {
     bool latch_;
     mutable std::mutex mutex_;  // all below
     std::string problem_;
+    std::vector<std::uint8_t> kept_;
     ros::Publisher publisher_;
 };
 

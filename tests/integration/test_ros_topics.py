@@ -151,6 +151,29 @@ def test_a_latched_topic_gives_its_last_value_to_those_who_come_late(
     listener.end()
 
 
+def test_what_was_latched_before_there_was_a_master_is_not_lost(tmp_path: Path) -> None:
+    master = Master(tmp_path)
+    daemon = Daemon(tmp_path, with_ros(master.uri, "/l/.*") + "latch = '/l/said'\n")
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            client.load(
+                rtcf.component(
+                    "rtcf_test_ros", "Text", name="text", ns="/l", parameters=["size:=17"]
+                )
+            )
+            wait_for(lambda: "no ROS master" in ros(client).problem, "the node to look for one")
+            client.step(1)
+            master.start()
+            listener = master.node("sizes", "/l/said")
+            listener.wait_for_values(1)
+            assert listener.values() == [17.0]
+            listener.end()
+    finally:
+        daemon.end()
+        master.end()
+
+
 @pytest.mark.parametrize(
     ("option", "value", "words"),
     [
