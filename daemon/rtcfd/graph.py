@@ -4,7 +4,7 @@ Functions on a Runner; each is one transaction of its executor.
 """
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from typing import TYPE_CHECKING
 
 from rtcf.executor.v1 import executor_pb2 as wire
@@ -48,11 +48,21 @@ async def load_when_master(
     runner: "Runner", spec: graph_pb2.ComponentSpec, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Load a component; wait for a ROS master if its hooks need one and there is none."""
+    return await when_master(lambda: load(runner, spec, progress), progress)
+
+
+async def when_master(
+    attempt: Callable[[], Awaitable[control_pb2.ChangeResult]], progress: Progress
+) -> control_pb2.ChangeResult:
+    """Try a load again for as long as its hooks need a ROS master and there is none."""
+    said = ""
     while True:
         try:
-            return await load(runner, spec, progress)
+            return await attempt()
         except NoMaster as refusal:
-            progress(f"waiting for a ROS master: {refusal}")
+            if str(refusal) != said:
+                said = str(refusal)
+                progress(f"waiting for a ROS master: {said}")
         # Between turns, so that other changes go on.
         await asyncio.sleep(_MASTER_POLL_S)
 

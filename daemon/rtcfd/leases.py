@@ -42,6 +42,10 @@ class Lease:
         """Load the component, or come back to it; tell the holder."""
         if self._request.attach:
             result = self._leases.attach(self._request, self._outbox)
+        elif self._request.wait:
+            result = await graph.when_master(
+                lambda: self._leases.open(self._request, self._outbox), self._outbox.progress
+            )
         else:
             result = await self._leases.open(self._request, self._outbox)
         self._outbox.say(loaded=result)

@@ -8,7 +8,7 @@ import pytest
 import rtcf
 from daemon_process import Daemon, wait_for, with_ros
 from ros_processes import Master, free_port
-from rtcf.v1 import graph_pb2, runner_pb2
+from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 from values import iteration, port_value
 
 
@@ -94,6 +94,30 @@ def test_load_waits_for_a_master_if_told_to(
     finally:
         load.kill()
         client.unload(["/user"])
+        master.end()
+
+
+def test_a_lease_waits_for_a_master_if_told_to(
+    lonely: tuple[Daemon, rtcf.Client, Master],
+) -> None:
+    _, client, master = lonely
+    lease = client.lease_component(control_pb2.OpenLease(component=user(), wait=True))
+    messages = iter(lease)
+    while True:
+        message = next(messages)
+        assert message.WhichOneof("kind") == "progress"
+        if "waiting for a ROS master" in message.progress:
+            break
+    assert master.uri in message.progress
+    master.start()
+    try:
+        while message.WhichOneof("kind") == "progress":
+            message = next(messages)
+        assert message.WhichOneof("kind") == "loaded"
+        assert [each.full_name for each in client.list_components()] == ["/arm/user"]
+        lease.end()
+        wait_for(lambda: not list(client.list_components()), "the component to leave")
+    finally:
         master.end()
 
 

@@ -172,6 +172,7 @@ class LauncherNode:
                 holder=f"rt_launcher {self._node} (pid {os.getpid()})",
                 hold=self._meeting.token,
                 attach=attach,
+                wait=True,
             )
         )
         self._inbox.read(self._tenancy)
@@ -197,7 +198,9 @@ class LauncherNode:
                 self._reconnect(event.error)
                 continue
             kind = event.WhichOneof("kind")
-            if kind == "loaded":
+            if kind == "progress" and event.progress.startswith("waiting"):
+                self._screen.warn(event.progress)
+            elif kind == "loaded":
                 self._say_loaded(event.loaded)
             elif kind == "logs":
                 self._screen.records(event.logs)
