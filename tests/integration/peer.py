@@ -8,7 +8,12 @@ peer.py count TOPIC         prints 0 for each std_msgs/Int64 it receives
 peer.py rosout NODE        prints each record that NODE publishes on /rosout, as JSON
 peer.py any TOPIC...       receives messages of any type of all these topics
 
-All print `connected` when they have met their peers.
+peer.py console LOGGER      prints each record of a logger, as JSON, where rqt_console looks
+peer.py graph               prints once, as JSON, what rqt_graph draws between nodes
+peer.py tune NODE CHANGE    tunes a node (a JSON object) as rqt_reconfigure does; prints, as JSON,
+                            what can be tuned, and the values whenever they change
+
+Others print `connected` when they have met their peers.
 """
 
 import json
@@ -16,6 +21,9 @@ import sys
 import time
 from typing import Any
 
+import dynamic_reconfigure
+import dynamic_reconfigure.client
+import rosgraph.impl.graph
 import rospy
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import Float64, Int64, String
@@ -38,6 +46,38 @@ def _print_record(message: Any, node: str) -> None:
     record = {key: getattr(message, key) for key in ("level", "name", "msg", "file", "line")}
     record["stamp"] = message.header.stamp.to_sec()
     sys.stdout.write(json.dumps(record) + "\n")
+
+
+def _print_of_logger(message: Any, logger: str) -> None:
+    if message.name == logger:
+        sys.stdout.write(json.dumps({"level": message.level, "msg": message.msg}) + "\n")
+
+
+def _graph() -> None:
+    graph = rosgraph.impl.graph.Graph()
+    graph.update()
+    edges = sorted([edge.start, edge.label, edge.end] for edge in graph.nn_edges)
+    print(json.dumps({"bad": sorted(graph.bad_nodes), "edges": edges}), flush=True)
+
+
+def _tune(node: str, change: str) -> None:
+    def show(**what: Any) -> None:
+        # One write: two threads do it.
+        sys.stdout.write(json.dumps(what) + "\n")
+        sys.stdout.flush()
+
+    def show_values(values: Any) -> None:
+        show(values={name: value for name, value in values.items() if name != "groups"})
+
+    def show_description(description: Any) -> None:
+        show(described={each["name"]: each["type"] for each in description})
+
+    show(found=dynamic_reconfigure.find_reconfigure_services())
+    client = dynamic_reconfigure.client.Client(
+        node, config_callback=show_values, description_callback=show_description
+    )
+    client.update_configuration(json.loads(change))
+    rospy.spin()
 
 
 class _Records:
@@ -64,7 +104,7 @@ def _stay(*peers: Any) -> None:
 
 def main() -> None:
     """Do what the command line says until the end of the node."""
-    action, topic, *values = sys.argv[1:]
+    action, topic, *values = sys.argv[1:] if len(sys.argv) > 2 else [sys.argv[1], ""]
     publisher: Any
     rospy.init_node("peer", anonymous=True)
     if action == "record":
@@ -75,6 +115,12 @@ def main() -> None:
         _stay(rospy.Subscriber(topic, Int64, lambda _: sys.stdout.write("0x0p0\n")))
     elif action == "rosout":
         _stay(_Records(topic))
+    elif action == "console":
+        _stay(rospy.Subscriber("/rosout_agg", Log, _print_of_logger, topic))
+    elif action == "graph":
+        _graph()
+    elif action == "tune":
+        _tune(topic, values[0])
     elif action == "any":
         _stay(*(rospy.Subscriber(each, rospy.AnyMsg) for each in [topic, *values]))
     elif action == "text":

@@ -77,6 +77,8 @@ def test_dynparam_sets_parameters_of_all_types_in_a_running_loop(
     daemon.ctl("set", _NAME, "rate:=7", "mode:=idle")
     shown = yaml.safe_load(dynparam(master, "get", _NAME))
     assert (shown["rate"], shown["mode"]) == (7.0, "idle")
+    wait_for(lambda: master.parameter(f"{_NAME}/mode") == "idle", "the parameter server")
+    assert master.parameter(f"{_NAME}/rate") == 7.0
     wait_for(lambda: master.parameter(f"{_NAME}/rate") == 7.0, "the parameter server")
 
 
