@@ -22,8 +22,8 @@ _CHOICES = {
 _FIELDS = ("frequency_hz", "cpu", "priority", "spin_us", "spin_auto", "max_overruns",
            "warmup_cycles", "stall_timeout_ms", "orphan_timeout_s", "lock_memory", "heap_kb",
            "stack_kb", "max_clock_jump_s")  # fmt: skip
-_ROS_FIELDS = ("enabled", "master_uri", "hostname", "whitelist", "blacklist", "queue", "latch",
-               "decimation", "decimate", "largest_message_kb")  # fmt: skip
+_ROS_FIELDS = ("enabled", "master_uri", "hostname", "ns", "whitelist", "blacklist", "queue",
+               "latch", "decimation", "decimate", "largest_message_kb")  # fmt: skip
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
@@ -165,6 +165,12 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
         dest="ros_hostname",
         metavar="HOST",
         help="name or address by which ROS peers reach the loop's node",
+    )
+    to.add_argument(
+        "--namespace",
+        dest="ros_ns",
+        metavar="NAMESPACE",
+        help="of iteration_info and the runner's services; \"\": the runner's name",
     )
     to.add_argument(
         "--whitelist",

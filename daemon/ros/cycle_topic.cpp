@@ -5,6 +5,7 @@
 
 #include <chrono>
 
+#include "graph/names.hpp"
 #include "ros/quiet_thread.hpp"
 #include "runner/runner_view.hpp"
 
@@ -33,9 +34,9 @@ CycleTopic::~CycleTopic() {
     thread_.join();
 }
 
-void CycleTopic::open(ros::NodeHandle& handle) {
+void CycleTopic::open(ros::NodeHandle& handle, const std::string& name_space) {
     ros::Publisher publisher = handle.advertise<rtcf_msgs::IterationInfo>(
-        "/" + runner_.name() + "/iteration_info", kQueue);
+        executor::joinName(name_space, "iteration_info"), kQueue);
     const std::lock_guard lock(mutex_);
     publisher_ = publisher;
 }

@@ -1,5 +1,5 @@
 /// @file
-/// The topic `/<runner>/iteration_info`: one message for each cycle.
+/// The topic `<namespace>/iteration_info`: one message for each cycle.
 #pragma once
 
 #include <ros/publisher.h>
@@ -28,7 +28,7 @@ class CycleTopic {
 
     /// @name Watch thread
     /// @{
-    void open(ros::NodeHandle& handle);  ///< with a master
+    void open(ros::NodeHandle& handle, const std::string& name_space);  ///< with a master
     void close();
     /// @}
 

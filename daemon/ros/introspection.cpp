@@ -19,12 +19,14 @@ std::string hostName() {
 Introspection::Introspection(executor::RunnerView& runner, const executor::AskSupervisor& ask)
     : cycles_(runner), report_(runner, hostName()), services_(runner, ask) {}
 
-void Introspection::open(ros::NodeHandle& handle) {
-    if (open_) return;
+void Introspection::open(ros::NodeHandle& handle, const std::string& name_space) {
+    if (open_ && name_space == name_space_) return;
+    close();
     open_ = true;
-    cycles_.open(handle);
+    name_space_ = name_space;
+    cycles_.open(handle, name_space);
     diagnostics_ = handle.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10);
-    services_.open(handle);
+    services_.open(handle, name_space);
 }
 
 void Introspection::close() {

@@ -1,6 +1,6 @@
 /// @file
 /// What ROS peers see of a runner besides its ports: every cycle on
-/// `/<runner>/iteration_info`, its health on `/diagnostics`, and services.
+/// `<namespace>/iteration_info`, its health on `/diagnostics`, and services.
 #pragma once
 
 #include <ros/publisher.h>
@@ -20,8 +20,8 @@ class Introspection {
    public:
     Introspection(executor::RunnerView& runner, const executor::AskSupervisor& ask);
 
-    /// Opens what is not open yet. With a master.
-    void open(ros::NodeHandle& handle);
+    /// Opens what is not open yet, in this namespace and no other. With a master.
+    void open(ros::NodeHandle& handle, const std::string& name_space);
     void close();
     bool isOpen() const { return open_; }
 
@@ -34,6 +34,7 @@ class Introspection {
     RunnerServices services_;
     ros::Publisher diagnostics_;
     std::chrono::steady_clock::time_point due_;
+    std::string name_space_;
     bool open_ = false;
 };
 

@@ -211,8 +211,8 @@ void MasterWatch::step() {
         const std::lock_guard lock(mutex_);
         settings = *settings_;
     }
-    openAndClose(master, settings);
     askForSimulation(master);
+    openAndClose(master, settings);
 }
 
 // Nothing if it does not answer.

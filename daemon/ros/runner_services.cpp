@@ -87,24 +87,25 @@ template <typename Service, typename Callback>
 void RunnerServices::advertise(ros::NodeHandle& handle, const std::string& name,
                                ros::CallbackQueue& queue, Callback callback) {
     using Call = boost::function<bool(typename Service::Request&, typename Service::Response&)>;
-    auto options = ros::AdvertiseServiceOptions::create<Service>(
-        "/" + runner_.name() + "/" + name, Call(callback), ros::VoidConstPtr(), &queue);
+    auto options = ros::AdvertiseServiceOptions::create<Service>(name, Call(callback),
+                                                                 ros::VoidConstPtr(), &queue);
     servers_.push_back(handle.advertiseService(options));
 }
 
-void RunnerServices::open(ros::NodeHandle& handle) {
+void RunnerServices::open(ros::NodeHandle& handle, const std::string& name_space) {
     using rtcf_msgs::GetIntrospectionInformation;
     using rtcf_msgs::LoadOrocosComponent;
     using rtcf_msgs::UnloadOrocosComponent;
     using std_srvs::Trigger;
-    advertise<GetIntrospectionInformation>(handle, "get_introspection_information", looks_,
+    const auto at = [&](const char* name) { return executor::joinName(name_space, name); };
+    advertise<GetIntrospectionInformation>(handle, at("get_introspection_information"), looks_,
                                            [this](GetIntrospectionInformation::Request&,
                                                   GetIntrospectionInformation::Response& response) {
                                                response = describeRunner(runner_);
                                                return true;
                                            });
     advertise<LoadOrocosComponent>(
-        handle, "load_orocos_component", changes_,
+        handle, at("load_orocos_component"), changes_,
         [this](LoadOrocosComponent::Request& request, LoadOrocosComponent::Response& response) {
             OutsideCall call;
             response.success = 0;
@@ -112,16 +113,16 @@ void RunnerServices::open(ros::NodeHandle& handle) {
             return change(call, response);
         });
     advertise<UnloadOrocosComponent>(
-        handle, "unload_orocos_component", changes_,
+        handle, at("unload_orocos_component"), changes_,
         [this](UnloadOrocosComponent::Request& request, UnloadOrocosComponent::Response& response) {
             return change(unloadCall(request), response);
         });
-    advertise<Trigger>(handle, "activate_rt_loop", changes_,
+    advertise<Trigger>(handle, at("activate_rt_loop"), changes_,
                        [this](Trigger::Request&, Trigger::Response& response) {
                            return change(simpleCall(OutsideCall::Kind::Start), response);
                        });
     // Does not wait behind a change that takes long.
-    advertise<Trigger>(handle, "deactivate_rt_loop", stops_,
+    advertise<Trigger>(handle, at("deactivate_rt_loop"), stops_,
                        [this](Trigger::Request&, Trigger::Response& response) {
                            return change(simpleCall(OutsideCall::Kind::Stop), response);
                        });

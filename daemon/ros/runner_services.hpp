@@ -1,5 +1,5 @@
 /// @file
-/// The services under `/<runner>` by which ROS peers look at a loop and ask for
+/// The services of a runner, by which ROS peers look at a loop and ask for
 /// changes. Looks are answered here; changes are handed to the supervisor, who
 /// decides.
 #pragma once
@@ -35,7 +35,7 @@ class RunnerServices {
 
     /// @name Watch thread
     /// @{
-    void open(ros::NodeHandle& handle);  ///< with a master
+    void open(ros::NodeHandle& handle, const std::string& name_space);  ///< with a master
     void close();
     /// @}
 

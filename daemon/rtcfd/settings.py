@@ -56,6 +56,7 @@ def defaults(
             blacklist="",
             queue=1000,
             hostname="",
+            ns="",
             latch="",
             decimation=1,
             decimate=".*",

@@ -17,6 +17,10 @@ from ros_processes import Master
 from rtcf.v1 import runner_pb2
 from values import iteration
 
+RUNNER_SERVICES = (
+    "activate_rt_loop", "deactivate_rt_loop", "get_introspection_information",
+    "load_orocos_component", "unload_orocos_component",
+)  # fmt: skip
 # What roscore itself has.
 ROSCORE_TOPICS = {"/rosout", "/rosout_agg"}
 
@@ -62,6 +66,18 @@ def topics(master: Master) -> dict[str, str]:
         for topic in mapped - ROSCORE_TOPICS
         if not topic.startswith(own) and "parameter_" not in topic
     }
+
+
+def services(master: Master, node: str) -> set[str]:
+    """Return the services of a node."""
+    state = rosgraph.Master("/test", master.uri).getSystemState()
+    return {name for name, providers in state[2] if node in providers}
+
+
+def parameters(master: Master) -> set[str]:
+    """Return the parameters of nodes, without roscore's and roslaunch's."""
+    names = rosgraph.Master("/test", master.uri).getParamNames()
+    return {name for name in names if not name.startswith(("/ros", "/run_id"))}
 
 
 def nodes(master: Master) -> set[str]:
@@ -192,6 +208,15 @@ TEN_RUNNER = """
 """
 
 
+TEN_PARAMETERS = {
+    *(f"/rt_runner/{name}" for name in (
+        "mode", "frequency", "ros_queue", "ros_mapping_whitelist", "ros_mapping_blacklist",
+        "rtcf_runner/host", "rtcf_runner/runner", "rtcf_runner/socket", "rtcf_runner/token")),
+    "/drive/is_first",
+    *(f"/{ns}/{base}/topics_ignore_for_graph" for ns in "lr" for base in ("velocity", "current")),
+}  # fmt: skip
+
+
 def ten_components() -> str:
     parts = ["<launch>", TEN_RUNNER]
     for name, wires in TEN.items():
@@ -254,15 +279,30 @@ def test_ten_components_in_nested_loops_and_namespaces_give_the_numbers_wanted(
         )
         loop = next(name for name in nodes(master) if name.startswith("/rtcfd/"))
         assert len(nodes(master) - {loop}) == 2  # ours
-        client.start(runner)
+        assert services(master, loop) == {
+            *(f"/rt_runner/{name}" for name in RUNNER_SERVICES),
+            *(f"{loop}/{name}" for name in ("get_loggers", "set_logger_level")),
+        }
+        assert parameters(master) == TEN_PARAMETERS
+        # The mode is wait_for_trigger.
+        assert not running(client, runner)
+        assert master.call("/rt_runner/activate_rt_loop")["success"] is True
         wait_for(lambda: iteration(client, runner) >= 500, "500 cycles")
-        client.stop(runner)
+        assert master.call("/rt_runner/deactivate_rt_loop")["success"] is True
+        assert not running(client, runner)
         cycles = iteration(client, runner)
         record.wait_for_values(cycles)
         assert record.values() == list(itertools.islice(simulate_ten(0.1), cycles))
         for node in (record, latched):
             node.end()
     press_ctrl_c(launch)
+
+
+def wait_until_shown(master: Master, runner: str) -> None:
+    """Wait for the topic and the services of a runner."""
+    own = {f"{runner}/{name}" for name in RUNNER_SERVICES}
+    wait_for(lambda: f"{runner}/iteration_info" in master.topics()[0], "its cycles")
+    wait_for(lambda: own <= master.services(), "its services")
 
 
 TWO_RUNNERS = """
@@ -296,6 +336,8 @@ def test_one_launch_file_has_several_runners(launching: Launching, master: Maste
             (status,) = client.get_status(runner).runners
             assert status.settings.frequency_hz == frequency
             assert client.get_order(runner) == [component]
+            # What it shows of itself is under its node's name, as of any node.
+            wait_until_shown(master, node)
     assert launching.tool("component_order", "-r", "/left/rt_runner").stdout == "/left/same\n"
     press_ctrl_c(launch)
 

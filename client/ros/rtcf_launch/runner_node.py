@@ -107,6 +107,7 @@ class RunnerNode:
             self._screen.warn(line)
         parameters.settings.ros.master_uri = self._given.master_uri
         parameters.settings.ros.hostname = self._given.hostname
+        parameters.settings.ros.ns = self._node
         return parameters
 
     def _check_free(self) -> None:

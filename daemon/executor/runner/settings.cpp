@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "graph/name_pattern.hpp"
+#include "graph/names.hpp"
 #include "refusal.hpp"
 
 namespace rtcf::executor {
@@ -60,6 +61,8 @@ void validate(RunnerSettings& settings) {
                  "s");
     requireRange("max clock jump", static_cast<double>(settings.max_clock_jump_ns) / 1e9, 0.0, 1e6,
                  "s");
+    if (!settings.bridge.name_space.empty())
+        settings.bridge.name_space = canonicalNamespace(settings.bridge.name_space);
     requireRange("queue", settings.bridge.queue, 1U, 1'000'000U, "messages");
     requireRange("decimation", settings.bridge.decimation, 1U, 1'000'000U, "values");
     requireRange("largest message", settings.bridge.largest_message / 1024, 1U, 64U * 1024, "KiB");

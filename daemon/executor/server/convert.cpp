@@ -259,6 +259,7 @@ RunnerSettings settingsFrom(const pb::RunnerSettings& message, RunnerSettings ba
     if (ros.has_enabled()) base.bridge.enabled = ros.enabled();
     if (ros.has_master_uri()) base.bridge.master_uri = ros.master_uri();
     if (ros.has_hostname()) base.bridge.hostname = ros.hostname();
+    if (ros.has_ns()) base.bridge.name_space = ros.ns();
     if (ros.has_queue()) base.bridge.queue = ros.queue();
     if (ros.has_latch()) base.bridge.latch = ros.latch();
     if (ros.has_decimation()) base.bridge.decimation = ros.decimation();
@@ -298,6 +299,7 @@ pb::RunnerSettings settingsTo(const RunnerSettings& settings) {
     ros.set_enabled(settings.bridge.enabled);
     ros.set_master_uri(settings.bridge.master_uri);
     ros.set_hostname(settings.bridge.hostname);
+    ros.set_ns(settings.bridge.name_space);
     ros.set_queue(settings.bridge.queue);
     ros.set_latch(settings.bridge.latch);
     ros.set_decimation(settings.bridge.decimation);
