@@ -34,14 +34,24 @@ MasterWatch::MasterWatch(const std::string& runner, executor::BridgeReport repor
       report_(std::move(report)),
       console_(log),
       rosout_(rosout),
-      node_(name_, [this](const std::string& reason) {
-          {
-              const std::lock_guard lock(mutex_);
-              shutdown_request_ = reason;
-              due_ = true;
-          }
-          changed_.notify_all();
-      }) {
+      node_(
+          name_,
+          [this](const std::string& reason) {
+              {
+                  const std::lock_guard lock(mutex_);
+                  shutdown_request_ = reason;
+                  due_ = true;
+              }
+              changed_.notify_all();
+          },
+          [this](const std::string& key) {
+              reconfiguring_.mirror().noteWritten(key);
+              {
+                  const std::lock_guard lock(mutex_);
+                  due_ = true;
+              }
+              changed_.notify_all();
+          }) {
     status_.node = name_.full();
 }
 
@@ -296,6 +306,7 @@ bool MasterWatch::leaveTopics(MasterClient& master) {
     if (introspection_) introspection_->close();
     publishing_.closeAll();
     subscribing_.closeAll();
+    reconfiguring_.mirror().leaveAll(master, caller());
     reconfiguring_.closeAll();
     rosout_.close();
     MasterClient node = self();
@@ -344,7 +355,7 @@ bool MasterWatch::watchMaster(MasterClient& master) {
     if (known && !returned) return true;
     // One that was out of reach has told us nothing of publishers that came or went meanwhile.
     MasterClient node = self();
-    if (!known) reconfiguring_.forgetUploads();
+    if (!known) reconfiguring_.mirror().forget();
     registered_ = registerAll(master, node, node_);
     if (!registered_) {
         setProblem("the ROS master at " + master_uri_ + " did not take all registrations");
@@ -363,7 +374,7 @@ void MasterWatch::openAndClose(MasterClient& master, const executor::BridgeSetti
     if (!rosout_.isOpen()) rosout_.open(node_.handle(), name_.full());
     publishing_.reconcile(node_.handle(), settings);
     subscribing_.reconcile(node_.handle(), simulated_);
-    if (!reconfiguring_.reconcile(node_.handle(), master, name_.full())) {
+    if (!reconfiguring_.reconcile(node_.handle(), master, caller())) {
         const std::lock_guard lock(mutex_);
         due_ = true;  // the rest at the next step, without waiting for it
     }
@@ -373,6 +384,8 @@ void MasterWatch::openAndClose(MasterClient& master, const executor::BridgeSetti
     for (const std::string& refusal : refusals_->take()) say(refusal);
 }
 
+ParameterMirror::Caller MasterWatch::caller() const { return {name_.full(), node_.uri()}; }
+
 MasterClient MasterWatch::self() const { return {"127.0.0.1", node_.port(), kCallTimeout, stop_}; }
 
 void MasterWatch::end() {
@@ -381,6 +394,7 @@ void MasterWatch::end() {
         constexpr auto kShort = std::chrono::milliseconds(300);
         MasterClient master = clientOf(master_uri_, kShort, never);
         MasterClient node("127.0.0.1", node_.port(), kShort, never);
+        reconfiguring_.mirror().leaveAll(master, caller());
         withdrawAll(master, node, node_, std::chrono::steady_clock::now() + 2 * kShort);
         node_.leaveMaster();
     }

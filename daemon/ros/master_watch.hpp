@@ -71,6 +71,7 @@ class MasterWatch {
     std::string whyOff() const;
     std::optional<int> pidOf(MasterClient& master) const;
     void end();
+    ParameterMirror::Caller caller() const;
     MasterClient self() const;
 
     void setProblem(const std::string& problem);

@@ -14,18 +14,6 @@ namespace {
 // For one call: the watch has more to look at than a thousand components' parameters.
 constexpr auto kTurn = std::chrono::milliseconds(300);
 
-XmlRpc::XmlRpcValue toXmlRpc(const ParameterValue& value) {
-    if (const auto* truth = std::get_if<bool>(&value)) return {*truth};
-    // XML-RPC has 32 bits.
-    if (const auto* integer = std::get_if<std::int64_t>(&value)) {
-        const auto narrow = static_cast<int>(*integer);
-        return narrow == *integer ? XmlRpc::XmlRpcValue(narrow)
-                                  : XmlRpc::XmlRpcValue(static_cast<double>(*integer));
-    }
-    if (const auto* real = std::get_if<double>(&value)) return {*real};
-    return {std::get<std::string>(value)};
-}
-
 }  // namespace
 
 Reconfiguring::Reconfiguring() {
@@ -67,7 +55,7 @@ void Reconfiguring::setSets(const Sets& sets) {
 }
 
 bool Reconfiguring::reconcile(ros::NodeHandle& handle, MasterClient& master,
-                              const std::string& caller) {
+                              const ParameterMirror::Caller& caller) {
     Servers wanted;
     Servers closing;
     {
@@ -85,10 +73,7 @@ bool Reconfiguring::reconcile(ros::NodeHandle& handle, MasterClient& master,
     }
     for (const auto& [component, server] : closing) {
         server->close();
-        const std::string prefix = component + "/";
-        auto key = uploaded_.lower_bound(prefix);
-        while (key != uploaded_.end() && key->first.rfind(prefix, 0) == 0)
-            key = uploaded_.erase(key);
+        mirror_.leave(master, caller, component);
     }
     const auto until = std::chrono::steady_clock::now() + kTurn;
     for (const auto& [component, server] : wanted) {
@@ -98,23 +83,7 @@ bool Reconfiguring::reconcile(ros::NodeHandle& handle, MasterClient& master,
             const std::lock_guard lock(mutex_);
             servers_[component] = server;
         }
-        if (!upload(master, caller, *server->set())) return false;
-    }
-    return true;
-}
-
-bool Reconfiguring::upload(MasterClient& master, const std::string& caller,
-                           const executor::ParameterSet& set) {
-    for (const auto& [declaration, value] : set.parameters) {
-        const std::string key = set.full_name + "/" + declaration.name;
-        const auto found = uploaded_.find(key);
-        if (found != uploaded_.end() && found->second == value) continue;
-        XmlRpc::XmlRpcValue arguments;
-        arguments[0] = caller;
-        arguments[1] = key;
-        arguments[2] = toXmlRpc(value);
-        if (master.call("setParam", arguments).silent()) return false;
-        uploaded_[key] = value;
+        if (!mirror_.reconcile(master, caller, *server->set())) return false;
     }
     return true;
 }
@@ -126,7 +95,7 @@ void Reconfiguring::closeAll() {
         closing.swap(servers_);
     }
     for (const auto& [component, server] : closing) server->close();
-    uploaded_.clear();
+    mirror_.forget();
 }
 
 std::string Reconfiguring::problem() const {

@@ -16,6 +16,7 @@
 
 #include "bridge/bridge.hpp"
 #include "ros/master_client.hpp"
+#include "ros/parameter_mirror.hpp"
 
 namespace ros {
 class NodeHandle;
@@ -36,18 +37,21 @@ class Reconfiguring {
     Reconfiguring& operator=(const Reconfiguring&) = delete;
 
     /// By which changes are asked for. Before all else.
-    void serve(executor::ParameterRequest request) { request_ = std::move(request); }
+    void serve(executor::ParameterRequest request) {
+        request_ = request;
+        mirror_.serve(std::move(request));
+    }
     /// The parameters to offer from now on. Any thread; returns at once.
     void setSets(const Sets& sets);
     /// Nobody answers requests any more: those under way fail. Any thread.
     void end() noexcept { stop_ = true; }
 
     /// Opens, closes and uploads until all is as it should be, or for a while. Watch thread, with a
-    /// master. @param caller the node's name
-    /// @return false if there is more to do
-    bool reconcile(ros::NodeHandle& handle, MasterClient& master, const std::string& caller);
-    /// Uploads all values again: the master is another one.
-    void forgetUploads() { uploaded_.clear(); }
+    /// master. @return false if there is more to do
+    bool reconcile(ros::NodeHandle& handle, MasterClient& master,
+                   const ParameterMirror::Caller& caller);
+    /// The values at the master's parameter server.
+    ParameterMirror& mirror() noexcept { return mirror_; }
     /// Closes all; reconcile() opens them again. Watch thread.
     void closeAll();
 
@@ -58,7 +62,6 @@ class Reconfiguring {
     using Servers = std::map<std::string, std::shared_ptr<ParameterServer>>;
 
     void run();
-    bool upload(MasterClient& master, const std::string& caller, const executor::ParameterSet& set);
 
     executor::ParameterRequest request_;
     ros::CallbackQueue queue_;
@@ -66,8 +69,7 @@ class Reconfiguring {
     mutable std::mutex mutex_;  // wanted_ and servers_
     Servers wanted_;            // by component
     Servers servers_;           // that have been opened
-    // Watch thread: the values that the master has.
-    std::map<std::string, ParameterValue> uploaded_;
+    ParameterMirror mirror_;
     std::thread thread_;
 };
 

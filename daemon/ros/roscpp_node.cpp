@@ -13,9 +13,12 @@
 #include "ros/quiet_thread.hpp"
 #include "ros/reconnection.hpp"
 
-// Exported by roscpp, and called by its ros::init(), but in none of its headers.
+// Exported by roscpp, and called by itself, but in none of its headers.
 namespace ros::master {
 void init(const M_string& remappings);
+}
+namespace ros::param {
+void paramUpdateCallback(XmlRpc::XmlRpcValue& parameters, XmlRpc::XmlRpcValue& result);
 }
 
 // Takes the place of roscpp's own: what components do without a namespace of
@@ -32,8 +35,11 @@ const std::string& getNamespace() {
 
 namespace rtcf::ros1 {
 
-RoscppNode::RoscppNode(NodeName name, ShutdownRequest on_shutdown_request)
-    : name_(std::move(name)), on_shutdown_request_(std::move(on_shutdown_request)) {}
+RoscppNode::RoscppNode(NodeName name, ShutdownRequest on_shutdown_request,
+                       ParameterWritten on_parameter_written)
+    : name_(std::move(name)),
+      on_shutdown_request_(std::move(on_shutdown_request)),
+      on_parameter_written_(std::move(on_parameter_written)) {}
 
 RoscppNode::~RoscppNode() { stop(); }
 
@@ -67,6 +73,12 @@ void RoscppNode::start(const std::string& master_uri, const std::string& hostnam
             result[1] = std::string();
             result[2] = 0;
         });
+    server->unbind("paramUpdate");
+    server->bind("paramUpdate", [written = on_parameter_written_](XmlRpc::XmlRpcValue& parameters,
+                                                                  XmlRpc::XmlRpcValue& result) {
+        ros::param::paramUpdateCallback(parameters, result);  // for components that cache them
+        written(static_cast<std::string&>(parameters[1]));
+    });
     handle_ = std::make_unique<ros::NodeHandle>("/");
     spinner_ = quietThread("ros-spin", [this] {
         while (!ending_) ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.1));

@@ -24,8 +24,12 @@ class RoscppNode {
     /// Called with the reason when somebody asks the node to shut down: the
     /// master, for a second node of its name, or `rosnode kill`. From roscpp's threads.
     using ShutdownRequest = std::function<void(const std::string& reason)>;
+    /// Called with the key when the master tells of a parameter that has been written. From
+    /// roscpp's threads.
+    using ParameterWritten = std::function<void(const std::string& key)>;
 
-    RoscppNode(NodeName name, ShutdownRequest on_shutdown_request);
+    RoscppNode(NodeName name, ShutdownRequest on_shutdown_request,
+               ParameterWritten on_parameter_written);
     ~RoscppNode();
     RoscppNode(const RoscppNode&) = delete;
     RoscppNode& operator=(const RoscppNode&) = delete;
@@ -63,6 +67,7 @@ class RoscppNode {
    private:
     NodeName name_;
     ShutdownRequest on_shutdown_request_;
+    ParameterWritten on_parameter_written_;
     MasterCalls calls_;
     std::unique_ptr<ros::NodeHandle> handle_;
     std::atomic<bool> ending_{false};

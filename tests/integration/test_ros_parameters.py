@@ -128,6 +128,47 @@ def test_a_refused_batch_changes_nothing_and_the_reply_says_what_holds(
     listener.end()
 
 
+def test_the_loop_follows_the_parameter_server_within_its_bounds(
+    knobs: tuple[Daemon, rtcf.Client], master: Master
+) -> None:
+    daemon, client = knobs
+    node = client.get_status("rt_runner").runners[0].ros.node
+    listener = master.node("rosout", node)
+    listener.wait_until_connected()
+    # A number that is not to change on its way there and back.
+    daemon.ctl("set", _NAME, "rate:=0.30000000000000004")
+    wait_for(lambda: master.parameter(f"{_NAME}/rate") == 0.30000000000000004, "the server")
+
+    master.run("rosparam", "set", f"{_NAME}/count", "5")
+    wait_for(lambda: values(client)["count"] == 5, "the loop to follow")
+    assert values(client)["rate"] == 0.30000000000000004
+    shown = yaml.safe_load(dynparam(master, "get", _NAME))
+    assert (shown["count"], shown["rate"]) == (5, 0.30000000000000004)
+
+    # Several at once; what is none of the component's parameters is left alone.
+    master.run("rosparam", "set", _NAME, "{rate: 2, mode: idle, other: 1}")
+    wait_for(lambda: values(client)["mode"] == "idle", "the loop to follow")
+    assert values(client)["rate"] == 2.0
+    wait_for(lambda: master.parameter(f"{_NAME}/count") == 5, "what was thrown away to return")
+    assert master.parameter(f"{_NAME}/other") == 1
+
+    # What it refuses does not stay.
+    for wrong, why in (("11", "is above its maximum 10"), ("many", "count")):
+        master.run("rosparam", "set", f"{_NAME}/count", wrong)
+        wait_for(lambda: master.parameter(f"{_NAME}/count") == 5, "the value that holds")
+
+        def told(text: str = why) -> bool:
+            return any(
+                "refused" in each["msg"] and text in each["msg"] for each in listener.records()
+            )
+
+        wait_for(told, "the reason")
+    assert values(client)["count"] == 5
+    master.run("rosparam", "delete", f"{_NAME}/count")
+    wait_for(lambda: master.parameter(f"{_NAME}/count") == 5, "the value to return")
+    listener.end()
+
+
 def test_a_component_that_leaves_takes_its_server_along(
     knobs: tuple[Daemon, rtcf.Client], master: Master
 ) -> None:

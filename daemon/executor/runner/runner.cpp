@@ -206,7 +206,7 @@ void Runner::changeByBridge(const std::string& component, const ParameterBatch& 
         events_(event);
     } catch (const Refusal& error) {
         refusal = error.what();
-        log_.write(LogLevel::Warn, component, "dynamic_reconfigure: refused: " + refusal);
+        log_.write(LogLevel::Warn, component, "a change asked for by ROS is refused: " + refusal);
     }
     done(refusal);
 }
