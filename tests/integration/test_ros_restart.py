@@ -81,14 +81,14 @@ def test_everything_is_registered_again_with_each_new_master(tmp_path: Path, res
 def test_several_masters_at_once_do_not_meet(tmp_path: Path) -> None:
     masters = []
     daemons = []
-    for index in range(2):
-        folder = tmp_path / str(index)
-        folder.mkdir()
-        masters.append(Master(folder, free_port()))
-        masters[-1].start()
-        daemons.append(Daemon(folder, with_ros(masters[-1].uri, "/t/.*")))
-        daemons[-1].start()
     try:
+        for index in range(2):
+            folder = tmp_path / str(index)
+            folder.mkdir()
+            masters.append(Master(folder, free_port()))
+            masters[-1].start()
+            daemons.append(Daemon(folder, with_ros(masters[-1].uri, "/t/.*")))
+            daemons[-1].start()
         for index, daemon in enumerate(daemons):
             with rtcf.Client(daemon.socket) as client:
                 client.load(
