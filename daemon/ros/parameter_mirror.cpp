@@ -69,27 +69,35 @@ void ParameterMirror::forget() {
     const std::lock_guard lock(pending_->mutex);
     pending_->followed.clear();
     pending_->written.clear();
+    pending_->refused.clear();
 }
 
 bool ParameterMirror::reconcile(MasterClient& master, const Caller& caller,
                                 const executor::ParameterSet& set) {
     const std::string& component = set.full_name;
     Values& known = known_[component];
-    const auto is_asked = [&] {
-        const std::lock_guard lock(pending_->mutex);
-        return pending_->asked.count(component) != 0;
-    };
     bool written = false;
     bool followed = false;
+    bool refused = false;
     {
         const std::lock_guard lock(pending_->mutex);
+        // While the loop is asked, nobody knows which value is to hold.
+        if (pending_->asked.count(component) != 0) return true;
         followed = pending_->followed.count(component) != 0;
         written = pending_->written.count(component) != 0;
+        refused = pending_->refused.count(component) != 0;
     }
-    // While the loop is asked, nobody knows which value is to hold.
-    if (is_asked()) return true;
-    if (written && !read(master, caller, set, known)) return false;
-    if (is_asked()) return true;
+    if (refused) {
+        // Before it is read again, and asked for again.
+        if (!write(master, caller, set, known)) return false;
+        const std::lock_guard lock(pending_->mutex);
+        pending_->refused.erase(component);
+    }
+    if (written) {
+        if (!read(master, caller, set, known)) return false;
+        const std::lock_guard lock(pending_->mutex);
+        if (pending_->asked.count(component) != 0) return true;
+    }
     if (!write(master, caller, set, known)) return false;
     return followed || follow(master, caller, set, known);
 }
@@ -159,9 +167,10 @@ void ParameterMirror::take(XmlRpc::XmlRpcValue& values, const executor::Paramete
         pending_->asked.insert(set.full_name);
     }
     request_(set.full_name, std::move(batch),
-             [pending = pending_, name = set.full_name](const std::string& /*refusal*/) {
+             [pending = pending_, name = set.full_name](const std::string& refusal) {
                  const std::lock_guard lock(pending->mutex);
                  pending->asked.erase(name);
+                 if (!refusal.empty()) pending->refused.insert(name);
              });
 }
 
@@ -171,6 +180,7 @@ bool ParameterMirror::leave(MasterClient& master, const Caller& caller,
     {
         const std::lock_guard lock(pending_->mutex);
         pending_->written.erase(component);
+        pending_->refused.erase(component);
         if (pending_->followed.erase(component) == 0) return true;
     }
     XmlRpc::XmlRpcValue call = arguments(caller.name, caller.uri);

@@ -48,6 +48,7 @@ class ParameterMirror {
         std::set<std::string> followed;  // the master tells of what is written
         std::set<std::string> written;   // of these, and not looked at yet
         std::set<std::string> asked;     // of the loop, and not answered yet
+        std::set<std::string> refused;   // by the loop, and not written over yet
     };
 
     bool write(MasterClient& master, const Caller& caller, const executor::ParameterSet& set,

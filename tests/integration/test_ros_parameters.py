@@ -164,6 +164,12 @@ def test_the_loop_follows_the_parameter_server_within_its_bounds(
 
         wait_for(told, "the reason")
     assert values(client)["count"] == 5
+    # One that is right beside one that is wrong, which is refused once.
+    master.run("rosparam", "set", f"{_NAME}/count", "12")
+    master.run("rosparam", "set", f"{_NAME}/mode", "run")
+    wait_for(lambda: values(client)["mode"] == "run", "the loop to follow")
+    wait_for(lambda: master.parameter(f"{_NAME}/count") == 5, "the value that holds")
+    assert sum("= 12 is above" in each["msg"] for each in listener.records()) == 1
     master.run("rosparam", "delete", f"{_NAME}/count")
     wait_for(lambda: master.parameter(f"{_NAME}/count") == 5, "the value to return")
     listener.end()
