@@ -104,7 +104,7 @@ class Bridge {
     virtual BridgeStatus status() const = 0;
 
     /// How parameters are to be changed. Called once, before all else.
-    virtual void serveParameters(ParameterRequest request) { (void)request; }
+    virtual void serveParameters(ParameterRequest /*request*/) {}
 
     /// What hooks reach the outside by; null if they do not. As long as the bridge.
     virtual HookGate* hooks() noexcept { return nullptr; }
