@@ -20,8 +20,15 @@ _DEVEL = BUILD_TREE / "devel"
 
 
 def environment(master: Master, system_socket: Path | str = "/nonexistent") -> dict[str, str]:
+    """Return that of a user who has sourced the build tree's setup.sh, at a master."""
+    return build_tree_environment(master.environment(), system_socket)
+
+
+def build_tree_environment(
+    base: dict[str, str], system_socket: Path | str = "/nonexistent"
+) -> dict[str, str]:
     """Return that of a user who has sourced the build tree's setup.sh."""
-    return master.environment() | {
+    return base | {
         "CMAKE_PREFIX_PATH": str(_DEVEL),
         "ROS_PACKAGE_PATH": str(_DEVEL / "share"),
         "PYTHONPATH": str(BUILD_TREE / "python"),

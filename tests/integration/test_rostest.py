@@ -1,0 +1,55 @@
+"""rostest: launch files with a test in them, several at once, each at a master of its own."""
+
+from pathlib import Path
+
+from daemon_process import DEADLINE_S, clean_environment
+from launch_processes import Process, build_tree_environment, left_over
+
+# Node and topic names are the same in all; `wave` is published only by a loop that runs.
+TEST = """
+<launch>
+  <node name="rt_runner" pkg="rtcf" type="rt_runner" output="screen">
+    <param name="num_components_expected" value="1"/>
+    <param name="ros_mapping_whitelist" value="/.*"/>
+  </node>
+  <node name="generator" pkg="rtcf" type="rt_launcher" args="rtcf_examples Wave">
+    <remap from="wave" to="wave{index}"/>
+  </node>
+  <test test-name="wave{index}" pkg="rostest" type="publishtest">
+    <rosparam>
+      topics:
+        - {{name: /wave{index}, timeout: {timeout}, negative: False}}
+        - {{name: /wave{other}, timeout: 1, negative: True}}
+    </rosparam>
+  </test>
+</launch>
+"""
+
+
+def test_rostests_at_random_ports_run_side_by_side(tmp_path: Path) -> None:
+    tests = []
+    for index in range(3):
+        folder = tmp_path / str(index)
+        folder.mkdir()
+        file = folder / "wave.test"
+        other = (index + 1) % 3
+        file.write_text(TEST.format(index=index, other=other, timeout=DEADLINE_S))
+        environment = build_tree_environment(
+            clean_environment() | {"ROS_HOME": str(folder), "ROS_HOSTNAME": "localhost"}
+        )
+        # publishtest takes the first python3 there is, which must be Debian's.
+        environment["PATH"] = f"/usr/bin:{environment['PATH']}"
+        command = ["/usr/bin/rostest", "--package=rtcf_examples", f"--pkgdir={folder}", str(file)]
+        tests.append(Process(command, environment, folder))
+    try:
+        for test in tests:
+            assert test.wait() == 0, test.output()
+            assert "RESULT: SUCCESS" in test.output()
+            assert "TESTS: 1\n" in test.output()
+    finally:
+        for test in tests:
+            test.make_sure()
+    # Each has ended its private daemon.
+    sockets = [each.output().partition("private daemon at ")[2].partition(",")[0] for each in tests]
+    assert len(set(sockets)) == 3
+    assert not [line for socket in sockets for line in left_over(socket)]
