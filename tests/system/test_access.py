@@ -15,6 +15,7 @@ CHANGES = (
     ("runner", "add", "other"),
     ("runner", "set", "--frequency", "10"),
     ("runner", "remove", "rt_runner"),
+    ("runner", "restart"),
     ("stats", "--reset"),
 )
 QUERIES = (("status",), ("list",), ("order",), ("info", "M"), ("connections",), ("stats",),
@@ -74,18 +75,37 @@ def test_rights_follow_a_reload(levels: Service) -> None:
     levels.ctl("unload", "M", user="alice")
 
 
+# Libraries to link against: in a folder that everybody can write, and in one of root's.
+_LIBRARIES = r"""
+mkdir -p /srv/open /srv/root; chmod 777 /srv/open
+# Where it is run there is no refusal but this one.
+cat >/srv/open/helps.c <<END
+#include <unistd.h>
+__attribute__((constructor)) static void run(void) { _exit(77); }
+END
+gcc -shared -o /srv/open/libhelps.so /srv/open/helps.c
+install -o alice /srv/open/libhelps.so /srv/root/
+empty="gcc -shared -nostartfiles -Wl,--no-as-needed -x c /dev/null -x none"
+$empty -o /srv/root/libgood.so
+$empty -o /srv/root/libchain.so -Wl,-rpath,/srv/open -L/srv/open -lhelps
+"""
+
+
 def untrusted(service: Service, make: str) -> str:
     """Load from a package folder that was made by a line of shell; return the refusal."""
+    make = make.replace("{ln}", "$empty -o $t")
     service.machine.shell(
-        "d=$(echo /usr/lib/*-linux-gnu/rtcf); rm -rf $d/evil; mkdir $d/evil; "
-        f"s=$(ls $d/rtcf_examples/*.so); t=$d/evil/evil.so; {make}"
+        "set -e; d=$(echo /usr/lib/*-linux-gnu/rtcf); rm -rf $d/evil; mkdir $d/evil; "
+        f"s=$(ls $d/rtcf_examples/*.so); t=$d/evil/evil.so; o=/srv/open; {_LIBRARIES}{make}"
     )
     try:
         done = service.ctl("load", "evil", "Mimo", check=False)
         assert done.returncode == 1, done.stdout
         return done.stderr
     finally:
-        service.machine.shell("rm -rf /usr/lib/*-linux-gnu/rtcf/evil /srv/evil.so")
+        service.machine.shell(
+            "rm -rf /usr/lib/*-linux-gnu/rtcf/evil /srv/evil.so /srv/open /srv/root"
+        )
 
 
 @pytest.mark.parametrize(
@@ -98,6 +118,16 @@ def untrusted(service: Service, make: str) -> str:
         ("cp $s $t; chmod o+w $d/evil", "rtcf/evil can be written by everybody"),
         ("cp $s /srv/evil.so; chown alice /srv/evil.so; ln -s /srv/evil.so $t",
          "/srv/evil.so belongs to user alice"),
+        ("{ln} -Wl,-rpath,/srv/open -L$o -lhelps", "/srv/open can be written by everybody"),
+        ("{ln} -Wl,-rpath,/usr/../srv/open -L$o -lhelps", "/srv/open can be written by everybody"),
+        ("{ln} -Wl,-rpath,/srv/open/none -L$o -lhelps", "/srv/open can be written by everybody"),
+        ("{ln} -Wl,-rpath,/tmp -Wl,--disable-new-dtags", "/tmp can be written by everybody"),
+        ("{ln} -Wl,-rpath,lib", 'its run path has "lib", which is no absolute folder'),
+        ("{ln} -Wl,-rpath,/usr/lib:", 'its run path has "", which is no absolute folder'),
+        ("{ln} $o/libhelps.so", "which links against /srv/open/libhelps.so: /srv/open can be"),
+        ("{ln} -Wl,-rpath,/srv/root -L/srv/root -lhelps",
+         "which links against /srv/root/libhelps.so: /srv/root/libhelps.so belongs to user alice"),
+        ("{ln} -Wl,-rpath,/srv/root -L/srv/root -lchain", "/srv/open can be written by everybody"),
         ("mkfifo $t", "not a regular file"),
         ("mkdir $t", "not a regular file"),
     ],
@@ -106,6 +136,12 @@ def test_code_that_others_can_write_is_refused(service: Service, make: str, said
     refusal = untrusted(service, make)
     assert said in refusal
     assert len(refusal.splitlines()) == 1
+
+
+def test_what_links_against_the_systems_and_trusted_folders_is_loaded(service: Service) -> None:
+    refusal = untrusted(service, "{ln} -Wl,-rpath,/srv/root -L/srv/root -lgood -lm")
+    # It has no components, but it has been loaded.
+    assert "has no components" in refusal
 
 
 @pytest.mark.parametrize("name", ["../etc", "/etc", "..", "rtcf_examples/../x", "a b", "a\n"])
@@ -132,9 +168,14 @@ def test_a_workspace_that_is_named_is_trusted_as_its_owner_is(service: Service) 
 
 
 def test_limits_are_refused_with_what_to_do(service: Service) -> None:
-    service.configure("[limits]\nrunners = 1\ncomponents = 1\nclients = 2\n")
+    service.configure("[limits]\nrunners = 1\ncomponents = 1\nclients = 2\ntaps = 1\n")
     service.systemctl("restart", "rtcfd.service")
     service.load_and_start()
+    done = service.ctl("runner", "set", "--whitelist", ".*", check=False)
+    assert done.returncode == 1
+    assert "2 published outputs (taps) are more than the 1 allowed" in done.stderr
+    assert "raise taps under [limits]" in done.stderr
+    service.ctl("runner", "set", "--whitelist", ".*1")
     done = service.ctl("runner", "add", "other", check=False)
     assert "2 runners are more than the 1 allowed: raise runners under [limits]" in done.stderr
     done = service.ctl("load", "rtcf_examples", "Identity", check=False)

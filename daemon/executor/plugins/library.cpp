@@ -12,6 +12,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "plugins/linked_files.hpp"
 #include "plugins/trusted_file.hpp"
 #include "refusal.hpp"
 
@@ -112,7 +113,7 @@ const ComponentRecord* Library::find(const std::string& type) const noexcept {
     return nullptr;
 }
 
-LibraryStore::LibraryStore() : owners_{::geteuid()} {}
+LibraryStore::LibraryStore() : owners_{::geteuid()}, linked_(loadedFiles()) {}
 
 std::shared_ptr<const Library> LibraryStore::open(const std::string& path) {
     const FileDescriptor file(openTrusted(path, owners_));
@@ -123,7 +124,16 @@ std::shared_ptr<const Library> LibraryStore::open(const std::string& path) {
     for (const Entry& entry : entries_) {
         if (entry.identity == identity) return entry.library;
     }
-    entries_.push_back({identity, std::make_shared<const Library>(path, file.get())});
+    requireTrustedLinks(path, file.get(), owners_);
+    auto library = std::make_shared<const Library>(path, file.get());
+    // What the loader found in other places than were judged.
+    for (const std::string& linked : loadedFiles()) {
+        if (linked_.count(linked) != 0) continue;
+        const FileDescriptor trusted(openTrusted(
+            linked, owners_, fmt::format("library {}, which links against {}", path, linked)));
+        linked_.insert(linked);
+    }
+    entries_.push_back({identity, std::move(library)});
     return entries_.back().library;
 }
 

@@ -51,6 +51,7 @@ class LibraryStore {
     };
     std::vector<Entry> entries_;
     std::set<uid_t> owners_;
+    std::set<std::string> linked_;  // files of libraries that are loaded, ours and others
 };
 
 }  // namespace rtcf::executor

@@ -32,47 +32,74 @@ std::string nameOf(uid_t uid) {
 
 class Walk {
    public:
-    Walk(const std::string& wanted, const std::set<uid_t>& owners)
-        : wanted_(wanted), owners_(owners) {}
+    Walk(std::string subject, const std::set<uid_t>& owners)
+        : subject_(std::move(subject)), owners_(owners) {}
     ~Walk() {
         if (at_ >= 0) ::close(at_);
     }
     Walk(const Walk&) = delete;
     Walk& operator=(const Walk&) = delete;
 
-    int open() {
+    int open(const std::string& wanted) {
         std::error_code error;
-        const std::filesystem::path real = std::filesystem::canonical(wanted_, error);
+        const std::filesystem::path real = std::filesystem::canonical(wanted, error);
         if (error) refuse(error.message());
         for (auto part = real.begin(); part != real.end(); ++part) {
             const bool last = std::next(part) == real.end();
-            // Links have been resolved: one that is met now was put there since.
-            const int flags =
-                O_NOFOLLOW | O_CLOEXEC | (last ? O_RDONLY | O_NONBLOCK : O_PATH | O_DIRECTORY);
-            const int next = ::openat(at_ < 0 ? AT_FDCWD : at_, part->c_str(), flags);
-            const int problem = errno;
-            if (at_ >= 0) ::close(at_);
-            at_ = next;
-            seen_ /= *part;
-            if (next < 0) refuse(fmt::format("{}: {}", seen_.string(), std::strerror(problem)));
-            check(last);
+            if (!step(*part, last ? O_RDONLY | O_NONBLOCK : O_PATH | O_DIRECTORY))
+                refuse(fmt::format("{}: {}", (seen_ / *part).string(), std::strerror(errno)));
+            const struct stat status = statusHere();
+            if (last && !S_ISREG(status.st_mode)) refuse("not a regular file");
+            // In a sticky folder only its owner moves what is there: that is checked next.
+            check(status, !last && (status.st_mode & S_ISVTX) != 0);
         }
         return std::exchange(at_, -1);
     }
 
-   private:
-    [[noreturn]] void refuse(const std::string& why) const {
-        throw Refusal(RefusalKind::FailedPrecondition, fmt::format("library {}: {}", wanted_, why));
+    /// Where what is not there (yet) can be put by those who are trusted only.
+    void requireFolder(const std::string& wanted) {
+        std::error_code error;
+        const std::filesystem::path real = std::filesystem::weakly_canonical(wanted, error);
+        if (error) refuse(fmt::format("{}: {}", wanted, error.message()));
+        struct stat status {};
+        for (const std::filesystem::path& part : real) {
+            if (part.empty()) continue;  // of a slash at the end
+            if (!step(part, O_PATH | O_DIRECTORY)) {
+                if (errno == ENOENT || errno == ENOTDIR) break;
+                refuse(fmt::format("{}: {}", (seen_ / part).string(), std::strerror(errno)));
+            }
+            status = statusHere();
+            check(status, (status.st_mode & S_ISVTX) != 0);
+        }
+        check(status, false);
     }
 
-    void check(bool last) const {
+   private:
+    [[noreturn]] void refuse(const std::string& why) const {
+        throw Refusal(RefusalKind::FailedPrecondition, fmt::format("{}: {}", subject_, why));
+    }
+
+    // Links have been resolved: one that is met now was put there since.
+    bool step(const std::filesystem::path& part, int flags) {
+        const int next =
+            ::openat(at_ < 0 ? AT_FDCWD : at_, part.c_str(), flags | O_NOFOLLOW | O_CLOEXEC);
+        if (next < 0) return false;
+        if (at_ >= 0) ::close(at_);
+        at_ = next;
+        seen_ /= part;
+        return true;
+    }
+
+    struct stat statusHere() const {
         struct stat status {};
         if (::fstat(at_, &status) != 0) refuse(std::strerror(errno));
-        if (last && !S_ISREG(status.st_mode)) refuse("not a regular file");
+        return status;
+    }
+
+    void check(const struct stat& status, bool anybody_may_write) const {
         const bool trusted = status.st_uid == 0 || owners_.count(status.st_uid) != 0;
         if (!trusted) distrust("belongs to user " + nameOf(status.st_uid), "chown root");
-        // In a sticky folder only its owner moves a file: that is checked next.
-        if (!last && (status.st_mode & S_ISVTX) != 0) return;
+        if (anybody_may_write) return;
         if ((status.st_mode & S_IWOTH) != 0) distrust("can be written by everybody", "chmod o-w");
         // A group of one person (adduser(8), USERGROUPS) is that person.
         const bool own_group =
@@ -88,7 +115,7 @@ class Walk {
                         seen_.string(), why, remedy, seen_.string()));
     }
 
-    const std::string& wanted_;
+    const std::string subject_;
     const std::set<uid_t>& owners_;
     std::filesystem::path seen_;
     int at_ = -1;
@@ -96,8 +123,14 @@ class Walk {
 
 }  // namespace
 
-int openTrusted(const std::string& path, const std::set<uid_t>& owners) {
-    return Walk(path, owners).open();
+int openTrusted(const std::string& path, const std::set<uid_t>& owners,
+                const std::string& subject) {
+    return Walk(subject.empty() ? "library " + path : subject, owners).open(path);
+}
+
+void requireTrustedFolder(const std::string& path, const std::set<uid_t>& owners,
+                          const std::string& subject) {
+    Walk(subject, owners).requireFolder(path);
 }
 
 }  // namespace rtcf::executor
