@@ -1,6 +1,7 @@
 """Desired states on disk: one JSON file per runner, replaced atomically.
 
-A file that cannot be read is set aside and reported, never overwritten.
+A file that cannot be read, or is of a newer rtcfd, is set aside and reported,
+never overwritten.  One of an older rtcfd is upgraded, and kept beside: a way back.
 """
 
 import dataclasses
@@ -8,6 +9,7 @@ import json
 import logging
 import os
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +22,27 @@ from rtcfd.names import check_base_name, full_name
 
 log = logging.getLogger(__name__)
 
-VERSION = 1
+VERSION = 2
 _SUFFIX = ".json"
+
+_Document = dict[str, Any]
+
+
+def _from_1(document: _Document) -> None:
+    """Before components could be left out, quarantined and held, and loops resumed."""
+    document.setdefault("running", False)
+    for key in ("quarantined", "left_out", "leased"):
+        document.setdefault(key, {})
+    document.setdefault("hold", None)
+
+
+# What makes a document of the version after out of one of each version.
+_UPGRADES: dict[int, Callable[[_Document], None]] = {1: _from_1}
+assert set(_UPGRADES) == set(range(1, VERSION))
+
+
+class _Newer(ValueError):
+    """The state is of a newer rtcfd."""
 
 
 class Store:
@@ -29,6 +50,7 @@ class Store:
 
     def __init__(self, folder: Path | None) -> None:
         self._folder = folder
+        self.problems: list[str] = []  # that load() met, a line each
 
     def prepare(self) -> None:
         """Make the folder; raises OSError."""
@@ -42,11 +64,25 @@ class Store:
         states = []
         for file in sorted(self._folder.glob(f"*{_SUFFIX}")):
             try:
-                states.append(_parse(file.stem, file.read_bytes()))
+                text = file.read_bytes()
+                document, version = _upgraded(text)
+                states.append(_parse(file.stem, document))
+                if version != VERSION:
+                    self._keep_beside(file, text, version)
             except OSError as error:
-                log.error("state %s cannot be read: %s", file, error.strerror)
-            except (ValueError, TypeError, KeyError, json_format.ParseError, Refusal) as error:
-                self._set_aside(file, error)
+                self._report(f"state {file} cannot be read: {error.strerror}")
+            except _Newer as newer:
+                self._set_aside(file, "newer", str(newer))
+            except (
+                ValueError,
+                TypeError,
+                KeyError,
+                AttributeError,
+                json_format.ParseError,
+                Refusal,
+            ) as error:
+                reason = " ".join(str(error).split())
+                self._set_aside(file, "corrupt", f"it is corrupt ({reason})")
         return states
 
     def text(self, desired: Desired) -> bytes:
@@ -101,16 +137,27 @@ class Store:
         finally:
             os.close(descriptor)
 
-    @staticmethod
-    def _set_aside(file: Path, error: Exception) -> None:
-        aside = file.with_name(f"{file.stem}.corrupt-{time.strftime('%Y%m%dT%H%M%S')}")
-        reason = " ".join(str(error).split())
+    def _set_aside(self, file: Path, why: str, reason: str) -> None:
+        aside = file.with_name(f"{file.stem}.{why}-{time.strftime('%Y%m%dT%H%M%S')}")
         try:
             file.rename(aside)
         except OSError as failure:
-            log.error("state %s is corrupt (%s), and stays: %s", file, reason, failure.strerror)
+            self._report(f"state {file} is not used, and stays: {reason}; {failure.strerror}")
             return
-        log.error("state %s is corrupt (%s): set aside as %s", file, reason, aside)
+        self._report(f"state {file} is set aside as {aside.name}: {reason}")
+
+    def _keep_beside(self, file: Path, text: bytes, version: int) -> None:
+        beside = file.with_name(f"{file.stem}.version-{version}")
+        try:
+            beside.write_bytes(text)
+        except OSError as failure:
+            log.warning("state %s of version %d is not kept: %s", file, version, failure.strerror)
+            return
+        log.info("state %s is of version %d: upgraded, kept as %s", file, version, beside.name)
+
+    def _report(self, problem: str) -> None:
+        log.error("%s", problem)
+        self.problems.append(problem)
 
 
 def _json(message: Any) -> str:
@@ -133,31 +180,41 @@ def _hold(desired: Desired) -> str:
     return f'{json.dumps(fields)[:-1]}, "settings": {_json(desired.chosen)}}}'
 
 
-def _parse(runner: str, text: bytes) -> Desired:
+def _upgraded(text: bytes) -> tuple[_Document, int]:
+    """Return a document of our version, and the version it had."""
     document = json.loads(text)
     if not isinstance(document, dict):
         raise ValueError("it is not a JSON object")
     version = document.get("version")
-    if type(version) is int and version > VERSION:
-        raise ValueError(f"its version is {version}, of a newer rtcfd; this one knows {VERSION}")
-    if version != VERSION:
-        raise ValueError(f"its version is {version!r}, not {VERSION}")
+    if type(version) is not int or version < 1:
+        raise ValueError(f"its version is {version!r}, which there never was")
+    if version > VERSION:
+        raise _Newer(
+            f"it is of version {version}, of a newer rtcfd than this, which knows {VERSION}; "
+            "install that, stop rtcfd and rename the file back to have it again"
+        )
+    for step in range(version, VERSION):
+        _UPGRADES[step](document)
+    return document, version
+
+
+def _parse(runner: str, document: _Document) -> Desired:
     if document.get("runner") != runner:
         raise ValueError(f"it is the state of {document.get('runner')!r}")
     desired = Desired(check_base_name("runner", runner))
-    json_format.ParseDict(document.get("settings", {}), desired.chosen)
-    for entry in document.get("components", []):
+    json_format.ParseDict(document["settings"], desired.chosen)
+    for entry in document["components"]:
         spec = json_format.ParseDict(entry, graph_pb2.ComponentSpec())
         desired.put(full_name(spec), spec)
-    desired.running = document.get("running", False) is True
-    for name, terms in document.get("leased", {}).items():
+    desired.running = document["running"] is True
+    for name, terms in document["leased"].items():
         desired.leased[name] = LeaseTerms(**terms)
-    if hold := document.get("hold"):
+    if hold := document["hold"]:
         desired.hold = HoldTerms(hold["token"], hold["holder"], desired.chosen, hold["added"])
         desired.chosen = json_format.ParseDict(hold["settings"], runner_pb2.RunnerSettings())
-    for name, reason in document.get("quarantined", {}).items():
+    for name, reason in document["quarantined"].items():
         desired.quarantine(name, str(reason))
-    for name, reason in document.get("left_out", {}).items():
+    for name, reason in document["left_out"].items():
         if name in desired.components:
             desired.left_out[name] = str(reason)
     return desired

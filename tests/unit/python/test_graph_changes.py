@@ -10,6 +10,7 @@ import pytest
 import rtcf
 from daemon_under_test import DaemonUnderTest, wait_for
 from rtcf.v1 import control_pb2, runner_pb2
+from rtcfd import store
 
 
 def saved(daemon: DaemonUnderTest, runner: str = "rt_runner") -> dict[str, object]:
@@ -230,7 +231,7 @@ def test_a_component_can_be_taken_out_while_the_executor_is_down(
     assert client.start().order == ["/b"]
 
 
-@pytest.mark.parametrize("content", ["{", "[]", '{"version": 9}', '{"version": 1}', "\xff"])
+@pytest.mark.parametrize("content", ["{", "[]", '{"version": 0}', '{"version": 1}', "\xff"])
 def test_a_corrupt_state_is_set_aside(stopped_daemon: DaemonUnderTest, content: str) -> None:
     stopped_daemon.state.mkdir()
     (stopped_daemon.state / "rt_runner.json").write_text(content, encoding="latin-1")
@@ -240,6 +241,47 @@ def test_a_corrupt_state_is_set_aside(stopped_daemon: DaemonUnderTest, content: 
     assert aside.name.startswith("rt_runner.corrupt-")
     assert aside.read_text(encoding="latin-1") == content
     assert stopped_daemon.executor_pid()
+    assert f"set aside as {aside.name}" in stopped_daemon.ctl("status").stdout
+
+
+def test_the_state_of_a_newer_rtcfd_is_set_aside_for_it(stopped_daemon: DaemonUnderTest) -> None:
+    stopped_daemon.state.mkdir()
+    content = f'{{"version": {store.VERSION + 1}, "runner": "rt_runner", "more": []}}'
+    (stopped_daemon.state / "rt_runner.json").write_text(content)
+    stopped_daemon.start()
+    (aside,) = stopped_daemon.state.iterdir()
+    assert aside.name.startswith("rt_runner.newer-")
+    assert aside.read_text() == content
+    said = stopped_daemon.ctl("status").stdout
+    assert f"it is of version {store.VERSION + 1}, of a newer rtcfd than this" in said
+
+
+# As rtcfd wrote it before components could be left out, quarantined and held.
+OLDEST = """\
+{
+  "version": 1,
+  "runner": "rt_runner",
+  "settings": {"frequency_hz": 250.0},
+  "components": [
+    {"package": "demo", "type": "Fine", "name": "a", "ns": "/"}
+  ]
+}
+"""
+
+
+def test_the_state_of_an_older_rtcfd_is_upgraded_and_kept(stopped_daemon: DaemonUnderTest) -> None:
+    stopped_daemon.state.mkdir()
+    (stopped_daemon.state / "rt_runner.json").write_text(OLDEST)
+    stopped_daemon.start()
+    assert "is of version 1: upgraded, kept as rt_runner.version-1" in stopped_daemon.log()
+    assert (stopped_daemon.state / "rt_runner.version-1").read_text() == OLDEST
+    with stopped_daemon.client() as client:
+        assert client.get_order() == ["/a"]
+        assert client.get_status().runners[0].settings.frequency_hz == 250.0
+        client.load(rtcf.component("demo", "Fine", name="b"))
+    saved = stopped_daemon.saved()
+    assert saved["version"] == store.VERSION
+    assert [each["name"] for each in saved["components"]] == ["a", "b"]
 
 
 def test_a_change_that_cannot_be_saved_stands_and_says_so(
