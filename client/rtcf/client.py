@@ -95,6 +95,11 @@ class Client:
         request = control_pb2.RemoveRunnerRequest(runner=runner)
         self._ask(self._stub.RemoveRunner, request, CHANGE_TIMEOUT_S)
 
+    def restart_runner(self, runner: str = "") -> runner_pb2.RunnerStatus:
+        """Begin anew with a fresh executor and the same graph, not started."""
+        request = control_pb2.RestartRunnerRequest(runner=runner)
+        return self._ask(self._stub.RestartRunner, request, CHANGE_TIMEOUT_S).status  # type: ignore[no-any-return]
+
     def start(
         self, runner: str = "", on_progress: OnProgress | None = None
     ) -> control_pb2.ChangeResult:

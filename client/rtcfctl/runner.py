@@ -1,4 +1,4 @@
-"""`rtcfctl runner list|add|set|remove`."""
+"""`rtcfctl runner list|add|set|restart|remove`."""
 
 import argparse
 from typing import Any
@@ -28,7 +28,7 @@ _ROS_FIELDS = ("enabled", "master_uri", "hostname", "ns", "whitelist", "blacklis
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the noun and its verbs."""
-    noun = verbs.add_parser("runner", help="list, add, set or remove runners")
+    noun = verbs.add_parser("runner", help="list, add, set, restart or remove runners")
     actions = noun.add_subparsers(metavar="ACTION", required=True)
 
     listing = actions.add_parser("list", parents=[common], help="all runners")
@@ -43,6 +43,12 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     change.add_argument("name", metavar="NAME", nargs="?", default="")
     _settings_options(change)
     change.set_defaults(run=set_runner)
+
+    again = actions.add_parser(
+        "restart", parents=[common], help="a fresh executor with the same graph, not started"
+    )
+    again.add_argument("name", metavar="NAME", nargs="?", default="")
+    again.set_defaults(run=restart_runner)
 
     remove = actions.add_parser("remove", parents=[common], help="stop a runner and forget it")
     remove.add_argument("name", metavar="NAME")
@@ -71,6 +77,12 @@ def set_runner(client: rtcf.Client, args: argparse.Namespace, output: Output) ->
         raise ValueError("runner set: no setting named; see `rtcfctl runner set --help`")
     status = client.set_runner(settings, args.name or args.runner)
     _changed(output, f"runner {status.runner} set", status)
+
+
+def restart_runner(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Restart a runner's executor."""
+    status = client.restart_runner(args.name or args.runner)
+    _changed(output, f"runner {status.runner} restarted", status)
 
 
 def remove_runner(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:

@@ -14,7 +14,8 @@ enum class RefusalKind {
     AlreadyExists,
     FailedPrecondition,
     Unavailable,
-    NoMaster
+    NoMaster,
+    ResourceExhausted
 };
 
 class Refusal : public std::runtime_error {

@@ -30,7 +30,17 @@ WORDS = {level.word: level for level in Level}
 
 # Calls that change what runs, but not what there is to run.
 _OPERATE = frozenset(
-    {"Start", "Stop", "Step", "Replay", "SetBreaks", "SetParameters", "Release", "ResetStatistics"}
+    {
+        "Start",
+        "Stop",
+        "Step",
+        "Replay",
+        "SetBreaks",
+        "SetParameters",
+        "Release",
+        "ResetStatistics",
+        "RestartRunner",
+    }
 )
 _OBSERVING = ("Get", "List", "Watch")
 

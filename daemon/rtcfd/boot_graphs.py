@@ -6,7 +6,7 @@ out, whole.
 
 import hashlib
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,16 +41,17 @@ class Given:
 class BootGraphs:
     """The folder, and what was read from it last."""
 
-    def __init__(self, folder: Path | None) -> None:
+    def __init__(self, folder: Path | None, applied: Mapping[str, str]) -> None:
+        """`applied`: the digests of an earlier rtcfd."""
         self._folder = folder
-        self._digests: dict[Path, bytes] = {}
+        self.digests = dict(applied)  # by file; of what was read last
 
     def read(self) -> tuple[list[Given], list[str]]:
         """Return all graphs, and a line for each thing that is wrong."""
         graphs: list[Given] = []
         problems: list[str] = []
         owners: dict[str, Path] = {}
-        digests: dict[Path, bytes] = {}
+        digests: dict[str, str] = {}
         for file in self._files(problems):
             try:
                 text = file.read_text(encoding="utf-8")
@@ -66,8 +67,8 @@ class BootGraphs:
             except Refusal as refusal:
                 problems.append(f"{file}: {refusal}")
                 continue
-            digests[file] = hashlib.sha256(text.encode()).digest()
-            changed = self._digests.get(file) != digests[file]
+            digests[str(file)] = hashlib.sha256(text.encode()).hexdigest()
+            changed = self.digests.get(str(file)) != digests[str(file)]
             for graph in found:
                 given = Given(file, graph, changed)
                 first = owners.setdefault(given.runner, file)
@@ -75,7 +76,7 @@ class BootGraphs:
                     problems.append(f"{file}: runner {given.runner} is in {first} already")
                 else:
                     graphs.append(given)
-        self._digests = digests
+        self.digests = digests
         for problem in problems:
             log.error("%s", problem)
         return graphs, problems

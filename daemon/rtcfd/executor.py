@@ -7,16 +7,19 @@ restarts: a new start is a new object.
 import asyncio
 import logging
 import signal
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
 from rtcf.executor.v1 import executor_pb2 as wire
 
+from rtcfd import VERSION
 from rtcfd.command import ExecutorCommand
 from rtcfd.errors import FailedPrecondition, Refusal, Unavailable
 from rtcfd.flight_recorder import FlightRecorder, Note
-from rtcfd.link import Link, Progress, Unasked
-from rtcfd.process import Child, End, Process, Stranger
+from rtcfd.limits import Limits
+from rtcfd.link import LIMITS_PROTOCOL, PROTOCOL, Link, Progress, Unasked
+from rtcfd.process import Child, End, Process
 
 log = logging.getLogger(__name__)
 
@@ -38,6 +41,9 @@ class Executor:
         self.pid = process.pid
         self.expected = False  # its end was asked for
         self.ended = asyncio.Event()  # set after on_end
+        self.version = ""  # of rtcf
+        self.foreign = ""  # why nothing but stop and its end can be asked of it
+        self._protocol = 0
         self._peer = f"executor of {runner} (pid {process.pid})"
         self._process = process
         self._socket = socket
@@ -56,9 +62,10 @@ class Executor:
             # An own session: Ctrl-C at rtcfd's terminal reaches rtcfd alone, which
             # then stops the loops in order.  Signals as rtcfd has them: without
             # SIGPIPE, so that a loop does not die of the reader of our stderr.
-            process = await asyncio.create_subprocess_exec(
-                *command.arguments(runner),
-                stdin=asyncio.subprocess.DEVNULL,
+            # Not asyncio's, which kills what it started when it is closed.
+            started = subprocess.Popen(
+                command.arguments(runner),
+                stdin=subprocess.DEVNULL,
                 stdout=2,
                 env=command.environment(),
                 start_new_session=True,
@@ -66,12 +73,16 @@ class Executor:
             )
         except OSError as error:
             raise FailedPrecondition(f"cannot run {command.binary}: {error.strerror}") from None
-        executor = cls(runner, Child(process), command.socket(runner), on_unasked, on_end)
+        process = Child(started)
+        executor = cls(runner, process, command.socket(runner), on_unasked, on_end)
         try:
             await executor._attach()
+            if executor.foreign:
+                raise FailedPrecondition(
+                    f"{executor.foreign}: install both of one version, then restart rtcfd"
+                )
         except BaseException:
-            if process.returncode is None:
-                process.kill()
+            process.signal(signal.SIGKILL)
             await process.wait()
             raise
         executor._watching = asyncio.create_task(executor._watch())
@@ -83,8 +94,8 @@ class Executor:
     ) -> "Executor | None":
         """Take over an executor that an earlier rtcfd left at its socket.
 
-        None if there is none: a dead socket is removed, and an executor that
-        speaks another protocol is ended in order.
+        None if there is none: a dead socket is removed.  One whose protocol is
+        not ours is `foreign`: its loop goes on, and can be stopped.
         """
         try:
             link = await Link.connect(f"left-over executor of {runner}", socket, on_unasked)
@@ -94,7 +105,7 @@ class Executor:
             socket.unlink(missing_ok=True)
             return None
         try:
-            process = Stranger(link.peer_pid)
+            process = Process(link.peer_pid)
         except OSError:
             await link.close()  # it has just ended
             socket.unlink(missing_ok=True)
@@ -103,11 +114,12 @@ class Executor:
         try:
             link.peer = executor._peer
             await executor._greet(link, QUERY_TIMEOUT_S)
-        except FailedPrecondition as refusal:
-            log.warning("%s: ending it", refusal)
-            await _retire(process, link)
-            socket.unlink(missing_ok=True)
-            return None
+            if executor.foreign:
+                executor.foreign += (
+                    f": its loop goes on as it is; `rtcfctl -r {runner} stop` ends it, "
+                    f"`rtcfctl runner restart {runner}` starts one of this version"
+                )
+                log.error("%s", executor.foreign)
         except BaseException as problem:
             await link.close()
             process.release()
@@ -138,7 +150,25 @@ class Executor:
         """Send one request; see Link.request."""
         if self._link is None:
             raise Unavailable(f"{self._peer} is not connected")
+        if self.foreign and request.WhichOneof("kind") not in ("stop", "exit"):
+            raise FailedPrecondition(self.foreign)
         return await self._link.request(request, timeout_s, on_progress)
+
+    async def limit(self, limits: Limits) -> None:
+        """Tell it what its graph may have; one that does not know of limits goes without."""
+        if self._protocol >= LIMITS_PROTOCOL and not self.foreign:
+            await self.request(wire.Request(limits=wire.Limits(taps=limits.taps)), None)
+
+    async def leave(self) -> None:
+        """Let go of it without ending it: the next rtcfd finds it."""
+        if self._watching is not None:
+            self._watching.cancel()
+            await asyncio.gather(self._watching, return_exceptions=True)
+        if self._link is not None:
+            await self._link.close()
+        if self._recorder is not None:
+            self._recorder.close()
+        self._process.release()
 
     async def shut_down(self) -> None:
         """Stop the loop in order, then end the process, by force if it must be."""
@@ -182,6 +212,13 @@ class Executor:
     async def _greet(self, link: Link, timeout_s: float) -> None:
         """Say hello, and open what the answer names."""
         hello = await link.hello(timeout_s)
+        self.version = hello.version or "?"
+        self._protocol = hello.protocol
+        if abs(hello.protocol - PROTOCOL) > 1:
+            self.foreign = (
+                f"{self._peer} is of rtcf {self.version} and speaks protocol {hello.protocol}, "
+                f"which rtcfd {VERSION} with protocol {PROTOCOL} does not"
+            )
         if self._recorder is None and hello.flight_recorder_fd > 0:
             try:
                 self._recorder = FlightRecorder(link.peer_pid, hello.flight_recorder_fd)
@@ -217,16 +254,6 @@ class Executor:
             self._recorder.close()
             self._recorder = None
         self.ended.set()
-
-
-async def _retire(process: Stranger, link: Link) -> None:
-    """End an executor that cannot be adopted, in order if it understands that."""
-    try:
-        await link.request(wire.Request(exit=wire.Exit()), STOP_TIMEOUT_S)
-    except Refusal:
-        process.signal(signal.SIGTERM)
-    await link.close()
-    await _end(process, f"left-over executor (pid {process.pid})")
 
 
 async def _end(process: Process, peer: str) -> None:

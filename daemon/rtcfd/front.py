@@ -42,10 +42,14 @@ class Front:
         """Begin to take clients from a listening socket."""
         self._server = await asyncio.start_unix_server(self._take, sock=listener, backlog=_BACKLOG)
 
-    def close(self) -> None:
-        """Take no more clients, and let go those that are there."""
+    def close_door(self) -> None:
+        """Take no more clients: with systemd's socket they wait for the next rtcfd."""
         if self._server is not None:
             self._server.close()
+
+    def close(self) -> None:
+        """Take no more clients, and let go those that are there."""
+        self.close_door()
         for relay in self._relays:
             relay.cancel()
 

@@ -57,7 +57,9 @@ class Hold:
         """The holder has died: likewise."""
         self._outbox.gone = True
         runner = self._runner
-        if runner is not None and runner.hold_outbox is self._outbox and runner.desired.hold:
+        if runner is None or runner.closing:
+            return
+        if runner.hold_outbox is self._outbox and runner.desired.hold:
             runner.log.error("%s has died: stopping the loop", runner.desired.hold.holder)
             self._runners.in_background(release(self._runners, runner, self._outbox))
 

@@ -12,6 +12,7 @@ class Limits:
     clients: int = 256  # connections at a time
     runners: int = 32
     components: int = 5000  # of one runner
+    taps: int = 1000  # outputs of one runner that are published; kept by its executor
     message_kb: int = 16384  # one request, KiB
     log_records_per_s: int = 2000  # of one runner, averaged over some seconds
 
@@ -37,6 +38,7 @@ RANGES = {
     "clients": (1, 4096),
     "runners": (1, 256),
     "components": (1, 100_000),
+    "taps": (0, 100_000),
     "message_kb": (16, 16384),
     "log_records_per_s": (1, 1_000_000),
 }

@@ -16,7 +16,11 @@ from rtcf.executor.v1 import executor_pb2 as wire
 
 from rtcfd import errors, frames
 
-PROTOCOL = 1
+# The protocol that this rtcfd speaks.  A number is added for what a peer cannot do without
+# knowing of it, so that rtcfd and an executor of neighbouring numbers work together: the newer
+# asks the older for nothing that it does not know.  Hello, Stop and Exit stay as they are for good.
+PROTOCOL = 2
+LIMITS_PROTOCOL = 2  # from it on executors keep [limits]
 _CREDENTIALS = struct.Struct("3i")  # struct ucred, unix(7)
 
 Progress = Callable[[str], None]
@@ -29,6 +33,7 @@ _REFUSALS: dict[int, type[errors.Refusal]] = {
     wire.Error.CODE_FAILED_PRECONDITION: errors.FailedPrecondition,
     wire.Error.CODE_UNAVAILABLE: errors.Unavailable,
     wire.Error.CODE_NO_MASTER: errors.NoMaster,
+    wire.Error.CODE_RESOURCE_EXHAUSTED: errors.ResourceExhausted,
 }
 
 
@@ -77,15 +82,9 @@ class Link:
         return link
 
     async def hello(self, timeout_s: float) -> wire.HelloResult:
-        """Open the conversation and check that both speak the same protocol."""
+        """Open the conversation; both then say which protocol and version they are."""
         request = wire.Request(hello=wire.Hello(protocol=PROTOCOL))
-        result = (await self.request(request, timeout_s)).hello
-        if result.protocol != PROTOCOL:
-            raise errors.FailedPrecondition(
-                f"{self.peer} speaks protocol {result.protocol}, rtcfd {PROTOCOL}: "
-                "install rtcfd and its executor of the same version"
-            )
-        return result
+        return (await self.request(request, timeout_s)).hello
 
     async def request(
         self, request: wire.Request, timeout_s: float | None, on_progress: Progress | None = None

@@ -13,7 +13,7 @@ import grpc
 import rtcf
 from rtcf.v1 import control_pb2_grpc
 
-from rtcfd import VERSION, frames, journal, options
+from rtcfd import VERSION, frames, handover, journal, options
 from rtcfd.catalog import Catalog
 from rtcfd.command import ExecutorCommand
 from rtcfd.describe import Describer
@@ -38,6 +38,7 @@ log = logging.getLogger("rtcfd")
 REFUSED = 1
 _GRACE_S = 60.0  # for calls under way: the end of their executors ends them sooner
 _LAST_WORDS_S = 0.1  # for their answers
+_LAST_ANSWERS_S = 1.0  # likewise where all is well: before a restart
 
 
 class Daemon:
@@ -64,16 +65,18 @@ class Daemon:
         )
         self._runners = Runners(shared)
         self._upkeep = Upkeep(
-            given, read_options, shared, catalog, self._runners, self._front, gate
+            given, read_options, shared, catalog, self._runners, self._front, gate, self._store
         )
         self._server = grpc.aio.server(options=_server_options(given), interceptors=[gate])
         self._left_over: list[str] = []  # runners of executors that outlived another rtcfd
+        self._leaving = False  # loops go on after our end
         control_pb2_grpc.add_ControlServicer_to_server(  # type: ignore[no-untyped-call]
             Control(self._runners, catalog, self._upkeep), self._server
         )
 
     async def run(self) -> None:
-        """Serve until SIGTERM or SIGINT; SIGHUP ends what runs from a terminal, else reloads."""
+        """Serve until SIGTERM or SIGINT stops all loops, or SIGUSR1 leaves them to the next rtcfd;
+        SIGHUP ends what runs from a terminal, else reloads."""
         end = asyncio.Event()
         loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGINT):
@@ -81,6 +84,8 @@ class Daemon:
         loop.add_signal_handler(
             signal.SIGHUP, end.set if self._options.foreground else self._reload
         )
+        if not self._options.foreground:
+            loop.add_signal_handler(signal.SIGUSR1, self._leave, end)
         if self._options.end_with_stdin:
             _when_stdin_ends(end.set)
         self._command.prepare()
@@ -102,22 +107,43 @@ class Daemon:
         log.info("rtcfd %s serves %s", VERSION, self._endpoint.path)
         starting = asyncio.create_task(self._start())
         await end.wait()
-        log.info("stopping all loops")
-        self._notify.stopping()
-        serving = asyncio.create_task(self._server.stop(_GRACE_S))
-        await self._runners.close()
-        await asyncio.wait({serving}, timeout=_LAST_WORDS_S)
-        await self._server.stop(None)
-        self._front.close()
+        await (self._let_go() if self._leaving else self._stop())
         starting.cancel()
         await asyncio.gather(starting, return_exceptions=True)
         self._clean_up()
         log.info("ended")
 
+    def _leave(self, end: asyncio.Event) -> None:
+        self._leaving = True
+        end.set()
+
+    async def _stop(self) -> None:
+        """End loops and executors, then what serves clients."""
+        log.info("stopping all loops")
+        self._notify.stopping("stopping all loops")
+        serving = asyncio.create_task(self._server.stop(_GRACE_S))
+        await self._runners.close()
+        await asyncio.wait({serving}, timeout=_LAST_WORDS_S)
+        await self._server.stop(None)
+        self._front.close()
+
+    async def _let_go(self) -> None:
+        """End for a restart: loops go on, clients wait for the next rtcfd."""
+        log.info("leaving all loops to the next rtcfd")
+        self._notify.stopping("leaving all loops to the next rtcfd")
+        self._front.close_door()
+        serving = asyncio.create_task(self._server.stop(_GRACE_S))
+        await self._runners.leave()
+        await asyncio.wait({serving}, timeout=_LAST_ANSWERS_S)
+        # Holders see a connection that is lost, and come back.
+        self._front.close()
+        await self._server.stop(None)
+
     async def _start(self) -> None:
         await self._runners.bring_up(self._left_over)
         for runner in self._runners.all():
             await_holder(self._runners, runner)
+        await self._upkeep.catch_up()
         self._notify.ready(self._runners.summary())
         log.info("ready; runners: %s", self._runners.summary())
 
@@ -147,6 +173,8 @@ class Daemon:
     def _clean_up(self) -> None:
         self._notify.close()
         self._endpoint.remove()
+        if not self._leaving:
+            handover.remove(self._command.folder)
         # What is not empty or not there stays as it is.
         with contextlib.suppress(OSError):
             self._command.folder.rmdir()

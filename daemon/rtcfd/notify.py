@@ -35,9 +35,9 @@ class Notify:
         """Say what is going on, in a line."""
         self._send(f"STATUS={status}")
 
-    def stopping(self) -> None:
+    def stopping(self, status: str) -> None:
         """Say that the end has begun."""
-        self._send("STOPPING=1\nSTATUS=stopping all loops")
+        self._send(f"STOPPING=1\nSTATUS={status}")
 
     def close(self) -> None:
         """Feed the watchdog no more."""

@@ -1,14 +1,15 @@
 """The process of an executor: our own child, or one that an earlier rtcfd left running.
 
 Owned by the Executor.  Of a child the kernel tells how it ended; of another
-process only that it did.
+process only that it did.  Nothing here ends a process that is merely forgotten:
+executors outlive the rtcfd that started them.
 """
 
 import asyncio
 import os
 import signal
+import subprocess
 from dataclasses import dataclass
-from typing import Protocol
 
 
 @dataclass(frozen=True)
@@ -23,82 +24,56 @@ class End:
         return describe_exit(self.status)
 
 
-class Process(Protocol):
-    """What an Executor needs of its process."""
-
-    pid: int
-
-    @property
-    def end(self) -> End | None:
-        """How it ended; None while it runs."""
-
-    async def wait(self) -> End:
-        """Wait until it has ended."""
-
-    def signal(self, number: signal.Signals) -> None:
-        """Send a signal; nothing happens if it has ended."""
-
-
-class Child:
-    """A process that this rtcfd started."""
-
-    def __init__(self, process: asyncio.subprocess.Process) -> None:
-        self.pid = process.pid
-        self._process = process
-
-    @property
-    def end(self) -> End | None:
-        """How it ended; None while it runs."""
-        status = self._process.returncode
-        return None if status is None else End(status)
-
-    async def wait(self) -> End:
-        """Wait until it has ended."""
-        return End(await self._process.wait())
-
-    def signal(self, number: signal.Signals) -> None:
-        """Send a signal; nothing happens if it has ended."""
-        if self._process.returncode is None:
-            self._process.send_signal(number)
-
-
-class Stranger:
-    """A process that is no child of ours, watched through a pidfd."""
+class Process:
+    """A process, watched through a pidfd."""
 
     def __init__(self, pid: int) -> None:
         """Raises OSError, if there is none (any more)."""
         self.pid = pid
         self._descriptor = os.pidfd_open(pid)
         self._ended = asyncio.Event()
+        self._end: End | None = None
         self._loop = asyncio.get_running_loop()
         # Readable when the process has ended, see pidfd_open(2).
-        self._loop.add_reader(self._descriptor, self._on_end)
+        self._loop.add_reader(self._descriptor, self.release)
 
     @property
     def end(self) -> End | None:
         """How it ended; None while it runs."""
-        return End() if self._ended.is_set() else None
+        return self._end
 
     async def wait(self) -> End:
         """Wait until it has ended."""
         await self._ended.wait()
-        return End()
+        return self._end or End()
 
     def signal(self, number: signal.Signals) -> None:
         """Send a signal; nothing happens if it has ended."""
-        if not self._ended.is_set():
+        if self._end is None:
             # By descriptor: never to another process that has got the number since.
             signal.pidfd_send_signal(self._descriptor, number)
 
     def release(self) -> None:
         """Watch it no more."""
-        if not self._ended.is_set():
-            self._on_end()
+        if self._end is None:
+            self._loop.remove_reader(self._descriptor)
+            os.close(self._descriptor)
+            self._end = self._how_it_ended()
+            self._ended.set()
 
-    def _on_end(self) -> None:
-        self._loop.remove_reader(self._descriptor)
-        os.close(self._descriptor)
-        self._ended.set()
+    def _how_it_ended(self) -> End:
+        return End()
+
+
+class Child(Process):
+    """A process that this rtcfd started."""
+
+    def __init__(self, process: "subprocess.Popen[bytes]") -> None:
+        super().__init__(process.pid)
+        self._process = process
+
+    def _how_it_ended(self) -> End:
+        return End(self._process.poll())
 
 
 def describe_exit(status: int) -> str:

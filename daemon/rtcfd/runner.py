@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 
-from rtcfd import revival, settings
+from rtcfd import VERSION, revival, settings
 from rtcfd.catalog import Catalog
 from rtcfd.command import ExecutorCommand
 from rtcfd.crash import Crashes, judge
@@ -34,6 +34,7 @@ from rtcfd.turns import Turns
 CHANGE_TIMEOUT_S = 60.0  # for one change, waiting for those before it included
 STOP_TIMEOUT_S = 30.0
 STATUS_TIMEOUT_S = 2.0
+LEAVE_TIMEOUT_S = 5.0  # for changes under way when rtcfd is restarted
 _LAST_WORDS_S = 2.0  # from the loss of a link to the end of its executor
 _WORTH_SAYING_S = 2.0  # a change that takes longer shows in the status
 
@@ -77,6 +78,7 @@ class Runner:
         self._saving = asyncio.Lock()
         self._unsaved = ""  # why the desired state is not on disk
         self._closing = False
+        self._leaving = False  # it ends for this rtcfd only
         self._settled = asyncio.Event()  # not set while an executor is being started
         self._background: set[asyncio.Task[None]] = set()
 
@@ -115,6 +117,19 @@ class Runner:
         await self._turns.drain()
         await asyncio.gather(*self._background)
 
+    async def leave(self) -> None:
+        """Let go of the executor, whose loop goes on until the next rtcfd adopts it.
+
+        Changes under way come first, but for those that take long: what an
+        executor has then is what the next rtcfd takes over.
+        """
+        self._closing = self._leaving = True
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(self._turns.drain(), LEAVE_TIMEOUT_S)
+        executor, self._executor = self._executor, None
+        if executor is not None:
+            await executor.leave()
+
     async def start_executor(self, only_left_over: bool = False, boot: bool = False) -> bool:
         """Do what bring_up() says, in a turn; without `boot` the loop is held."""
         self._settled.clear()
@@ -129,7 +144,7 @@ class Runner:
                 return False
             executor = executor or await self._launch()
             if self._closing:
-                await executor.shut_down()
+                await (executor.leave() if self._leaving else executor.shut_down())
                 raise Unavailable(f"runner {self.name} is being ended")
             self._executor = executor
         except Refusal as refusal:
@@ -138,6 +153,10 @@ class Runner:
         finally:
             self._settled.set()
         self._trouble = ""
+        if executor.foreign:
+            self.running = self.desired.running  # as far as can be known
+            return True
+        await self._limit()
         if adopted:
             await revival.follow(self)
         else:
@@ -147,14 +166,32 @@ class Runner:
         self._shared.on_change()
         return True
 
+    async def restart(self) -> None:
+        """Begin anew with a fresh executor, whatever the one of now is stuck in; what is desired
+        is loaded, held."""
+
+        async def work() -> None:
+            if not self.up:
+                await self.start_executor()
+            await self.save()
+
+        # Not in a turn: a change that hangs ends with the executor it hangs in.
+        await self._end_executor()
+        self.desired.running = False
+        await self.change("the restart of its executor", work)
+        self.log.info("executor restarted")
+
     async def restart_executor(self) -> None:
         """Begin anew with a fresh executor, in a turn; what is desired is loaded, held."""
+        await self._end_executor()
+        await self.start_executor()
+
+    async def _end_executor(self) -> None:
         executor, self._executor = self._executor, None
         if executor is not None:
             self._trouble = "its executor is being restarted"
             await executor.shut_down()
         self.running, self.held, self.fault = False, "", ""
-        await self.start_executor()
 
     def end_leases(self, why: "control_pb2.LeaseEnded.Why", message: str) -> None:
         """Tell the holders of this runner and of its components that it is over."""
@@ -362,6 +399,13 @@ class Runner:
                     lines.append(self._trouble)  # it has just died
             status.runner = self.name
             status.pid = executor.pid if executor is self._executor else 0
+            status.version = executor.version
+            if executor.version != VERSION and not executor.foreign:
+                lines.append(
+                    f"restart pending: its executor is of rtcf {executor.version}, rtcfd "
+                    f"{VERSION}; `rtcfctl runner restart {self.name}` stops the loop and starts "
+                    "a new one"
+                )
         # Some settings are rtcfd's alone.
         status.settings.CopyFrom(settings.merged(self.settings(), status.settings))
         status.chosen.CopyFrom(self.desired.chosen)
@@ -400,6 +444,18 @@ class Runner:
 
         await self.change("a change of settings", work)
         self.log.info("settings changed")
+
+    async def follow_limits(self) -> None:
+        """Take over limits that have changed."""
+
+        async def work() -> None:
+            if self.up:
+                await self._limit()
+
+        try:
+            await self.change("a change of limits", work)
+        except Refusal as refusal:
+            self.log.error("limits not changed: %s", refusal)
 
     async def follow_defaults(self, before: runner_pb2.RunnerSettings) -> list[str]:
         """Take over defaults that are others than `before`; return a line for each setting."""
@@ -475,6 +531,10 @@ class Runner:
             return (await self.ask(wire.Request(replay=request))).replay
 
         return await self.change("a replay", work, timeout_s=None)
+
+    async def _limit(self) -> None:
+        if self._executor is not None:
+            await self._executor.limit(self.limits)
 
     async def _need_executor(self, progress: Progress) -> None:
         if not self.up:

@@ -172,6 +172,11 @@ class Runners:
         await asyncio.gather(*(each.shut_down(why, "rtcfd is being ended") for each in runners))
         await asyncio.gather(*self._background)
 
+    async def leave(self) -> None:
+        """Let go of all executors, whose loops go on: the next rtcfd adopts them."""
+        self.closing.set()
+        await asyncio.gather(*(runner.leave() for runner in self._runners.values()))
+
     def in_background(self, work: Coroutine[Any, Any, None]) -> None:
         """Do what nobody waits for; it is waited for at the end."""
         task = asyncio.create_task(work)

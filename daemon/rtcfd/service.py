@@ -184,6 +184,13 @@ class Control(control_pb2_grpc.ControlServicer):
         await self._runners.remove(request.runner)
         return control_pb2.RemoveRunnerResponse()
 
+    @_answering
+    async def RestartRunner(self, request: control_pb2.RestartRunnerRequest) -> Any:
+        """A fresh executor."""
+        runner = self._runners.get(request.runner)
+        await runner.restart()
+        return control_pb2.RunnerResponse(status=await runner.status())
+
     @_changing
     def Start(self, request: control_pb2.StartRequest) -> Any:
         """Start the loop."""

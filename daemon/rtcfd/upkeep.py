@@ -9,17 +9,20 @@ from collections.abc import Callable, Iterable
 from dataclasses import fields
 from pathlib import Path
 
-from rtcf.v1 import control_pb2
+from rtcf.v1 import control_pb2, runner_pb2
 
-from rtcfd.boot_graphs import BootGraphs, become
+from rtcfd import handover, settings
+from rtcfd.boot_graphs import BootGraphs, Given, become
 from rtcfd.catalog import Catalog
 from rtcfd.desired import Desired
 from rtcfd.errors import Refusal
 from rtcfd.front import Front
 from rtcfd.gate import Gate
+from rtcfd.handover import Handover
 from rtcfd.options import Options
 from rtcfd.runner import Surroundings
 from rtcfd.runners import Runners
+from rtcfd.store import Store
 
 log = logging.getLogger(__name__)
 
@@ -39,40 +42,63 @@ class Upkeep:
         runners: Runners,
         front: Front,
         gate: Gate,
+        store: Store,
     ) -> None:
         self._given = given
+        self._command_folder = shared.command.folder
         self._read_options = read_options
         self._shared = shared
         self._catalog = catalog
         self._runners = runners
         self._front = front
         self._gate = gate
-        self._graphs = BootGraphs(given.graphs_dir)
+        self._store = store
+        self._left: Handover | None = None  # by the rtcfd before this one
+        self._graphs = BootGraphs(given.graphs_dir, {})
+        self._late: list[Given] = []  # for runners that are adopted first
         self._graph_problems: list[str] = []
         self._files = (Path(__file__), given.executor)
         self._identities = [_identity(file) for file in self._files]
 
     def boot(self, states: list[Desired], running: Iterable[str]) -> list[Desired]:
-        """Return the states with the runners of graphs.d as their files say, but for those whose
-        executors run."""
+        """Return the states with the runners of graphs.d as their files say.
+
+        Those whose executors run are taken as they are; catch_up() follows."""
+        adopted = set(running)
+        if adopted and (left := handover.read(self._command_folder)):
+            self._left = left
+            self._shared.defaults = settings.merged(self._given.defaults, left.defaults)
+            self._graphs = BootGraphs(self._given.graphs_dir, left.graphs)
         graphs, self._graph_problems = self._graphs.read()
         found = {state.runner: state for state in states}
-        adopted = set(running)
         for given in graphs:
             if given.runner in adopted:
+                if self._left and given.changed:
+                    self._late.append(given)
                 continue
             become(found.setdefault(given.runner, Desired(given.runner)), given.graph)
             log.info("runner %s is as %s says", given.runner, given.file)
         return list(found.values())
 
+    async def catch_up(self) -> None:
+        """Once executors are adopted: apply what has changed in settings and graphs.d since the
+        rtcfd before this one read them."""
+        lines = await self._follow_defaults(self._given.defaults)
+        lines += await self._apply(self._late)
+        self._late = []
+        self._leave_note()
+        for line in lines:
+            log.info("changed while rtcfd was away: %s", line)
+
     def notes(self) -> list[str]:
         """Return what is to be said about rtcfd itself."""
         lines = [f"not applied: {problem}" for problem in self._graph_problems]
+        lines += self._store.problems
         if [_identity(file) for file in self._files] != self._identities:
             lines.insert(
                 0,
                 "restart pending: rtcfd was upgraded while it runs; `systemctl restart rtcfd` "
-                "stops the loops and starts the new version",
+                "starts the new version, loops go on",
             )
         return lines
 
@@ -94,21 +120,32 @@ class Upkeep:
         self._catalog.folders = new.folders
         self._gate.access = new.access
         self._front.limit = new.limits.clients
-        self._shared.limits = new.limits
-        before, self._shared.defaults = self._shared.defaults, new.defaults
+        taps, self._shared.limits = self._shared.limits.taps, new.limits
         self._given = new
-        for runner in self._runners.all():
-            lines += await runner.follow_defaults(before)
-        lines += await self._reload_graphs()
+        if new.limits.taps != taps:
+            for runner in self._runners.all():
+                await runner.follow_limits()
+        lines += await self._follow_defaults(new.defaults)
+        graphs, self._graph_problems = self._graphs.read()
+        lines += self._graph_problems
+        lines += await self._apply([given for given in graphs if given.changed])
+        self._leave_note()
         log.info("settings and graphs read again: %s", "; ".join(lines) or "nothing has changed")
         return lines
 
-    async def _reload_graphs(self) -> list[str]:
-        graphs, self._graph_problems = self._graphs.read()
-        lines = list(self._graph_problems)
+    def _leave_note(self) -> None:
+        handover.write(self._command_folder, Handover(self._shared.defaults, self._graphs.digests))
+
+    async def _follow_defaults(self, new: runner_pb2.RunnerSettings) -> list[str]:
+        before, self._shared.defaults = self._shared.defaults, new
+        lines: list[str] = []
+        for runner in self._runners.all():
+            lines += await runner.follow_defaults(before)
+        return lines
+
+    async def _apply(self, graphs: Iterable[Given]) -> list[str]:
+        lines: list[str] = []
         for given in graphs:
-            if not given.changed:
-                continue
             request = control_pb2.ApplyRequest(
                 runner=given.runner,
                 components=given.graph.components,

@@ -563,6 +563,7 @@ void Runner::adopt(Change change, const Progress& progress) {
     }
     const Graph graph = change.graph;
     Wiring wiring = wire(graph, filter(), change.loading);
+    checkTaps(wiring);
     Adoption adoption;
     std::unique_ptr<Plan> plan = buildPlan(graph, std::move(wiring), *plan_, settings_.frequency_hz,
                                            adoption, settings_.bridge);
@@ -603,6 +604,19 @@ void Runner::adopt(Change change, const Progress& progress) {
         instance->cleanup();
     }
     noticeEnd();
+}
+
+void Runner::checkTaps(const Wiring& wiring) const {
+    const auto taps = static_cast<std::size_t>(
+        std::count_if(wiring.connections.begin(), wiring.connections.end(),
+                      [](const auto& each) { return each.second.published; }));
+    // What is above a limit that was lowered may stay, and shrink.
+    if (taps <= most_taps_ || taps <= plan_->taps.size()) return;
+    throw Refusal(RefusalKind::ResourceExhausted,
+                  fmt::format("{} published outputs (taps) are more than the {} allowed: let the "
+                              "whitelist match fewer, or raise taps under [limits] in rtcfd's "
+                              "settings",
+                              taps, most_taps_));
 }
 
 ChangeOutcome Runner::load(ComponentDefinition definition, const std::string& library,

@@ -102,6 +102,8 @@ class Runner final : private RunnerView {
     /// @name By jobs, on the graph thread. All throw Refusal and have then changed nothing.
     /// @{
     void configure(RunnerSettings settings);
+    /// Refuses changes that would have more outputs published than so many, from here on.
+    void limitTaps(std::size_t most) noexcept { most_taps_ = most; }
     /// Also loads libraries that belong to this user, from here on.
     void trust(uid_t owner) { libraries_.trust(owner); }
     ChangeOutcome start(const Progress& progress);
@@ -192,6 +194,7 @@ class Runner final : private RunnerView {
     void publish(const std::set<std::string>& changed = {});
     void publishPicture();
     std::int64_t adoptionTimeout() const noexcept;
+    void checkTaps(const Wiring& wiring) const;
     void note(std::string activity);
 
     const std::string name_;
@@ -208,6 +211,7 @@ class Runner final : private RunnerView {
     // Graph thread only.
     RunnerSettings settings_;
     std::unique_ptr<Plan> plan_ = std::make_unique<Plan>();
+    std::size_t most_taps_ = SIZE_MAX;
     RunnerState state_ = RunnerState::Stopped;
     std::vector<std::string> degraded_;
     std::string status_;

@@ -382,6 +382,9 @@ v1::Error errorTo(RefusalKind kind, const std::string& message) {
         case RefusalKind::NoMaster:
             error.set_code(v1::Error::CODE_NO_MASTER);
             break;
+        case RefusalKind::ResourceExhausted:
+            error.set_code(v1::Error::CODE_RESOURCE_EXHAUSTED);
+            break;
     }
     error.set_message(message);
     return error;

@@ -26,7 +26,9 @@ namespace pb = ::rtcf::v1;
 
 namespace {
 
-constexpr std::uint32_t kProtocol = 1;
+// Of rtcfd and executor the newer asks for nothing that the older does not know:
+// see link.py of rtcfd. Hello, stop and exit stay as they are for good.
+constexpr std::uint32_t kProtocol = 2;
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kHookTimeout = 10 * kSecond;
 constexpr std::int64_t kProbeTimeout = kSecond / 2;
@@ -457,6 +459,9 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
             if (request.kind_case() == v1::Request::kConfigure) {
                 runner_->configure(settingsFrom(request.configure(), runner_->settings()));
                 *response.mutable_status() = status();
+            } else if (request.kind_case() == v1::Request::kLimits) {
+                runner_->limitTaps(request.limits().taps());
+                response.mutable_done();
             } else if (request.kind_case() == v1::Request::kReplay) {
                 *response.mutable_replay() =
                     replayTo(runner_->replay(replayFrom(request.replay()), progress));

@@ -22,6 +22,12 @@ class Allocates final : public Faulty {
     std::vector<char> memory_;
 };
 
+class Hoards final : public Faulty {
+    static constexpr std::size_t kBytes = 1000 * 1000;
+    void fault() override { memory_.push_back(std::vector<char>(kBytes, 1)); }
+    std::vector<std::vector<char>> memory_;
+};
+
 class Sleeps final : public Faulty {
     void fault() override { std::this_thread::sleep_for(std::chrono::microseconds(100)); }
 };
@@ -41,6 +47,7 @@ class NotFiniteStops final : public Faulty {
 
 RTCF_COMPONENT(Throws, "Throws an exception")
 RTCF_COMPONENT(Allocates, "Allocates 10 MB in each update")
+RTCF_COMPONENT(Hoards, "Takes 1 MB more in each update, until there is no memory left")
 RTCF_COMPONENT(Sleeps, "Sleeps in each update")
 RTCF_COMPONENT(NotFinite, "Writes NaN to an output that is declared finite")
 RTCF_COMPONENT(NotFiniteStops, "Writes infinity to an output that stops the loop then")

@@ -38,6 +38,8 @@ class DaemonUnderTest:
         self.executor = folder / "executor"
         self.process: subprocess.Popen[bytes] | None = None
         self.environment: dict[str, str] = {}
+        self.settings = folder / "rtcfd.toml"
+        self.graphs = folder / "graphs.d"
         peer = Path(__file__).with_name("peer_executor.py")
         self.executor.write_text(
             f'#!/bin/sh\nPYTHONPATH={BUILD_TREE}/python exec {sys.executable} {peer} "$@"\n'
@@ -51,13 +53,24 @@ class DaemonUnderTest:
         file.write_text(json.dumps(contents))
         return file
 
-    def start(self, *options: str) -> "DaemonUnderTest":
+    def start_service(self) -> "DaemonUnderTest":
+        """Start rtcfd as systemd does."""
+        self.settings.touch()
+        self.graphs.mkdir(exist_ok=True)
+        return self.start(
+            *("--runtime-dir", str(self.folder / "run"), "--config", str(self.settings)),
+            *("--graphs-dir", str(self.graphs)),
+            foreground=False,
+        )
+
+    def start(self, *options: str, foreground: bool = True) -> "DaemonUnderTest":
         """Start rtcfd and wait until it is ready."""
         with self.log_file.open("ab") as log:
             begin = log.tell()
             self.process = subprocess.Popen(
                 [
-                    *(str(BUILD_TREE / "bin" / "rtcfd"), "--foreground"),
+                    str(BUILD_TREE / "bin" / "rtcfd"),
+                    *(["--foreground"] if foreground else []),
                     *("--socket", str(self.socket), "--state-dir", str(self.state)),
                     *("--path", str(self.packages), "--executor", str(self.executor)),
                     *options,

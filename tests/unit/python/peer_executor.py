@@ -6,6 +6,9 @@ A "library" here is a JSON file: {"types": {"Name": "behaviour"}, "problem":
 "refused", "crashes", "slow" (until the file named by its parameter `until`
 exists), "logs".
 
+PEER_PROTOCOL is what it speaks, PEER_LATER_PROTOCOL what it turns out to speak
+with the next rtcfd.
+
 A parameter `die` that is set lets it die as if in the component's update:
 "SIGSEGV" and so on with a note in the flight recorder, "stall" likewise,
 "exit" and "SIGKILL" without.  The loop counts its cycles by the wall clock.
@@ -24,7 +27,8 @@ from flight_writer import FlightWriter
 from google.protobuf import json_format
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
-from rtcfd import frames
+from rtcfd import VERSION, frames
+from rtcfd.link import LIMITS_PROTOCOL, PROTOCOL
 
 POLL_S = 0.005
 GRAPH_SLOT, UPDATE_SLOT = 1, 2
@@ -56,6 +60,8 @@ class Peer:
         self.running = False
         self.started = 0.0
         self.connections = 0
+        self.hellos = 0
+        self.protocol = int(os.environ.get("PEER_PROTOCOL", PROTOCOL))
         self.generation = 0
         self.components: dict[str, graph_pb2.ComponentSpec] = {}
         self.live: dict[str, dict[str, graph_pb2.ParameterValue]] = {}
@@ -92,14 +98,23 @@ class Peer:
             self.end.set()
 
     async def hello(self, _: wire.Hello, __: int) -> wire.Response:
+        self.hellos += 1
+        if self.hellos > 1 and (later := os.environ.get("PEER_LATER_PROTOCOL")):
+            self.protocol = int(later)
         return wire.Response(
             hello=wire.HelloResult(
-                protocol=int(os.environ.get("PEER_PROTOCOL", "1")),
+                protocol=self.protocol,
+                version=os.environ.get("PEER_VERSION", VERSION),
                 runner=self.runner,
                 pid=os.getpid(),
                 flight_recorder_fd=self.recorder.descriptor,
             )
         )
+
+    async def limits(self, _: wire.Limits, __: int) -> wire.Response:
+        if self.protocol < LIMITS_PROTOCOL:
+            os._exit(9)  # whoever does not know of them must not be asked
+        return wire.Response(done=wire.Done())
 
     async def configure(self, change: runner_pb2.RunnerSettings, _: int) -> wire.Response:
         if change.ros.whitelist == "(":

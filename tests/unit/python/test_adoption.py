@@ -10,8 +10,10 @@ import pytest
 import rtcf
 from daemon_under_test import DaemonUnderTest, wait_for
 from rtcf.v1 import graph_pb2, runner_pb2
+from rtcfd import VERSION
 from rtcfd.adoption import follow_components, follow_settings
 from rtcfd.desired import Desired
+from rtcfd.link import PROTOCOL
 from rtcfd.settings import defaults
 
 LONG = runner_pb2.RunnerSettings(orphan_timeout_s=60.0)
@@ -139,36 +141,71 @@ def test_a_dead_socket_is_removed(daemon: DaemonUnderTest, left: int) -> None:
         assert client.get_order() == ["/a", "/b"]
 
 
-def test_an_executor_of_another_protocol_is_ended(
-    stopped_daemon: DaemonUnderTest, tmp_path: Path
+@pytest.mark.parametrize("distance", [-1, 1])
+def test_an_executor_of_a_neighbouring_protocol_is_as_good_as_ours(
+    stopped_daemon: DaemonUnderTest, distance: int
 ) -> None:
-    works = stopped_daemon.executor.read_text()
+    stopped_daemon.environment = {
+        "PEER_PROTOCOL": str(PROTOCOL + distance), "PEER_VERSION": "0.0.9",
+    }  # fmt: skip
+    pid = loop_left_behind(stopped_daemon)
     stopped_daemon.start()
     with stopped_daemon.client() as client:
-        client.set_runner(LONG)
-    stopped_daemon.end(signal.SIGKILL)
-    os.kill(int(next(iter(_peers(stopped_daemon)))), signal.SIGKILL)
-    # One that is left over and speaks another protocol.
-    stopped_daemon.executor.write_text(works.replace("PYTHONPATH", "PEER_PROTOCOL=9 PYTHONPATH"))
+        status = client.get_status().runners[0]
+        assert (status.pid, status.state) == (pid, runner_pb2.RUNNER_STATE_RUNNING)
+        assert status.version == "0.0.9"
+        assert status.status == (
+            f"restart pending: its executor is of rtcf 0.0.9, rtcfd {VERSION}; "
+            "`rtcfctl runner restart rt_runner` stops the loop and starts a new one"
+        )
+        client.load(rtcf.component("demo", "Fine", name="b"))
+        assert client.get_order() == ["/a", "/b"]
+
+
+@pytest.mark.parametrize("number", [PROTOCOL - 2, PROTOCOL + 2])
+def test_an_executor_of_a_foreign_protocol_is_left_running_and_can_be_replaced(
+    stopped_daemon: DaemonUnderTest, number: int
+) -> None:
+    stopped_daemon.environment = {"PEER_LATER_PROTOCOL": str(number), "PEER_VERSION": "7.8"}
+    pid = loop_left_behind(stopped_daemon)
+    stopped_daemon.environment = {}
     stopped_daemon.start()
-    stopped_daemon.executor.write_text(works)
-    assert "speaks protocol 9" in stopped_daemon.log()
+    refusal = (
+        f"executor of rt_runner (pid {pid}) is of rtcf 7.8 and speaks protocol {number}, which "
+        f"rtcfd {VERSION} with protocol {PROTOCOL} does not: its loop goes on as it is; "
+        "`rtcfctl -r rt_runner stop` ends it, "
+        "`rtcfctl runner restart rt_runner` starts one of this version"
+    )
+    assert refusal in stopped_daemon.log()
+    with stopped_daemon.client() as client:
+        status = client.get_status().runners[0]
+        assert status.pid == pid
+        assert status.status == refusal
+        with pytest.raises(rtcf.RefusedError, match="speaks protocol"):
+            client.start()
+        with pytest.raises(rtcf.RefusedError, match="speaks protocol"):
+            client.load(rtcf.component("demo", "Fine"))
+        assert is_alive(pid)
+        client.stop()
+        assert is_alive(pid)
+        client.restart_runner()
+        assert client.get_order() == ["/a"]
+        status = client.get_status().runners[0]
+        assert status.pid != pid
+        assert (status.version, status.status) == (VERSION, "")
+        wait_for(lambda: not is_alive(pid), "its end")
 
 
-def _peers(daemon: DaemonUnderTest) -> list[str]:
-    mark = f"{daemon.socket}.d/executors".encode()
-    return [
-        folder.name
-        for folder in Path("/proc").iterdir()
-        if folder.name.isdigit() and mark in _read(folder / "cmdline")
-    ]
-
-
-def _read(file: Path) -> bytes:
-    try:
-        return file.read_bytes()
-    except OSError:
-        return b""
+def loop_left_behind(daemon: DaemonUnderTest) -> int:
+    """Leave a loop with one component by a rtcfd that was killed; return its executor's pid."""
+    daemon.start()
+    with daemon.client() as client:
+        client.set_runner(LONG)
+        client.load(rtcf.component("demo", "Fine", name="a"))
+        client.start()
+    pid = daemon.executor_pid()
+    daemon.end(signal.SIGKILL)
+    return pid
 
 
 def test_a_private_rtcfd_takes_its_executors_with_it(

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcfd import errors, frames
-from rtcfd.link import Link
+from rtcfd.link import PROTOCOL, Link
 
 Peer = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 
@@ -95,14 +95,14 @@ def test_a_peer_that_breaks_off_fails_what_waits(tmp_path: Path, reply: bytes) -
     against(tmp_path, peer, test)
 
 
-def test_another_protocol_is_refused(tmp_path: Path) -> None:
+def test_both_say_which_protocol_they_speak(tmp_path: Path) -> None:
     async def peer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         request = await received(reader)
-        response = wire.Response(id=request.id, hello=wire.HelloResult(protocol=2))
+        answer = wire.HelloResult(protocol=request.hello.protocol + 7)
+        response = wire.Response(id=request.id, hello=answer)
         writer.write(frames.pack(response.SerializeToString()))
 
     async def test(link: Link) -> None:
-        with pytest.raises(errors.FailedPrecondition, match="protocol 2"):
-            await link.hello(5.0)
+        assert (await link.hello(5.0)).protocol == PROTOCOL + 7
 
     against(tmp_path, peer, test)
