@@ -14,8 +14,9 @@ _DEGRADED = '[daemon]\nrealtime = "preferred"\n[runner.ros]\nenabled = false\n'
 class Service:
     """What an administrator does with systemctl, journalctl and rtcfctl."""
 
-    def __init__(self, machine: Machine) -> None:
+    def __init__(self, machine: Machine, settings: str = _DEGRADED) -> None:
         self.machine = machine
+        self._settings = settings
         self._since = time.time()
 
     def reset(self) -> None:
@@ -31,11 +32,16 @@ class Service:
 
     def configure(self, more: str) -> None:
         """Write the settings; they count from the next start or reload on."""
-        self.machine.path(SETTINGS).write_text(_DEGRADED + more)
+        self.machine.path(SETTINGS).write_text(self._settings + more)
 
     def systemctl(self, *arguments: str, check: bool = True) -> Done:
         """Call systemctl."""
         return self.machine.run("systemctl", *arguments, check=check)
+
+    def start_anew(self) -> None:
+        """Stop it with its loops, and start it."""
+        self.systemctl("stop", "rtcfd.service")
+        self.systemctl("start", "rtcfd.service")
 
     def unit_property(self, name: str, unit: str = "rtcfd.service") -> str:
         """Return a property of the unit."""

@@ -85,7 +85,7 @@ def test_a_service_with_bad_settings_stays_down_and_says_why(service: Service) -
 
 def test_graphs_d_is_what_a_runner_has_at_boot(service: Service) -> None:
     service.machine.path("/etc/rtcfd/graphs.d/line.yaml").write_text(GRAPH)
-    service.systemctl("restart", "rtcfd.service")
+    service.start_anew()
     assert service.ctl("-o", "json", "order").stdout.count("/") == 2
     service.wait_until_said("runner rt_runner is as /etc/rtcfd/graphs.d/line.yaml says")
 
@@ -106,9 +106,26 @@ def test_a_bad_graph_is_reported_and_the_others_are_applied(service: Service) ->
     folder = service.machine.path("/etc/rtcfd/graphs.d")
     (folder / "a-bad.yaml").write_text("runner: other\ncomponentz: []\n")
     (folder / "line.yaml").write_text(GRAPH)
-    service.systemctl("restart", "rtcfd.service")
+    service.start_anew()
     assert "a-bad.yaml:2" in service.ctl("status").stdout
     assert service.status()["components"] == 2
+
+
+def test_a_restart_leaves_the_loop_alone_and_reads_settings_and_graphs(service: Service) -> None:
+    before, daemon = service.load_and_start(), service.pid
+    service.configure("[runner]\nfrequency_hz = 500\n")
+    service.machine.path("/etc/rtcfd/graphs.d/line.yaml").write_text(GRAPH)
+    service.systemctl("restart", "rtcfd.service")
+    after = service.status()
+    assert service.pid not in (0, daemon)
+    assert service.unit_property("NRestarts") == "0"
+    assert (after["pid"], after["realtime_tid"]) == (before["pid"], before["realtime_tid"])
+    assert (after["state"], after["components"]) == ("running", 2)
+    assert after["settings"]["frequency_hz"] == 500
+    assert int(after["iteration"]) > int(before["iteration"])
+    said = [entry["MESSAGE"] for entry in service.journal()]
+    assert "leaving all loops to the next rtcfd" in said
+    assert "stopping all loops" not in said
 
 
 def test_a_stop_ends_loops_in_order_and_leaves_nothing(service: Service) -> None:

@@ -90,8 +90,9 @@ def test_a_read_only_etc_is_enough(service: Service) -> None:
     machine.run("mount", "--bind", "/etc", "/etc")
     machine.run("mount", "-o", "remount,bind,ro", "/etc")
     try:
-        service.systemctl("restart", "rtcfd.service")
+        service.start_anew()
         assert service.load_and_start()["state"] == "running"
+        service.systemctl("reload", "rtcfd.service")
     finally:
         service.systemctl("stop", "rtcfd.service")
         machine.run("umount", "/etc")
@@ -105,6 +106,7 @@ def test_a_corrupt_state_is_set_aside_and_told(service: Service) -> None:
     assert service.status().get("components", 0) == 0
     assert "rt_runner.corrupt-" in service.machine.run("ls", "/var/lib/rtcfd").stdout
     service.wait_until_said("is corrupt")
+    assert "set aside as rt_runner.corrupt-" in service.ctl("status").stdout
 
 
 def test_two_hundred_clients_at_once_are_served(service: Service) -> None:
@@ -126,10 +128,10 @@ def test_two_hundred_clients_at_once_are_served(service: Service) -> None:
     assert (after["pid"], after["state"]) == (before["pid"], "running")
 
 
-def test_the_state_survives_a_restart_of_the_machines_service(service: Service) -> None:
+def test_the_state_survives_a_stop_and_a_start(service: Service) -> None:
     service.load_and_start()
     service.ctl("runner", "set", "--frequency", "500")
-    service.systemctl("restart", "rtcfd.service")
+    service.start_anew()
     status = service.status()
     assert (status["state"], status["components"]) == ("stopped", 1)
     assert status["settings"]["frequency_hz"] == 500

@@ -3,27 +3,14 @@
 from typing import Any
 
 import pytest
+import versions
 from machine import Machine, wait_for
 from rtcf_service import Service
-
-# The same packages again, with a higher version.
-HIGHER = r"""
-set -e
-for deb in /debs/*.deb; do
-  dpkg-deb --raw-extract $deb /srv/up
-  version=$(dpkg-deb --field $deb Version)
-  sed -i "s/\b$version\b/$version+upgrade/g" /srv/up/DEBIAN/control
-  find /srv/up -name '*.py' -exec touch {} +
-  dpkg-deb -Znone --build /srv/up /upgrade/ >/dev/null
-  rm -r /srv/up
-done
-"""
 
 
 @pytest.fixture(scope="module")
 def higher(machine: Machine) -> str:
-    machine.shell(f"mkdir /upgrade; {HIGHER}")
-    return "/upgrade/*.deb"
+    return versions.make_higher(machine, "/debs", "/upgrade")
 
 
 def runs_on(service: Service, before: dict[str, Any], daemon: int) -> None:
@@ -40,7 +27,33 @@ def test_a_reinstallation_leaves_the_loop_alone(service: Service) -> None:
     runs_on(service, before, daemon)
 
 
+@pytest.mark.parametrize("distance", [-2, 2])
+def test_a_rtcfd_too_old_or_too_new_leaves_the_loop_running_and_says_so(
+    service: Service, distance: int
+) -> None:
+    machine, ours = service.machine, versions.protocol(service.machine)
+    before = service.load_and_start()
+    try:
+        versions.speak(machine, ours + distance)
+        service.systemctl("restart", "rtcfd.service")
+        said = service.ctl("status").stdout
+        assert f"which rtcfd {version(service)} with protocol {ours + distance} does not" in said
+        assert "its loop goes on as it is; `rtcfctl -r rt_runner stop` ends it" in said
+        done = service.ctl("load", "rtcf_examples", "Identity", check=False)
+        assert (done.returncode, len(done.stderr.splitlines())) == (1, 1)
+        machine.run("kill", "-0", str(before["realtime_tid"]))
+    finally:
+        versions.speak(machine, ours)
+    service.systemctl("restart", "rtcfd.service")
+    runs_on(service, before, service.pid)
+
+
+def version(service: Service) -> str:
+    return service.ctl("--version").stdout.split()[1]
+
+
 def test_an_upgrade_leaves_the_loop_alone_until_the_restart(service: Service, higher: str) -> None:
+    service.ctl("runner", "set", "--frequency", "2000")
     before, daemon = service.load_and_start(), service.pid
     assert "restart pending" not in service.ctl("status").stdout
     service.machine.shell(f"apt-get install --yes --quiet {higher}")
@@ -49,7 +62,18 @@ def test_an_upgrade_leaves_the_loop_alone_until_the_restart(service: Service, hi
     # What is new works with what is old.
     service.ctl("load", "rtcf_examples", "Identity", "--name", "new")
 
+    # The rtcfd of the next protocol works with the executor that runs on.
     service.systemctl("restart", "rtcfd.service")
     assert service.pid != daemon
-    assert "restart pending" not in service.ctl("status").stdout
-    assert service.status()["components"] == 2
+    runs_on(service, before, service.pid)
+    said = service.ctl("status").stdout
+    assert "rtcfd was upgraded" not in said
+    assert "restart pending: its executor is of rtcf" in said
+    service.ctl("unload", "new")
+    service.ctl("load", "rtcf_examples", "Identity", "--name", "newer")
+    runs_on(service, before, service.pid)
+
+    service.ctl("runner", "restart")
+    after = service.status()
+    assert after["pid"] != before["pid"]
+    assert (after["state"], after["components"]) == ("stopped", 2)

@@ -1,0 +1,43 @@
+"""The packages again, as if of another version; and rtcfd as if of another protocol."""
+
+from machine import Machine
+
+_PACKAGE = "/usr/lib/python3/dist-packages/rtcfd"
+
+_HIGHER = r"""
+set -e
+mkdir -p {into}
+for deb in {debs}/*.deb; do
+  dpkg-deb --raw-extract $deb /srv/up
+  version=$(dpkg-deb --field $deb Version)
+  sed -i "s/\b$version\b/$version+upgrade/g" /srv/up/DEBIAN/control
+  find /srv/up -name '*.py' -exec touch {{}} +
+  if [ -d /srv/up{package} ]; then
+    sed -i 's/^VERSION = "\(.*\)"/VERSION = "\1+upgrade"/' /srv/up{package}/__init__.py
+    sed -i 's/^PROTOCOL = .*/PROTOCOL = {protocol}/' /srv/up{package}/link.py
+    (cd /srv/up; find * -path DEBIAN -prune -o -type f -print0 | xargs -0 md5sum >DEBIAN/md5sums)
+  fi
+  dpkg-deb -Znone --build /srv/up {into}/ >/dev/null
+  rm -r /srv/up
+done
+"""
+
+
+def protocol(machine: Machine) -> int:
+    """Return the protocol of the rtcfd that is installed."""
+    text = machine.path(f"{_PACKAGE}/link.py").read_text()
+    (line,) = [line for line in text.splitlines() if line.startswith("PROTOCOL = ")]
+    return int(line.partition("= ")[2])
+
+
+def speak(machine: Machine, number: int) -> None:
+    """Make the rtcfd that is installed one of another protocol, from its next start on."""
+    machine.shell(f"sed -i 's/^PROTOCOL = .*/PROTOCOL = {number}/' {_PACKAGE}/link.py")
+
+
+def make_higher(machine: Machine, debs: str, into: str) -> str:
+    """Make packages of a higher version, whose rtcfd speaks the next protocol; return their
+    files."""
+    values = {"debs": debs, "into": into, "package": _PACKAGE, "protocol": protocol(machine) + 1}
+    machine.shell(_HIGHER.format(**values))
+    return f"{into}/*.deb"

@@ -1,0 +1,62 @@
+"""A loop at 2 kHz in the service of this machine, and whether it went on."""
+
+from dataclasses import dataclass
+
+import rtcf
+from machine import wait_for
+from rtcf.v1 import runner_pb2
+from rtcf_service import Service
+
+FREQUENCY_HZ = 2000.0
+DROP_IN = "/etc/systemd/system/rtcfd.service.d/test.conf"
+
+
+@dataclass(frozen=True)
+class Mark:
+    """What a loop that goes on undisturbed does not change, and its cycles."""
+
+    executor: int
+    thread: int
+    missed: int
+    overruns: int
+    iteration: int
+
+
+class Loop(Service):
+    """The service, asked by the client library: each rtcfctl takes long on an emulated CPU."""
+
+    def begin(self) -> None:
+        """Have a loop with one component."""
+        with rtcf.Client() as client:
+            client.set_runner(runner_pb2.RunnerSettings(frequency_hz=FREQUENCY_HZ))
+            client.load(rtcf.component("rtcf_examples", "Mimo", name="M"))
+            client.start()
+        wait_for(lambda: self.now().iteration > FREQUENCY_HZ, "a second of cycles")
+
+    def told(self) -> runner_pb2.RunnerStatus:
+        """Return its status."""
+        with rtcf.Client() as client:
+            (told,) = client.get_status("rt_runner").runners
+        return told  # type: ignore[no-any-return]
+
+    def now(self) -> Mark:
+        """Return where it is."""
+        told = self.told()
+        assert told.state == runner_pb2.RUNNER_STATE_RUNNING, told
+        return Mark(told.pid, told.realtime_tid, told.missed, told.overruns, told.iteration)
+
+    def must_have_gone_on(self, since: Mark, seconds: float = 0.0) -> None:
+        """Fail if it has missed a cycle, or is another; wait until it is so far on."""
+        enough = since.iteration + FREQUENCY_HZ * max(seconds, 0.5)
+        now = wait_for(lambda: m if (m := self.now()).iteration > enough else None, "its cycles")
+        assert now == Mark(since.executor, since.thread, since.missed, since.overruns,
+                           now.iteration)  # fmt: skip
+
+    def drop_in(self, text: str) -> None:
+        """Give the unit a drop-in that counts from now on; empty takes it away."""
+        file = self.machine.path(DROP_IN)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(f"[Service]\n{text}\n")
+        if not text:
+            file.unlink()
+        self.systemctl("daemon-reload")
