@@ -3,6 +3,7 @@
 Owned by the Runner; called by its Link on rtcfd's one thread.
 """
 
+import asyncio
 import logging
 from collections.abc import Callable
 from typing import Protocol
@@ -33,6 +34,9 @@ _EVENT_LEVELS: dict[int, int] = {
 }
 
 
+_REPORT_S = 1.0  # from the first record that is dropped to the line that says how many were
+
+
 class Audience(Protocol):
     """Who else hears of it: the Runner."""
 
@@ -60,6 +64,7 @@ class Relay:
         self._audience = audience
         self._limits = limits
         self._budget = Budget(limits().log_records_per_s)
+        self._report: asyncio.TimerHandle | None = None  # of what was lost
 
     def take(self, response: wire.Response) -> None:
         """Take one unasked frame."""
@@ -81,15 +86,10 @@ class Relay:
         # A component that logs in each cycle must not fill the disk.
         self._budget.per_s = self._limits().log_records_per_s
         if not self._budget.take():
+            if self._report is None:
+                later = asyncio.get_running_loop().call_later
+                self._report = later(_REPORT_S, self._tell_what_was_lost)
             return
-        if lost := self._budget.take_lost():
-            log.warning(
-                "%d log records of its components were dropped: more than %d a second; see "
-                "log_records_per_s under [limits]",
-                lost,
-                self._budget.per_s,
-                extra={"runner": self._runner},
-            )
         entry = log.makeRecord(
             log.name,
             level,
@@ -109,6 +109,16 @@ class Relay:
         entry.created = record.time_ns / 1e9
         entry.msecs = record.time_ns // 1_000_000 % 1000
         log.handle(entry)
+
+    def _tell_what_was_lost(self) -> None:
+        self._report = None
+        log.warning(
+            "%d log records of its components were dropped: more than %d a second; see "
+            "log_records_per_s under [limits]",
+            self._budget.take_lost(),
+            self._budget.per_s,
+            extra={"runner": self._runner},
+        )
 
     def _event(self, event: wire.Event) -> None:
         log.log(

@@ -20,6 +20,7 @@ def stopped_daemon(tmp_path: Path) -> Iterator[DaemonUnderTest]:
             "Crashes": "crashes",
             "Slow": "slow",
             "Logs": "logs",
+            "Chatters": "chatters",
         },
     )
     yield daemon

@@ -4,7 +4,7 @@ Speaks the real frames over a real unix socket and keeps a list of components.
 A "library" here is a JSON file: {"types": {"Name": "behaviour"}, "problem":
 "...", "crash": "SIGSEGV"}; behaviours of a type at its load: "fine",
 "refused", "crashes", "slow" (until the file named by its parameter `until`
-exists), "logs".
+exists), "logs", "chatters".
 
 PEER_PROTOCOL is what it speaks, PEER_LATER_PROTOCOL what it turns out to speak
 with the next rtcfd.
@@ -31,6 +31,7 @@ from rtcfd import VERSION, frames
 from rtcfd.link import LIMITS_PROTOCOL, PROTOCOL
 
 POLL_S = 0.005
+CHATTER = 100  # records at once
 GRAPH_SLOT, UPDATE_SLOT = 1, 2
 
 
@@ -172,6 +173,10 @@ class Peer:
             until = Path(spec.parameters[0].value.string_value)
             while not until.exists():
                 await asyncio.sleep(POLL_S)
+        if behaviour == "chatters":
+            for number in range(CHATTER):
+                record = wire.LogRecord(level=wire.LogRecord.LEVEL_INFO, message=f"line {number}")
+                self.send(wire.Response(log=record))
         if behaviour == "logs":
             record = wire.LogRecord(
                 level=wire.LogRecord.LEVEL_WARN,

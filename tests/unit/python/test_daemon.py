@@ -1,6 +1,7 @@
 """rtcfd from outside: its socket, its life, its runners."""
 
 import os
+import re
 import signal
 import socket
 import stat
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 import rtcf
 from daemon_under_test import DaemonUnderTest, wait_for
+from peer_executor import CHATTER
 from rtcf.v1 import runner_pb2
 
 
@@ -185,3 +187,18 @@ def test_log_records_arrive_with_their_source(daemon: DaemonUnderTest, client: r
     )
     assert line.split(maxsplit=1)[0].endswith(".500")
     assert "WARNING rt_runner /Logs: from the loop (logs.cpp:12, #7)" in line
+
+
+def test_too_many_log_records_are_counted_and_the_count_is_told(
+    stopped_daemon: DaemonUnderTest,
+) -> None:
+    stopped_daemon.settings.write_text("[limits]\nlog_records_per_s = 1\n")
+    stopped_daemon.start("--config", str(stopped_daemon.settings))
+    with stopped_daemon.client() as client:
+        client.load(rtcf.component("demo", "Chatters"))
+    wait_for(lambda: "were dropped: more than 1 a second" in stopped_daemon.log(), "the count")
+    log = stopped_daemon.log()
+    assert "see log_records_per_s under [limits]" in log
+    (dropped,) = re.findall(r"(\d+) log records of its components were dropped", log)
+    assert int(dropped) + len(re.findall(r"line \d+$", log, re.M)) == CHATTER
+    assert int(dropped) > CHATTER // 2
