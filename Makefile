@@ -24,8 +24,8 @@ test: all ## all checks: lint, unit, sanitizers, integration, packages
 	@tools/install-dependencies test
 	@tests/run
 
-test-long: all ## the same with the tests that take hours
-	@tools/install-dependencies test
+test-long: all ## the same with soaks, reproducible builds and the PREEMPT_RT machine
+	@tools/install-dependencies test-long
 	@tests/run --long
 
 bench: all ## measure against HAL, cyclictest and direct calls; HOURS=3: a long run
