@@ -46,6 +46,7 @@ class Daemon:
 
     def __init__(self, given: options.Options, read_options: Callable[[], options.Options]) -> None:
         self._options = given
+        self._read_options = read_options
         self._notify = Notify()
         self._command = ExecutorCommand(given.executor, given.runtime_dir / "executors")
         self._store = Store(given.state_dir)
@@ -131,6 +132,13 @@ class Daemon:
         """End for a restart: loops go on, clients wait for the next rtcfd."""
         log.info("leaving all loops to the next rtcfd")
         self._notify.stopping("leaving all loops to the next rtcfd")
+        try:
+            self._read_options()
+        except Refusal as refusal:
+            log.error(
+                "the next rtcfd will not start, and loops stop after their orphan_timeout_s: %s",
+                refusal,
+            )
         self._front.close_door()
         serving = asyncio.create_task(self._server.stop(_GRACE_S))
         await self._runners.leave()

@@ -14,6 +14,7 @@ def test_removal_ends_everything_and_keeps_settings_and_state(machine: Machine) 
     service.ctl("load", "rtcf_examples", "Mimo", "--name", "M")
     machine.run("apt-get", "remove", "--yes", "--quiet", *PACKAGES)
     assert machine.run("pgrep", "-u", "rtcf", check=False).stdout == ""
+    assert machine.run("ls", "/run/rtcfd", check=False).returncode != 0
     assert machine.path("/etc/rtcfd/rtcfd.toml").is_file()
     assert machine.path("/var/lib/rtcfd/rt_runner.json").is_file()
     assert machine.run("systemctl", "is-failed", "rtcfd.service", check=False).returncode != 0
