@@ -22,7 +22,7 @@ def offered(daemon: DaemonUnderTest) -> DaemonUnderTest:
     ("line", "among"),
     [
         ("sta", ["start", "stats", "status"]),
-        ("runner ", ["add", "list", "remove", "set"]),
+        ("runner ", ["add", "list", "remove", "restart", "set"]),
         ("runner remove ", ["other", "rt_runner"]),
         ("-r ", ["other", "rt_runner"]),
         ("-o ", ["json", "table", "yaml"]),
