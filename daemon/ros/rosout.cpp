@@ -36,8 +36,6 @@ ros::Time timeOf(const executor::LogEntry& entry) {
 
 void Rosout::publish(const executor::LogEntry& entry) {
     rosgraph_msgs::Log message;
-    // Of a simulation only the present is known, which is hardly later than the call.
-    message.header.stamp = ros::Time::isSimTime() ? ros::Time::now() : timeOf(entry);
     message.level = levelTo(entry.level);
     message.msg = entry.message;
     message.file = entry.file;
@@ -45,6 +43,9 @@ void Rosout::publish(const executor::LogEntry& entry) {
     message.line = entry.line;
     const std::lock_guard lock(mutex_);
     if (!publisher_) return;
+    // Of a simulation only the present is known, which is hardly later than the call. Without a
+    // node there is no time of ROS.
+    message.header.stamp = ros::Time::isSimTime() ? ros::Time::now() : timeOf(entry);
     // What the node itself says is under the node's name, as for any node.
     message.name = entry.component.empty() ? node_ : executor::LogLevels::loggerOf(entry.component);
     publisher_.publish(message);
