@@ -23,6 +23,8 @@ _CHUNK = 65536
 _BACKLOG = 256
 # Connections above the limit that get a word of refusal; more wait until others leave.
 _MOST_WAITING = 64
+# Above that they are hung up on, before the descriptors are gone that loops take.
+_MOST_QUEUED = 4096
 _SHOWN_PREFIX = "unix-abstract:"  # of an abstract name, as grpcio shows it
 
 
@@ -77,6 +79,8 @@ class Front:
             await self._turn()
             self._admit(name, writer.get_extra_info("socket"))
             await self._relay(name, reader, writer)
+        except ConnectionRefusedError:
+            pass  # too many: that was said when the first of them came; or we are ending
         except OSError as error:
             log.warning("a client is lost: %s", error.strerror or error)
         finally:
@@ -89,6 +93,8 @@ class Front:
     async def _turn(self) -> None:
         """Wait as long as there are too many even to be refused."""
         while len(self._peers) >= self.limit and len(self._waiting) >= _MOST_WAITING:
+            if len(self._queue) >= _MOST_QUEUED:
+                raise ConnectionRefusedError
             turn: asyncio.Future[None] = asyncio.get_running_loop().create_future()
             self._queue.append(turn)
             await turn
