@@ -61,7 +61,7 @@ void CycleTopic::run() {
 
 void CycleTopic::publishAll() {
     const std::lock_guard lock(mutex_);
-    const bool wanted = publisher_ && publisher_.getNumSubscribers() > 0;
+    const bool wanted = static_cast<bool>(publisher_) && publisher_.getNumSubscribers() > 0;
     executor::CycleRecord record{};
     while (!stop_ && runner_.popCycle(record)) {
         if (wanted) publisher_.publish(messageOf(record));

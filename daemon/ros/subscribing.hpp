@@ -48,7 +48,8 @@ class Subscribing {
     /// @param simulated whether the master says that time is simulated
     /// @return true if anything was opened or closed
     bool reconcile(ros::NodeHandle& handle, bool simulated) {
-        return reconcileTopics(handle, true) | clock_.reconcile(handle, queue_, simulated);
+        const bool topics = reconcileTopics(handle, true);
+        return clock_.reconcile(handle, queue_, simulated) || topics;
     }
     /// The same without a master: only new injectors of topics that are subscribed.
     void reconcileWithoutMaster(ros::NodeHandle& handle) { reconcileTopics(handle, false); }

@@ -104,6 +104,7 @@ class Bridge {
     virtual BridgeStatus status() const = 0;
 
     /// How parameters are to be changed. Called once, before all else.
+    // NOLINTNEXTLINE(performance-unnecessary-value-param): to be kept
     virtual void serveParameters(ParameterRequest /*request*/) {}
 
     /// What hooks reach the outside by; null if they do not. As long as the bridge.
