@@ -326,9 +326,10 @@ def test_random_changes_leave_the_graph_of_the_model(soak: Soak, runs: int, chan
         ),
     )
     print(f"{soak.changes} changes, {soak.refusals} of them refused")
-    print(f"memory of the executor after each run, KiB: {soak.resident_kb}")
+    runs_at = {kb: run for run, kb in reversed(list(enumerate(soak.resident_kb)))}
+    print(f"memory of the executor, KiB, and since which run: {runs_at}")
     assert soak.changes >= changes
-    assert 0 < soak.refusals < soak.changes * 0.6
+    assert 0 < soak.refusals < soak.changes * 0.7
     # All tables have grown once after some hundred changes.
     if (warm := len(soak.resident_kb) // 2) >= 100:
         assert soak.resident_kb[-1] <= soak.resident_kb[warm]
