@@ -22,6 +22,7 @@ struct Topic {
 bool topics(MasterClient& self, const char* method, std::vector<Topic>& found) {
     MasterAnswer answer = self.call(method, array({"/rtcfd"}));
     if (!answer || answer.value.getType() != XmlRpc::XmlRpcValue::TypeArray) return false;
+    // NOLINTNEXTLINE(modernize-loop-convert): its begin() is for structs
     for (int i = 0; i < answer.value.size(); ++i) {
         XmlRpc::XmlRpcValue& pair = answer.value[i];
         found.push_back({static_cast<std::string&>(pair[0]), static_cast<std::string&>(pair[1])});

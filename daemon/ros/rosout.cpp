@@ -36,7 +36,7 @@ ros::Time timeOf(const executor::LogEntry& entry) {
 
 void Rosout::publish(const executor::LogEntry& entry) {
     rosgraph_msgs::Log message;
-    message.level = levelTo(entry.level);
+    message.level = static_cast<rosgraph_msgs::Log::_level_type>(levelTo(entry.level));
     message.msg = entry.message;
     message.file = entry.file;
     message.function = entry.function;
@@ -53,9 +53,9 @@ void Rosout::publish(const executor::LogEntry& entry) {
 
 void Rosout::open(ros::NodeHandle& handle, const std::string& node) {
     // As roscpp does: a console that comes late gets the last record.
-    ros::Publisher publisher = handle.advertise<rosgraph_msgs::Log>("/rosout", kQueue, true);
+    const ros::Publisher publisher = handle.advertise<rosgraph_msgs::Log>("/rosout", kQueue, true);
     const std::lock_guard lock(mutex_);
-    publisher_ = std::move(publisher);
+    publisher_ = publisher;
     node_ = node;
 }
 

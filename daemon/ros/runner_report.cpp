@@ -53,7 +53,7 @@ void addMicroseconds(DiagnosticStatus& status, const std::string& what,
 // The worse of two: an error hides a warning, not the other way round.
 void raise(DiagnosticStatus& status, std::uint8_t level, const std::string& message) {
     if (level <= status.level) return;
-    status.level = level;
+    status.level = static_cast<DiagnosticStatus::_level_type>(level);
     status.message = message;
 }
 
@@ -94,7 +94,8 @@ rtcf_msgs::GetIntrospectionInformation::Response describeRunner(
                 found != graph->connections.end()) {
                 const executor::ConnectionSnapshot& connection = found->second;
                 line.connected = connection.writer && !connection.readers.empty() ? 1 : 0;
-                line.mapped = connection.published || (!port.output && connection.subscribed);
+                const bool mapped = connection.published || (!port.output && connection.subscribed);
+                line.mapped = mapped ? 1 : 0;
                 for (const executor::EndpointSnapshot& reader : connection.readers) {
                     const bool same =
                         reader.component == component->full_name && reader.port == port.name;

@@ -387,15 +387,19 @@ ChangeOutcome Runner::stop(const Progress& progress) {
     return outcome();
 }
 
+// Other cycles than the loop's are run only while it does not run.
+void Runner::requireNoLoop() {
+    noticeEnd();
+    if (!loop_.joinable()) return;
+    throw Refusal(
+        RefusalKind::FailedPrecondition,
+        fmt::format("the loop of {0} runs in real time: stop it first: rtcfctl -r {0} stop",
+                    name_));
+}
+
 ChangeOutcome Runner::step(std::uint64_t cycles, const Progress& progress) {
     constexpr std::uint64_t kChunk = 10000;  // cycles between reports
-    noticeEnd();
-    if (loop_.joinable()) {
-        throw Refusal(
-            RefusalKind::FailedPrecondition,
-            fmt::format("the loop of {0} runs in real time: stop it first: rtcfctl -r {0} stop",
-                        name_));
-    }
+    requireNoLoop();
     if (state_ != RunnerState::Stepping) {
         startAll(progress);
         loop_.beginStepping(settings_.loop);
@@ -440,13 +444,7 @@ ReplayOutcome Runner::replay(const ReplayChunk& chunk, const Progress& progress)
 }
 
 ReplayOutcome Runner::beginReplay(const ReplayChunk& chunk, const Progress& progress) {
-    noticeEnd();
-    if (loop_.joinable()) {
-        throw Refusal(
-            RefusalKind::FailedPrecondition,
-            fmt::format("the loop of {0} runs in real time: stop it first: rtcfctl -r {0} stop",
-                        name_));
-    }
+    requireNoLoop();
     if (state_ == RunnerState::Stepping) endStepping();
     Replay::check(plan_->bridgeTable(), chunk.topics);
     renewComponents(progress);

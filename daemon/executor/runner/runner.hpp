@@ -160,6 +160,7 @@ class Runner final : private RunnerView {
     void threadMain();
     void tick();
     void noticeEnd();
+    void requireNoLoop();
     void loopEnded();
     void noteLoopFault();
     void noteComponentFaults();
