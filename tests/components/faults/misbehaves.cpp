@@ -24,7 +24,7 @@ class Allocates final : public Faulty {
 
 class Hoards final : public Faulty {
     static constexpr std::size_t kBytes = 1000 * 1000;
-    void fault() override { memory_.push_back(std::vector<char>(kBytes, 1)); }
+    void fault() override { memory_.emplace_back(kBytes, 1); }
     std::vector<std::vector<char>> memory_;
 };
 
