@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -90,10 +90,10 @@ class DaemonUnderTest:
     def client(self) -> rtcf.Client:
         return rtcf.Client(self.socket)
 
-    def ctl(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        """Run rtcfctl."""
+    def ctl(self, *arguments: str, wrapper: Sequence[str] = ()) -> subprocess.CompletedProcess[str]:
+        """Run rtcfctl; `wrapper` is a command that runs it."""
         return subprocess.run(
-            [str(BUILD_TREE / "bin" / "rtcfctl"), *arguments],
+            [*wrapper, str(BUILD_TREE / "bin" / "rtcfctl"), *arguments],
             env={**os.environ, "RTCF_SOCKET": str(self.socket)},
             capture_output=True,
             text=True,
