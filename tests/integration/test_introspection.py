@@ -3,12 +3,10 @@
 import itertools
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import fig_1
 import pytest
-import rosgraph
 import rtcf
 import yaml
 from daemon_process import BUILD_TREE, DEADLINE_S, Daemon, wait_for, with_ros
@@ -27,27 +25,13 @@ SERVICES = {
 
 
 @pytest.fixture
-def ros_daemon(tmp_path: Path, master: Master) -> Iterator[Daemon]:
-    daemon = Daemon(tmp_path, with_ros(master.uri, fig_1.WHITELIST))
-    daemon.start()
-    yield daemon
-    if not daemon.ended:
-        daemon.end()
-
-
-@pytest.fixture
-def ros_client(ros_daemon: Daemon) -> Iterator[rtcf.Client]:
-    with rtcf.Client(ros_daemon.socket) as client:
-        yield client
-
-
-def _services(master: Master) -> set[str]:
-    state = rosgraph.Master("/test", master.uri).getSystemState()
-    return {name for name, _ in state[2]}
+def settings(master: Master) -> str:
+    """Let the loops of `daemon` have a ROS node."""
+    return with_ros(master.uri, fig_1.WHITELIST)
 
 
 def _wait_for_services(master: Master) -> None:
-    wait_for(lambda: _services(master) >= SERVICES, "the services of the runner")
+    wait_for(lambda: master.services() >= SERVICES, "the services of the runner")
 
 
 def _call(master: Master, service: str, request: str = "") -> dict[str, object]:
@@ -85,24 +69,24 @@ def _lines(peer: "subprocess.Popen[str]") -> list[str]:
 
 
 def test_every_cycle_is_published_with_stamp_and_duration(
-    ros_client: rtcf.Client, master: Master
+    client: rtcf.Client, master: Master
 ) -> None:
-    ros_client.set_runner(runner_pb2.RunnerSettings(frequency_hz=2000.0))
-    fig_1.load(ros_client)
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=2000.0))
+    fig_1.load(client)
     _wait_for_services(master)
     peer = _peer(master, "cycles", "/rt_runner/iteration_info", "6000")
     assert peer.stdout is not None
     assert peer.stdout.readline() == "connected\n"
-    ros_client.start()
+    client.start()
     cycles = [[int(word) for word in line.split()] for line in _lines(peer)]
-    ros_client.stop()
+    client.stop()
     assert [each[0] for each in cycles] == list(range(6000))  # none lost, from the first on
     stamps = [each[1] for each in cycles]
     assert all(later > earlier for earlier, later in itertools.pairwise(stamps))
     assert all(duration > 0 for _, _, duration in cycles)
 
 
-def test_rostopic_knows_the_type_of_iteration_info(ros_daemon: Daemon, master: Master) -> None:
+def test_rostopic_knows_the_type_of_iteration_info(daemon: Daemon, master: Master) -> None:
     _wait_for_services(master)
     done = subprocess.run(
         ["/usr/bin/rostopic", "info", "/rt_runner/iteration_info"],
@@ -116,13 +100,11 @@ def test_rostopic_knows_the_type_of_iteration_info(ros_daemon: Daemon, master: M
 
 
 def test_diagnostics_tell_the_health_of_loop_and_components(
-    ros_client: rtcf.Client, master: Master
+    client: rtcf.Client, master: Master
 ) -> None:
-    ros_client.load(
-        rtcf.component("rtcf_faults", "Throws", name="Bomb", parameters=["after:=2000"])
-    )
-    ros_client.load(rtcf.component("rtcf_examples", "Mimo", name="Sum"))
-    ros_client.start()
+    client.load(rtcf.component("rtcf_faults", "Throws", name="Bomb", parameters=["after:=2000"]))
+    client.load(rtcf.component("rtcf_examples", "Mimo", name="Sum"))
+    client.start()
     peer = _peer(master, "diagnostics", "rt_runner: loop", "2")
     statuses = [line.split("|") for line in _lines(peer)]
     # name, level, message, then key=value
@@ -141,7 +123,7 @@ def test_diagnostics_tell_the_health_of_loop_and_components(
 
 
 def test_services_load_run_and_unload_as_rtcfctl_does(
-    ros_daemon: Daemon, ros_client: rtcf.Client, master: Master
+    daemon: Daemon, client: rtcf.Client, master: Master
 ) -> None:
     _wait_for_services(master)
     sum_1 = "{name: Sum, ns: arm, package: rtcf_examples, type: Mimo, remaps: ['out1:=total']}"
@@ -152,10 +134,10 @@ def test_services_load_run_and_unload_as_rtcfctl_does(
         " topics_ignore_for_graph: '/nothing'}"
     )
     assert _call(master, "load_orocos_component", sum_2)["success"] is True
-    assert ros_daemon.ctl("order").stdout.split() == ["/Second", "/arm/Sum"]
+    assert daemon.ctl("order").stdout.split() == ["/Second", "/arm/Sum"]
 
     assert _call(master, "activate_rt_loop")["success"] is True
-    wait_for(lambda: iteration(ros_client) > 10, "the loop")
+    wait_for(lambda: iteration(client) > 10, "the loop")
     told = _call(master, "get_introspection_information")
     assert (told["runner"], told["state"], told["frequency"]) == ("rt_runner", "running", 1000.0)
     assert told["component_order"] == ["/Second", "/arm/Sum"]
@@ -178,21 +160,21 @@ def test_services_load_run_and_unload_as_rtcfctl_does(
     assert (total["writer"], total["readers"]) == ("/arm/Sum", ["/Second"])
 
     assert _call(master, "deactivate_rt_loop")["success"] is True
-    assert ros_client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_STOPPED
+    assert client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_STOPPED
     assert _call(master, "unload_orocos_component", "{name: Sum, ns: /arm}")["success"] is True
     assert _call(master, "unload_orocos_component", "{name: /Second}")["success"] is True
-    assert ros_daemon.ctl("order").stdout.split() == []
+    assert daemon.ctl("order").stdout.split() == []
 
 
 def test_what_services_change_is_the_desired_state(
-    ros_daemon: Daemon, ros_client: rtcf.Client, master: Master
+    daemon: Daemon, client: rtcf.Client, master: Master
 ) -> None:
     _wait_for_services(master)
     spec = "{name: Sum, package: rtcf_examples, type: Mimo}"
     assert _call(master, "load_orocos_component", spec)["success"] is True
-    ros_daemon.end()
-    ros_daemon.start()
-    wait_for(lambda: "/Sum" in ros_daemon.ctl("order").stdout, "the component after a restart")
+    daemon.end()
+    daemon.start()
+    wait_for(lambda: "/Sum" in daemon.ctl("order").stdout, "the component after a restart")
 
 
 @pytest.mark.parametrize(
@@ -206,13 +188,13 @@ def test_what_services_change_is_the_desired_state(
     ],
 )
 def test_refusals_say_what_is_wrong(
-    ros_daemon: Daemon, master: Master, service: str, request_text: str, why: str
+    daemon: Daemon, master: Master, service: str, request_text: str, why: str
 ) -> None:
     _wait_for_services(master)
     answer = _call(master, service, request_text)
     assert answer["success"] is False
     assert why in str(answer["message"])
-    assert ros_daemon.ctl("order").stdout.split() == []
+    assert daemon.ctl("order").stdout.split() == []
 
 
 @pytest.mark.parametrize(
@@ -257,7 +239,7 @@ def test_services_and_topics_are_there_again_after_a_restart_of_the_master(
         master.end()
 
 
-def test_services_leave_with_the_daemon(ros_daemon: Daemon, master: Master) -> None:
+def test_services_leave_with_the_daemon(daemon: Daemon, master: Master) -> None:
     _wait_for_services(master)
-    ros_daemon.end()
-    assert not _services(master) & SERVICES
+    daemon.end()
+    assert not master.services() & SERVICES

@@ -10,7 +10,7 @@ import rtcf
 from daemon_process import Daemon, wait_for
 from holders import held, hold, lease, leased
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
-from values import iteration, wait_until_after
+from values import iteration, state, wait_until_after
 
 UNLOAD = control_pb2.ON_LEASE_LOST_UNLOAD
 KEEP = control_pb2.ON_LEASE_LOST_KEEP
@@ -23,11 +23,6 @@ def counter(name: str) -> graph_pb2.ComponentSpec:
 
 def names(client: rtcf.Client) -> list[str]:
     return [info.full_name for info in client.list_components()]
-
-
-def state(client: rtcf.Client) -> runner_pb2.RunnerStatus:
-    status: runner_pb2.RunnerStatus = client.get_status("rt_runner").runners[0]
-    return status
 
 
 def running(client: rtcf.Client) -> bool:

@@ -3,7 +3,6 @@
 import json
 import re
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -19,39 +18,37 @@ BUILD_S = 600.0
 
 
 @pytest.fixture
-def ros_daemon(tmp_path: Path, master: Master) -> Iterator[Daemon]:
-    daemon = Daemon(tmp_path, with_ros(master.uri, "/ros/.*"))
-    daemon.start()
-    yield daemon
-    daemon.end()
+def settings(master: Master) -> str:
+    """Let the loops of `daemon` have a ROS node."""
+    return with_ros(master.uri, "/ros/.*")
 
 
-def test_listing_1_of_the_paper_runs(ros_daemon: Daemon, master: Master) -> None:
+def test_listing_1_of_the_paper_runs(daemon: Daemon, master: Master) -> None:
     """Two of them as in Listing 2: what is written to /ros/in comes out of /ros/out."""
     _set_parameter(master, "/test_param", "4.25")
-    with rtcf.Client(ros_daemon.socket) as client:
+    with rtcf.Client(daemon.socket) as client:
         load = ("load", "rtcf_compat", "PaperExample", "--name")
-        first = ros_daemon.ctl(
+        first = daemon.ctl(
             *load, "example1", "--first", "--remap", "in_port:=/ros/in", "--remap", "out_port:=/tmp"
         )
-        second = ros_daemon.ctl(
+        second = daemon.ctl(
             *load, "example2", "--remap", "in_port:=/tmp", "--remap", "out_port:=/ros/out"
         )
         assert (first.returncode, first.stderr) == (0, "")
         assert (second.returncode, second.stderr) == (0, "")
-        assert ros_daemon.ctl("order").stdout.split() == ["/example1", "/example2"]
+        assert daemon.ctl("order").stdout.split() == ["/example1", "/example2"]
         client.start()
         writer = subprocess.Popen(
             ["/usr/bin/rostopic", "pub", "/ros/in", "std_msgs/Float32", "0.1"],
             env=master.environment(),
         )
         try:
-            wait_for(lambda: _value(ros_daemon, "example2", "out_port") == 0.1, "the value")
+            wait_for(lambda: _value(daemon, "example2", "out_port") == 0.1, "the value")
         finally:
             writer.terminate()
             writer.wait()
         client.stop()
-    log = ros_daemon.log()
+    log = daemon.log()
     assert "Fetched param with value 4.25" in log
     assert "Update hook called!" in log
 

@@ -14,7 +14,7 @@ from daemon_process import DEADLINE_S, Daemon, wait_for, with_ros
 from ros_processes import Master
 from rtcf.v1 import runner_pb2
 from std_msgs.msg import Float64
-from values import iteration
+from values import iteration, state
 
 SECOND = 1_000_000_000
 _PEER = Path(__file__).with_name("clock_peer.py")
@@ -85,11 +85,6 @@ def clock(tmp_path: Path, simulated: Master, client: rtcf.Client) -> Iterator[Cl
     clock.end()
 
 
-def _status(client: rtcf.Client) -> runner_pb2.RunnerStatus:
-    status: runner_pb2.RunnerStatus = client.get_status("rt_runner").runners[0]
-    return status
-
-
 def _wait_for_exactly(client: rtcf.Client, cycles: int) -> None:
     try:
         wait_for(lambda: iteration(client) >= cycles, f"cycle {cycles}")
@@ -101,7 +96,7 @@ def _wait_for_exactly(client: rtcf.Client, cycles: int) -> None:
 def test_a_clock_of_any_rate_makes_the_exact_number_of_cycles(
     client: rtcf.Client, clock: Clock, rate_hz: int
 ) -> None:
-    status = _status(client)
+    status = state(client)
     assert status.simulated
     assert status.iteration == 0
     seconds = 5
@@ -123,7 +118,7 @@ def test_a_clock_that_stands_stops_the_loop_and_nothing_else(
     clock.tick(5 * SECOND + 20_000_000)
     _wait_for_exactly(client, 21)
     client.stop()
-    assert _status(client).state == runner_pb2.RUNNER_STATE_STOPPED
+    assert state(client).state == runner_pb2.RUNNER_STATE_STOPPED
 
 
 def test_a_jump_begins_anew_with_one_cycle_and_is_said(
@@ -144,7 +139,7 @@ def test_a_jump_begins_anew_with_one_cycle_and_is_said(
 def test_what_peers_are_told_has_the_simulations_time(
     client: rtcf.Client, clock: Clock, simulated: Master
 ) -> None:
-    listener = simulated.node("rosout", _status(client).ros.node)
+    listener = simulated.node("rosout", state(client).ros.node)
     listener.wait_until_connected()
     clock.tick(SECOND, SECOND + 5_000_000, 60 * SECOND)
     jump = wait_for(
@@ -164,7 +159,7 @@ def test_a_loop_that_is_not_to_follow_the_clock_does_not(client: rtcf.Client) ->
     client.set_runner(runner_pb2.RunnerSettings(sim_time=runner_pb2.SIM_TIME_NEVER))
     client.start()
     wait_for(lambda: iteration(client) > 10, "cycles in real time")
-    assert not _status(client).simulated
+    assert not state(client).simulated
 
 
 def test_a_bag_that_is_played_loses_no_input_and_no_cycle(
