@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint32_t kQueue = 1000;
 
-std::uint8_t levelTo(LogLevel level) {
+rosgraph_msgs::Log::_level_type levelTo(LogLevel level) {
     switch (level) {
         case LogLevel::Debug:
             return rosgraph_msgs::Log::DEBUG;
@@ -36,7 +36,7 @@ ros::Time timeOf(const executor::LogEntry& entry) {
 
 void Rosout::publish(const executor::LogEntry& entry) {
     rosgraph_msgs::Log message;
-    message.level = static_cast<rosgraph_msgs::Log::_level_type>(levelTo(entry.level));
+    message.level = levelTo(entry.level);
     message.msg = entry.message;
     message.file = entry.file;
     message.function = entry.function;

@@ -51,9 +51,10 @@ void addMicroseconds(DiagnosticStatus& status, const std::string& what,
 }
 
 // The worse of two: an error hides a warning, not the other way round.
-void raise(DiagnosticStatus& status, std::uint8_t level, const std::string& message) {
+void raise(DiagnosticStatus& status, DiagnosticStatus::_level_type level,
+           const std::string& message) {
     if (level <= status.level) return;
-    status.level = static_cast<DiagnosticStatus::_level_type>(level);
+    status.level = level;
     status.message = message;
 }
 
