@@ -108,8 +108,7 @@ int checkComponent(const CheckRequest& request) {
         [](LogEntry&& entry) { fmt::print(stderr, "{}: {}\n", entry.component, entry.message); });
     auto bridge = std::make_unique<ValueSource>();
     ValueSource& values = *bridge;
-    Runner runner(
-        "check", log, [](const RunnerEvent&) {}, std::move(bridge), recorder);
+    Runner runner("check", log, [](const RunnerEvent&) {}, std::move(bridge), recorder);
     std::promise<std::string> refusal;
     runner.post([&] {
         try {

@@ -43,7 +43,7 @@ void handle(int signal, siginfo_t* info, void* /*context*/) {
 void installCrashHandler(FlightRecorder& recorder) {
     the_recorder.store(&recorder);
     for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP}) {
-        struct sigaction action {};
+        struct sigaction action{};
         action.sa_sigaction = &handle;
         action.sa_flags = SA_SIGINFO | SA_ONSTACK;
         sigemptyset(&action.sa_mask);

@@ -34,7 +34,7 @@ void handleCpuLimit(int /*signal*/) {
 
 StallMonitor::StallMonitor(const Loop& loop) : loop_(loop), thread_([this] { threadMain(); }) {
     watched_loop.store(&loop);
-    struct sigaction action {};
+    struct sigaction action{};
     action.sa_handler = &handleCpuLimit;
     action.sa_flags = SA_RESTART | SA_ONSTACK;
     sigemptyset(&action.sa_mask);

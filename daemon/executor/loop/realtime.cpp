@@ -45,7 +45,7 @@ int releaseTextTables(dl_phdr_info* library, std::size_t /*size*/, void* /*unuse
     if (std::strstr(library->dlpi_name, "/libicudata.so") == nullptr) return 0;
     const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
     for (unsigned i = 0; i < library->dlpi_phnum; ++i) {
-        const ElfW(Phdr)& segment = library->dlpi_phdr[i];
+        const ElfW(Phdr) & segment = library->dlpi_phdr[i];
         if (segment.p_type != PT_LOAD || (segment.p_flags & PF_W) != 0) continue;
         const std::uintptr_t begin = (library->dlpi_addr + segment.p_vaddr) / page * page;
         const std::uintptr_t end = library->dlpi_addr + segment.p_vaddr + segment.p_memsz;

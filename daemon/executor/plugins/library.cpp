@@ -42,7 +42,7 @@ class FileDescriptor {
 std::string systemError() { return std::strerror(errno); }
 
 struct stat statusOf(const std::string& path, int file) {
-    struct stat status {};
+    struct stat status{};
     if (::fstat(file, &status) != 0) refuse(path, systemError());
     return status;
 }

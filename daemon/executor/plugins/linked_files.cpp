@@ -120,7 +120,7 @@ class LinkCheck {
             }
             for (const std::string& folder : folders) {
                 const std::string found = folder + "/" + name;
-                struct stat status {};
+                struct stat status{};
                 if (::stat(found.c_str(), &status) != 0) continue;
                 checkFile(found, own ? std::vector<std::string>() : folders);
                 break;

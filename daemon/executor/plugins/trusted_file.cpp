@@ -61,7 +61,7 @@ class Walk {
         std::error_code error;
         const std::filesystem::path real = std::filesystem::weakly_canonical(wanted, error);
         if (error) refuse(fmt::format("{}: {}", wanted, error.message()));
-        struct stat status {};
+        struct stat status{};
         for (const std::filesystem::path& part : real) {
             if (part.empty()) continue;  // of a slash at the end
             if (!step(part, O_PATH | O_DIRECTORY)) {
@@ -91,7 +91,7 @@ class Walk {
     }
 
     struct stat statusHere() const {
-        struct stat status {};
+        struct stat status{};
         if (::fstat(at_, &status) != 0) refuse(std::strerror(errno));
         return status;
     }

@@ -86,7 +86,7 @@ class Component {
     const std::string& name() const noexcept { return context_->name; }  ///< e.g. "H1"
     const std::string& fullName() const noexcept {
         return context_->full_name;
-    }                                                                        ///< e.g. "/arm/H1"
+    }  ///< e.g. "/arm/H1"
     const std::string& runner() const noexcept { return context_->runner; }  ///< e.g. "rt_runner"
     /// @}
 

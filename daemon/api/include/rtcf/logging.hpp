@@ -184,7 +184,7 @@ inline bool logThrottle(std::atomic<std::int64_t>& next_ns, std::int64_t now_ns,
         static std::atomic<std::int64_t> rtcf_log_next{std::numeric_limits<std::int64_t>::min()}; \
         RTCF_LOG_IF_(self, log_level,                                                             \
                      ::rtcf::detail::logThrottle(rtcf_log_next, (self)->time(),                   \
-                                                 static_cast<std::int64_t>((period_s)*1e9)),      \
+                                                 static_cast<std::int64_t>((period_s) * 1e9)),    \
                      text, ##__VA_ARGS__);                                                        \
     } while (false)
 /// @}

@@ -209,14 +209,12 @@ TEST_F(Change, BatchOfParametersIsSetInOneCycle) {
 
 TEST_F(Change, BatchWithABadValueSetsNothing) {
     startWithA();
-    const std::string text = refusal([&] {
-        setParameters("/A", {{"gain", 2.0}, {"throws_at", 1.5}});
-    });
+    const std::string text =
+        refusal([&] { setParameters("/A", {{"gain", 2.0}, {"throws_at", 1.5}}); });
     EXPECT_NE(text.find("throws_at"), std::string::npos) << text;
-    EXPECT_NE(refusal([&] {
-                  setParameters("/A", {{"gain", 3.0}, {"nonsense", 1.0}});
-              }).find("nonsense"),
-              std::string::npos);
+    EXPECT_NE(
+        refusal([&] { setParameters("/A", {{"gain", 3.0}, {"nonsense", 1.0}}); }).find("nonsense"),
+        std::string::npos);
     ASSERT_TRUE(runs());
     stop();
     EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration())) << "the gain is still 1";
