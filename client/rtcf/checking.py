@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rtcf.errors import RtcfError
-from rtcf.folders import component_folders, packages
-from rtcf.naming import listing, suggestion
+from rtcf_shared.errors import RtcfError
+from rtcf_shared.folders import component_folders, packages
+from rtcf_shared.naming import listing, suggestion
+
 from rtcf.sanitizer import Violation, violations
 
 INSTALLED = Path("/usr/lib/rtcf/rtcf-executor-rtsan")

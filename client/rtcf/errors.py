@@ -4,13 +4,11 @@ import os
 import socket as sockets
 from typing import Any
 
+from rtcf_shared.errors import RtcfError
+
 # Set by rtcfd on its own refusals; gRPC's word on a lost connection lacks it.
 _REFUSAL_KEY = "rtcf-refusal"
 _PROBE_TIMEOUT_S = 1.0
-
-
-class RtcfError(Exception):
-    """A call failed; the text is one line for people."""
 
 
 class RefusedError(RtcfError):

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from rtcf_shared.errors import RtcfError
+
 from rtcf.client import Client
-from rtcf.errors import RtcfError
 from rtcf.v1 import control_pb2
 
 # Of one request; far below what a frame takes.

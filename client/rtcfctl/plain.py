@@ -9,7 +9,7 @@ import math
 from typing import Any
 
 from google.protobuf.descriptor import FieldDescriptor
-from rtcf.enums import word
+from rtcf_shared.enums import word
 
 _VALUE_MESSAGE = "rtcf.v1.ParameterValue"
 

@@ -4,8 +4,8 @@ import argparse
 from typing import Any
 
 import rtcf
-from rtcf.enums import choices
 from rtcf.v1 import runner_pb2
+from rtcf_shared.enums import choices
 
 from rtcfctl.output import Output
 from rtcfctl.status import print_runners

@@ -10,28 +10,30 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import grpc
-import rtcf
-from rtcf.v1 import control_pb2_grpc
+from rtcf.v1 import control_pb2, control_pb2_grpc
 
-from rtcfd import VERSION, frames, handover, journal, options
-from rtcfd.catalog import Catalog
-from rtcfd.command import ExecutorCommand
-from rtcfd.describe import Describer
-from rtcfd.desired import Desired
-from rtcfd.endpoint import Endpoint
-from rtcfd.errors import FailedPrecondition, Refusal
-from rtcfd.executor import left_overs
-from rtcfd.front import Front
-from rtcfd.gate import Gate
-from rtcfd.holds import await_holder
-from rtcfd.names import DEFAULT_RUNNER
+from rtcfd import VERSION, journal
+from rtcfd.access.admission import Admission
+from rtcfd.access.clients import Clients
+from rtcfd.access.endpoint import Endpoint
+from rtcfd.catalog.catalog import Catalog
+from rtcfd.catalog.describe import Describer
+from rtcfd.common.names import DEFAULT_RUNNER
+from rtcfd.common.refusals import FailedPrecondition, Refusal
+from rtcfd.configuration import options
+from rtcfd.executor import frames
+from rtcfd.executor.command import ExecutorCommand
+from rtcfd.executor.executor import left_overs
 from rtcfd.notify import Notify
-from rtcfd.ros_services import RosServices
-from rtcfd.runner import Surroundings
-from rtcfd.runners import Runners
-from rtcfd.service import Control
-from rtcfd.store import Store
-from rtcfd.upkeep import Upkeep
+from rtcfd.reload import Reloads
+from rtcfd.runners.held_runners import await_holder
+from rtcfd.runners.ros_services import RosServices
+from rtcfd.runners.runner import Surroundings
+from rtcfd.runners.runners import Runners
+from rtcfd.service.control import Control
+from rtcfd.state import handover
+from rtcfd.state.desired import Desired
+from rtcfd.state.store import Store
 
 log = logging.getLogger("rtcfd")
 
@@ -52,8 +54,8 @@ class Daemon:
         self._store = Store(given.state_dir)
         self._endpoint = Endpoint(given.socket)
         self._private = given.runtime_dir / "executors" / "control"
-        self._front = Front(self._private, given.limits.clients)
-        gate = Gate(self._front, given.access)
+        self._clients = Clients(self._private, given.limits.clients)
+        admission = Admission(self._clients, given.access)
         catalog = Catalog(given.folders, Describer(given.executor))
         shared = Surroundings(
             command=self._command,
@@ -65,14 +67,21 @@ class Daemon:
             limits=given.limits,
         )
         self._runners = Runners(shared)
-        self._upkeep = Upkeep(
-            given, read_options, shared, catalog, self._runners, self._front, gate, self._store
+        self._reloads = Reloads(
+            given,
+            read_options,
+            shared,
+            catalog,
+            self._runners,
+            self._clients,
+            admission,
+            self._store,
         )
-        self._server = grpc.aio.server(options=_server_options(given), interceptors=[gate])
+        self._server = grpc.aio.server(options=_server_options(given), interceptors=[admission])
         self._left_over: list[str] = []  # runners of executors that outlived another rtcfd
         self._leaving = False  # loops go on after our end
         control_pb2_grpc.add_ControlServicer_to_server(  # type: ignore[no-untyped-call]
-            Control(self._runners, catalog, self._upkeep), self._server
+            Control(self._runners, catalog, self._reloads), self._server
         )
 
     async def run(self) -> None:
@@ -102,9 +111,9 @@ class Daemon:
         states = self._store.load()
         if self._options.default_runner and DEFAULT_RUNNER not in [s.runner for s in states]:
             states.append(Desired(DEFAULT_RUNNER))
-        self._runners.adopt(self._upkeep.boot(states, self._left_over))
+        self._runners.adopt(self._reloads.boot(states, self._left_over))
         await self._server.start()
-        await self._front.serve(listener)
+        await self._clients.serve(listener)
         log.info("rtcfd %s serves %s", VERSION, self._endpoint.path)
         starting = asyncio.create_task(self._start())
         await end.wait()
@@ -126,7 +135,7 @@ class Daemon:
         await self._runners.close()
         await asyncio.wait({serving}, timeout=_LAST_WORDS_S)
         await self._server.stop(None)
-        self._front.close()
+        self._clients.close()
 
     async def _let_go(self) -> None:
         """End for a restart: loops go on, clients wait for the next rtcfd."""
@@ -139,19 +148,19 @@ class Daemon:
                 "the next rtcfd will not start, and loops stop after their orphan_timeout_s: %s",
                 refusal,
             )
-        self._front.close_door()
+        self._clients.close_door()
         serving = asyncio.create_task(self._server.stop(_GRACE_S))
         await self._runners.leave()
         await asyncio.wait({serving}, timeout=_LAST_ANSWERS_S)
         # Holders see a connection that is lost, and come back.
-        self._front.close()
+        self._clients.close()
         await self._server.stop(None)
 
     async def _start(self) -> None:
         await self._runners.bring_up(self._left_over)
         for runner in self._runners.all():
             await_holder(self._runners, runner)
-        await self._upkeep.catch_up()
+        await self._reloads.catch_up()
         self._notify.ready(self._runners.summary())
         log.info("ready; runners: %s", self._runners.summary())
 
@@ -169,7 +178,7 @@ class Daemon:
     def _reload(self) -> None:
         async def reload() -> None:
             try:
-                await self._upkeep.reload()
+                await self._reloads.reload()
             except Refusal as refusal:
                 log.error("not reloaded: %s", refusal)
 
@@ -225,11 +234,12 @@ async def _run(given: options.Options, read_options: Callable[[], options.Option
 def _reload(socket: Path) -> int:
     """Make the rtcfd that runs read its settings again; what came of it is printed."""
     try:
-        with rtcf.Client(socket) as client:
-            for line in client.reload():
+        with grpc.insecure_channel(f"unix:{socket}") as channel:
+            daemon = control_pb2_grpc.ControlStub(channel)  # type: ignore[no-untyped-call]
+            for line in daemon.Reload(control_pb2.ReloadRequest()).notes:
                 print(line)
-    except rtcf.RtcfError as error:
-        print(f"rtcfd: not reloaded: {error}", file=sys.stderr)
+    except grpc.RpcError as error:
+        print(f"rtcfd: not reloaded: {error.details()}", file=sys.stderr)
         return REFUSED
     return 0
 

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from rtcf.spec import parse_value
 from rtcf.v1 import graph_pb2
+from rtcf_shared.spec import parse_value
 
 DEFAULT_MASTER = "http://localhost:11311"
 

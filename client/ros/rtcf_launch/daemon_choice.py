@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import rtcf
-from rtcf.folders import component_folders, packages
 from rtcf.v1 import runner_pb2
+from rtcf_shared.folders import component_folders, packages
 
 from rtcf_launch import rendezvous
 

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rtcf.enums import choices
 from rtcf.v1 import runner_pb2
+from rtcf_shared.enums import choices
 
 from rtcf_launch.codes import Code, Ending
 from rtcf_launch.parameters import Parameters, close_to

@@ -27,8 +27,9 @@ from flight_writer import FlightWriter
 from google.protobuf import json_format
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
-from rtcfd import VERSION, frames
-from rtcfd.link import LIMITS_PROTOCOL, PROTOCOL
+from rtcfd import VERSION
+from rtcfd.executor import frames
+from rtcfd.executor.link import LIMITS_PROTOCOL, PROTOCOL
 
 POLL_S = 0.005
 CHATTER = 100  # records at once

@@ -4,10 +4,10 @@ import os
 
 import pytest
 from rtcf.v1 import control_pb2
-from rtcfd import access
-from rtcfd.access import Access, Level
-from rtcfd.errors import PermissionDenied
-from rtcfd.peer import Peer
+from rtcfd.access import rights
+from rtcfd.access.peer import Peer
+from rtcfd.access.rights import Access, Level
+from rtcfd.common.refusals import PermissionDenied
 
 
 class Named(Peer):
@@ -25,7 +25,7 @@ class Named(Peer):
         return set(self.__dict__["names"][1])
 
 
-RULES = access.rules(
+RULES = rights.rules(
     {Level.OBSERVE: ["ann", "@lab"], Level.OPERATE: ["@shift"], Level.ADMIN: ["bob"]},
     default=Level.NONE,
 )
@@ -58,18 +58,18 @@ def test_who_is_in_the_group_may_do_everything_unless_told_otherwise() -> None:
 
 def test_only_administrators_load_code() -> None:
     for method in ("Load", "Replace", "Apply", "AddRunner", "SetRunner", "Reload"):
-        assert access.needed(method) == Level.ADMIN
+        assert rights.needed(method) == Level.ADMIN
 
 
 def test_a_method_that_is_not_known_takes_an_administrator() -> None:
-    assert access.needed("SomethingNew") == Level.ADMIN
+    assert rights.needed("SomethingNew") == Level.ADMIN
 
 
 def test_every_query_is_open_to_observers() -> None:
     service = control_pb2.DESCRIPTOR.services_by_name["Control"]
     for method in service.methods:
         if method.name.startswith(("Get", "List", "Watch")):
-            assert access.needed(method.name) == Level.OBSERVE
+            assert rights.needed(method.name) == Level.OBSERVE
 
 
 def test_a_refusal_says_how_the_right_is_granted() -> None:

@@ -11,10 +11,10 @@ import rtcf
 from daemon_under_test import DaemonUnderTest, wait_for
 from rtcf.v1 import graph_pb2, runner_pb2
 from rtcfd import VERSION
-from rtcfd.adoption import follow_components, follow_settings
-from rtcfd.desired import Desired
-from rtcfd.link import PROTOCOL
-from rtcfd.settings import defaults
+from rtcfd.common.runner_settings import defaults
+from rtcfd.executor.link import PROTOCOL
+from rtcfd.recovery.follow import follow_components, follow_settings
+from rtcfd.state.desired import Desired
 
 LONG = runner_pb2.RunnerSettings(orphan_timeout_s=60.0)
 

@@ -7,10 +7,11 @@ from typing import Any
 
 import pytest
 from rtcf.v1 import runner_pb2
-from rtcfd import config, options, settings
-from rtcfd.access import Access, Level
-from rtcfd.errors import Refusal
-from rtcfd.limits import Limits
+from rtcfd.access.rights import Access, Level
+from rtcfd.common import runner_settings
+from rtcfd.common.limits import Limits
+from rtcfd.common.refusals import Refusal
+from rtcfd.configuration import options, settings_file
 
 
 def written(tmp_path: Path, text: str) -> Path:
@@ -20,12 +21,12 @@ def written(tmp_path: Path, text: str) -> Path:
 
 
 def test_every_setting_has_a_default() -> None:
-    complete = settings.defaults(runner_pb2.REALTIME_REQUIRED)
+    complete = runner_settings.defaults(runner_pb2.REALTIME_REQUIRED)
     messages: list[Any] = [complete, complete.ros]
     for message in messages:
         for field in message.DESCRIPTOR.fields:
             assert message.HasField(field.name), field.name
-    settings.check(complete)
+    runner_settings.check(complete)
 
 
 def test_a_file_is_read(tmp_path: Path) -> None:
@@ -44,7 +45,7 @@ def test_a_file_is_read(tmp_path: Path) -> None:
         whitelist = "/a.*"
         """,
     )
-    found = config.read(file)
+    found = settings_file.read(file)
     assert (found.socket, found.realtime) == (Path("/run/x.sock"), "preferred")
     assert found.ros_services is Level.OPERATE
     assert found.path == [Path("/opt/a/lib/rtcf")]
@@ -89,21 +90,21 @@ def test_a_file_is_read(tmp_path: Path) -> None:
 def test_a_bad_file_is_refused_by_name(tmp_path: Path, text: str, said: str) -> None:
     file = written(tmp_path, text)
     with pytest.raises(Refusal) as refused:
-        config.read(file)
+        settings_file.read(file)
     assert said in str(refused.value)
     assert str(file) in str(refused.value)
 
 
 def test_a_cpu_that_is_not_there_is_refused() -> None:
     with pytest.raises(Refusal, match="CPU 4096"):
-        settings.check(runner_pb2.RunnerSettings(cpu=4096))
-    settings.check(runner_pb2.RunnerSettings(cpu=max(os.sched_getaffinity(0))))
+        runner_settings.check(runner_pb2.RunnerSettings(cpu=4096))
+    runner_settings.check(runner_pb2.RunnerSettings(cpu=max(os.sched_getaffinity(0))))
 
 
 def test_the_unspecified_leaves_a_setting_as_it_is() -> None:
-    base = settings.defaults(runner_pb2.REALTIME_REQUIRED)
+    base = runner_settings.defaults(runner_pb2.REALTIME_REQUIRED)
     change = runner_pb2.RunnerSettings(realtime=runner_pb2.REALTIME_UNSPECIFIED, spin_us=3)
-    result = settings.merged(base, change)
+    result = runner_settings.merged(base, change)
     assert (result.realtime, result.spin_us) == (runner_pb2.REALTIME_REQUIRED, 3)
 
 
@@ -144,9 +145,9 @@ def test_every_line_of_the_shipped_file_is_a_setting_that_is_accepted(tmp_path: 
     lines = [line[1:] if re.match(r"#[a-z_]+ = ", line) else line
              for line in shipped.read_text().splitlines()]  # fmt: skip
     file = written(tmp_path, "\n".join(lines))
-    found = config.read(file)
-    defaults = settings.defaults(runner_pb2.REALTIME_REQUIRED)
-    assert settings.differences(defaults, found.runner) == []
+    found = settings_file.read(file)
+    defaults = runner_settings.defaults(runner_pb2.REALTIME_REQUIRED)
+    assert runner_settings.differences(defaults, found.runner) == []
     assert (found.access, found.limits) == (Access(), Limits())
     known = {field.name for field in [*runner_pb2.RunnerSettings.DESCRIPTOR.fields,
                                       *runner_pb2.RosSettings.DESCRIPTOR.fields]}  # fmt: skip

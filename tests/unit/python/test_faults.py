@@ -8,9 +8,9 @@ import rtcf
 from daemon_under_test import DaemonUnderTest, wait_for
 from flight_writer import FlightWriter
 from rtcf.v1 import graph_pb2, runner_pb2
-from rtcfd.crash import judge
-from rtcfd.flight_recorder import FlightRecorder, Note
-from rtcfd.process import End
+from rtcfd.executor.flight_recorder import FlightRecorder, Note
+from rtcfd.executor.process import End
+from rtcfd.recovery.verdict import judge
 
 
 def die(client: rtcf.Client, name: str, how: str) -> None:

@@ -10,7 +10,7 @@ import pytest
 import rtcf
 from daemon_under_test import DaemonUnderTest, wait_for
 from rtcf.v1 import control_pb2, runner_pb2
-from rtcfd import store
+from rtcfd.state import store
 
 
 def saved(daemon: DaemonUnderTest, runner: str = "rt_runner") -> dict[str, object]:

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcfd import errors, frames
-from rtcfd.link import PROTOCOL, Link
+from rtcfd.common import refusals
+from rtcfd.executor import frames
+from rtcfd.executor.link import PROTOCOL, Link
 
 Peer = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 
@@ -63,7 +64,7 @@ def test_no_answer_in_time_is_unavailable(tmp_path: Path) -> None:
         await reader.read()
 
     async def test(link: Link) -> None:
-        with pytest.raises(errors.Unavailable, match=r"did not answer get_status within 0\.01 s"):
+        with pytest.raises(refusals.Unavailable, match=r"did not answer get_status within 0\.01 s"):
             await link.request(wire.Request(get_status=STATUS), 0.01)
 
     against(tmp_path, peer, test)
@@ -86,10 +87,10 @@ def test_a_peer_that_breaks_off_fails_what_waits(tmp_path: Path, reply: bytes) -
         writer.close()
 
     async def test(link: Link) -> None:
-        with pytest.raises(errors.Unavailable, match="the peer"):
+        with pytest.raises(refusals.Unavailable, match="the peer"):
             await link.request(wire.Request(get_status=STATUS), 5.0)
         assert link.ended.is_set()
-        with pytest.raises(errors.Unavailable, match="the peer"):
+        with pytest.raises(refusals.Unavailable, match="the peer"):
             await link.request(wire.Request(get_status=STATUS), 5.0)
 
     against(tmp_path, peer, test)

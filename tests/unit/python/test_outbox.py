@@ -4,7 +4,7 @@ import asyncio
 from typing import Any
 
 from rtcf.v1 import control_pb2
-from rtcfd.outbox import MOST_RECORDS, Outbox
+from rtcfd.runners.outbox import MOST_RECORDS, Outbox
 
 
 def collect(outbox: Outbox) -> list[Any]:

@@ -1,0 +1,1 @@
+"""Who connects, who they are, and what they may do."""

@@ -1,0 +1,1 @@
+"""Which component types there are, and in which library."""

@@ -1,0 +1,153 @@
+"""The catalog: which library offers a component type.
+
+A package is a folder of libraries, `<folder>/<package>/*.so`, in one of the
+folders of the search path; of two types with one name the first found wins.
+"""
+
+import asyncio
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import graph_pb2
+from rtcf_shared.folders import packages
+from rtcf_shared.naming import listing, suggestion
+
+from rtcfd.catalog.describe import Describer
+from rtcfd.common.names import check_base_name
+from rtcfd.common.refusals import FailedPrecondition, NotFound
+
+
+@dataclass(frozen=True)
+class Folder:
+    """A folder of packages; in one that the settings name, its owner's libraries are trusted."""
+
+    path: Path
+    named: bool = False
+
+    def owner(self) -> int | None:
+        """Return whose libraries are trusted besides root's and our own."""
+        if not self.named:
+            return None
+        try:
+            return self.path.stat().st_uid
+        except OSError:
+            return None
+
+
+@dataclass(frozen=True)
+class Found:
+    """A library that offers a type."""
+
+    path: str
+    owner: int | None
+
+    def load(self, spec: graph_pb2.ComponentSpec) -> wire.Load:
+        """Return the request to load a component from it."""
+        return wire.Load(component=spec, library=self.path, owner=self.owner)
+
+
+@dataclass
+class _Contents:
+    """What the libraries of a package offer."""
+
+    types: dict[str, graph_pb2.ComponentType] = field(default_factory=dict)
+    problems: list[str] = field(default_factory=list)
+
+
+class Catalog:
+    """Finds component types along the search path."""
+
+    def __init__(self, folders: Sequence[Folder], describer: Describer) -> None:
+        self.folders = list(folders)
+        self._describer = describer
+
+    async def find(self, package: str, type_name: str) -> Found:
+        """Return the library that offers a type, or refuse and say why."""
+        check_base_name("package", package)
+        check_base_name("type", type_name)
+        libraries = self._packages().get(package)
+        if libraries is None:
+            raise NotFound(self._no_package(package))
+        contents = await self._contents(package, libraries)
+        found = contents.types.get(type_name)
+        if found is not None:
+            return Found(str(found.library), self._owner(Path(found.library)))
+        if contents.problems:
+            raise FailedPrecondition(
+                f'no type "{type_name}" in package "{package}" (types: '
+                f"{listing(contents.types)}), and not all of it loads: "
+                + "; ".join(contents.problems)
+            )
+        raise NotFound(
+            f'no type "{type_name}" in package "{package}"'
+            f"{suggestion(type_name, contents.types)} (types: {listing(contents.types)})"
+        )
+
+    async def types(self, package: str = "") -> tuple[list[graph_pb2.ComponentType], list[str]]:
+        """Return the types of one package or of all, by name, and what does not load."""
+        known = self._packages()
+        if package:
+            check_base_name("package", package)
+            if package not in known:
+                raise NotFound(self._no_package(package))
+            known = {package: known[package]}
+        names = sorted(known)
+        every = await asyncio.gather(*(self._contents(name, known[name]) for name in names))
+        types = [contents.types[name] for contents in every for name in sorted(contents.types)]
+        return types, [problem for contents in every for problem in contents.problems]
+
+    async def _contents(self, package: str, libraries: list[Path]) -> _Contents:
+        contents = _Contents()
+        descriptions = await asyncio.gather(
+            *(
+                self._describer.describe(library, package, self._owner(library))
+                for library in libraries
+            )
+        )
+        for library, description in zip(libraries, descriptions, strict=True):
+            if description.problem:
+                contents.problems.append(_one_problem(library, description.problem))
+            for described in description.types:
+                offered = graph_pb2.ComponentType()
+                offered.CopyFrom(described)
+                offered.package = package
+                offered.library = str(library)
+                contents.types.setdefault(offered.type, offered)
+        return contents
+
+    def _packages(self) -> dict[str, list[Path]]:
+        return packages([folder.path for folder in self.folders])
+
+    def _owner(self, library: Path) -> int | None:
+        """Return whose libraries are trusted in the folder that holds a package's library."""
+        for folder in self.folders:
+            if folder.path == library.parents[1]:
+                return folder.owner()
+        return None
+
+    def _no_package(self, package: str) -> str:
+        folders = ", ".join(str(folder.path) for folder in self.folders)
+        return (
+            f'no package "{package}" with component libraries in {folders}'
+            f"{suggestion(package, self._packages())}"
+        )
+
+
+async def loads(catalog: Catalog, specs: Iterable[graph_pb2.ComponentSpec]) -> list[wire.Load]:
+    """Return components with their libraries; each type is looked for once."""
+    libraries: dict[tuple[str, str], Found] = {}
+    result = []
+    for spec in specs:
+        key = (spec.package, spec.type)
+        if key not in libraries:
+            libraries[key] = await catalog.find(*key)
+        result.append(libraries[key].load(spec))
+    return result
+
+
+def _one_problem(library: Path, problem: str) -> str:
+    """Name the library, unless the dynamic loader's text begins with it already."""
+    text = " ".join(problem.split())
+    return text if str(library) in text else f"{library}: {text}"

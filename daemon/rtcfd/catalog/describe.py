@@ -1,0 +1,103 @@
+"""Describes component libraries, each in a throw-away process.
+
+So that foreign code, which runs as soon as a library is loaded, runs neither
+in rtcfd nor in a loop's process: a crash there is a refusal.
+"""
+
+import asyncio
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from google.protobuf.message import DecodeError
+from rtcf.executor.v1 import executor_pb2 as wire
+
+from rtcfd.executor.command import ExecutorCommand
+from rtcfd.executor.process import describe_exit
+
+TIMEOUT_S = 10.0
+_AT_ONCE = 2
+_MAX_STDERR_LINE = 300
+
+_Key = tuple[str, int | None, int, int, int]
+
+
+@dataclass
+class Describer:
+    """Answers what a library offers, from a cache while the file stays as it is."""
+
+    binary: Path
+
+    def __post_init__(self) -> None:
+        self._known: dict[_Key, wire.LibraryDescription] = {}
+        self._slots = asyncio.Semaphore(_AT_ONCE)
+
+    async def describe(
+        self, library: Path, package: str, owner: int | None = None
+    ) -> wire.LibraryDescription:
+        """Return the description; `problem` in it says why there is none.
+
+        `owner` is a user whose libraries are trusted besides root's and our own.
+        """
+        try:
+            found = library.stat()
+        except OSError as error:
+            return _problem(f"cannot read it: {error.strerror}")
+        key = (str(library), owner, found.st_ino, found.st_mtime_ns, found.st_size)
+        known = self._known.get(key)
+        if known is not None:
+            return known
+        async with self._slots:
+            description = await self._run(library, package, owner)
+        # What does not load may do so later, when what it links against is there.
+        if not description.problem:
+            self._known[key] = description
+        return description
+
+    async def _run(self, library: Path, package: str, owner: int | None) -> wire.LibraryDescription:
+        try:
+            process = await asyncio.create_subprocess_exec(
+                self.binary,
+                "--describe",
+                library,
+                "--package",
+                package,
+                *(() if owner is None else ("--trust", str(owner))),
+                stdin=asyncio.subprocess.DEVNULL,
+                stdout=asyncio.subprocess.PIPE,
+                stderr=asyncio.subprocess.PIPE,
+                env=ExecutorCommand.environment(),
+                start_new_session=True,
+            )
+        except OSError as error:
+            return _problem(f"cannot run {self.binary}: {error.strerror}")
+        try:
+            async with asyncio.timeout(TIMEOUT_S):
+                output, complaint = await process.communicate()
+        except TimeoutError:
+            return _problem(f"loading it did not end within {TIMEOUT_S:g} s")
+        finally:
+            if process.returncode is None:
+                process.kill()
+                await process.wait()
+        status = process.returncode or 0
+        if status < 0:
+            return _problem(f"the process that loaded it {describe_exit(status)}")
+        try:
+            description: wire.LibraryDescription = wire.LibraryDescription.FromString(output)
+        except DecodeError:
+            return _problem("the process that loaded it did not answer in the protocol")
+        if status and not description.problem:
+            return _problem(
+                f"the process that loaded it {describe_exit(status)}{_last_line(complaint)}"
+            )
+        return description
+
+
+def _problem(text: str) -> wire.LibraryDescription:
+    return wire.LibraryDescription(problem=text)
+
+
+def _last_line(output: bytes) -> str:
+    lines = os.fsdecode(output).strip().splitlines()
+    return f": {lines[-1][:_MAX_STDERR_LINE]}" if lines else ""

@@ -1,0 +1,1 @@
+"""What all rooms stand on: refusals and their codes, names, limits, budgets, settings."""

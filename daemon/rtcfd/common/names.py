@@ -1,0 +1,35 @@
+"""Names of runners, packages, types and components: checking and resolving."""
+
+import re
+
+from rtcf.v1 import graph_pb2
+
+from rtcfd.common.refusals import InvalidArgument
+
+DEFAULT_RUNNER = "rt_runner"
+
+# A runner's name becomes a file name and, with a suffix, a unix socket's path.
+_MAX_LENGTH = 64
+_BASE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
+
+
+def check_base_name(kind: str, name: str) -> str:
+    """Return `name` if it is a ROS base name; `kind` ("runner", …) is for the message."""
+    if not _BASE_NAME.fullmatch(name):
+        raise InvalidArgument(
+            f'{kind} name "{name}" is not valid: use letters, digits and _, and begin with a letter'
+        )
+    if len(name) > _MAX_LENGTH:
+        raise InvalidArgument(f"{kind} name of {len(name)} characters: at most {_MAX_LENGTH}")
+    return name
+
+
+def absolute(name: str) -> str:
+    """Resolve a component's name as requests give it: relative ones are taken in "/"."""
+    return name if name.startswith("/") else "/" + name
+
+
+def full_name(spec: graph_pb2.ComponentSpec) -> str:
+    """Return namespace and name of a component as the executor makes them."""
+    parts = [part for part in spec.ns.split("/") if part]
+    return "/" + "/".join([*parts, spec.name or spec.type])

@@ -1,0 +1,176 @@
+"""Settings of runners: their defaults, and what is allowed.
+
+Regular expressions are left to the executor, which compiles them with the
+engine that will use them.
+"""
+
+import math
+import os
+from typing import Any, TypeVar
+
+from rtcf.v1 import runner_pb2
+from rtcf_shared.enums import word
+
+from rtcfd.common.refusals import InvalidArgument
+
+Settings = TypeVar("Settings", runner_pb2.RunnerSettings, runner_pb2.RosSettings)
+
+FREQUENCY_HZ = (0.1, 20000.0)
+PRIORITY = (1, 98)  # 99 is the kernel's own watchdog and migration threads'
+LAST_CPU = -1  # the last one that is allowed
+ORPHAN_TIMEOUT_S = 60.0
+# A private rtcfd takes its executors with it, however it ends.
+PRIVATE_ORPHAN_TIMEOUT_S = 2.0
+_LONGEST_S = 86400.0
+_MAX_MEMORY_KB = 64 * 1024 * 1024
+_DEFAULT_MASTER = "http://localhost:11311"
+
+
+def defaults(
+    realtime: runner_pb2.Realtime, orphan_timeout_s: float = ORPHAN_TIMEOUT_S
+) -> runner_pb2.RunnerSettings:
+    """Return complete settings; ROS_MASTER_URI of our environment is part of them."""
+    return runner_pb2.RunnerSettings(
+        frequency_hz=1000.0,
+        cpu=LAST_CPU,
+        priority=80,
+        spin_us=0,
+        realtime=realtime,
+        overrun=runner_pb2.OVERRUN_POLICY_SKIP,
+        max_overruns=0,
+        lock_memory=True,
+        heap_kb=8192,
+        stack_kb=256,
+        warmup_cycles=10,
+        stall_timeout_ms=2000,
+        orphan_timeout_s=orphan_timeout_s,
+        spin_auto=False,
+        on_boot=runner_pb2.ON_BOOT_HOLD,
+        on_crash=runner_pb2.ON_CRASH_HOLD,
+        sim_time=runner_pb2.SIM_TIME_AUTO,
+        max_clock_jump_s=10.0,
+        ros=runner_pb2.RosSettings(
+            enabled=True,
+            master_uri=os.environ.get("ROS_MASTER_URI") or _DEFAULT_MASTER,
+            whitelist="",
+            blacklist="",
+            queue=1000,
+            hostname="",
+            ns="",
+            latch="",
+            decimation=1,
+            decimate=".*",
+            largest_message_kb=256,
+        ),
+    )
+
+
+def merged(
+    base: runner_pb2.RunnerSettings, change: runner_pb2.RunnerSettings
+) -> runner_pb2.RunnerSettings:
+    """Return `base` with what `change` sets; what is UNSPECIFIED there counts as unset."""
+    effective = runner_pb2.RunnerSettings()
+    effective.CopyFrom(change)
+    for field in ("realtime", "overrun", "on_boot", "on_crash", "sim_time"):
+        if not getattr(effective, field):
+            effective.ClearField(field)
+    result = runner_pb2.RunnerSettings()
+    result.CopyFrom(base)
+    result.MergeFrom(effective)
+    return result
+
+
+def changed(base: Settings, other: Settings) -> Settings:
+    """Return the settings of `other` that are set and not as in `base`."""
+    result = type(other)()
+    for field, value in other.ListFields():
+        if field.message_type is not None:
+            inner = changed(getattr(base, field.name), value)
+            if inner.ListFields():
+                getattr(result, field.name).CopyFrom(inner)
+        elif not _same(getattr(base, field.name), value):
+            setattr(result, field.name, value)
+    return result
+
+
+def differences(base: Settings, other: Settings, prefix: str = "") -> list[str]:
+    """Return a line for each setting of `other` that is set and not as in `base`."""
+    lines: list[str] = []
+    for field, value in changed(base, other).ListFields():
+        old = getattr(base, field.name)
+        if field.message_type is not None:
+            lines += differences(old, value, f"{field.name}.")
+        else:
+            lines.append(f"{prefix}{field.name} {_text(field, old)} -> {_text(field, value)}")
+    return lines
+
+
+def _same(one: Any, other: Any) -> bool:
+    # An executor counts in ns; what it tells may be rounded.
+    if isinstance(one, float):
+        return math.isclose(one, other, rel_tol=1e-9, abs_tol=1e-9)
+    return bool(one == other)
+
+
+def _text(field: Any, value: Any) -> str:
+    if field.enum_type is not None:
+        return word(field.enum_type, value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f"{value:g}" if isinstance(value, float) else str(value) or "''"
+
+
+def check(settings: runner_pb2.RunnerSettings) -> None:
+    """Refuse settings that are set and not allowed."""
+    if settings.HasField("frequency_hz"):
+        low, high = FREQUENCY_HZ
+        value = settings.frequency_hz
+        if not (math.isfinite(value) and low <= value <= high):
+            raise InvalidArgument(
+                f"frequency of {value:g} Hz is out of range: {low:g} to {high:g} Hz"
+            )
+    if settings.HasField("cpu") and settings.cpu != LAST_CPU:
+        allowed = os.sched_getaffinity(0)
+        if settings.cpu not in allowed:
+            raise InvalidArgument(
+                f"CPU {settings.cpu} is not one rtcfd may use: choose of "
+                f"{_ranges(allowed)}, or -1 for the last of them"
+            )
+    if settings.HasField("priority") and not PRIORITY[0] <= settings.priority <= PRIORITY[1]:
+        raise InvalidArgument(
+            f"priority {settings.priority} is out of range: {PRIORITY[0]} to {PRIORITY[1]}"
+        )
+    for field in ("heap_kb", "stack_kb"):
+        if settings.HasField(field) and getattr(settings, field) > _MAX_MEMORY_KB:
+            raise InvalidArgument(
+                f"{field} of {getattr(settings, field)} is out of range: at most {_MAX_MEMORY_KB}"
+            )
+    if settings.HasField("orphan_timeout_s"):
+        value = settings.orphan_timeout_s
+        if not (math.isfinite(value) and 0.0 <= value <= _LONGEST_S):
+            raise InvalidArgument(
+                f"orphan timeout of {value:g} s is out of range: 0 to {_LONGEST_S:g} s"
+            )
+    if settings.HasField("max_clock_jump_s"):
+        value = settings.max_clock_jump_s
+        if not (math.isfinite(value) and 0.0 <= value <= _LONGEST_S):
+            raise InvalidArgument(
+                f"max clock jump of {value:g} s is out of range: 0 to {_LONGEST_S:g} s"
+            )
+    if settings.HasField("ros") and settings.ros.HasField("master_uri"):
+        uri = settings.ros.master_uri
+        if not uri.startswith(("http://", "https://")):
+            raise InvalidArgument(
+                f'ROS master URI "{uri}" is not valid: write it as http://HOST:PORT'
+            )
+
+
+def _ranges(numbers: set[int]) -> str:
+    """Return CPUs as Linux writes them: "0-3,6"."""
+    parts: list[list[int]] = []
+    for number in sorted(numbers):
+        if parts and number == parts[-1][-1] + 1:
+            parts[-1].append(number)
+        else:
+            parts.append([number])
+    return ",".join(str(p[0]) if len(p) == 1 else f"{p[0]}-{p[-1]}" for p in parts)

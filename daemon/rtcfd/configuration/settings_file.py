@@ -1,0 +1,216 @@
+"""The configuration file, /etc/rtcfd/rtcfd.toml: reading and checking.
+
+    [daemon]            socket, path, realtime, state_dir, runtime_dir, graphs_dir, executor,
+                        ros_services
+    [access]            default, and the users and @groups of each level
+    [limits]            named as in common/limits.py
+    [runner]            defaults of runners, named as in RunnerSettings
+    [runner.ros]        likewise, named as in RosSettings
+
+Every key is optional.  What is not known, of the wrong type or out of range is
+refused by name and line.
+"""
+
+import re
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from rtcf.v1 import runner_pb2
+from rtcf_shared.enums import choices
+from rtcf_shared.naming import listing, suggestion
+
+from rtcfd.access import rights
+from rtcfd.access.rights import Access, Level
+from rtcfd.common import runner_settings
+from rtcfd.common.limits import RANGES, Limits
+from rtcfd.common.refusals import InvalidArgument, Refusal
+from rtcfd.configuration.toml_lines import lines_of_keys
+
+DEFAULT_FILE = Path("/etc/rtcfd/rtcfd.toml")
+
+_PATHS = ("socket", "state_dir", "runtime_dir", "graphs_dir", "executor")
+# As adduser(8) allows them, and systemd: with @ before a group.
+_PRINCIPAL = re.compile(r"@?[A-Za-z_][A-Za-z0-9_.-]*\$?")
+_TYPE_WORDS = {bool: "true or false", int: "an integer", float: "a number", str: "a string"}
+
+
+@dataclass
+class Config:
+    """What a configuration file says; None or empty where it says nothing."""
+
+    socket: Path | None = None
+    state_dir: Path | None = None
+    runtime_dir: Path | None = None
+    graphs_dir: Path | None = None
+    executor: Path | None = None
+    path: list[Path] = field(default_factory=list)
+    realtime: str = ""
+    ros_services: Level | None = None
+    runner: runner_pb2.RunnerSettings = field(default_factory=runner_pb2.RunnerSettings)
+    access: Access = field(default_factory=Access)
+    limits: Limits = field(default_factory=Limits)
+
+
+class _Wrong(InvalidArgument):
+    """Something is wrong with a key."""
+
+    def __init__(self, key: str, what: str) -> None:
+        super().__init__(what)
+        self.key = key
+
+
+def read(file: Path) -> Config:
+    """Read a configuration file; a Refusal names the file, the line and what is wrong there."""
+    try:
+        text = file.read_text(encoding="utf-8")
+        document = tomllib.loads(text)
+    except OSError as error:
+        raise InvalidArgument(f"cannot read {file}: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InvalidArgument(f"{file}: {error}") from None
+    config = Config()
+    try:
+        _check_keys("", document, ("daemon", "access", "limits", "runner"))
+        _read_daemon(_table(document, "daemon"), config)
+        _read_access(_table(document, "access"), config)
+        _read_limits(_table(document, "limits"), config)
+        _read_message(_table(document, "runner"), "runner", config.runner)
+        _check_runner(config.runner)
+    except _Wrong as wrong:
+        line = lines_of_keys(text).get(wrong.key)
+        where = f"{file}:{line}" if line else str(file)
+        raise InvalidArgument(f"{where}: {wrong}") from None
+    return config
+
+
+def _read_daemon(table: dict[str, Any], config: Config) -> None:
+    _check_keys("daemon.", table, (*_PATHS, "path", "realtime", "ros_services"))
+    for name in _PATHS:
+        if name in table:
+            setattr(config, name, _absolute_path(f"daemon.{name}", table[name]))
+    folders = table.get("path", [])
+    if not isinstance(folders, list):
+        raise _Wrong("daemon.path", "daemon.path must be a list of folders")
+    config.path = [_absolute_path("daemon.path", folder) for folder in folders]
+    if "realtime" in table:
+        _enumerator("daemon.realtime", runner_pb2.Realtime.DESCRIPTOR, table["realtime"])
+        config.realtime = table["realtime"]
+    if "ros_services" in table:
+        config.ros_services = _level("daemon.ros_services", table["ros_services"])
+
+
+def _read_access(table: dict[str, Any], config: Config) -> None:
+    lists = [level.word for level in Level if level]
+    _check_keys("access.", table, ("default", *lists))
+    default = _level("access.default", table.get("default", config.access.default.word))
+    named: dict[Level, list[str]] = {}
+    seen: dict[str, str] = {}
+    for word in lists:
+        key = f"access.{word}"
+        names = table.get(word, [])
+        if not isinstance(names, list):
+            raise _Wrong(key, f"{key} must be a list of users and @groups, not {names!r}")
+        for name in names:
+            if not isinstance(name, str) or not _PRINCIPAL.fullmatch(name):
+                raise _Wrong(key, f"{key}: {name!r} is no user's name, nor @ and a group's")
+            if name in seen:
+                raise _Wrong(key, f"{key}: {name} is in {seen[name]} already")
+            seen[name] = key
+        named[rights.WORDS[word]] = names
+    config.access = rights.rules(named, default)
+
+
+def _read_limits(table: dict[str, Any], config: Config) -> None:
+    _check_keys("limits.", table, [each.name for each in fields(Limits)])
+    for name, value in table.items():
+        key, (least, most) = f"limits.{name}", RANGES[name]
+        if type(value) is not int:
+            raise _Wrong(key, f"{key} must be an integer, not {value!r}")
+        if not least <= value <= most:
+            raise _Wrong(key, f"{key} of {value} is out of range: {least} to {most}")
+    config.limits = Limits(**table)
+
+
+def _read_message(table: dict[str, Any], where: str, message: Any) -> None:
+    """Set the fields of a settings message by the keys of a table."""
+    known = message.DESCRIPTOR.fields_by_name
+    _check_keys(where + ".", table, known)
+    for key, value in table.items():
+        descriptor = known[key]
+        name = f"{where}.{key}"
+        if descriptor.message_type is not None:
+            if not isinstance(value, dict):
+                raise _Wrong(name, f"{name} must be a table")
+            _read_message(value, name, getattr(message, key))
+        elif descriptor.enum_type is not None:
+            setattr(message, key, _enumerator(name, descriptor.enum_type, value))
+        else:
+            _set_scalar(message, key, name, value, type(descriptor.default_value))
+
+
+def _set_scalar(message: Any, key: str, name: str, value: Any, expected: type) -> None:
+    if expected is float and type(value) is int:
+        value = float(value)
+    if type(value) is not expected:
+        raise _Wrong(name, f"{name} must be {_TYPE_WORDS[expected]}, not {value!r}")
+    try:
+        setattr(message, key, value)
+    except ValueError:
+        raise _Wrong(name, f"{name} is out of range: {value}") from None
+
+
+def _check_runner(runner: runner_pb2.RunnerSettings) -> None:
+    """Refuse values by the key that has them."""
+    for descriptor, value in runner.ListFields():
+        alone = runner_pb2.RunnerSettings()
+        key = f"runner.{descriptor.name}"
+        if descriptor.message_type is not None:
+            getattr(alone, descriptor.name).CopyFrom(value)
+            key += ".master_uri"  # the one in it that is checked
+        else:
+            setattr(alone, descriptor.name, value)
+        try:
+            runner_settings.check(alone)
+        except Refusal as refusal:
+            raise _Wrong(key, str(refusal)) from None
+
+
+def _enumerator(name: str, enum_type: Any, value: Any) -> int:
+    known = choices(enum_type)
+    if not isinstance(value, str) or value not in known:
+        raise _Wrong(name, f"{name} must be one of {', '.join(known)}, not {value!r}")
+    return known[value]
+
+
+def _level(name: str, value: Any) -> Level:
+    if not isinstance(value, str) or value not in rights.WORDS:
+        raise _Wrong(name, f"{name} must be one of {', '.join(rights.WORDS)}, not {value!r}")
+    return rights.WORDS[value]
+
+
+def _absolute_path(name: str, value: Any) -> Path:
+    if not isinstance(value, str) or not value.startswith("/"):
+        raise _Wrong(name, f"{name} must be an absolute path, not {value!r}")
+    if "\0" in value:
+        raise _Wrong(name, f"{name} must be a path, not {value!r}")
+    return Path(value)
+
+
+def _table(document: dict[str, Any], name: str) -> dict[str, Any]:
+    table = document.get(name, {})
+    if not isinstance(table, dict):
+        raise _Wrong(name, f"{name} must be a table")
+    return table
+
+
+def _check_keys(where: str, table: dict[str, Any], known: Iterable[str]) -> None:
+    names = list(known)
+    for key in table:
+        if key not in names:
+            raise _Wrong(
+                f"{where}{key}",
+                f'unknown key "{where}{key}"{suggestion(key, names)} (known: {listing(names)})',
+            )

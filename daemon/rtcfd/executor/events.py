@@ -1,0 +1,142 @@
+"""Log records and events of an executor, into rtcfd's log.
+
+Owned by the Runner; called by its Link on rtcfd's one thread.
+"""
+
+import asyncio
+import logging
+from collections.abc import Callable
+from typing import Protocol
+
+from rtcf.executor.v1 import executor_pb2 as wire
+
+from rtcfd.common.budget import Budget
+from rtcfd.common.limits import Limits
+
+log = logging.getLogger("rtcf-executor")
+# What a component logs is chosen where it is logged, by its logger's level.
+log.setLevel(logging.DEBUG)
+
+_LEVELS: dict[int, int] = {
+    wire.LogRecord.LEVEL_DEBUG: logging.DEBUG,
+    wire.LogRecord.LEVEL_INFO: logging.INFO,
+    wire.LogRecord.LEVEL_WARN: logging.WARNING,
+    wire.LogRecord.LEVEL_ERROR: logging.ERROR,
+    wire.LogRecord.LEVEL_FATAL: logging.CRITICAL,
+}
+_EVENT_LEVELS: dict[int, int] = {
+    wire.Event.KIND_LOOP_ENDED: logging.ERROR,
+    wire.Event.KIND_DEGRADED: logging.WARNING,
+    wire.Event.KIND_ROS: logging.INFO,
+    wire.Event.KIND_COMPONENT_FAILED: logging.WARNING,
+    wire.Event.KIND_OVERRUNS: logging.WARNING,
+    wire.Event.KIND_CLOCK: logging.INFO,
+}
+
+
+_REPORT_S = 1.0  # from the first record that is dropped to the line that says how many were
+
+
+class Audience(Protocol):
+    """Who else hears of it: the Runner."""
+
+    def loop_ended(self, component: str, reason: str) -> None:
+        """The loop has ended by itself."""
+
+    def component_failed(self, component: str, reason: str) -> None:
+        """A component has failed; the loop goes on."""
+
+    def take_log(self, record: wire.LogRecord) -> None:
+        """A record has come."""
+
+    def called(self, call: wire.ServiceCall) -> None:
+        """Somebody calls a service of the executor's ROS node."""
+
+    def parameters_changed(self, changed: wire.ParametersChanged) -> None:
+        """A peer on ROS has changed parameters of a component."""
+
+
+class Events:
+    """The unasked frames of one runner's executor."""
+
+    def __init__(self, runner: str, audience: Audience, limits: Callable[[], Limits]) -> None:
+        self._runner = runner
+        self._audience = audience
+        self._limits = limits
+        self._budget = Budget(limits().log_records_per_s)
+        self._report: asyncio.TimerHandle | None = None  # of what was lost
+
+    def take(self, response: wire.Response) -> None:
+        """Take one unasked frame."""
+        kind = response.WhichOneof("kind")
+        if kind == "log":
+            self._log(response.log)
+        elif kind == "event":
+            self._event(response.event)
+        elif kind == "service_call":
+            self._audience.called(response.service_call)
+        elif kind == "parameters_changed":
+            self._audience.parameters_changed(response.parameters_changed)
+        elif kind == "error":
+            log.error("%s", response.error.message, extra={"runner": self._runner})
+
+    def _log(self, record: wire.LogRecord) -> None:
+        self._audience.take_log(record)
+        level = _LEVELS.get(record.level, logging.INFO)
+        # A component that logs in each cycle must not fill the disk.
+        self._budget.per_s = self._limits().log_records_per_s
+        if not self._budget.take():
+            if self._report is None:
+                later = asyncio.get_running_loop().call_later
+                self._report = later(_REPORT_S, self._tell_what_was_lost)
+            return
+        entry = log.makeRecord(
+            log.name,
+            level,
+            record.file,
+            record.line,
+            "%s",
+            (record.message,),
+            None,
+            record.function,
+            {
+                "runner": self._runner,
+                "component": record.component,
+                "iteration": record.iteration,
+            },
+        )
+        # The time of the call, not of its arrival here.
+        entry.created = record.time_ns / 1e9
+        entry.msecs = record.time_ns // 1_000_000 % 1000
+        log.handle(entry)
+
+    def _tell_what_was_lost(self) -> None:
+        self._report = None
+        log.warning(
+            "%d log records of its components were dropped: more than %d a second; see "
+            "log_records_per_s under [limits]",
+            self._budget.take_lost(),
+            self._budget.per_s,
+            extra={"runner": self._runner},
+        )
+
+    def _event(self, event: wire.Event) -> None:
+        log.log(
+            _EVENT_LEVELS.get(event.kind, logging.WARNING),
+            "%s",
+            event.message,
+            extra={
+                "runner": self._runner,
+                "component": event.component,
+                "iteration": event.iteration,
+            },
+        )
+        if event.kind == wire.Event.KIND_LOOP_ENDED:
+            self._audience.loop_ended(event.component, event.message)
+        elif event.kind == wire.Event.KIND_COMPONENT_FAILED:
+            self._audience.component_failed(event.component, event.message)
+
+
+def logger_of(runner: str) -> "logging.LoggerAdapter[logging.Logger]":
+    """Return the logger for what rtcfd itself says about a runner."""
+    return logging.LoggerAdapter(logging.getLogger("rtcfd"), {"runner": runner})

@@ -1,0 +1,276 @@
+"""One executor process and the link to it.
+
+Owned by its Runner from launch, or from its adoption, to its end.  It never
+restarts: a new start is a new object.
+"""
+
+import asyncio
+import logging
+import signal
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+from rtcf.executor.v1 import executor_pb2 as wire
+
+from rtcfd import VERSION
+from rtcfd.common.limits import Limits
+from rtcfd.common.refusals import FailedPrecondition, Refusal, Unavailable
+from rtcfd.executor.command import ExecutorCommand
+from rtcfd.executor.flight_recorder import FlightRecorder, Note
+from rtcfd.executor.link import LIMITS_PROTOCOL, PROTOCOL, Link, Progress, Unasked
+from rtcfd.executor.process import Child, End, Process
+
+log = logging.getLogger(__name__)
+
+CONNECT_TIMEOUT_S = 10.0
+QUERY_TIMEOUT_S = 5.0
+STOP_TIMEOUT_S = 10.0  # for the loop to end and the stop hooks to return
+EXIT_TIMEOUT_S = 5.0  # from the exit frame, and then from SIGTERM, to the end
+_RETRY_S = 0.01
+
+OnEnd = Callable[["Executor", End], None]
+
+
+class Executor:
+    """A running executor.  `on_end` is called once, with how it ended."""
+
+    def __init__(
+        self, runner: str, process: Process, socket: Path, on_unasked: Unasked, on_end: OnEnd
+    ) -> None:
+        self.pid = process.pid
+        self.expected = False  # its end was asked for
+        self.ended = asyncio.Event()  # set after on_end
+        self.version = ""  # of rtcf
+        self.foreign = ""  # why nothing but stop and its end can be asked of it
+        self._protocol = 0
+        self._peer = f"executor of {runner} (pid {process.pid})"
+        self._process = process
+        self._socket = socket
+        self._on_unasked = on_unasked
+        self._on_end = on_end
+        self._link: Link | None = None
+        self._recorder: FlightRecorder | None = None
+        self._watching: asyncio.Task[None] | None = None
+
+    @classmethod
+    async def launch(
+        cls, runner: str, command: ExecutorCommand, on_unasked: Unasked, on_end: OnEnd
+    ) -> "Executor":
+        """Start the process and connect; a failure leaves no process behind."""
+        try:
+            # An own session: Ctrl-C at rtcfd's terminal reaches rtcfd alone, which
+            # then stops the loops in order.  Signals as rtcfd has them: without
+            # SIGPIPE, so that a loop does not die of the reader of our stderr.
+            # Not asyncio's, which kills what it started when it is closed.
+            started = subprocess.Popen(
+                command.arguments(runner),
+                stdin=subprocess.DEVNULL,
+                stdout=2,
+                env=command.environment(),
+                start_new_session=True,
+                restore_signals=False,
+            )
+        except OSError as error:
+            raise FailedPrecondition(f"cannot run {command.binary}: {error.strerror}") from None
+        process = Child(started)
+        executor = cls(runner, process, command.socket(runner), on_unasked, on_end)
+        try:
+            await executor._attach()
+            if executor.foreign:
+                raise FailedPrecondition(
+                    f"{executor.foreign}: install both of one version, then restart rtcfd"
+                )
+        except BaseException:
+            process.signal(signal.SIGKILL)
+            await process.wait()
+            raise
+        executor._watching = asyncio.create_task(executor._watch())
+        return executor
+
+    @classmethod
+    async def adopt(
+        cls, runner: str, socket: Path, on_unasked: Unasked, on_end: OnEnd
+    ) -> "Executor | None":
+        """Take over an executor that an earlier rtcfd left at its socket.
+
+        None if there is none: a dead socket is removed.  One whose protocol is
+        not ours is `foreign`: its loop goes on, and can be stopped.
+        """
+        try:
+            link = await Link.connect(f"left-over executor of {runner}", socket, on_unasked)
+        except FileNotFoundError:
+            return None
+        except ConnectionRefusedError:
+            socket.unlink(missing_ok=True)
+            return None
+        try:
+            process = Process(link.peer_pid)
+        except OSError:
+            await link.close()  # it has just ended
+            socket.unlink(missing_ok=True)
+            return None
+        executor = cls(runner, process, socket, on_unasked, on_end)
+        try:
+            link.peer = executor._peer
+            await executor._greet(link, QUERY_TIMEOUT_S)
+            if executor.foreign:
+                executor.foreign += (
+                    f": its loop goes on as it is; `rtcfctl -r {runner} stop` ends it, "
+                    f"`rtcfctl runner restart {runner}` starts one of this version"
+                )
+                log.error("%s", executor.foreign)
+        except BaseException as problem:
+            await link.close()
+            process.release()
+            if isinstance(problem, Unavailable):
+                raise Unavailable(
+                    f"{problem}; its loop may be running: `rtcfctl -r {runner} start` tries again, "
+                    f"`kill {executor.pid}` ends it"
+                ) from None
+            raise
+        executor._watching = asyncio.create_task(executor._watch())
+        return executor
+
+    @property
+    def connected(self) -> bool:
+        """Tell whether the link stands."""
+        return self._link is not None and not self._link.ended.is_set()
+
+    def note(self) -> Note | None:
+        """Return what the flight recorder says; None if there is none."""
+        return None if self._recorder is None else self._recorder.read()
+
+    async def request(
+        self,
+        request: wire.Request,
+        timeout_s: float | None = QUERY_TIMEOUT_S,
+        on_progress: Progress | None = None,
+    ) -> wire.Response:
+        """Send one request; see Link.request."""
+        if self._link is None:
+            raise Unavailable(f"{self._peer} is not connected")
+        if self.foreign and request.WhichOneof("kind") not in ("stop", "exit"):
+            raise FailedPrecondition(self.foreign)
+        return await self._link.request(request, timeout_s, on_progress)
+
+    async def limit(self, limits: Limits) -> None:
+        """Tell it what its graph may have; one that does not know of limits goes without."""
+        if self._protocol >= LIMITS_PROTOCOL and not self.foreign:
+            await self.request(wire.Request(limits=wire.Limits(taps=limits.taps)), None)
+
+    async def leave(self) -> None:
+        """Let go of it without ending it: the next rtcfd finds it."""
+        if self._watching is not None:
+            self._watching.cancel()
+            await asyncio.gather(self._watching, return_exceptions=True)
+        if self._link is not None:
+            await self._link.close()
+        if self._recorder is not None:
+            self._recorder.close()
+        self._process.release()
+
+    async def shut_down(self) -> None:
+        """Stop the loop in order, then end the process, by force if it must be."""
+        self.expected = True
+        try:
+            await self.request(wire.Request(stop=wire.Stop()), STOP_TIMEOUT_S)
+            await self.request(wire.Request(exit=wire.Exit()), EXIT_TIMEOUT_S)
+        except Refusal as refusal:
+            log.warning("%s: no orderly end: %s", self._peer, refusal)
+            self._process.signal(signal.SIGTERM)
+        await _end(self._process, self._peer)
+        if self._watching is not None:
+            await self._watching
+
+    async def _attach(self) -> None:
+        """Connect and say hello, within the deadline."""
+        loop = asyncio.get_running_loop()
+        deadline = loop.time() + CONNECT_TIMEOUT_S
+        while True:
+            if self._process.end is not None:
+                raise FailedPrecondition(
+                    f"{self._peer} {self._process.end} before it served; "
+                    "its reason is in rtcfd's log"
+                )
+            try:
+                link = await Link.connect(self._peer, self._socket, self._on_unasked)
+                break
+            except (FileNotFoundError, ConnectionRefusedError):
+                if loop.time() > deadline:
+                    raise Unavailable(
+                        f"{self._peer} does not serve {self._socket} "
+                        f"{CONNECT_TIMEOUT_S:g} s after its start"
+                    ) from None
+                await asyncio.sleep(_RETRY_S)
+        try:
+            await self._greet(link, max(deadline - loop.time(), 1.0))
+        except BaseException:
+            await link.close()
+            raise
+
+    async def _greet(self, link: Link, timeout_s: float) -> None:
+        """Say hello, and open what the answer names."""
+        hello = await link.hello(timeout_s)
+        self.version = hello.version or "?"
+        self._protocol = hello.protocol
+        if abs(hello.protocol - PROTOCOL) > 1:
+            self.foreign = (
+                f"{self._peer} is of rtcf {self.version} and speaks protocol {hello.protocol}, "
+                f"which rtcfd {VERSION} with protocol {PROTOCOL} does not"
+            )
+        if self._recorder is None and hello.flight_recorder_fd > 0:
+            try:
+                self._recorder = FlightRecorder(link.peer_pid, hello.flight_recorder_fd)
+            except (OSError, ValueError) as error:
+                log.warning("%s: no flight recorder: %s", self._peer, error)
+        self._link = link
+
+    async def _watch(self) -> None:
+        """See the process end; a link lost before that is made anew."""
+        ending = asyncio.create_task(self._process.wait())
+        while self._link is not None:
+            lost = asyncio.create_task(self._link.ended.wait())
+            await asyncio.wait({ending, lost}, return_when=asyncio.FIRST_COMPLETED)
+            lost.cancel()
+            if not ending.done():
+                # A process that dies closes its socket a little before it can be reaped.
+                await asyncio.wait({ending}, timeout=1.0)
+            if ending.done() or self.expected:
+                break
+            log.error("%s; connecting again", self._link.problem or f"{self._peer} hung up")
+            try:
+                await self._attach()
+            except Refusal as refusal:
+                log.error("%s: ending it", refusal)
+                self._process.signal(signal.SIGTERM)
+                break
+        end = await ending
+        if self._link is not None:
+            await self._link.close()
+        self._socket.unlink(missing_ok=True)
+        self._on_end(self, end)
+        if self._recorder is not None:
+            self._recorder.close()
+            self._recorder = None
+        self.ended.set()
+
+
+async def _end(process: Process, peer: str) -> None:
+    """Wait until a process that was asked to end has done so; insist."""
+    for harder in (signal.SIGTERM, signal.SIGKILL):
+        try:
+            await asyncio.wait_for(process.wait(), EXIT_TIMEOUT_S)
+            return
+        except TimeoutError:
+            log.warning("%s does not end: sending %s", peer, harder.name)
+            process.signal(harder)
+    await process.wait()
+
+
+def left_overs(folder: Path) -> list[str]:
+    """Return the runners that have a socket in the folder of the executors."""
+    try:
+        return sorted(each.stem for each in folder.glob("*.sock") if each.is_socket())
+    except OSError:
+        return []

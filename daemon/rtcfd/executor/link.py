@@ -1,0 +1,161 @@
+"""The connection to one executor: requests out, responses and unasked frames in.
+
+Owned by the Executor.  Requests may overlap; each response finds its request
+by id.  A link that ends fails all requests that wait for it.
+"""
+
+import asyncio
+import os
+import socket
+import struct
+from collections.abc import Callable
+from pathlib import Path
+
+from google.protobuf.message import DecodeError
+from rtcf.executor.v1 import executor_pb2 as wire
+
+from rtcfd.common import refusals
+from rtcfd.executor import frames
+
+# The protocol that this rtcfd speaks.  A number is added for what a peer cannot do without
+# knowing of it, so that rtcfd and an executor of neighbouring numbers work together: the newer
+# asks the older for nothing that it does not know.  Hello, Stop and Exit stay as they are for good.
+PROTOCOL = 2
+LIMITS_PROTOCOL = 2  # from it on executors keep [limits]
+_CREDENTIALS = struct.Struct("3i")  # struct ucred, unix(7)
+
+Progress = Callable[[str], None]
+Unasked = Callable[[wire.Response], None]
+
+_REFUSALS: dict[int, type[refusals.Refusal]] = {
+    wire.Error.CODE_INVALID_ARGUMENT: refusals.InvalidArgument,
+    wire.Error.CODE_NOT_FOUND: refusals.NotFound,
+    wire.Error.CODE_ALREADY_EXISTS: refusals.AlreadyExists,
+    wire.Error.CODE_FAILED_PRECONDITION: refusals.FailedPrecondition,
+    wire.Error.CODE_UNAVAILABLE: refusals.Unavailable,
+    wire.Error.CODE_NO_MASTER: refusals.NoMaster,
+    wire.Error.CODE_RESOURCE_EXHAUSTED: refusals.ResourceExhausted,
+}
+
+
+class _Pending:
+    """A request on its way."""
+
+    def __init__(self, on_progress: Progress | None) -> None:
+        self.on_progress = on_progress
+        self.result: asyncio.Future[wire.Response] = asyncio.get_running_loop().create_future()
+
+
+class Link:
+    """One connection.  `peer` names the executor in messages."""
+
+    def __init__(
+        self,
+        peer: str,
+        reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+        on_unasked: Unasked,
+    ) -> None:
+        self.peer = peer
+        self._writer = writer
+        self._on_unasked = on_unasked
+        self._next_id = 1
+        self._pending: dict[int, _Pending] = {}
+        self.problem = ""  # why the peer was cut off; empty = it closed
+        self.ended = asyncio.Event()
+        credentials = writer.get_extra_info("socket").getsockopt(
+            socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size
+        )
+        # Of the process that listens, by the kernel's word.
+        self.peer_pid, self.peer_uid, _ = _CREDENTIALS.unpack(credentials)
+        self._reading = asyncio.create_task(self._read(reader))
+
+    @classmethod
+    async def connect(cls, peer: str, path: Path, on_unasked: Unasked) -> "Link":
+        """Connect to the executor's socket; raises OSError, or a refusal of a foreign one."""
+        reader, writer = await asyncio.open_unix_connection(path)
+        link = cls(peer, reader, writer, on_unasked)
+        if link.peer_uid not in (os.geteuid(), 0):
+            await link.close()
+            raise refusals.Unavailable(
+                f"{path} is served by user {link.peer_uid}, not by us: remove it"
+            )
+        return link
+
+    async def hello(self, timeout_s: float) -> wire.HelloResult:
+        """Open the conversation; both then say which protocol and version they are."""
+        request = wire.Request(hello=wire.Hello(protocol=PROTOCOL))
+        return (await self.request(request, timeout_s)).hello
+
+    async def request(
+        self, request: wire.Request, timeout_s: float | None, on_progress: Progress | None = None
+    ) -> wire.Response:
+        """Send a request (its id is set here) and return the response that ends it.
+
+        Raises the executor's refusal, or Unavailable when the link ends or
+        `timeout_s` of wall-clock time passes (None: for callers with an own limit).
+        """
+        if self.ended.is_set():
+            raise refusals.Unavailable(self._lost())
+        request.id = self._next_id
+        self._next_id += 1
+        pending = self._pending[request.id] = _Pending(on_progress)
+        try:
+            self._writer.write(frames.pack(request.SerializeToString()))
+            async with asyncio.timeout(timeout_s):
+                await self._writer.drain()
+                response = await pending.result
+        except TimeoutError:
+            raise refusals.Unavailable(
+                f"{self.peer} did not answer {request.WhichOneof('kind')} within {timeout_s:g} s"
+            ) from None
+        except frames.FrameError as error:
+            raise refusals.InvalidArgument(f"request too large: {error}") from None
+        except ConnectionError:
+            raise refusals.Unavailable(self._lost()) from None
+        finally:
+            del self._pending[request.id]
+            pending.result.cancel()
+        if response.WhichOneof("kind") == "error":
+            refusal = _REFUSALS.get(response.error.code, refusals.FailedPrecondition)
+            raise refusal(response.error.message)
+        return response
+
+    async def close(self) -> None:
+        """End the connection; requests that wait fail."""
+        self._writer.close()
+        self._reading.cancel()
+        await asyncio.gather(self._reading, return_exceptions=True)
+        self._fail_pending()
+
+    async def _read(self, reader: asyncio.StreamReader) -> None:
+        try:
+            while (message := await frames.read(reader)) is not None:
+                self._dispatch(wire.Response.FromString(message))
+        except (frames.FrameError, DecodeError) as error:
+            self.problem = f"{self.peer} does not keep to the protocol: {error}"
+        finally:
+            self._writer.close()
+            self._fail_pending()
+
+    def _dispatch(self, response: wire.Response) -> None:
+        if response.id == 0:
+            self._on_unasked(response)
+            return
+        pending = self._pending.get(response.id)
+        if pending is None:
+            return  # its caller gave up
+        if response.WhichOneof("kind") == "progress":
+            if pending.on_progress is not None:
+                pending.on_progress(response.progress)
+        elif not pending.result.done():
+            pending.result.set_result(response)
+
+    def _fail_pending(self) -> None:
+        self.ended.set()
+        for pending in self._pending.values():
+            if not pending.result.done():
+                pending.result.set_exception(refusals.Unavailable(self._lost()))
+
+    def _lost(self) -> str:
+        return self.problem or f"{self.peer} closed its connection"

@@ -1,0 +1,1 @@
+"""What is done to one runner, one thing at a time."""

@@ -1,0 +1,270 @@
+"""Changes of a runner's graph: the executor adopts, then rtcfd notes and saves.
+
+Functions on a Runner; each is one transaction of its executor.
+"""
+
+import asyncio
+from collections.abc import Awaitable, Callable, Sequence
+from typing import TYPE_CHECKING
+
+from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import control_pb2, graph_pb2
+from rtcf_shared.naming import listing, suggestion
+
+from rtcfd.catalog.catalog import loads
+from rtcfd.common import runner_settings
+from rtcfd.common.names import absolute, full_name
+from rtcfd.common.refusals import InvalidArgument, NoMaster, NotFound, Refusal
+from rtcfd.executor.link import Progress
+from rtcfd.state.desired import replacement
+
+if TYPE_CHECKING:
+    from rtcfd.runners.runner import Runner
+
+_MASTER_POLL_S = 0.5
+
+
+async def load(
+    runner: "Runner", spec: graph_pb2.ComponentSpec, progress: Progress
+) -> control_pb2.ChangeResult:
+    """Load a component."""
+    library = await runner.catalog.find(spec.package, spec.type)
+
+    async def work() -> control_pb2.ChangeResult:
+        runner.limits.check_components(len(runner.desired.components) + 1)
+        request = wire.Request(load=library.load(spec))
+        result = (await runner.ask(request, progress)).change
+        runner.left_out.pop(result.component, None)
+        runner.desired.put(result.component, spec)
+        return await _saved(runner, result)
+
+    what = f"{spec.package}/{spec.type}"
+    result = await runner.change(f"the load of {what}", work)
+    runner.log.info("%s loaded (%s)", result.component, what)
+    return result
+
+
+async def load_when_master(
+    runner: "Runner", spec: graph_pb2.ComponentSpec, progress: Progress
+) -> control_pb2.ChangeResult:
+    """Load a component; wait for a ROS master if its hooks need one and there is none."""
+    return await when_master(lambda: load(runner, spec, progress), progress)
+
+
+async def when_master(
+    attempt: Callable[[], Awaitable[control_pb2.ChangeResult]], progress: Progress
+) -> control_pb2.ChangeResult:
+    """Try a load again for as long as its hooks need a ROS master and there is none."""
+    said = ""
+    while True:
+        try:
+            return await attempt()
+        except NoMaster as refusal:
+            if str(refusal) != said:
+                said = str(refusal)
+                progress(f"waiting for a ROS master: {said}")
+        # Between turns, so that other changes go on.
+        await asyncio.sleep(_MASTER_POLL_S)
+
+
+async def unload(
+    runner: "Runner", names: list[str], progress: Progress
+) -> control_pb2.ChangeResult:
+    """Unload components.
+
+    Those that were left out, or belong to an executor that is down, are only
+    forgotten: so a component that breaks its executor can be taken out.
+    """
+    if not names:
+        raise InvalidArgument("no component named to unload")
+    full_names = [absolute(name) for name in names]
+
+    async def work() -> control_pb2.ChangeResult:
+        live = [name for name in full_names if name not in runner.left_out]
+        if runner.up and live:
+            request = wire.Request(unload=control_pb2.UnloadRequest(components=live))
+            result = (await runner.ask(request, progress)).change
+        else:
+            _check_known(runner, full_names)
+            result = control_pb2.ChangeResult(notes=["taken out of the saved graph only"])
+        for name in full_names:
+            runner.left_out.pop(name, None)
+        runner.desired.drop(full_names)
+        return await _saved(runner, result)
+
+    what = ", ".join(full_names)
+    result = await runner.change(f"the unload of {what}", work)
+    runner.log.info("%s unloaded", what)
+    return result
+
+
+async def replace(
+    runner: "Runner", name: str, given: graph_pb2.ComponentSpec, progress: Progress
+) -> control_pb2.ChangeResult:
+    """Put a new component in the place of an old one."""
+    old = absolute(name)
+    library = await runner.catalog.find(given.package, given.type)
+
+    async def work() -> control_pb2.ChangeResult:
+        spec = replacement(runner.desired.components.get(old), given)
+        if old in runner.left_out:  # the executor does not have it
+            request = wire.Request(load=library.load(spec))
+        else:
+            change = wire.Replace(
+                component=old, replacement=spec, library=library.path, owner=library.owner
+            )
+            request = wire.Request(replace=change)
+        result = (await runner.ask(request, progress)).change
+        runner.left_out.pop(old, None)
+        runner.desired.drop([old])
+        runner.desired.put(result.component, spec)
+        return await _saved(runner, result)
+
+    what = f"{given.package}/{given.type}"
+    result = await runner.change(f"the replacement of {old} by {what}", work)
+    runner.log.info("%s replaced by %s (%s)", old, result.component, what)
+    return result
+
+
+async def release(
+    runner: "Runner", names: list[str], progress: Progress
+) -> control_pb2.ChangeResult:
+    """Load components again that were left out of the loop."""
+    if not names:
+        raise InvalidArgument("no component named to release")
+    full_names = [absolute(name) for name in names]
+    what = ", ".join(full_names)
+
+    async def work() -> control_pb2.ChangeResult:
+        _check_known(runner, full_names)
+        for name in full_names:
+            if name not in runner.left_out:
+                raise NotFound(f"{name} is not left out of runner {runner.name}: it is in the loop")
+        specs = [runner.desired.components[name] for name in full_names]
+        if len(specs) == 1:
+            (load,) = await loads(runner.catalog, specs)
+            request = wire.Request(load=load)
+        else:
+            every = [spec for name, spec in runner.desired.components.items()
+                     if name not in runner.left_out or name in full_names]  # fmt: skip
+            request = wire.Request(apply=wire.Apply(components=await loads(runner.catalog, every)))
+        result = (await runner.ask(request, progress)).change
+        for name in full_names:
+            runner.left_out.pop(name, None)
+            runner.desired.quarantined.pop(name, None)
+        return await _saved(runner, result)
+
+    result = await runner.change(f"the release of {what}", work)
+    runner.log.info("%s released", what)
+    return result
+
+
+async def apply(
+    runner: "Runner", request: control_pb2.ApplyRequest, progress: Progress
+) -> control_pb2.ChangeResult:
+    """Make the graph, and the settings that are given, what a request says."""
+    check_graph(request.components)
+    runner_settings.check(request.settings)
+    runner.limits.check_components(len(request.components))
+
+    async def work() -> control_pb2.ChangeResult:
+        before = runner.settings()
+        changes = runner_settings.differences(before, request.settings)
+        apply = wire.Apply(components=await loads(runner.catalog, request.components), dry_run=True)
+        if changes and not request.dry_run:
+            # So that a graph that is refused changes no settings, for however short a time.
+            await runner.ask(wire.Request(apply=apply), progress)
+            await runner.ask(wire.Request(configure=request.settings))
+        apply.dry_run = request.dry_run
+        try:
+            result = (await runner.ask(wire.Request(apply=apply), progress)).change
+        except Refusal:
+            if changes and not request.dry_run and runner.up:
+                await runner.ask(wire.Request(configure=before))
+            raise
+        for text in changes:
+            kind = control_pb2.Difference.KIND_SETTINGS
+            result.differences.append(control_pb2.Difference(kind=kind, detail=text))
+        if request.dry_run:
+            return result
+        runner.desired.become(request.components)
+        runner.left_out.clear()
+        runner.desired.choose(request.settings)
+        return await _saved(runner, result)
+
+    result = await runner.change("the application of a graph", work)
+    if not request.dry_run:
+        runner.log.info("graph of %d components applied: %d differed",
+                        len(request.components), len(result.differences))  # fmt: skip
+    return result
+
+
+def left_out(runner: "Runner") -> list[graph_pb2.ComponentInfo]:
+    """Return what belongs to the graph but is not loaded, with the reason."""
+    return [
+        graph_pb2.ComponentInfo(
+            full_name=name,
+            spec=runner.desired.components[name],
+            state=graph_pb2.COMPONENT_STATE_LEFT_OUT,
+            fault=reason,
+        )
+        for name, reason in sorted(runner.left_out.items())
+    ]
+
+
+def check_graph(specs: Sequence[graph_pb2.ComponentSpec]) -> None:
+    """Refuse a graph with two components of one name."""
+    seen: set[str] = set()
+    for spec in specs:
+        name = full_name(spec)
+        if name in seen:
+            raise InvalidArgument(f"component {name} is there twice in the graph")
+        seen.add(name)
+
+
+async def set_breaks(
+    runner: "Runner", request: control_pb2.SetBreaksRequest, progress: Progress
+) -> control_pb2.ChangeResult:
+    """Set or remove loop breaks."""
+
+    async def work() -> control_pb2.ChangeResult:
+        result = (await runner.ask(wire.Request(set_breaks=request), progress)).change
+        runner.desired.set_breaks(request.ports, request.broken)
+        return await _saved(runner, result)
+
+    result = await runner.change("a change of loop breaks", work)
+    ports = ", ".join(f"{absolute(port.component)}.{port.port}" for port in request.ports)
+    runner.log.info("%s: loop break %s", ports, "set" if request.broken else "removed")
+    return result
+
+
+async def set_parameters(
+    runner: "Runner", request: control_pb2.SetParametersRequest, progress: Progress
+) -> control_pb2.ChangeResult:
+    """Change parameters of one component."""
+    name = absolute(request.component)
+
+    async def work() -> control_pb2.ChangeResult:
+        result = (await runner.ask(wire.Request(set_parameters=request), progress)).change
+        runner.desired.set_parameters(name, request.parameters)
+        return await _saved(runner, result)
+
+    result = await runner.change(f"a change of parameters of {name}", work)
+    changed = ", ".join(setting.name for setting in request.parameters)
+    runner.log.info("%s: %s set", name, changed)
+    return result
+
+
+async def _saved(runner: "Runner", result: control_pb2.ChangeResult) -> control_pb2.ChangeResult:
+    result.notes.extend(await runner.save())
+    return result
+
+
+def _check_known(runner: "Runner", full_names: list[str]) -> None:
+    known = runner.desired.components
+    for name in full_names:
+        if name not in known:
+            raise NotFound(
+                f"no component {name} in runner {runner.name}"
+                f"{suggestion(name, known)} (components: {listing(known)})"
+            )

@@ -1,0 +1,1 @@
+"""How an executor gets its graph again: adopted, restored, or after a crash."""

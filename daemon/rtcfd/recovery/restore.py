@@ -1,0 +1,192 @@
+"""How an executor gets its graph: followed when it is adopted, restored when it is
+new, restored without the culprit when the last one crashed.
+
+Functions on a Runner; each runs in a turn of it, except recover().
+"""
+
+import time
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+from rtcf_shared.graph_writer import live_spec
+from rtcf_shared.naming import listing
+
+from rtcfd.catalog.catalog import loads
+from rtcfd.common.refusals import InvalidArgument, Refusal
+from rtcfd.recovery.follow import follow_components, follow_settings
+from rtcfd.recovery.verdict import MOST_ATTEMPTS, MOST_CRASHES, WINDOW_S, Verdict
+
+if TYPE_CHECKING:
+    from rtcfd.runners.runner import Runner
+
+_WORDS = {
+    runner_pb2.RUNNER_STATE_STOPPED: "stopped",
+    runner_pb2.RUNNER_STATE_RUNNING: "running",
+    runner_pb2.RUNNER_STATE_FAULTED: "ended by a fault",
+    runner_pb2.RUNNER_STATE_STUCK: "stuck",
+    runner_pb2.RUNNER_STATE_STEPPING: "stepping",
+}
+
+
+async def follow(runner: "Runner") -> None:
+    """Make the desired state that of an executor that was adopted.
+
+    What its loop lacks is loaded if it does not run: then the rtcfd before this
+    one died while it restored it.
+    """
+    await _settle(runner)
+    status = (await runner.ask(wire.Request(get_status=wire.GetStatus()))).status
+    listed = await runner.ask(wire.Request(list_components=wire.ListComponents()))
+    runner.log.info(
+        "adopted: loop %s, iteration %d", _WORDS.get(status.state, "in an unknown state"),
+        status.iteration,
+    )  # fmt: skip
+    lines = follow_settings(runner.desired, runner.defaults, status.settings)
+    _follow_leased(runner, listed.components.components)
+    fresh = status.state == runner_pb2.RUNNER_STATE_STOPPED and not status.iteration
+    more, runner.left_out = follow_components(
+        runner.desired, listed.components.components, restored=not fresh
+    )
+    for line in lines + more:
+        runner.log.warning("%s: the executor's is kept", line)
+    was_running = runner.desired.running
+    runner.running = status.state == runner_pb2.RUNNER_STATE_RUNNING
+    runner.desired.running = runner.running or (fresh and was_running)
+    if status.state == runner_pb2.RUNNER_STATE_STOPPED:
+        missing = [name for name in runner.left_out if name not in runner.desired.quarantined]
+        await _load_each(runner, missing)
+    if lines or more or runner.desired.running != was_running:
+        await runner.save()
+    runner.leases.await_holders()
+
+
+def _follow_leased(runner: "Runner", found: Iterable[graph_pb2.ComponentInfo]) -> None:
+    """Take leased components, which are not saved, from the executor that has them."""
+    live = {str(info.full_name): info for info in found}
+    for name in list(runner.desired.leased):
+        if name in live:
+            runner.desired.put(name, live_spec(live[name]))
+        else:
+            runner.desired.drop([name])
+
+
+async def restore(runner: "Runner") -> None:
+    """Load what is desired into a new executor; what does not load is left out and reported."""
+    runner.left_out = dict(runner.desired.quarantined)
+    wanted = [name for name in runner.desired.components if name not in runner.left_out]
+    if not wanted:
+        return
+    try:
+        # All at once, for speed; one by one if that finds something to refuse.
+        every = await loads(runner.catalog, [runner.desired.components[name] for name in wanted])
+        await runner.ask(wire.Request(apply=wire.Apply(components=every)))
+    except Refusal:
+        if runner.up:
+            await _load_each(runner, wanted)
+    if runner.up:
+        count = len(runner.desired.components) - len(runner.left_out)
+        runner.log.info("%d of its components restored, held", count)
+    if runner.left_out:
+        await runner.save()
+
+
+async def resume(runner: "Runner") -> None:
+    """At the start of rtcfd: start a loop that ran, if `on_boot` says so."""
+    if runner.running or not runner.up or not runner.desired.running:
+        return
+    if runner.settings().on_boot == runner_pb2.ON_BOOT_RESUME:
+        try:
+            await runner.start_loop()
+            runner.log.info("loop resumed")
+            return
+        except Refusal as refusal:
+            runner.held = f"not resumed: {refusal}"
+            runner.log.error("%s", runner.held)
+    runner.desired.running = False
+    await runner.save()
+
+
+async def recover(runner: "Runner", verdict: Verdict, trouble: str) -> None:
+    """After a death that nobody asked for: a new executor, the graph without the culprit."""
+    begin = time.monotonic()
+
+    async def work() -> None:
+        # First of all: whatever comes, the culprit is not loaded again.
+        await runner.save()
+        if runner.up or runner.closing:
+            return
+        if runner.crashes.recent >= MOST_ATTEMPTS:
+            runner.give_up(f"{trouble}, the last of {runner.crashes.recent} in {WINDOW_S:g} s")
+            return
+        await runner.start_executor()
+        if not runner.up:
+            return  # that one died too: its own recovery follows
+        runner.held = _held(runner, verdict, trouble)
+        if runner.desired.running:
+            try:
+                await runner.start_loop()
+                runner.held = _held(runner, verdict, trouble)
+            except Refusal as refusal:
+                runner.held += f"; not resumed: {refusal}"
+        took = time.monotonic() - begin
+        runner.log.warning("executor restarted in %.2f s: %s", took, runner.held)
+
+    try:
+        await runner.change("the recovery of its executor", work)
+    except Refusal as refusal:
+        if not runner.up and not runner.closing:
+            runner.give_up(f"{trouble}; not recovered: {refusal}")
+
+
+def resumes(runner: "Runner", verdict: Verdict) -> bool:
+    """Tell whether a loop that ran goes on without the culprit."""
+    culprit = runner.desired.components.get(verdict.culprit)
+    return (
+        runner.settings().on_crash == runner_pb2.ON_CRASH_RESUME
+        and culprit is not None
+        and bool(culprit.optional)
+        and runner.crashes.recent <= MOST_CRASHES
+    )
+
+
+def _held(runner: "Runner", verdict: Verdict, trouble: str) -> str:
+    """Return what the status says after a recovery."""
+    loop = "its loop goes on" if runner.running else f"held: `rtcfctl -r {runner.name} start`"
+    if verdict.culprit not in runner.desired.quarantined:
+        return f"{trouble}; {loop} with all its components"
+    return (
+        f"{trouble}; {loop} without {verdict.culprit}, which "
+        f"`rtcfctl -r {runner.name} release {verdict.culprit}` loads again"
+    )
+
+
+async def _settle(runner: "Runner") -> None:
+    """Wait until a change is done that the rtcfd before this one had asked for.
+
+    An unload of nothing is refused by the thread that makes the changes, when
+    it comes to it.
+    """
+    try:
+        await runner.ask(wire.Request(unload=control_pb2.UnloadRequest()))
+    except InvalidArgument:
+        pass
+    except Refusal as refusal:
+        runner.log.warning("%s", refusal)
+
+
+async def _load_each(runner: "Runner", names: Iterable[str]) -> None:
+    """Load components one by one; what does not load is left out and reported."""
+    for name in names:
+        try:
+            (load,) = await loads(runner.catalog, [runner.desired.components[name]])
+            await runner.ask(wire.Request(load=load))
+            runner.left_out.pop(name, None)
+        except Refusal as refusal:
+            if not runner.up:
+                return  # it died: its recovery sees to the rest
+            runner.left_out[name] = str(refusal)
+            runner.log.error("%s is left out of the loop: %s", name, refusal)
+    if runner.left_out:
+        runner.log.warning("left out of its loop: %s", listing(runner.left_out))

@@ -1,0 +1,176 @@
+"""What changes in rtcfd itself while it runs: its settings, its graphs.d, its own files.
+
+Owned by the daemon.
+"""
+
+import logging
+import os
+from collections.abc import Callable, Iterable
+from dataclasses import fields
+from pathlib import Path
+
+from rtcf.v1 import control_pb2, runner_pb2
+
+from rtcfd.access.admission import Admission
+from rtcfd.access.clients import Clients
+from rtcfd.catalog.catalog import Catalog
+from rtcfd.common import runner_settings
+from rtcfd.common.refusals import Refusal
+from rtcfd.configuration.options import Options
+from rtcfd.runners.runner import Surroundings
+from rtcfd.runners.runners import Runners
+from rtcfd.state import handover
+from rtcfd.state.boot_graphs import BootGraphs, Given, become
+from rtcfd.state.desired import Desired
+from rtcfd.state.handover import Handover
+from rtcfd.state.store import Store
+
+log = logging.getLogger(__name__)
+
+# Read at the start only.
+_FIXED = ("socket", "runtime_dir", "state_dir", "graphs_dir", "executor")
+
+
+class Reloads:
+    """Keeps the parts of the daemon as the settings say."""
+
+    def __init__(
+        self,
+        given: Options,
+        read_options: Callable[[], Options],
+        shared: Surroundings,
+        catalog: Catalog,
+        runners: Runners,
+        clients: Clients,
+        admission: Admission,
+        store: Store,
+    ) -> None:
+        self._given = given
+        self._command_folder = shared.command.folder
+        self._read_options = read_options
+        self._shared = shared
+        self._catalog = catalog
+        self._runners = runners
+        self._clients = clients
+        self._admission = admission
+        self._store = store
+        self._left: Handover | None = None  # by the rtcfd before this one
+        self._graphs = BootGraphs(given.graphs_dir, {})
+        self._late: list[Given] = []  # for runners that are adopted first
+        self._graph_problems: list[str] = []
+        self._files = (Path(__file__), given.executor)
+        self._identities = [_identity(file) for file in self._files]
+
+    def boot(self, states: list[Desired], running: Iterable[str]) -> list[Desired]:
+        """Return the states with the runners of graphs.d as their files say.
+
+        Those whose executors run are taken as they are; catch_up() follows."""
+        adopted = set(running)
+        if adopted and (left := handover.read(self._command_folder)):
+            self._left = left
+            self._shared.defaults = runner_settings.merged(self._given.defaults, left.defaults)
+            self._graphs = BootGraphs(self._given.graphs_dir, left.graphs)
+        graphs, self._graph_problems = self._graphs.read()
+        found = {state.runner: state for state in states}
+        for given in graphs:
+            if given.runner in adopted:
+                if self._left and given.changed:
+                    self._late.append(given)
+                continue
+            become(found.setdefault(given.runner, Desired(given.runner)), given.graph)
+            log.info("runner %s is as %s says", given.runner, given.file)
+        return list(found.values())
+
+    async def catch_up(self) -> None:
+        """Once executors are adopted: apply what has changed in settings and graphs.d since the
+        rtcfd before this one read them."""
+        lines = await self._follow_defaults(self._given.defaults)
+        lines += await self._apply(self._late)
+        self._late = []
+        self._leave_note()
+        for line in lines:
+            log.info("changed while rtcfd was away: %s", line)
+
+    def notes(self) -> list[str]:
+        """Return what is to be said about rtcfd itself."""
+        lines = [f"not applied: {problem}" for problem in self._graph_problems]
+        lines += self._store.problems
+        if [_identity(file) for file in self._files] != self._identities:
+            lines.insert(
+                0,
+                "restart pending: rtcfd was upgraded while it runs; `systemctl restart rtcfd` "
+                "starts the new version, loops go on",
+            )
+        return lines
+
+    async def reload(self) -> list[str]:
+        """Read settings and graphs.d again; refused as a whole if the settings are not valid."""
+        new = self._read_options()
+        lines = [
+            f"{name} changes with the next restart of rtcfd"
+            for name in _FIXED
+            if getattr(new, name) != getattr(self._given, name)
+        ]
+        if new.limits.message_kb != self._given.limits.message_kb:
+            lines.append("limits.message_kb changes with the next restart of rtcfd")
+        for part in fields(new):
+            if part.name in ("folders", "access", "limits", "defaults") and (
+                getattr(new, part.name) != getattr(self._given, part.name)
+            ):
+                lines.append(f"{_WORDS[part.name]} changed")
+        self._catalog.folders = new.folders
+        self._admission.access = new.access
+        self._clients.limit = new.limits.clients
+        taps, self._shared.limits = self._shared.limits.taps, new.limits
+        self._given = new
+        if new.limits.taps != taps:
+            for runner in self._runners.all():
+                await runner.follow_limits()
+        lines += await self._follow_defaults(new.defaults)
+        graphs, self._graph_problems = self._graphs.read()
+        lines += self._graph_problems
+        lines += await self._apply([given for given in graphs if given.changed])
+        self._leave_note()
+        log.info("settings and graphs read again: %s", "; ".join(lines) or "nothing has changed")
+        return lines
+
+    def _leave_note(self) -> None:
+        handover.write(self._command_folder, Handover(self._shared.defaults, self._graphs.digests))
+
+    async def _follow_defaults(self, new: runner_pb2.RunnerSettings) -> list[str]:
+        before, self._shared.defaults = self._shared.defaults, new
+        lines: list[str] = []
+        for runner in self._runners.all():
+            lines += await runner.follow_defaults(before)
+        return lines
+
+    async def _apply(self, graphs: Iterable[Given]) -> list[str]:
+        lines: list[str] = []
+        for given in graphs:
+            request = control_pb2.ApplyRequest(
+                runner=given.runner,
+                components=given.graph.components,
+                settings=given.graph.settings,
+            )
+            try:
+                result = await self._runners.apply(request, lambda line: None)
+                lines.append(f"{given.file}: {len(result.differences)} differences applied")
+            except Refusal as refusal:
+                problem = f"{given.file}: {refusal}"
+                self._graph_problems.append(problem)
+                log.error("%s", problem)
+                lines.append(problem)
+        return lines
+
+
+_WORDS = {"folders": "component folders", "access": "access rights", "limits": "limits",
+          "defaults": "defaults of runners"}  # fmt: skip
+
+
+def _identity(file: Path) -> tuple[int, int] | None:
+    """Return what is another when a package manager has replaced a file."""
+    try:
+        found = os.stat(file)
+    except OSError:
+        return None
+    return found.st_ino, found.st_mtime_ns

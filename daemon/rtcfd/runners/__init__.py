@@ -1,0 +1,1 @@
+"""The runners, and who holds them and their components."""

@@ -1,0 +1,162 @@
+"""Runners that somebody holds: rt_runner's, for the life of a launch.
+
+A runner that is held has the settings of its holder, and an executor of its
+own from the first to the last moment: so nothing of one launch, a ROS node's
+host name included, is left for the next.  Functions on Runners and a Runner.
+"""
+
+import asyncio
+import contextlib
+
+from rtcf.v1 import control_pb2, runner_pb2
+from rtcf_shared.naming import listing
+
+from rtcfd.common import runner_settings
+from rtcfd.common.names import DEFAULT_RUNNER
+from rtcfd.common.refusals import FailedPrecondition, InvalidArgument, NotFound, Refusal
+from rtcfd.runners.leases import RETURN_S
+from rtcfd.runners.outbox import Outbox
+from rtcfd.runners.runner import Runner
+from rtcfd.runners.runners import Runners
+from rtcfd.state.desired import HoldTerms
+
+
+class Hold:
+    """One call's runner.  `open` first, then `end` or `lost`."""
+
+    def __init__(self, runners: Runners, request: control_pb2.OpenHold, outbox: Outbox) -> None:
+        self._runners = runners
+        self._request = request
+        self._outbox = outbox
+        self._runner: Runner | None = None
+
+    async def open(self) -> None:
+        """Take the runner, or come back to it; tell the holder."""
+        request = self._request
+        if not request.token:
+            raise InvalidArgument("a hold needs a token")
+        name = request.runner or DEFAULT_RUNNER
+        self._outbox.progress(f"taking runner {name}")
+        if request.attach:
+            runner = _attach(self._runners, name, request.token)
+        else:
+            runner = await _take(self._runners, name, request)
+        self._runner = runner
+        runner.hold_outbox = self._outbox
+        self._outbox.say(taken=await runner.status())
+        if self._outbox.gone:
+            self.lost()
+        runner.tell()
+
+    async def end(self) -> None:
+        """Give the runner back, at its holder's word."""
+        if self._runner is not None:
+            await release(self._runners, self._runner, self._outbox)
+
+    def lost(self) -> None:
+        """The holder has died: likewise."""
+        self._outbox.gone = True
+        runner = self._runner
+        if runner is None or runner.closing:
+            return
+        if runner.hold_outbox is self._outbox and runner.desired.hold:
+            runner.log.error("%s has died: stopping the loop", runner.desired.hold.holder)
+            self._runners.in_background(release(self._runners, runner, self._outbox))
+
+
+def await_holder(runners: Runners, runner: Runner) -> None:
+    """After a restart of rtcfd: give the holder time to come back."""
+
+    async def wait() -> None:
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(runners.closing.wait(), RETURN_S)
+        if runner.desired.hold and runner.hold_outbox is None and not runner.closing:
+            runner.log.error(
+                "%s did not come back within %g s: stopping the loop",
+                runner.desired.hold.holder, RETURN_S,
+            )  # fmt: skip
+            await release(runners, runner, None)
+
+    if runner.desired.hold:
+        runners.in_background(wait())
+
+
+async def release(runners: Runners, runner: Runner, outbox: Outbox | None) -> None:
+    """Stop the loop, unload what is leased, give a runner its own settings back or remove it."""
+    hold = runner.desired.hold
+    if hold is None or runner.hold_outbox is not outbox or runner.closing:
+        return
+    runner.hold_outbox = None
+    try:
+        await runner.stop(lambda _: None)
+    except Refusal as refusal:
+        runner.log.error("%s", refusal)
+    runner.leases.end_all(
+        control_pb2.LeaseEnded.WHY_RUNNER_ENDED, f"{hold.holder}, which held its runner, has ended"
+    )
+    if hold.added:
+        await runners.remove(runner.name)
+        return
+
+    async def work() -> None:
+        runner.desired.let_go()
+        await runner.restart_executor()
+        await runner.save()
+
+    try:
+        await runner.change("the end of its launch", work)
+    except Refusal as refusal:
+        runner.log.error("%s", refusal)
+    runner.log.info("given back by %s", hold.holder)
+
+
+def _attach(runners: Runners, name: str, token: str) -> Runner:
+    runner = runners.get(name)
+    hold = runner.desired.hold
+    if hold is None or hold.token != token or runner.hold_outbox is not None:
+        raise NotFound(f"runner {name} is not kept for its holder any more")
+    runner.log.info("%s is back", hold.holder)
+    return runner
+
+
+async def _take(runners: Runners, name: str, request: control_pb2.OpenHold) -> Runner:
+    runner_settings.check(request.settings)
+    terms = HoldTerms(request.token, request.holder or "a client", runner_pb2.RunnerSettings())
+    try:
+        runner = runners.get(name)
+    except NotFound:
+        terms.added = True
+        return await runners.add(name, request.settings, terms)
+
+    async def work() -> None:
+        desired = runner.desired
+        if desired.hold is not None:
+            raise FailedPrecondition(
+                f"runner {name} is held by {desired.hold.holder}: end that launch, "
+                "or give the runner of this one another name"
+            )
+        if desired.components:
+            raise FailedPrecondition(
+                f"runner {name} has components of its own ({listing(desired.components)}): "
+                "unload them, or give the runner of this launch another name"
+            )
+        if runner.running:
+            raise FailedPrecondition(
+                f"the loop of runner {name} runs: stop it, or give the runner of this launch "
+                "another name"
+            )
+        terms.parked.CopyFrom(desired.chosen)
+        desired.hold = terms
+        desired.choose(request.settings)
+        try:
+            await runner.restart_executor()
+        except BaseException:
+            desired.let_go()
+            if not runner.up:
+                await runner.restart_executor()
+            raise
+        await runner.save()
+
+    await runner.change("the begin of a launch", work)
+    runner.log.info("held by %s", terms.holder)
+    return runner

@@ -1,0 +1,261 @@
+"""Components that stay as long as somebody holds them: a lease is that caller's connection.
+
+Owned by the Runner, on rtcfd's one thread.  The terms of each lease belong to the
+desired state, so that a rtcfd that was restarted knows whom to wait for; the
+components themselves are not saved.
+"""
+
+import asyncio
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import control_pb2
+
+from rtcfd.common.names import full_name
+from rtcfd.common.refusals import AlreadyExists, FailedPrecondition, NotFound, Refusal, Unavailable
+from rtcfd.operations import graph
+from rtcfd.runners.outbox import Outbox
+from rtcfd.state.desired import LeaseTerms
+
+if TYPE_CHECKING:
+    from rtcfd.runners.runner import Runner
+
+# For holders to come back after a restart of rtcfd.
+RETURN_S = 10.0
+# Leases of one run that end within this time of each other leave together.
+GATHER_S = 0.2
+_LONGEST_GATHER_S = 1.0
+
+_Ended = control_pb2.LeaseEnded
+
+
+class Lease:
+    """One call's component.  `open` or `attach` first, then `end` or `lost`."""
+
+    def __init__(self, runner: "Runner", request: control_pb2.OpenLease, outbox: Outbox) -> None:
+        self._leases = runner.leases
+        self._request = request
+        self._outbox = outbox
+
+    async def open(self) -> None:
+        """Load the component, or come back to it; tell the holder."""
+        if self._request.attach:
+            result = self._leases.attach(self._request, self._outbox)
+        elif self._request.wait:
+            result = await graph.when_master(
+                lambda: self._leases.open(self._request, self._outbox), self._outbox.progress
+            )
+        else:
+            result = await self._leases.open(self._request, self._outbox)
+        self._outbox.say(loaded=result)
+
+    async def end(self) -> None:
+        """Unload the component, at its holder's word."""
+        await self._leases.end(full_name(self._request.component), self._outbox)
+
+    def lost(self) -> None:
+        """Do what was agreed for the death of the holder."""
+        self._outbox.gone = True
+        self._leases.lost(full_name(self._request.component), self._outbox)
+
+
+class Leases:
+    """All leases of a runner's components."""
+
+    def __init__(self, runner: "Runner") -> None:
+        self._runner = runner
+        self._outboxes: dict[str, Outbox] = {}  # by component; of holders that are there
+        self._loading: set[str] = set()
+        self._leaving: dict[str, asyncio.Task[None]] = {}
+        self._groups: dict[str, list[str]] = {}  # by run: what leaves in one transaction
+        self._patience: asyncio.Task[None] | None = None  # with holders of before a restart
+
+    @property
+    def _terms(self) -> dict[str, LeaseTerms]:
+        return self._runner.desired.leased
+
+    async def open(
+        self, request: control_pb2.OpenLease, outbox: Outbox
+    ) -> control_pb2.ChangeResult:
+        """Load a component for a holder."""
+        runner, spec = self._runner, request.component
+        library = await runner.catalog.find(spec.package, spec.type)
+        name = full_name(spec)
+        if leaving := self._leaving.get(name):
+            outbox.progress(f"waiting for {name} of before to leave")
+            await asyncio.wait({leaving})
+
+        async def work() -> control_pb2.ChangeResult:
+            if outbox.gone:
+                raise Unavailable(f"the caller that wanted {name} has left")
+            self._check_hold(request.hold)
+            runner.limits.check_components(len(runner.desired.components) + 1)
+            if name in runner.desired.components:
+                raise AlreadyExists(
+                    f"component {name} is there already in runner {runner.name}: "
+                    "give this one another name or namespace"
+                )
+            # Noted ahead: a rtcfd that dies meanwhile must not take it for one that stays.
+            self._terms[name] = LeaseTerms(
+                request.run_id, request.on_lost or control_pb2.ON_LEASE_LOST_STOP, request.holder
+            )
+            self._outboxes[name] = outbox
+            self._loading.add(name)
+            await runner.save()
+            try:
+                load = wire.Request(load=library.load(spec))
+                result = (await runner.ask(load, outbox.progress)).change
+                runner.desired.put(name, spec)
+            except BaseException:
+                self._terms.pop(name, None)
+                self._outboxes.pop(name, None)
+                await runner.save()
+                raise
+            finally:
+                self._loading.discard(name)
+            if outbox.gone:  # it was never seen: no reason to stop the loop
+                self._leave(name)
+            return result
+
+        what = f"{spec.package}/{spec.type}"
+        result = await runner.change(f"the load of {what}", work)
+        runner.log.info("%s loaded (%s) for %s", name, what, request.holder or "a lease")
+        return result
+
+    def attach(self, request: control_pb2.OpenLease, outbox: Outbox) -> control_pb2.ChangeResult:
+        """Give a component back to its holder."""
+        name = full_name(request.component)
+        terms = self._terms.get(name)
+        if (
+            terms is None
+            or terms.run_id != request.run_id
+            or name in self._outboxes
+            or name in self._leaving
+        ):
+            raise NotFound(f"runner {self._runner.name} keeps no {name} for its launcher any more")
+        self._outboxes[name] = outbox
+        self._runner.log.info("%s: its holder is back", name)
+        return control_pb2.ChangeResult(component=name)
+
+    async def end(self, name: str, outbox: Outbox) -> None:
+        """Unload a component because its holder says so; return when it is done."""
+        if self._outboxes.get(name) is not outbox:
+            return
+        task = self._leaving.get(name) or self._leave(name)
+        await asyncio.wait({task})
+
+    def lost(self, name: str, outbox: Outbox) -> None:
+        """Do what was agreed when the connection of a holder ends without a word."""
+        if self._outboxes.get(name) is not outbox or name in self._leaving:
+            return
+        if name in self._loading:
+            return  # open() sees to it
+        del self._outboxes[name]
+        self._runner.in_background(self._lose(name, "has died"))
+
+    def await_holders(self) -> None:
+        """After a restart of rtcfd: give holders time to come back."""
+        waiting = [name for name in self._terms if name not in self._outboxes]
+        if waiting:
+            self._patience = asyncio.create_task(self._await(waiting))
+
+    def take_log(self, record: control_pb2.LogRecord) -> None:
+        """Hand a record to the holder of its component."""
+        outbox = self._outboxes.get(record.component)
+        if outbox is not None:
+            outbox.log(record)
+
+    def failed(self, component: str, reason: str) -> None:
+        """Tell a holder that its component has failed; the component leaves."""
+        outbox = self._outboxes.get(component)
+        if outbox is not None and component not in self._leaving | dict.fromkeys(self._loading):
+            outbox.end(_Ended.WHY_FAILED, reason)
+            self._leave(component)
+
+    def settle(self) -> None:
+        """After a change of the graph: tell holders whose component is not in the loop any more."""
+        runner = self._runner
+        for name, outbox in list(self._outboxes.items()):
+            if name in self._loading or name in self._leaving:
+                continue
+            if name not in self._terms:
+                outbox.end(_Ended.WHY_UNLOADED, f"{name} was taken out by another client")
+                del self._outboxes[name]
+            elif runner.up and name in runner.left_out:
+                self.failed(name, runner.left_out[name])
+
+    def end_all(self, why: "control_pb2.LeaseEnded.Why", message: str) -> None:
+        """Tell all holders that it is over; what they hold is ended by the caller."""
+        if self._patience is not None:
+            self._patience.cancel()
+        for outbox in self._outboxes.values():
+            outbox.end(why, message)
+        self._outboxes.clear()
+
+    def _check_hold(self, token: str) -> None:
+        hold = self._runner.desired.hold
+        if token and (hold is None or hold.token != token):
+            raise FailedPrecondition(f"the holder of runner {self._runner.name} has ended")
+
+    async def _await(self, names: Iterable[str]) -> None:
+        await asyncio.sleep(RETURN_S)
+        for name in names:
+            if name in self._terms and name not in self._outboxes and name not in self._leaving:
+                await self._lose(name, f"did not come back within {RETURN_S:g} s")
+
+    async def _lose(self, name: str, how: str) -> None:
+        runner, terms = self._runner, self._terms.get(name)
+        if terms is None or runner.closing:
+            return
+        lost = f"{terms.holder or 'its holder'} {how}"
+        if terms.on_lost == control_pb2.ON_LEASE_LOST_KEEP:
+            runner.log.warning("%s: %s: kept", name, lost)
+            self._terms.pop(name, None)
+            await runner.save()
+            return
+        if terms.on_lost != control_pb2.ON_LEASE_LOST_UNLOAD and runner.running:
+            runner.alarm(f"{name}: {lost}: stopping the loop")
+            try:
+                await runner.stop(lambda _: None)
+            except Refusal as refusal:
+                runner.log.error("%s", refusal)
+        else:
+            runner.log.warning("%s: %s", name, lost)
+        self._leave(name)
+
+    def _leave(self, name: str) -> "asyncio.Task[None]":
+        """Unload a component together with others of its run that leave now."""
+        terms = self._terms.get(name)
+        run = terms.run_id if terms and terms.run_id else name
+        group = self._groups.get(run)
+        if group is None:
+            group = self._groups[run] = []
+            task = self._runner.in_background(self._unload(run, group))
+        else:
+            task = self._leaving[group[0]]
+        group.append(name)
+        self._leaving[name] = task
+        return task
+
+    async def _unload(self, run: str, group: list[str]) -> None:
+        loop = asyncio.get_running_loop()
+        deadline = loop.time() + _LONGEST_GATHER_S
+        count = 0
+        while count < len(group) and loop.time() < deadline:
+            count = len(group)
+            await asyncio.sleep(GATHER_S)
+        del self._groups[run]
+        runner = self._runner
+        try:
+            names = [name for name in group if name in runner.desired.components]
+            if names and not runner.closing:
+                await graph.unload(runner, names, lambda _: None)
+        except Refusal as refusal:
+            # It belongs to nobody now, and shows in the list of components.
+            runner.log.error("%s stays loaded: %s", ", ".join(group), refusal)
+        for name in group:
+            self._terms.pop(name, None)
+            self._leaving.pop(name, None)
+            self._outboxes.pop(name, None)
+        runner.tell()

@@ -1,0 +1,1 @@
+"""What was accepted and outlives a process: desired states, on disk and handed over."""

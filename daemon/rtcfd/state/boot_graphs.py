@@ -1,0 +1,111 @@
+"""The graphs of graphs.d: what runners are at boot, and applied again when a file changes.
+
+Owned by the daemon (reload.py); a file that is not valid is reported and left
+out, whole.
+"""
+
+import hashlib
+import logging
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from rtcf_shared.errors import RtcfError
+from rtcf_shared.graph_reader import Graph, read_graphs
+
+from rtcfd.common import runner_settings
+from rtcfd.common.names import DEFAULT_RUNNER, check_base_name
+from rtcfd.common.refusals import Refusal
+from rtcfd.operations.graph import check_graph
+from rtcfd.state.desired import Desired
+
+log = logging.getLogger(__name__)
+
+_SUFFIXES = (".yaml", ".yml")
+
+
+@dataclass
+class Given:
+    """One runner's graph, and the file that gives it."""
+
+    file: Path
+    graph: Graph
+    changed: bool  # since the last read()
+
+    @property
+    def runner(self) -> str:
+        """Return the runner's name."""
+        return self.graph.runner or DEFAULT_RUNNER
+
+
+class BootGraphs:
+    """The folder, and what was read from it last."""
+
+    def __init__(self, folder: Path | None, applied: Mapping[str, str]) -> None:
+        """`applied`: the digests of an earlier rtcfd."""
+        self._folder = folder
+        self.digests = dict(applied)  # by file; of what was read last
+
+    def read(self) -> tuple[list[Given], list[str]]:
+        """Return all graphs, and a line for each thing that is wrong."""
+        graphs: list[Given] = []
+        problems: list[str] = []
+        owners: dict[str, Path] = {}
+        digests: dict[str, str] = {}
+        for file in self._files(problems):
+            try:
+                text = file.read_text(encoding="utf-8")
+                found = read_graphs(text, str(file))
+                for graph in found:
+                    _check(graph)
+            except (OSError, UnicodeDecodeError) as error:
+                problems.append(f"cannot read {file}: {error}")
+                continue
+            except RtcfError as error:
+                problems.append(str(error))
+                continue
+            except Refusal as refusal:
+                problems.append(f"{file}: {refusal}")
+                continue
+            digests[str(file)] = hashlib.sha256(text.encode()).hexdigest()
+            changed = self.digests.get(str(file)) != digests[str(file)]
+            for graph in found:
+                given = Given(file, graph, changed)
+                first = owners.setdefault(given.runner, file)
+                if first != file:
+                    problems.append(f"{file}: runner {given.runner} is in {first} already")
+                else:
+                    graphs.append(given)
+        self.digests = digests
+        for problem in problems:
+            log.error("%s", problem)
+        return graphs, problems
+
+    def _files(self, problems: list[str]) -> Iterator[Path]:
+        if self._folder is None:
+            return
+        try:
+            files = sorted(self._folder.iterdir())
+        except FileNotFoundError:
+            return
+        except OSError as error:
+            problems.append(f"cannot read {self._folder}: {error.strerror}")
+            return
+        yield from (
+            each for each in files if each.suffix in _SUFFIXES and not each.name.startswith(".")
+        )
+
+
+def become(desired: Desired, graph: Graph) -> None:
+    """Make a desired state what a graph says; whether it ran and what is quarantined stays."""
+    quarantined = dict(desired.quarantined)
+    desired.become(graph.components)
+    desired.choose(graph.settings)
+    for name, reason in quarantined.items():
+        desired.quarantine(name, reason)
+
+
+def _check(graph: Graph) -> None:
+    check_base_name("runner", graph.runner or DEFAULT_RUNNER)
+    runner_settings.check(graph.settings)
+    check_graph(graph.components)

@@ -1,0 +1,156 @@
+"""The desired state of one runner: what was accepted, and what came of it.
+
+Owned by its Runner; store.py keeps it on disk.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from google.protobuf import json_format
+from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+
+from rtcfd.common import names, runner_settings
+from rtcfd.common.names import absolute
+
+
+@dataclass(frozen=True)
+class LeaseTerms:
+    """Of a component that stays only while it is held; see runners/leases.py."""
+
+    run_id: str
+    on_lost: int  # OnLeaseLost
+    holder: str  # for people
+
+
+@dataclass
+class HoldTerms:
+    """Of a runner that is held for a while; see runners/held_runners.py."""
+
+    token: str
+    holder: str  # for people
+    parked: runner_pb2.RunnerSettings  # the runner's own choice, for afterwards
+    added: bool = False  # there is no such runner otherwise
+
+
+class Desired:
+    """Settings that were chosen (what is unset follows the defaults) and components."""
+
+    def __init__(self, runner: str) -> None:
+        self.runner = runner
+        self.chosen = runner_pb2.RunnerSettings()
+        self.running = False  # the loop was started, and neither stopped nor ended by a fault
+        self.quarantined: dict[str, str] = {}  # components that a fault took out, and why
+        self.left_out: dict[str, str] = {}  # components that are not loaded, and why
+        self.leased: dict[str, LeaseTerms] = {}  # components that are held; not saved themselves
+        self.hold: HoldTerms | None = None
+        self._components: dict[str, graph_pb2.ComponentSpec] = {}
+        # The text of each component as it is saved: a change of one among
+        # a thousand costs the text of one.
+        self._texts: dict[str, str] = {}
+
+    @property
+    def components(self) -> dict[str, graph_pb2.ComponentSpec]:
+        """All components by full name, in the order of loading.  Not to be changed."""
+        return self._components
+
+    def complete(self, defaults: runner_pb2.RunnerSettings) -> runner_pb2.RunnerSettings:
+        """Return all settings."""
+        return runner_settings.merged(defaults, self.chosen)
+
+    def choose(self, change: runner_pb2.RunnerSettings) -> None:
+        """Note settings that were accepted."""
+        self.chosen = runner_settings.merged(self.chosen, change)
+
+    def put(self, full_name: str, spec: graph_pb2.ComponentSpec) -> None:
+        """Note a component, new or changed, with the name and namespace it got."""
+        kept = graph_pb2.ComponentSpec()
+        kept.CopyFrom(spec)
+        namespace, _, kept.name = full_name.rpartition("/")
+        kept.ns = namespace or "/"
+        self._components[full_name] = kept
+        self._texts.pop(full_name, None)
+        self.quarantined.pop(full_name, None)
+
+    def drop(self, full_names: Iterable[str]) -> None:
+        """Forget components."""
+        for name in full_names:
+            self._components.pop(name, None)
+            self._texts.pop(name, None)
+            self.quarantined.pop(name, None)
+            self.left_out.pop(name, None)
+            self.leased.pop(name, None)
+
+    def let_go(self) -> None:
+        """Forget a hold and what is leased; the settings are the runner's own again."""
+        self.drop(list(self.leased))
+        if self.hold is not None:
+            self.chosen = self.hold.parked
+            self.hold = None
+
+    def quarantine(self, full_name: str, reason: str) -> None:
+        """Note that a component is not to be loaded until it is released."""
+        if full_name in self._components:
+            self.quarantined[full_name] = reason
+
+    def become(self, specs: Iterable[graph_pb2.ComponentSpec]) -> None:
+        """Take a whole graph in the place of what was there."""
+        before, texts = self._components, self._texts
+        self._components, self._texts, self.quarantined = {}, {}, {}
+        for spec in specs:
+            name = names.full_name(spec)
+            self.put(name, spec)
+            if name in texts and before[name] == self._components[name]:
+                self._texts[name] = texts[name]
+        self.leased = {
+            name: terms for name, terms in self.leased.items() if name in self._components
+        }
+
+    def set_breaks(self, ports: Iterable[control_pb2.PortName], broken: bool) -> None:
+        """Note loop breaks that were set or removed."""
+        for port in ports:
+            name = absolute(port.component)
+            spec = self._components.get(name)
+            if spec is None:
+                continue
+            breaks = [each for each in spec.breaks if each != port.port]
+            spec.breaks[:] = [*breaks, port.port] if broken else breaks
+            self._texts.pop(name, None)
+
+    def set_parameters(self, component: str, changes: Iterable[graph_pb2.ParameterSetting]) -> None:
+        """Note parameters that were changed."""
+        name = absolute(component)
+        spec = self._components.get(name)
+        if spec is None:
+            return
+        values = {setting.name: setting for setting in spec.parameters}
+        values.update({setting.name: setting for setting in changes})
+        parameters = list(values.values())
+        del spec.parameters[:]
+        spec.parameters.extend(parameters)
+        self._texts.pop(name, None)
+
+    def component_texts(self) -> list[str]:
+        """Return each component that stays as a line of JSON."""
+        staying = [name for name in self._components if name not in self.leased]
+        for name in staying:
+            if name not in self._texts:
+                self._texts[name] = json_format.MessageToJson(
+                    self._components[name], preserving_proto_field_name=True, indent=None
+                )
+        return [self._texts[name] for name in staying]
+
+
+def replacement(
+    old: graph_pb2.ComponentSpec | None, given: graph_pb2.ComponentSpec
+) -> graph_pb2.ComponentSpec:
+    """Return the spec of a replacement: name, namespace, remaps, flags and breaks that
+    are empty in `given` are those of the old component."""
+    result = graph_pb2.ComponentSpec()
+    if old is not None:
+        result.CopyFrom(old)
+        del result.parameters[:]  # they belong to the old type
+    for field in ("remaps", "breaks"):
+        if getattr(given, field):
+            result.ClearField(field)
+    result.MergeFrom(given)
+    return result

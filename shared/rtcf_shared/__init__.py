@@ -1,0 +1,1 @@
+"""What the daemon and its clients share: words, graph files, folders of components."""

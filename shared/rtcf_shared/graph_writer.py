@@ -1,0 +1,110 @@
+"""Writes graph files: what graph_reader.py reads, and what is loaded as a Graph."""
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+from rtcf.v1 import graph_pb2, runner_pb2
+
+from rtcf_shared.enums import word
+from rtcf_shared.graph_reader import Graph
+from rtcf_shared.spec import parse_value
+
+
+def write_graphs(graphs: Iterable[Graph]) -> str:
+    """Return the text of a graph file; one graph stands alone, several under `runners`."""
+    import yaml  # slow to import
+
+    class Dumper(yaml.SafeDumper):  # type: ignore[misc]
+        """Quotes text that would be read as something else."""
+
+    def text(dumper: Any, value: str) -> Any:
+        style = None
+        if value and parse_value(value).WhichOneof("kind") != "string_value":
+            style = "'"
+        return dumper.represent_scalar("tag:yaml.org,2002:str", value, style=style)
+
+    Dumper.add_representer(str, text)
+    documents = {graph.runner: _graph(graph) for graph in graphs}
+    if len(documents) == 1:
+        ((runner, body),) = documents.items()
+        document: dict[str, Any] = {"runner": runner, **body}
+    else:
+        document = {"runners": documents}
+    return str(yaml.dump(document, Dumper=Dumper, sort_keys=False, allow_unicode=True))
+
+
+def live_spec(info: graph_pb2.ComponentInfo) -> graph_pb2.ComponentSpec:
+    """Return what would load a component as it is now.
+
+    That is its spec with the values its parameters have now, as far as they
+    were given when it was loaded or differ from the defaults.
+    """
+    spec = graph_pb2.ComponentSpec()
+    spec.CopyFrom(info.spec)
+    if spec.every == 1:
+        spec.every = 0
+    live = {each.name: each for each in info.parameters}
+    for setting in spec.parameters:
+        if setting.name in live:
+            setting.value.CopyFrom(live.pop(setting.name).value)
+    for each in live.values():
+        if not same_value(each.value, each.default_value):
+            spec.parameters.append(graph_pb2.ParameterSetting(name=each.name, value=each.value))
+    return spec
+
+
+def same_value(one: graph_pb2.ParameterValue, other: graph_pb2.ParameterValue) -> bool:
+    """Tell whether two values are the same; 1 and 1.0 are."""
+    left, right = (getattr(value, value.WhichOneof("kind") or "string_value")
+                   for value in (one, other))  # fmt: skip
+    if isinstance(left, float) and isinstance(right, float) and math.isnan(left):
+        return math.isnan(right)
+    # True == 1 in Python, but not here.
+    return bool(left == right) and isinstance(left, bool) == isinstance(right, bool)
+
+
+def _graph(graph: Graph) -> dict[str, Any]:
+    result: dict[str, Any] = {}
+    if settings := _settings(graph.settings):
+        result["settings"] = settings
+    result["components"] = [_component(spec) for spec in graph.components]
+    return result
+
+
+def _settings(settings: runner_pb2.RunnerSettings | runner_pb2.RosSettings) -> dict[str, Any]:
+    result: dict[str, Any] = {}
+    for descriptor, value in settings.ListFields():
+        if descriptor.message_type is not None:
+            result[descriptor.name] = _settings(value)
+        elif descriptor.enum_type is not None:
+            result[descriptor.name] = word(descriptor.enum_type, value)
+        else:
+            result[descriptor.name] = value
+    return result
+
+
+def _component(spec: graph_pb2.ComponentSpec) -> dict[str, Any]:
+    result: dict[str, Any] = {"name": spec.name or spec.type}
+    if spec.ns not in ("", "/"):
+        result["ns"] = spec.ns
+    result |= {"package": spec.package, "type": spec.type}
+    if spec.remaps:
+        result["remaps"] = {getattr(remap, "from"): remap.to for remap in spec.remaps}
+    if spec.parameters:
+        result["parameters"] = {
+            setting.name: getattr(setting.value, setting.value.WhichOneof("kind"))
+            for setting in spec.parameters
+        }
+    for flag in ("first", "optional"):
+        if getattr(spec, flag):
+            result[flag] = True
+    if spec.ignore:
+        result["ignore"] = spec.ignore
+    if spec.breaks:
+        result["breaks"] = list(spec.breaks)
+    if spec.every > 1:
+        result["every"] = spec.every
+    if spec.HasField("phase"):
+        result["phase"] = spec.phase
+    return result
