@@ -1,12 +1,21 @@
-# The tasks of this tree. Each starts on a plain Debian 12 that has make and
-# git: what more it needs is installed with apt first.
+# The tasks of this tree. Each starts on a plain Debian 12 or 13 that has make and
+# git: what more it needs is installed with apt first. With RELEASE=trixie (or
+# bookworm) on a machine of the other release, it is done in a Debian of that one.
 BUILD := build
 # Compilers are called by way of ccache where it is installed.
 export CMAKE_CXX_COMPILER_LAUNCHER = $(wildcard /usr/bin/ccache)
 export CMAKE_BUILD_PARALLEL_LEVEL ?= $(shell nproc)
 
-.PHONY: all dependencies build demo test test-long bench bench-rt deb lint clean help
+tasks := all build demo test test-long bench bench-rt deb lint
+elsewhere := $(filter-out $(shell tools/release codename),$(RELEASE))
+
+.PHONY: $(tasks) dependencies clean help
 .NOTPARALLEL:
+
+ifneq ($(elsewhere),)
+$(tasks):
+	@tools/in-release $(elsewhere) $(MAKE) --no-print-directory $@ RELEASE=
+else
 
 all: dependencies build ## build everything into build/ (default)
 
@@ -24,7 +33,7 @@ test: all ## all checks: lint, unit, sanitizers, integration, packages
 	@tools/install-dependencies test
 	@tests/run
 
-test-long: all ## the same with soaks, reproducible builds and the PREEMPT_RT machine
+test-long: all ## the same with soaks, reproducible builds, PREEMPT_RT and the other Debian
 	@tools/install-dependencies test-long
 	@tests/run --long
 
@@ -42,6 +51,8 @@ deb: dependencies ## build the Debian packages into build/deb/
 lint: all ## format, static checks and types; LINT_ALL=1: clang-tidy on every file
 	@tools/install-dependencies test
 	@tools/lint
+
+endif
 
 clean: ## remove everything that was built
 	rm -rf $(BUILD) build-tsan build-asan build-rtsan
