@@ -10,8 +10,10 @@ import contextlib
 import logging
 import secrets
 import socket
+import sys
 from collections import deque
 from pathlib import Path
+from typing import Any
 
 from rtcfd.access import peer
 from rtcfd.access.peer import Peer
@@ -25,6 +27,8 @@ _BACKLOG = 256
 _MOST_WAITING = 64
 # Above that they are hung up on, before the descriptors are gone that loops take.
 _MOST_QUEUED = 4096
+# asyncio of Python 3.13 on removes a socket's file with its server; ours is systemd's or Endpoint's.
+_KEEP_FILE: dict[str, Any] = {"cleanup_socket": False} if sys.version_info >= (3, 13) else {}
 _SHOWN_PREFIX = "unix-abstract:"  # of an abstract name, as grpcio shows it
 
 
@@ -42,7 +46,9 @@ class Clients:
 
     async def serve(self, listener: socket.socket) -> None:
         """Begin to take clients from a listening socket."""
-        self._server = await asyncio.start_unix_server(self._take, sock=listener, backlog=_BACKLOG)
+        self._server = await asyncio.start_unix_server(
+            self._take, sock=listener, backlog=_BACKLOG, **_KEEP_FILE
+        )
 
     def close_door(self) -> None:
         """Take no more clients: with systemd's socket they wait for the next rtcfd."""
