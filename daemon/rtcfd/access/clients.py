@@ -27,7 +27,7 @@ _BACKLOG = 256
 _MOST_WAITING = 64
 # Above that they are hung up on, before the descriptors are gone that loops take.
 _MOST_QUEUED = 4096
-# asyncio of Python 3.13 on removes a socket's file with its server; ours is systemd's or Endpoint's.
+# asyncio of Python 3.13 on removes a socket's file with its server; it is systemd's or Endpoint's.
 _KEEP_FILE: dict[str, Any] = {"cleanup_socket": False} if sys.version_info >= (3, 13) else {}
 _SHOWN_PREFIX = "unix-abstract:"  # of an abstract name, as grpcio shows it
 
