@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "ros/node_name.hpp"
+#include "ros/roscpp/node_name.hpp"
 
 using rtcf::ros1::nodeName;
 

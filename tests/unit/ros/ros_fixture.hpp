@@ -18,8 +18,8 @@
 #include "bridge/injector.hpp"
 #include "bridge/tap.hpp"
 #include "child_process.hpp"
+#include "ros/logging/rosout.hpp"
 #include "ros/ros_node.hpp"
-#include "ros/rosout.hpp"
 
 using namespace std::chrono_literals;
 

@@ -1,0 +1,76 @@
+#include "ros/logging/rosout.hpp"
+
+#include <ros/node_handle.h>
+#include <rosgraph_msgs/Log.h>
+
+#include <utility>
+
+namespace rtcf::ros1 {
+
+namespace {
+
+constexpr std::uint32_t kQueue = 1000;
+
+rosgraph_msgs::Log::_level_type levelTo(LogLevel level) {
+    switch (level) {
+        case LogLevel::Debug:
+            return rosgraph_msgs::Log::DEBUG;
+        case LogLevel::Info:
+            return rosgraph_msgs::Log::INFO;
+        case LogLevel::Warn:
+            return rosgraph_msgs::Log::WARN;
+        case LogLevel::Error:
+            return rosgraph_msgs::Log::ERROR;
+        case LogLevel::Fatal:
+            break;
+    }
+    return rosgraph_msgs::Log::FATAL;
+}
+
+ros::Time timeOf(const executor::LogEntry& entry) {
+    ros::Time time;
+    return time.fromNSec(static_cast<std::uint64_t>(entry.time_ns));
+}
+
+}  // namespace
+
+void Rosout::publish(const executor::LogEntry& entry) {
+    rosgraph_msgs::Log message;
+    message.level = levelTo(entry.level);
+    message.msg = entry.message;
+    message.file = entry.file;
+    message.function = entry.function;
+    message.line = entry.line;
+    const std::lock_guard lock(mutex_);
+    if (!publisher_) return;
+    // Of a simulation only the present is known, which is hardly later than the call. Without a
+    // node there is no time of ROS.
+    message.header.stamp = ros::Time::isSimTime() ? ros::Time::now() : timeOf(entry);
+    // What the node itself says is under the node's name, as for any node.
+    message.name = entry.component.empty() ? node_ : executor::LogLevels::loggerOf(entry.component);
+    publisher_.publish(message);
+}
+
+void Rosout::open(ros::NodeHandle& handle, const std::string& node) {
+    // As roscpp does: a console that comes late gets the last record.
+    const ros::Publisher publisher = handle.advertise<rosgraph_msgs::Log>("/rosout", kQueue, true);
+    const std::lock_guard lock(mutex_);
+    publisher_ = publisher;
+    node_ = node;
+}
+
+void Rosout::close() {
+    ros::Publisher closing;
+    {
+        const std::lock_guard lock(mutex_);
+        std::swap(closing, publisher_);
+    }
+    closing.shutdown();
+}
+
+bool Rosout::isOpen() const {
+    const std::lock_guard lock(mutex_);
+    return publisher_ != nullptr;
+}
+
+}  // namespace rtcf::ros1

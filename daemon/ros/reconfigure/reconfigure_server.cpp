@@ -1,0 +1,120 @@
+#include "ros/reconfigure/reconfigure_server.hpp"
+
+#include <ros/node_handle.h>
+
+#include <chrono>
+#include <future>
+#include <utility>
+
+#include "ros/reconfigure/reconfigure_messages.hpp"
+
+namespace rtcf::ros1 {
+
+namespace {
+
+constexpr auto kPatience = std::chrono::seconds(10);  // as long as a hook may take
+constexpr auto kSlice = std::chrono::milliseconds(20);
+
+}  // namespace
+
+ReconfigureServer::ReconfigureServer(Set set, executor::ParameterRequest request,
+                                     const std::atomic<bool>& ending)
+    : request_(std::move(request)), ending_(ending), set_(std::move(set)) {}
+
+void ReconfigureServer::open(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue) {
+    using dynamic_reconfigure::ReconfigureRequest;
+    using dynamic_reconfigure::ReconfigureResponse;
+    const Set opening = set();
+    const std::string& name = opening->full_name;
+    const boost::function<bool(ReconfigureRequest&, ReconfigureResponse&)> change =
+        [this](ReconfigureRequest& asked, ReconfigureResponse& answer) {
+            return this->change(asked, answer);
+        };
+    ros::AdvertiseServiceOptions options;
+    options.init<ReconfigureRequest, ReconfigureResponse>(name + "/set_parameters", change);
+    options.callback_queue = &queue;
+    ros::Publisher descriptions;
+    ros::Publisher updates;
+    ros::ServiceServer service;
+    std::string problem;
+    try {
+        descriptions = handle.advertise<dynamic_reconfigure::ConfigDescription>(
+            name + "/parameter_descriptions", 1, true);
+        updates =
+            handle.advertise<dynamic_reconfigure::Config>(name + "/parameter_updates", 1, true);
+        service = handle.advertiseService(options);
+        if (!descriptions || !updates || !service)
+            problem = "one of its names is taken in this process";
+    } catch (const std::exception& error) {
+        problem = error.what();
+    }
+    if (!problem.empty()) problem = "no dynamic_reconfigure of " + name + ": " + problem;
+    if (descriptions) descriptions.publish(descriptionOf(*opening));
+    const std::lock_guard lock(mutex_);
+    descriptions_ = descriptions;
+    updates_ = updates;
+    service_ = service;
+    problem_ = problem;
+    if (updates_) updates_.publish(valuesOf(*set_));
+}
+
+void ReconfigureServer::close() {
+    ros::Publisher descriptions;
+    ros::Publisher updates;
+    ros::ServiceServer service;
+    {
+        const std::lock_guard lock(mutex_);
+        std::swap(descriptions, descriptions_);
+        std::swap(updates, updates_);
+        std::swap(service, service_);
+    }
+    // Waits for a call that is being answered, which takes the lock.
+    service.shutdown();
+    updates.shutdown();
+    descriptions.shutdown();
+}
+
+bool ReconfigureServer::isOpen() const {
+    const std::lock_guard lock(mutex_);
+    return service_ != nullptr;
+}
+
+std::string ReconfigureServer::problem() const {
+    const std::lock_guard lock(mutex_);
+    return problem_;
+}
+
+void ReconfigureServer::update(Set set) {
+    const std::lock_guard lock(mutex_);
+    if (set == set_) return;
+    set_ = std::move(set);
+    if (updates_) updates_.publish(valuesOf(*set_));
+}
+
+ReconfigureServer::Set ReconfigureServer::set() const {
+    const std::lock_guard lock(mutex_);
+    return set_;
+}
+
+// The answer has the values that hold then: those that were asked for, or, of a change that was
+// refused, those of before.
+bool ReconfigureServer::change(const dynamic_reconfigure::ReconfigureRequest& asked,
+                               dynamic_reconfigure::ReconfigureResponse& answer) {
+    const Set before = set();
+    executor::ParameterBatch batch = batchOf(asked.config, *before);
+    if (!batch.empty()) {
+        const auto done = std::make_shared<std::promise<void>>();
+        std::future<void> outcome = done->get_future();
+        request_(before->full_name, std::move(batch),
+                 [done](const std::string& /*refusal*/) { done->set_value(); });
+        const auto deadline = std::chrono::steady_clock::now() + kPatience;
+        while (outcome.wait_for(kSlice) != std::future_status::ready) {
+            // A hook that hangs: whether it will be changed nobody can say.
+            if (ending_ || std::chrono::steady_clock::now() > deadline) return false;
+        }
+    }
+    answer.config = valuesOf(*set());
+    return true;
+}
+
+}  // namespace rtcf::ros1

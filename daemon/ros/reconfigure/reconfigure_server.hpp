@@ -1,0 +1,59 @@
+/// @file
+/// The dynamic_reconfigure server of one component, made of its declared
+/// parameters: the service `set_parameters` and the latched topics
+/// `parameter_descriptions` and `parameter_updates` below its name.
+#pragma once
+
+#include <dynamic_reconfigure/Reconfigure.h>
+#include <ros/publisher.h>
+#include <ros/service_server.h>
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "bridge/bridge.hpp"
+
+namespace ros {
+class CallbackQueueInterface;
+class NodeHandle;
+}  // namespace ros
+
+namespace rtcf::ros1 {
+
+/// Owned by Reconfiguring.
+class ReconfigureServer {
+   public:
+    using Set = std::shared_ptr<const executor::ParameterSet>;
+
+    /// @param request by which a change is asked for
+    /// @param ending  becomes true when nobody answers requests any more
+    ReconfigureServer(Set set, executor::ParameterRequest request, const std::atomic<bool>& ending);
+
+    /// Opens and closes service and topics. Watch thread.
+    void open(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue);
+    void close();
+    bool isOpen() const;
+    /// Why it could not be opened, one line; empty if it could.
+    std::string problem() const;
+
+    /// The values from now on; tells the peers if they differ. Any thread; returns at once.
+    void update(Set set);
+    Set set() const;
+
+   private:
+    bool change(const dynamic_reconfigure::ReconfigureRequest& asked,
+                dynamic_reconfigure::ReconfigureResponse& answer);
+
+    const executor::ParameterRequest request_;
+    const std::atomic<bool>& ending_;
+    mutable std::mutex mutex_;  // all below
+    Set set_;
+    std::string problem_;
+    ros::Publisher descriptions_;
+    ros::Publisher updates_;
+    ros::ServiceServer service_;
+};
+
+}  // namespace rtcf::ros1

@@ -1,0 +1,113 @@
+#include "ros/reconfigure/reconfiguring.hpp"
+
+#include <ros/node_handle.h>
+
+#include <chrono>
+
+#include "ros/reconfigure/reconfigure_server.hpp"
+#include "ros/roscpp/quiet_thread.hpp"
+
+namespace rtcf::ros1 {
+
+namespace {
+
+// For one call: the watch has more to look at than a thousand components' parameters.
+constexpr auto kTurn = std::chrono::milliseconds(300);
+
+}  // namespace
+
+Reconfiguring::Reconfiguring() {
+    thread_ = quietThread("ros-parameters", [this] { run(); });
+}
+
+Reconfiguring::~Reconfiguring() {
+    stop_ = true;
+    queue_.disable();  // wakes the thread up
+    thread_.join();
+}
+
+void Reconfiguring::setSets(const Sets& sets) {
+    const std::lock_guard lock(mutex_);
+    Servers wanted;
+    for (const auto& set : sets) {
+        const auto found = wanted_.find(set->full_name);
+        // The same component with other values, or another one of that name.
+        const auto declares_same = [&](const executor::ParameterSet& known) {
+            if (known.parameters.size() != set->parameters.size()) return false;
+            for (std::size_t i = 0; i < known.parameters.size(); ++i) {
+                const ParameterDeclaration& one = known.parameters[i].declaration;
+                const ParameterDeclaration& other = set->parameters[i].declaration;
+                if (one.name != other.name || one.type != other.type ||
+                    one.minimum != other.minimum || one.maximum != other.maximum ||
+                    one.default_value != other.default_value || one.doc != other.doc)
+                    return false;
+            }
+            return true;
+        };
+        if (found != wanted_.end() && declares_same(*found->second->set())) {
+            found->second->update(set);
+            wanted.insert(*found);
+        } else {
+            wanted[set->full_name] = std::make_shared<ReconfigureServer>(set, request_, stop_);
+        }
+    }
+    wanted_ = std::move(wanted);
+}
+
+bool Reconfiguring::reconcile(ros::NodeHandle& handle, MasterClient& master,
+                              const ParameterMirror::Caller& caller) {
+    Servers wanted;
+    Servers closing;
+    {
+        const std::lock_guard lock(mutex_);
+        wanted = wanted_;
+        for (auto server = servers_.begin(); server != servers_.end();) {
+            const auto found = wanted.find(server->first);
+            if (found != wanted.end() && found->second == server->second) {
+                ++server;
+                continue;
+            }
+            closing.insert(*server);
+            server = servers_.erase(server);
+        }
+    }
+    for (const auto& [component, server] : closing) {
+        server->close();
+        mirror_.leave(master, caller, component);
+    }
+    const auto until = std::chrono::steady_clock::now() + kTurn;
+    for (const auto& [component, server] : wanted) {
+        if (std::chrono::steady_clock::now() > until) return false;
+        if (!server->isOpen() && server->problem().empty()) {
+            server->open(handle, queue_);
+            const std::lock_guard lock(mutex_);
+            servers_[component] = server;
+        }
+        if (!mirror_.reconcile(master, caller, *server->set())) return false;
+    }
+    return true;
+}
+
+void Reconfiguring::closeAll() {
+    Servers closing;
+    {
+        const std::lock_guard lock(mutex_);
+        closing.swap(servers_);
+    }
+    for (const auto& [component, server] : closing) server->close();
+    mirror_.forget();
+}
+
+std::string Reconfiguring::problem() const {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [component, server] : servers_) {
+        if (!server->problem().empty()) return server->problem();
+    }
+    return {};
+}
+
+void Reconfiguring::run() {
+    while (!stop_) queue_.callAvailable(ros::WallDuration(0.1));
+}
+
+}  // namespace rtcf::ros1

@@ -1,0 +1,32 @@
+/// @file
+/// What components' hooks have to do with the node: their way in, and what
+/// went wrong under them.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <utility>
+
+#include "bridge/hook_gate.hpp"
+
+namespace rtcf::ros1 {
+
+/// Owned by the master watch; called by the thread that runs the hooks.
+class Hooks final : public executor::HookGate {
+   public:
+    /// @param await_node waits until the node is up at a master that answers; throws
+    ///                   NoMaster otherwise
+    explicit Hooks(std::function<void()> await_node) : await_node_(std::move(await_node)) {}
+
+    void pass() override;
+    void enter(const std::string& component) noexcept override;
+    std::string leave() noexcept override;
+
+    /// Full name of the component whose hook the calling thread is in; null = none.
+    static const std::string* component() noexcept;
+
+   private:
+    std::function<void()> await_node_;
+};
+
+}  // namespace rtcf::ros1

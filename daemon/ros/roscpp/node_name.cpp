@@ -1,0 +1,36 @@
+#include "ros/roscpp/node_name.hpp"
+
+#include <unistd.h>
+
+#include <array>
+#include <climits>
+
+namespace rtcf::ros1 {
+
+namespace {
+
+std::string legal(const std::string& text, const char* if_empty) {
+    if (text.empty()) return if_empty;
+    std::string name = text;
+    for (char& c : name) {
+        // Not std::isalnum: a locale may count letters that ROS does not.
+        const bool allowed =
+            (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+        if (!allowed) c = '_';
+    }
+    return name;
+}
+
+}  // namespace
+
+NodeName nodeName(const std::string& host, const std::string& runner) {
+    return {"/rtcfd/" + legal(host, "localhost"), legal(runner, "rt_runner")};
+}
+
+NodeName nodeName(const std::string& runner) {
+    std::array<char, HOST_NAME_MAX + 1> host{};
+    if (gethostname(host.data(), host.size() - 1) != 0) host[0] = '\0';
+    return nodeName(host.data(), runner);
+}
+
+}  // namespace rtcf::ros1

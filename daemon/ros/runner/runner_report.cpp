@@ -1,0 +1,237 @@
+#include "ros/runner/runner_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "runner/runner.hpp"
+#include "runner/runner_view.hpp"
+
+namespace rtcf::ros1 {
+
+namespace {
+
+using diagnostic_msgs::DiagnosticStatus;
+using executor::RunnerState;
+
+const char* stateName(RunnerState state) {
+    switch (state) {
+        case RunnerState::Running:
+            return "running";
+        case RunnerState::Faulted:
+            return "faulted";
+        case RunnerState::Stuck:
+            return "stuck";
+        case RunnerState::Stepping:
+            return "stepping";
+        case RunnerState::Stopped:
+            break;
+    }
+    return "stopped";
+}
+
+template <typename T>
+void addValue(DiagnosticStatus& status, const char* key, const T& value) {
+    diagnostic_msgs::KeyValue pair;
+    pair.key = key;
+    pair.value = fmt::format("{}", value);
+    status.values.push_back(std::move(pair));
+}
+
+void addMicroseconds(DiagnosticStatus& status, const std::string& what,
+                     const executor::DistributionSummary& ns) {
+    const auto add = [&](const char* which, double value) {
+        addValue(status, fmt::format("{} {} (us)", what, which).c_str(),
+                 fmt::format("{:.3f}", value * 1e-3));
+    };
+    if (ns.count == 0) return;
+    add("mean", ns.mean);
+    add("p99", ns.p99);
+    add("p99.9", ns.p999);
+}
+
+// The worse of two: an error hides a warning, not the other way round.
+void raise(DiagnosticStatus& status, DiagnosticStatus::_level_type level,
+           const std::string& message) {
+    if (level <= status.level) return;
+    status.level = level;
+    status.message = message;
+}
+
+std::string joined(const std::vector<std::string>& lines) {
+    return fmt::format("{}", fmt::join(lines, "; "));
+}
+
+}  // namespace
+
+rtcf_msgs::GetIntrospectionInformation::Response describeRunner(
+    const executor::RunnerView& runner) {
+    const executor::RunnerPicture picture = runner.picture();
+    const std::shared_ptr<const executor::GraphSnapshot> graph = runner.snapshot();
+    const executor::LoopFigures& figures = runner.loop().figures();
+    rtcf_msgs::GetIntrospectionInformation::Response response;
+    response.runner = runner.name();
+    response.state = stateName(picture.state);
+    response.status = picture.status;
+    response.frequency = picture.settings.frequency_hz;
+    response.iteration = figures.iteration.load(std::memory_order_relaxed);
+    response.overruns = figures.overruns.load(std::memory_order_relaxed);
+    response.generation = graph->generation;
+    response.degraded = picture.degraded;
+    for (const auto& component : graph->components) {
+        rtcf_msgs::ComponentInfo info;
+        info.name = component->full_name;
+        info.package = component->definition.package;
+        info.type = component->definition.type;
+        info.is_first = component->definition.first ? 1 : 0;
+        info.fault = component->fault;
+        for (const executor::PortSnapshot& port : component->ports) {
+            rtcf_msgs::PortInfo line;
+            line.direction = port.output ? rtcf_msgs::PortInfo::OUTPUT : rtcf_msgs::PortInfo::INPUT;
+            line.name = port.name;
+            line.mapped_name = port.mapped_name;
+            line.type = port.type->name;
+            if (const auto found = graph->connections.find(port.mapped_name);
+                found != graph->connections.end()) {
+                const executor::ConnectionSnapshot& connection = found->second;
+                line.connected = connection.writer && !connection.readers.empty() ? 1 : 0;
+                const bool mapped = connection.published || (!port.output && connection.subscribed);
+                line.mapped = mapped ? 1 : 0;
+                for (const executor::EndpointSnapshot& reader : connection.readers) {
+                    const bool same =
+                        reader.component == component->full_name && reader.port == port.name;
+                    if (same && !port.output) line.broken = reader.broken ? 1 : 0;
+                }
+            }
+            info.ports.push_back(std::move(line));
+        }
+        response.component_order.push_back(info.name);
+        response.components.push_back(std::move(info));
+    }
+    for (const auto& [name, connection] : graph->connections) {
+        rtcf_msgs::ConnectionInfo info;
+        info.name = name;
+        info.type = connection.type;
+        if (connection.writer) info.writer = connection.writer->component;
+        for (const auto& reader : connection.readers) info.readers.push_back(reader.component);
+        info.published = connection.published ? 1 : 0;
+        info.subscribed = connection.subscribed ? 1 : 0;
+        response.connections.push_back(std::move(info));
+    }
+    return response;
+}
+
+DiagnosticReport::DiagnosticReport(const executor::RunnerView& runner, std::string hardware)
+    : runner_(runner), hardware_(std::move(hardware)) {}
+
+diagnostic_msgs::DiagnosticArray DiagnosticReport::take() {
+    diagnostic_msgs::DiagnosticArray array;
+    array.status.push_back(loopStatus());
+    const double ns_per_tick = runner_.loop().counter().nsPerTick();
+    std::map<Figures, Counts> counts;
+    const std::shared_ptr<const executor::GraphSnapshot> graph = runner_.snapshot();
+    for (const auto& component : graph->components) {
+        Counts& last = counts[component->figures];
+        if (const auto found = components_.find(component->figures); found != components_.end())
+            last = std::move(found->second);
+        array.status.push_back(componentStatus(runner_.name() + ": " + component->full_name,
+                                               component->fault, *component->figures, ns_per_tick,
+                                               last));
+    }
+    components_ = std::move(counts);
+    for (DiagnosticStatus& status : array.status) status.hardware_id = hardware_;
+    return array;
+}
+
+DiagnosticStatus DiagnosticReport::loopStatus() {
+    const executor::RunnerPicture picture = runner_.picture();
+    const executor::Loop& loop = runner_.loop();
+    const executor::LoopFigures& figures = loop.figures();
+    const executor::HistogramSnapshot duration = figures.duration.snapshot();
+    const executor::HistogramSnapshot latency = figures.latency.snapshot();
+    std::uint64_t taps = 0;
+    const std::shared_ptr<const executor::GraphSnapshot> graph = runner_.snapshot();
+    for (const auto& tap : graph->taps) taps += tap->dropped();
+    const std::uint64_t logs = runner_.logRecordsDropped();
+    const std::uint64_t cycles = loop.recordsDropped();
+    const std::uint64_t iteration = figures.iteration.load(std::memory_order_relaxed);
+    const std::int64_t now_ns = executor::monotonicNow();
+    const std::uint64_t done = growth(iteration, iteration_);
+    const std::int64_t elapsed_ns = time_ns_ == 0 ? 0 : now_ns - time_ns_;
+    time_ns_ = now_ns;
+
+    DiagnosticStatus status;
+    status.name = runner_.name() + ": loop";
+    status.level = DiagnosticStatus::OK;
+    status.message = stateName(picture.state);
+    const std::uint64_t overruns =
+        growth(figures.overruns.load(std::memory_order_relaxed), overruns_);
+    const std::uint64_t missed = growth(figures.missed.load(std::memory_order_relaxed), missed_);
+    const std::uint64_t dropped = growth(taps + logs + cycles, dropped_);
+    if (dropped != 0) {
+        raise(status, DiagnosticStatus::WARN,
+              fmt::format("{}: {} records lost in full rings", status.message, dropped));
+    }
+    if (overruns != 0) {
+        raise(status, DiagnosticStatus::WARN,
+              fmt::format("{}: {} overruns, {} cycles missed", stateName(picture.state), overruns,
+                          missed));
+    }
+    if (!picture.degraded.empty()) {
+        raise(status, DiagnosticStatus::WARN,
+              fmt::format("{}, not in real time: {}", stateName(picture.state),
+                          joined(picture.degraded)));
+    }
+    if (picture.state == RunnerState::Faulted || picture.state == RunnerState::Stuck) {
+        raise(status, DiagnosticStatus::ERROR,
+              fmt::format("{}: {}", stateName(picture.state), picture.status));
+    }
+    addValue(status, "state", stateName(picture.state));
+    addValue(status, "frequency wanted (Hz)", picture.settings.frequency_hz);
+    if (elapsed_ns > 0 && loop.running()) {
+        addValue(status, "frequency (Hz)",
+                 fmt::format("{:.1f}",
+                             static_cast<double>(done) * 1e9 / static_cast<double>(elapsed_ns)));
+    }
+    addValue(status, "iteration", iteration);
+    addValue(status, "components", graph->components.size());
+    addValue(status, "overruns", overruns_);
+    addValue(status, "missed cycles", missed_);
+    addValue(status, "values lost on the way to topics", taps);
+    addValue(status, "log records lost", logs);
+    addValue(status, "iteration_info messages lost", cycles);
+    addValue(status, "real time", picture.degraded.empty() ? "yes" : joined(picture.degraded));
+    addMicroseconds(status, "calculation",
+                    summarize(difference(duration, duration_), loop.counter().nsPerTick()));
+    addMicroseconds(status, "wake-up latency", summarize(difference(latency, latency_), 1.0));
+    duration_ = duration;
+    latency_ = latency;
+    return status;
+}
+
+DiagnosticStatus DiagnosticReport::componentStatus(const std::string& name,
+                                                   const std::string& fault,
+                                                   const executor::ComponentFigures& now,
+                                                   double ns_per_tick, Counts& last) {
+    DiagnosticStatus status;
+    status.name = name;
+    status.level = DiagnosticStatus::OK;
+    status.message = "ok";
+    const executor::HistogramSnapshot duration = now.duration.snapshot();
+    const std::uint64_t overruns =
+        growth(now.overruns.load(std::memory_order_relaxed), last.overruns);
+    if (overruns != 0) raise(status, DiagnosticStatus::WARN, fmt::format("{} overruns", overruns));
+    if (!fault.empty()) raise(status, DiagnosticStatus::ERROR, fault);
+    addValue(status, "overruns", last.overruns);
+    addMicroseconds(status, "update", summarize(difference(duration, last.duration), ns_per_tick));
+    last.duration = duration;
+    return status;
+}
+
+std::uint64_t DiagnosticReport::growth(std::uint64_t now, std::uint64_t& last) {
+    const std::uint64_t grown = now >= last ? now - last : now;
+    last = now;
+    return grown;
+}
+
+}  // namespace rtcf::ros1

@@ -1,0 +1,156 @@
+#include "ros/topics/publishing.hpp"
+
+#include <chrono>
+
+#include "graph/name_pattern.hpp"
+#include "ros/roscpp/quiet_thread.hpp"
+
+namespace rtcf::ros1 {
+
+Publishing::Publishing() {
+    thread_ = quietThread("ros-publish", [this] { run(); });
+}
+
+Publishing::~Publishing() {
+    {
+        const std::lock_guard lock(mutex_);
+        stop_ = true;
+    }
+    changed_.notify_all();
+    thread_.join();
+}
+
+void Publishing::setTaps(Taps taps) {
+    {
+        const std::lock_guard lock(mutex_);
+        taps_ = std::move(taps);
+        ++generation_;
+    }
+    changed_.notify_all();
+}
+
+void Publishing::prepare(const executor::BridgeSettings& settings) {
+    const executor::NamePattern latched("latch", settings.latch);
+    const std::lock_guard lock(mutex_);
+    bool any = false;
+    for (const auto& tap : taps_) {
+        std::shared_ptr<TopicPublisher>& publisher = publishers_[tap->topic()];
+        if (publisher != nullptr) continue;
+        publisher = std::make_shared<TopicPublisher>(tap->topic(), tap->type(), settings.queue,
+                                                     latched.matches(tap->topic()));
+        any = true;
+    }
+    if (!any) return;
+    ++generation_;
+    changed_.notify_all();
+}
+
+bool Publishing::reconcile(ros::NodeHandle& handle, const executor::BridgeSettings& settings) {
+    const executor::NamePattern latched("latch", settings.latch);
+    std::vector<std::shared_ptr<TopicPublisher>> opening;
+    std::vector<std::shared_ptr<TopicPublisher>> closing;
+    {
+        const std::lock_guard lock(mutex_);
+        std::map<std::string, std::shared_ptr<TopicPublisher>> wanted;
+        for (const auto& tap : taps_) {
+            const bool latch = latched.matches(tap->topic());
+            const auto found = publishers_.find(tap->topic());
+            if (found != publishers_.end() && found->second->serves(tap->type()) &&
+                found->second->queue() == settings.queue && found->second->latch() == latch) {
+                wanted[tap->topic()] = found->second;
+                if (!found->second->isOpen() && found->second->problem().empty())
+                    opening.push_back(found->second);
+                continue;
+            }
+            auto publisher =
+                std::make_shared<TopicPublisher>(tap->topic(), tap->type(), settings.queue, latch);
+            wanted[tap->topic()] = publisher;
+            opening.push_back(std::move(publisher));
+        }
+        for (const auto& [topic, publisher] : publishers_) {
+            const auto found = wanted.find(topic);
+            if (found == wanted.end() || found->second != publisher) closing.push_back(publisher);
+        }
+        if (opening.empty() && closing.empty()) return false;
+        publishers_ = std::move(wanted);
+        ++generation_;
+    }
+    changed_.notify_all();
+    // Without the lock: these call the master. A topic that changes its type closes first.
+    for (const auto& publisher : closing) publisher->close();
+    for (const auto& publisher : opening) publisher->open(handle);
+    return true;
+}
+
+void Publishing::closeAll() {
+    std::map<std::string, std::shared_ptr<TopicPublisher>> closing;
+    {
+        const std::lock_guard lock(mutex_);
+        closing.swap(publishers_);
+        ++generation_;
+    }
+    for (const auto& [topic, publisher] : closing) publisher->close();
+}
+
+std::uint32_t Publishing::open() const {
+    const std::lock_guard lock(mutex_);
+    std::uint32_t count = 0;
+    for (const auto& [topic, publisher] : publishers_) count += publisher->isOpen() ? 1 : 0;
+    return count;
+}
+
+std::string Publishing::problem() const {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [topic, publisher] : publishers_) {
+        if (!publisher->problem().empty()) return publisher->problem();
+    }
+    return {};
+}
+
+std::vector<Publishing::Stream> Publishing::streams() const {
+    std::vector<Stream> streams;
+    for (const auto& tap : taps_) {
+        const auto found = publishers_.find(tap->topic());
+        // Until reconcile() replaces it, a publisher of another type must not get the bytes.
+        const bool fits = found != publishers_.end() && found->second->serves(tap->type());
+        streams.push_back({tap, fits ? found->second : nullptr});
+    }
+    return streams;
+}
+
+void Publishing::drain(const std::vector<Stream>& streams) {
+    constexpr int kMost =
+        1000;  // a tap that fills as fast as it is emptied must not starve the others
+    for (const Stream& stream : streams) {
+        const auto use = [&stream](const std::uint8_t* bytes, std::uint32_t size) {
+            if (stream.publisher) stream.publisher->publish(bytes, size);
+        };
+        for (int i = 0; i < kMost && stream.tap->pop(use); ++i) {
+        }
+    }
+}
+
+void Publishing::run() {
+    constexpr auto kPeriod = std::chrono::milliseconds(1);
+    std::vector<Stream> serving;
+    std::uint64_t generation = 0;
+    while (true) {
+        {
+            std::unique_lock lock(mutex_);
+            // Nothing to empty: no need to wake up a thousand times a second.
+            while (!stop_ && serving.empty() && generation == generation_) changed_.wait(lock);
+            if (stop_) return;
+            if (generation != generation_) {
+                generation = generation_;
+                std::vector<Stream> next = streams();
+                lock.unlock();
+                drain(serving);  // the last values of taps that leave
+                serving = std::move(next);
+            }
+        }
+        drain(serving);
+        std::this_thread::sleep_for(kPeriod);
+    }
+}
+
+}  // namespace rtcf::ros1

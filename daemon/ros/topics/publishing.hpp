@@ -1,0 +1,68 @@
+/// @file
+/// The way out: takes the values out of all taps and publishes them.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "bridge/bridge.hpp"
+#include "bridge/tap.hpp"
+#include "ros/topics/topic_publisher.hpp"
+
+namespace rtcf::ros1 {
+
+/// Owned by the master watch. A thread of its own empties the taps each
+/// millisecond, with or without a master, so that none overflows.
+class Publishing {
+   public:
+    using Taps = std::vector<std::shared_ptr<executor::Tap>>;
+
+    Publishing();
+    ~Publishing();
+    Publishing(const Publishing&) = delete;
+    Publishing& operator=(const Publishing&) = delete;
+
+    /// The taps to empty from now on. A topic that is open already goes on with
+    /// its new tap at once. Any thread; returns at once.
+    void setTaps(Taps taps);
+
+    /// Makes ready for topics that are to be opened once there is a master: of those that are
+    /// latched, the last message is kept. Watch thread.
+    void prepare(const executor::BridgeSettings& settings);
+    /// Opens and closes topics until they are those of the taps. Watch thread, with a master.
+    /// @return true if anything was opened or closed
+    bool reconcile(ros::NodeHandle& handle, const executor::BridgeSettings& settings);
+    /// Closes all topics; reconcile() opens them again. Watch thread.
+    void closeAll();
+
+    /// Topics that are open. Any thread.
+    std::uint32_t open() const;
+    /// Why a topic could not be opened; empty if all could. Any thread.
+    std::string problem() const;
+
+   private:
+    struct Stream {
+        std::shared_ptr<executor::Tap> tap;
+        std::shared_ptr<TopicPublisher> publisher;  // none: the values are dropped
+    };
+
+    void run();
+    static void drain(const std::vector<Stream>& streams);
+    std::vector<Stream> streams() const;
+
+    mutable std::mutex mutex_;  // all below
+    std::condition_variable changed_;
+    Taps taps_;
+    std::map<std::string, std::shared_ptr<TopicPublisher>> publishers_;
+    std::uint64_t generation_ = 0;
+    bool stop_ = false;
+    std::thread thread_;
+};
+
+}  // namespace rtcf::ros1

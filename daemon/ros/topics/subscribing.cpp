@@ -1,0 +1,117 @@
+#include "ros/topics/subscribing.hpp"
+
+#include <algorithm>
+#include <set>
+
+#include "ros/roscpp/quiet_thread.hpp"
+#include "ros/topics/topic_subscriber.hpp"
+
+namespace rtcf::ros1 {
+
+namespace {
+
+using Connection = std::pair<std::string, std::string>;  // topic and MD5 of its type
+
+Connection connection(const executor::Injector& injector) {
+    return {injector.topic(), injector.type().ros_md5};
+}
+
+}  // namespace
+
+Subscribing::Subscribing() {
+    thread_ = quietThread("ros-deliver", [this] { run(); });
+}
+
+Subscribing::~Subscribing() {
+    stop_ = true;
+    queue_.disable();  // wakes the thread up
+    thread_.join();
+}
+
+void Subscribing::setInjectors(Injectors injectors) {
+    const std::lock_guard lock(mutex_);
+    injectors_ = std::move(injectors);
+    for (const auto& [injector, subscriber] : subscribers_) {
+        const bool stays =
+            std::find(injectors_.begin(), injectors_.end(), injector) != injectors_.end();
+        if (!stays) subscriber->mute();
+    }
+}
+
+bool Subscribing::reconcileTopics(ros::NodeHandle& handle, bool master) {
+    std::vector<std::shared_ptr<TopicSubscriber>> closing_first;
+    std::vector<std::shared_ptr<TopicSubscriber>> opening;
+    std::vector<std::shared_ptr<TopicSubscriber>> closing;
+    {
+        const std::lock_guard lock(mutex_);
+        // roscpp calls the master for the first and the last subscriber of a topic only.
+        std::set<Connection> served;
+        for (const auto& [injector, subscriber] : subscribers_) {
+            if (subscriber->isOpen()) served.insert(connection(*injector));
+        }
+        Subscribers wanted;
+        std::map<std::string, Connection> topics;
+        for (const auto& injector : injectors_) {
+            const auto found = subscribers_.find(injector);
+            auto subscriber = found != subscribers_.end()
+                                  ? found->second
+                                  : std::make_shared<TopicSubscriber>(injector);
+            const bool due = !subscriber->isOpen() && subscriber->problem().empty();
+            if (due && (master || served.count(connection(*injector)) != 0))
+                opening.push_back(subscriber);
+            wanted[injector] = std::move(subscriber);
+            topics[injector->topic()] = connection(*injector);
+        }
+        for (const auto& [injector, subscriber] : subscribers_) {
+            if (wanted.count(injector) != 0) continue;
+            const auto topic = topics.find(injector->topic());
+            const bool goes_on = topic != topics.end() && topic->second == connection(*injector);
+            if (!master && !goes_on) {
+                wanted[injector] = subscriber;  // until there is a master; it is mute already
+            } else if (topic != topics.end() && !goes_on) {
+                closing_first.push_back(subscriber);  // roscpp has one type per topic
+            } else {
+                closing.push_back(subscriber);  // after the opening, so that peers stay connected
+            }
+        }
+        subscribers_ = std::move(wanted);
+    }
+    // Without the lock: these call the master.
+    for (const auto& subscriber : closing_first) subscriber->close();
+    for (const auto& subscriber : opening) {
+        if (!subscriber->open(handle, queue_)) break;
+    }
+    for (const auto& subscriber : closing) subscriber->close();
+    return !(closing_first.empty() && opening.empty() && closing.empty());
+}
+
+void Subscribing::closeAll() {
+    Subscribers closing;
+    {
+        const std::lock_guard lock(mutex_);
+        closing.swap(subscribers_);
+    }
+    for (const auto& [injector, subscriber] : closing) subscriber->close();
+    clock_.close();
+}
+
+std::uint32_t Subscribing::open() const {
+    const std::lock_guard lock(mutex_);
+    std::uint32_t count = 0;
+    for (const auto& [injector, subscriber] : subscribers_) count += subscriber->isOpen() ? 1 : 0;
+    return count;
+}
+
+std::string Subscribing::problem() const {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [injector, subscriber] : subscribers_) {
+        if (!subscriber->problem().empty()) return subscriber->problem();
+    }
+    return {};
+}
+
+void Subscribing::run() {
+    while (!stop_) queue_.callAvailable(ros::WallDuration(0.1));
+}
+
+}  // namespace rtcf::ros1

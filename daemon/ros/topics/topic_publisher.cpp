@@ -1,0 +1,70 @@
+#include "ros/topics/topic_publisher.hpp"
+
+#include <ros/node_handle.h>
+
+#include "ros/roscpp/raw_message.hpp"
+
+namespace rtcf::ros1 {
+
+TopicPublisher::TopicPublisher(std::string topic, const TypeInfo& type, std::uint32_t queue,
+                               bool latch)
+    : topic_(std::move(topic)),
+      type_(type.ros_type),
+      md5_(type.ros_md5),
+      definition_(type.ros_definition),
+      queue_(queue),
+      latch_(latch) {}
+
+bool TopicPublisher::serves(const TypeInfo& type) const {
+    return type_ == type.ros_type && md5_ == type.ros_md5;
+}
+
+bool TopicPublisher::isOpen() const {
+    const std::lock_guard lock(mutex_);
+    return publisher_ != nullptr;
+}
+
+std::string TopicPublisher::problem() const {
+    const std::lock_guard lock(mutex_);
+    return problem_;
+}
+
+void TopicPublisher::open(ros::NodeHandle& handle) {
+    ros::AdvertiseOptions options(topic_, queue_, md5_, type_, definition_);
+    options.has_header = startsWithHeader(definition_);
+    options.latch = latch_;
+    ros::Publisher publisher;
+    std::string problem;
+    try {
+        publisher = handle.advertise(options);
+        if (!publisher) problem = "it is published in this process with another type";
+    } catch (const std::exception& error) {
+        problem = error.what();
+    }
+    const std::lock_guard lock(mutex_);
+    publisher_ = publisher;
+    if (publisher_ && !kept_.empty())
+        publisher_.publish(RawView{kept_.data(), static_cast<std::uint32_t>(kept_.size())});
+    kept_.clear();
+    if (!problem.empty()) problem_ = "cannot publish " + topic_ + " as " + type_ + ": " + problem;
+}
+
+void TopicPublisher::close() {
+    ros::Publisher closing;
+    {
+        const std::lock_guard lock(mutex_);
+        std::swap(closing, publisher_);
+    }
+    closing.shutdown();
+}
+
+void TopicPublisher::publish(const std::uint8_t* bytes, std::uint32_t size) {
+    const std::lock_guard lock(mutex_);
+    if (publisher_) {
+        publisher_.publish(RawView{bytes, size});
+    } else if (latch_) {
+        kept_.assign(bytes, bytes + size);
+    }
+}
+
+}  // namespace rtcf::ros1

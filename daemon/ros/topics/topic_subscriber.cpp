@@ -1,0 +1,64 @@
+#include "ros/topics/topic_subscriber.hpp"
+
+#include <ros/node_handle.h>
+#include <ros/subscription_callback_helper.h>
+
+#include "ros/roscpp/raw_message.hpp"
+
+namespace rtcf::ros1 {
+
+TopicSubscriber::TopicSubscriber(std::shared_ptr<executor::Injector> injector)
+    : injector_(std::move(injector)), muted_(std::make_shared<std::atomic<bool>>(false)) {}
+
+bool TopicSubscriber::open(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue) {
+    using Message = boost::shared_ptr<const RawBytes>;
+    const boost::function<void(const Message)> deliver = [injector = injector_,
+                                                          muted = muted_](const Message& message) {
+        const auto& bytes = message->bytes;
+        if (!*muted) injector->deliver(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+    };
+    ros::SubscribeOptions options;
+    options.topic = injector_->topic();
+    // The injector knows if only the newest counts; here none is lost before it gets there.
+    constexpr std::uint32_t kQueue = 1000;
+    options.queue_size = kQueue;
+    options.md5sum = injector_->type().ros_md5;
+    options.datatype = injector_->type().ros_type;
+    options.helper = boost::make_shared<ros::SubscriptionCallbackHelperT<const Message&>>(deliver);
+    options.callback_queue = &queue;
+    options.transport_hints = ros::TransportHints().tcpNoDelay();
+    ros::Subscriber subscriber;
+    std::string problem;
+    try {
+        subscriber = handle.subscribe(options);
+    } catch (const std::exception& error) {
+        problem =
+            "cannot subscribe " + options.topic + " as " + options.datatype + ": " + error.what();
+    }
+    const std::lock_guard lock(mutex_);
+    subscriber_ = subscriber;
+    problem_ = problem;
+    return subscriber_ != nullptr || !problem_.empty();
+}
+
+void TopicSubscriber::close() {
+    mute();
+    ros::Subscriber closing;
+    {
+        const std::lock_guard lock(mutex_);
+        std::swap(closing, subscriber_);
+    }
+    closing.shutdown();
+}
+
+bool TopicSubscriber::isOpen() const {
+    const std::lock_guard lock(mutex_);
+    return subscriber_ != nullptr;
+}
+
+std::string TopicSubscriber::problem() const {
+    const std::lock_guard lock(mutex_);
+    return problem_;
+}
+
+}  // namespace rtcf::ros1
