@@ -160,10 +160,19 @@ class Client:
         replacement: graph_pb2.ComponentSpec,
         runner: str = "",
         on_progress: OnProgress | None = None,
+        *,
+        reset_parameters: bool = False,
     ) -> control_pb2.ChangeResult:
-        """Put a new component in the place of an old one; what is empty in it is the old one's."""
+        """Put a new component in the place of an old one; what is empty in it is the old one's.
+
+        So are parameters that it does not name, as the result's `kept` and `notes` tell; with
+        `reset_parameters` they begin with their defaults.
+        """
         request = control_pb2.ReplaceRequest(
-            runner=runner, component=component, replacement=replacement
+            runner=runner,
+            component=component,
+            replacement=replacement,
+            reset_parameters=reset_parameters,
         )
         return self._change(self._stub.Replace, request, on_progress)
 

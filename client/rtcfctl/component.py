@@ -34,6 +34,11 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     )
     replacing.add_argument("old", metavar="NAME")
     _component_options(replacing)
+    replacing.add_argument(
+        "--reset-parameters",
+        action="store_true",
+        help="begin with defaults, not with the old component's values",
+    )
     replacing.set_defaults(run=replace)
 
     releasing = verbs.add_parser(
@@ -64,8 +69,18 @@ def unload(client: rtcf.Client, args: argparse.Namespace, output: Output) -> Non
 
 def replace(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Replace a component."""
-    result = client.replace(args.old, _spec(args), args.runner, output.progress)
-    output.changed(f"replaced {args.old} by {result.component}", result)
+    result = client.replace(
+        args.old,
+        _spec(args),
+        args.runner,
+        output.progress,
+        reset_parameters=args.reset_parameters,
+    )
+    kept = ", ".join(f"{each.name} {words.value(each.value)}" for each in result.kept)
+    output.changed(
+        f"replaced {args.old} by {result.component}{f', which keeps {kept}' if kept else ''}",
+        result,
+    )
 
 
 def release(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:

@@ -111,3 +111,46 @@ def test_parameters_change_while_the_loop_runs(daemon: Daemon, client: rtcf.Clie
     values = {each["name"]: each["value"] for each in info["parameters"]}
     assert values == {"enabled": True, "count": 4, "rate": 3.0, "label": "four", "mode": "run"}
     assert iteration(client) > before
+
+
+def _values(client: rtcf.Client, component: str) -> dict[str, object]:
+    found = client.get_component(component).parameters
+    return {each.name: getattr(each.value, each.value.WhichOneof("kind")) for each in found}
+
+
+def test_a_replacement_keeps_the_parameters_that_it_does_not_name(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", parameters=["rate:=2.5"]))
+    client.start()
+    assert daemon.ctl("set", "knobs", "count:=4", "label:=mine").returncode == 0
+    done = daemon.ctl("replace", "knobs", "rtcf_test", "Knobs", "--param", "label:=theirs")
+    assert done.stdout == "replaced knobs by /knobs, which keeps count 4, rate 2.5\n"
+    assert _values(client, "knobs") == {
+        "enabled": True, "count": 4, "rate": 2.5, "label": "theirs", "mode": "run",
+    }  # fmt: skip
+    # They are of the saved graph, too.
+    saved = daemon.ctl("save").stdout
+    assert "count: 4" in saved and "rate: 2.5" in saved and "label: theirs" in saved
+    assert daemon.ctl("runner", "restart").returncode == 0
+    assert _values(client, "knobs")["count"] == 4
+
+
+def test_a_replacement_says_which_parameters_do_not_fit(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", parameters=["rate:=2.5"]))
+    done = daemon.ctl("replace", "knobs", "rtcf_test", "Counter")
+    assert done.stdout == "replaced knobs by /knobs\n"
+    # Of the others nobody has chosen the value.
+    note = "rtcfctl: note: parameter rate = 2.5 is not kept: rtcf_test/Counter has none"
+    assert done.stderr == f"{note}\n"
+
+
+def test_a_replacement_begins_with_defaults_if_asked_to(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", parameters=["rate:=2.5"]))
+    done = daemon.ctl("replace", "knobs", "rtcf_test", "Knobs", "--reset-parameters")
+    assert (done.stdout, done.stderr) == ("replaced knobs by /knobs\n", "")
+    assert _values(client, "knobs")["rate"] == 1.5

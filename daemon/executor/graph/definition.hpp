@@ -14,6 +14,13 @@
 
 namespace rtcf::executor {
 
+/// A value of a component that another one replaces.
+struct InheritedParameter {
+    std::string name;
+    ParameterValue value;
+    bool chosen = true;  ///< it is not the default: worth saying if it gets lost
+};
+
 struct ComponentDefinition {
     std::string name;      ///< base name
     std::string ns = "/";  ///< canonical namespace
@@ -21,6 +28,8 @@ struct ComponentDefinition {
     std::string type;
     Remaps remaps;
     std::vector<std::pair<std::string, ParameterValue>> parameters;  ///< load-time values
+    /// Values of the component it replaces, taken where they fit and `parameters` has no other.
+    std::vector<InheritedParameter> inherited;
     bool first = false;  ///< all connections into it are loop breaks
     std::string ignore;  ///< regular expression of connections that are loop breaks for it
     std::set<std::string> breaks;  ///< inputs whose connection is a loop break

@@ -30,6 +30,10 @@ std::string parameterNames(const Component& component) {
     return names.empty() ? "none" : names;
 }
 
+std::string parameterText(const ParameterValue& value) {
+    return std::visit([](const auto& held) { return fmt::format("{}", held); }, value);
+}
+
 // What the flight recorder and the gate to ROS know of a hook, as long as it runs.
 class HookNote {
    public:
@@ -95,8 +99,7 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
         for (const ParameterBase* parameter : component_->parameters()) {
             parameter_values_.push_back(parameter->declaration().default_value);
         }
-        for (StagedValue* value : stageParameters(definition_.parameters)) value->commit();
-        releaseStaged();
+        setFirstParameters();
     } catch (const Refusal&) {
         log_.levels().detach(context_.log_level);
         recorder_.removeSlot(slot_);
@@ -111,6 +114,36 @@ Instance::~Instance() {
     log_.levels().detach(context_.log_level);
     log_.drain();  // pending records refer to its name
     recorder_.removeSlot(slot_);
+}
+
+void Instance::setFirstParameters() {
+    auto batch = definition_.parameters;
+    const auto& declared = component_->parameters();
+    for (const auto& [name, given, chosen] : definition_.inherited) {
+        const auto names_it = [&name = name](const auto& setting) { return setting.first == name; };
+        if (std::any_of(batch.begin(), batch.end(), names_it)) continue;
+        const auto found = std::find_if(declared.begin(), declared.end(),
+                                        [&name = name](const ParameterBase* parameter) {
+                                            return parameter->declaration().name == name;
+                                        });
+        ParameterValue value = given;
+        const std::string why =
+            found == declared.end()
+                ? fmt::format("{}/{} has none", definition_.package, definition_.type)
+                : (*found)->check(value);
+        if (why.empty()) {
+            if (value != (*found)->declaration().default_value)
+                kept_parameters_.emplace_back(name, std::move(value));
+        } else if (chosen) {
+            lost_parameters_.push_back(
+                fmt::format("parameter {} = {} is not kept: {}", name, parameterText(given), why));
+        }
+    }
+    batch.insert(batch.end(), kept_parameters_.begin(), kept_parameters_.end());
+    for (StagedValue* value : stageParameters(batch)) value->commit();
+    releaseStaged();
+    definition_.parameters = std::move(batch);
+    definition_.inherited.clear();
 }
 
 // A failing hook's own words, or its exception's, in one line.

@@ -77,6 +77,12 @@ class Instance {
     const std::vector<ParameterValue>& parameterValues() const noexcept {
         return parameter_values_;
     }
+    /// What it has taken of its definition's `inherited`, but for what is its default anyway.
+    const std::vector<std::pair<std::string, ParameterValue>>& keptParameters() const noexcept {
+        return kept_parameters_;
+    }
+    /// What of `inherited` does not fit, a line each.
+    const std::vector<std::string>& lostParameters() const noexcept { return lost_parameters_; }
     /// Takes back a batch that the loop did not adopt.
     void restoreParameterValues(std::vector<ParameterValue> values);
     /// Checks a batch, stages it and lets the component prepare for it. @return what to commit at
@@ -89,6 +95,7 @@ class Instance {
     void setFault(std::string text) { fault_ = std::move(text); }
 
    private:
+    void setFirstParameters();
     void callHook(Hook hook, const std::function<bool()>& call);
     /// Of a hook that cannot refuse any more: what goes wrong is logged.
     void callLastHook(Hook hook, const std::function<void()>& call) noexcept;
@@ -105,6 +112,8 @@ class Instance {
     ComponentContext context_;
     std::unique_ptr<Component> component_;
     std::vector<ParameterValue> parameter_values_;
+    std::vector<std::pair<std::string, ParameterValue>> kept_parameters_;
+    std::vector<std::string> lost_parameters_;
     std::vector<std::string> input_names_;
     std::vector<std::string> output_names_;
     std::vector<std::shared_ptr<SlotHeader>> samples_;

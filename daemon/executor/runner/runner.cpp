@@ -629,11 +629,17 @@ ChangeOutcome Runner::load(ComponentDefinition definition, const std::string& li
     change.loading = instance->fullName();
     change.arriving = {instance};
     adopt(std::move(change), progress);
-    ChangeOutcome result = outcome(instance->fullName());
-    for (const std::string& remap : instance->uselessRemaps()) {
+    return outcomeOf(*instance);
+}
+
+ChangeOutcome Runner::outcomeOf(const Instance& arrived) const {
+    ChangeOutcome result = outcome(arrived.fullName());
+    for (const std::string& remap : arrived.uselessRemaps()) {
         result.notes.push_back(
-            fmt::format("remap {} names no port of {}", remap, instance->fullName()));
+            fmt::format("remap {} names no port of {}", remap, arrived.fullName()));
     }
+    result.kept = arrived.keptParameters();
+    for (const std::string& line : arrived.lostParameters()) result.notes.push_back(line);
     return result;
 }
 
@@ -652,9 +658,18 @@ ChangeOutcome Runner::unload(const std::vector<std::string>& names, const Progre
 }
 
 ChangeOutcome Runner::replace(const std::string& name, ComponentDefinition definition,
-                              const std::string& library, const Progress& progress) {
+                              const std::string& library, bool reset, const Progress& progress) {
     const GraphNode old = plan_->graph.get(name);
     if (definition.fullName() != name) plan_->graph.requireFree(definition.fullName());
+    if (!reset) {
+        const auto& declared = old.instance->component().parameters();
+        for (std::size_t i = 0; i < declared.size(); ++i) {
+            const ParameterDeclaration& declaration = declared[i]->declaration();
+            const ParameterValue& value = old.instance->parameterValues()[i];
+            definition.inherited.push_back(
+                {declaration.name, value, value != declaration.default_value});
+        }
+    }
     const std::set<std::string> breaks = definition.breaks;
     const std::shared_ptr<Instance> instance =
         makeInstance(std::move(definition), library, progress);
@@ -666,7 +681,7 @@ ChangeOutcome Runner::replace(const std::string& name, ComponentDefinition defin
     change.leaving = {old.instance};
     change.hand_overs = {{&instance->component(), &old.instance->component()}};
     adopt(std::move(change), progress);
-    return outcome(instance->fullName());
+    return outcomeOf(*instance);
 }
 
 ChangeOutcome Runner::apply(const std::vector<WantedComponent>& wanted, bool dry_run,

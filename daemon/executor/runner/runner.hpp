@@ -45,6 +45,8 @@ struct ChangeOutcome {
     std::string component;           ///< full name of the one the change was about; may be empty
     std::vector<std::string> notes;  ///< one line each
     std::vector<Difference> differences;  ///< of apply()
+    /// Of replace(): what the new component has of the old one's values.
+    std::vector<std::pair<std::string, ParameterValue>> kept;
 };
 
 /// Something that happened without a request.
@@ -116,8 +118,10 @@ class Runner final : private RunnerView {
     ChangeOutcome load(ComponentDefinition definition, const std::string& library,
                        const Progress& progress);
     ChangeOutcome unload(const std::vector<std::string>& names, const Progress& progress);
+    /// @param reset parameters that `definition` does not name get their defaults, else those of
+    ///              the old component that fit
     ChangeOutcome replace(const std::string& name, ComponentDefinition definition,
-                          const std::string& library, const Progress& progress);
+                          const std::string& library, bool reset, const Progress& progress);
     /// Makes the graph what is wanted, in one transaction; or only tells what it would take.
     ChangeOutcome apply(const std::vector<WantedComponent>& wanted, bool dry_run,
                         const Progress& progress);
@@ -186,6 +190,7 @@ class Runner final : private RunnerView {
     void startAll(const Progress& progress);
     void stopAll() noexcept;
     ChangeOutcome outcome(std::string component = {}) const;
+    ChangeOutcome outcomeOf(const Instance& arrived) const;
     RealtimeProblems lockAndStart();
     LoopSettings loopSettings() const;
     bool wantsSimulation(const Progress& progress);

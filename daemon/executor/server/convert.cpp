@@ -402,6 +402,11 @@ pb::ChangeResult outcomeTo(const ChangeOutcome& outcome) {
         message.set_component(difference.component);
         message.set_detail(difference.detail);
     }
+    for (const auto& [name, value] : outcome.kept) {
+        pb::ParameterSetting& setting = *result.add_kept();
+        setting.set_name(name);
+        *setting.mutable_value() = valueTo(value);
+    }
     return result;
 }
 

@@ -494,10 +494,13 @@ ChangeOutcome Server::change(const v1::Request& request, const Runner::Progress&
             if (request.step().cycles() == 0)
                 throw Refusal(RefusalKind::InvalidArgument, "0 cycles to step: name a number");
             return runner_->step(request.step().cycles(), progress);
-        case v1::Request::kLoad:
+        case v1::Request::kLoad: {
             trustOwnerOf(request.load());
-            return runner_->load(definitionFrom(request.load().component()),
-                                 request.load().library(), progress);
+            ComponentDefinition definition = definitionFrom(request.load().component());
+            for (auto& [name, value] : parametersFrom(request.load().inherited()))
+                definition.inherited.push_back({name, value});
+            return runner_->load(std::move(definition), request.load().library(), progress);
+        }
         case v1::Request::kUnload: {
             std::vector<std::string> names;
             for (const std::string& name : request.unload().components())
@@ -511,7 +514,7 @@ ChangeOutcome Server::change(const v1::Request& request, const Runner::Progress&
                 if (component->full_name != name) continue;
                 return runner_->replace(
                     name, replacementFrom(request.replace().replacement(), component->definition),
-                    request.replace().library(), progress);
+                    request.replace().library(), request.replace().reset_parameters(), progress);
             }
             throw Refusal(RefusalKind::NotFound, fmt::format("no component {} to replace", name));
         }

@@ -99,22 +99,30 @@ async def unload(
 
 
 async def replace(
-    runner: "Runner", name: str, given: graph_pb2.ComponentSpec, progress: Progress
+    runner: "Runner", request: control_pb2.ReplaceRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
-    """Put a new component in the place of an old one."""
-    old = absolute(name)
+    """Put a new component in the place of an old one; parameters stay unless they are named."""
+    old, given = absolute(request.component), request.replacement
     library = await runner.catalog.find(given.package, given.type)
 
     async def work() -> control_pb2.ChangeResult:
         spec = replacement(runner.desired.components.get(old), given)
         if old in runner.left_out:  # the executor does not have it
-            request = wire.Request(load=library.load(spec))
+            load = library.load(spec)
+            if not request.reset_parameters:
+                load.inherited.extend(runner.desired.components[old].parameters)
+            asked = wire.Request(load=load)
         else:
             change = wire.Replace(
-                component=old, replacement=spec, library=library.path, owner=library.owner
+                component=old,
+                replacement=spec,
+                library=library.path,
+                owner=library.owner,
+                reset_parameters=request.reset_parameters,
             )
-            request = wire.Request(replace=change)
-        result = (await runner.ask(request, progress)).change
+            asked = wire.Request(replace=change)
+        result = (await runner.ask(asked, progress)).change
+        spec.parameters.extend(result.kept)
         runner.left_out.pop(old, None)
         runner.desired.drop([old])
         runner.desired.put(result.component, spec)

@@ -230,9 +230,7 @@ class Control(control_pb2_grpc.ControlServicer):
     def Replace(self, request: control_pb2.ReplaceRequest) -> Any:
         """Replace a component."""
         runner = self._runners.get(request.runner)
-        return lambda progress: graph.replace(
-            runner, request.component, request.replacement, progress
-        )
+        return lambda progress: graph.replace(runner, request, progress)
 
     @_changing
     def Apply(self, request: control_pb2.ApplyRequest) -> Any:

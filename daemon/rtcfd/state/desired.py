@@ -148,7 +148,7 @@ def replacement(
     result = graph_pb2.ComponentSpec()
     if old is not None:
         result.CopyFrom(old)
-        del result.parameters[:]  # they belong to the old type
+        del result.parameters[:]  # the executor knows which of them fit
     for field in ("remaps", "breaks"):
         if getattr(given, field):
             result.ClearField(field)

@@ -43,7 +43,7 @@ RunnerFixture::RunnerFixture()
 RunnerFixture::~RunnerFixture() { journal().gate_open.store(true); }
 
 ChangeOutcome RunnerFixture::load(const ComponentDefinition& component) {
-    return onGraphThread([&] { return runner_->load(component, kLibrary, kSilent); });
+    return onGraphThread([&] { return runner_->load(component, kLibrary, false, kSilent); });
 }
 
 Pending<ChangeOutcome> RunnerFixture::beginLoad(const ComponentDefinition& component) {
