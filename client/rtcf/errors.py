@@ -2,6 +2,7 @@
 
 import os
 import socket as sockets
+import stat
 from typing import Any
 
 from rtcf_shared.errors import RtcfError
@@ -54,10 +55,7 @@ def _why_unreachable(socket: str, text: str) -> str:
             probe.settimeout(_PROBE_TIMEOUT_S)
             probe.connect(socket)
     except PermissionError:
-        return (
-            f"permission denied on {socket}: join its group "
-            f"(`sudo adduser {_user()} {_group(socket)}`) and log in again"
-        )
+        return f"permission denied on {socket}: {_who_may(socket)}"
     except (FileNotFoundError, ConnectionRefusedError):
         return (
             f"rtcfd is not running at {socket}: start it with `sudo systemctl start rtcfd`, "
@@ -77,10 +75,17 @@ def _user() -> str:
         return f"#{os.getuid()}"
 
 
-def _group(socket: str) -> str:
+def _who_may(socket: str) -> str:
+    """Say how to be let in, but for ways that give more than that."""
     import grp
+    import pwd
 
     try:
-        return grp.getgrgid(os.stat(socket).st_gid).gr_name
+        found = os.stat(socket)
+        if found.st_mode & stat.S_IWGRP and found.st_gid != 0:
+            group = grp.getgrgid(found.st_gid).gr_name
+            return f"join its group (`sudo adduser {_user()} {group}`) and log in again"
+        owner = pwd.getpwuid(found.st_uid).pw_name
     except (KeyError, OSError):
-        return "rtcf"
+        return "its owner keeps it to himself"
+    return f"it is the own rtcfd of user {owner}"

@@ -4,13 +4,15 @@ stopped, and running."""
 import json
 import re
 import shlex
+import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import pytest
 import rtcf
-from daemon_process import Daemon, wait_for
+from daemon_process import BUILD_TREE, Daemon, wait_for
 from rtcf.v1 import runner_pb2
 from rtcfctl.plain import plain
 from values import iteration
@@ -249,3 +251,18 @@ def test_a_component_that_does_not_start_is_not_loaded_into_a_running_loop(daemo
     assert refused.returncode == 1
     assert "start failed: the emergency stop is pressed" in refused.stderr
     assert daemon.ctl("list", "-o", "json").stdout == before
+
+
+def test_what_is_not_trusted_is_not_to_be_given_to_others(tmp_path: Path) -> None:
+    folder = tmp_path / "packages"
+    shutil.copytree(BUILD_TREE / "lib" / "rtcf" / "rtcf_examples", folder / "open" / "rtcf_open")
+    (folder / "open" / "rtcf_open").chmod(0o777)
+    daemon = Daemon(tmp_path, arguments=["--path", str(folder / "open")])
+    daemon.start()
+    try:
+        said = daemon.ctl("load", "rtcf_open", "Mimo").stderr
+    finally:
+        daemon.end()
+    assert "rtcf_open can be written by everybody, so its code is not trusted" in said
+    assert "install it as root (components into /usr/lib/rtcf/PACKAGE)" in said
+    assert "chmod" not in said and "chown" not in said

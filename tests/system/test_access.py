@@ -136,6 +136,8 @@ def test_code_that_others_can_write_is_refused(service: Service, make: str, said
     refusal = untrusted(service, make)
     assert said in refusal
     assert len(refusal.splitlines()) == 1
+    # Advice gives nobody more rights, and touches none of /tmp or a home.
+    assert "chmod" not in refusal and "chown" not in refusal
 
 
 def test_what_links_against_the_systems_and_trusted_folders_is_loaded(service: Service) -> None:

@@ -98,21 +98,22 @@ class Walk {
 
     void check(const struct stat& status, bool anybody_may_write) const {
         const bool trusted = status.st_uid == 0 || owners_.count(status.st_uid) != 0;
-        if (!trusted) distrust("belongs to user " + nameOf(status.st_uid), "chown root");
+        if (!trusted) distrust("belongs to user " + nameOf(status.st_uid));
         if (anybody_may_write) return;
-        if ((status.st_mode & S_IWOTH) != 0) distrust("can be written by everybody", "chmod o-w");
+        if ((status.st_mode & S_IWOTH) != 0) distrust("can be written by everybody");
         // A group of one person (adduser(8), USERGROUPS) is that person.
         const bool own_group =
             status.st_gid == 0 || (status.st_gid == status.st_uid && status.st_uid >= kFirstPerson);
-        if ((status.st_mode & S_IWGRP) != 0 && !own_group)
-            distrust("can be written by its group", "chmod g-w");
+        if ((status.st_mode & S_IWGRP) != 0 && !own_group) distrust("can be written by its group");
     }
 
-    [[noreturn]] void distrust(const std::string& why, const std::string& remedy) const {
+    // No advice to change the rights of what is there: it may be a home, or /tmp.
+    [[noreturn]] void distrust(const std::string& why) const {
         refuse(
-            fmt::format("{} {}, so its code is not trusted: `{} {}`, or name the component folder "
-                        "of a trusted user under path in rtcfd's settings",
-                        seen_.string(), why, remedy, seen_.string()));
+            fmt::format("{} {}, so its code is not trusted: install it as root (components into "
+                        "/usr/lib/rtcf/PACKAGE), or name the component folder of a trusted user "
+                        "under path in rtcfd's settings",
+                        seen_.string(), why));
     }
 
     const std::string subject_;

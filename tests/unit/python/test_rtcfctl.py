@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import socket
 
@@ -86,17 +87,28 @@ def test_no_daemon_is_exit_code_3(stopped_daemon: DaemonUnderTest) -> None:
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="takes root to become somebody else")
-def test_no_permission_is_exit_code_3_and_names_the_group(stopped_daemon: DaemonUnderTest) -> None:
+@pytest.mark.parametrize(
+    ("mode", "group", "advice"),
+    [
+        (0o660, "daemon", "join its group (`sudo adduser nobody daemon`) and log in again"),
+        # No group that gives more than this socket, or nothing.
+        (0o660, "root", "it is the own rtcfd of user root"),
+        (0o600, "daemon", "it is the own rtcfd of user root"),
+    ],
+)
+def test_no_permission_is_exit_code_3_and_names_the_group(
+    stopped_daemon: DaemonUnderTest, mode: int, group: str, advice: str
+) -> None:
     # Somebody who may look into all folders, also those above the build tree and the socket.
     nobody = ["--reuid=65534", "--regid=65534", "--clear-groups"]
     looks = ["--inh-caps=+dac_read_search", "--ambient-caps=+dac_read_search"]
     with socket.socket(socket.AF_UNIX) as listening:
         listening.bind(str(stopped_daemon.socket))
         listening.listen()
-        stopped_daemon.socket.chmod(0o600)
+        shutil.chown(stopped_daemon.socket, group=group)
+        stopped_daemon.socket.chmod(mode)
         done = stopped_daemon.ctl("status", wrapper=["setpriv", *nobody, *looks])
-    assert "permission denied" in done.stderr
-    assert "adduser nobody" in done.stderr
+    assert done.stderr.endswith(f": permission denied on {stopped_daemon.socket}: {advice}\n")
     assert done.returncode == 3
 
 
