@@ -2,7 +2,9 @@
 #
 # Builds a shared library of components. It is put where a daemon run from this
 # build tree with `--path <build>/lib/rtcf` finds it, and is installed to
-# <libdir>/rtcf/<package>, where the system daemon looks.
+# <libdir>/rtcf/<package>, where the system daemon looks. Where no CMAKE_BUILD_TYPE
+# is set it is built as by RelWithDebInfo: a loop needs optimised code, and
+# `rtcfctl check` and crash reports need its lines.
 include(GNUInstallDirs)
 
 function(rtcf_add_components target)
@@ -22,6 +24,17 @@ function(rtcf_add_components target)
                CXX_VISIBILITY_PRESET hidden
                VISIBILITY_INLINES_HIDDEN ON
                LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib/rtcf/${arg_PACKAGE})
+  if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+    # Of these libraries alone: a catkin workspace builds other packages with them.
+    separate_arguments(optimised UNIX_COMMAND "${CMAKE_CXX_FLAGS_RELWITHDEBINFO}")
+    target_compile_options(${target} PRIVATE ${optimised})
+    get_property(said GLOBAL PROPERTY RTCF_BUILD_TYPE_SAID)
+    if(NOT said)
+      message(STATUS "rtcf: no CMAKE_BUILD_TYPE is set: components are built as by RelWithDebInfo "
+                     "(${CMAKE_CXX_FLAGS_RELWITHDEBINFO})")
+      set_property(GLOBAL PROPERTY RTCF_BUILD_TYPE_SAID TRUE)
+    endif()
+  endif()
   # A unique symbol would be shared between an old and a new build of the same
   # library in one process.
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
