@@ -2,12 +2,15 @@
 
 import argparse
 import os
+import re
 import time
+import uuid
+from dataclasses import dataclass
 from typing import Any
 
 import rtcf
 from rtcf.diagnosis import Finding, Grade, Host, Loop, diagnose, last_cpu_of
-from rtcf.v1 import runner_pb2
+from rtcf.v1 import control_pb2, runner_pb2
 
 from rtcfctl.output import Output
 
@@ -15,6 +18,9 @@ _SECONDS = 10.0
 _FREQUENCY_HZ = 1000.0
 # Of wake-up latency, µs: what a loop of 1 kHz notices, and what it cannot live with.
 _GOOD_US = 100.0
+# Besides 0 to 3, which mean the same with all verbs.
+WEAK, UNFIT = 4, 5
+_EXIT_CODES = {Grade.GOOD: 0, Grade.UNKNOWN: 0, Grade.WARNING: WEAK, Grade.BAD: UNFIT}
 _STYLES = {Grade.GOOD: "green", Grade.UNKNOWN: "", Grade.WARNING: "yellow", Grade.BAD: "bold red"}
 
 
@@ -33,22 +39,19 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     doctor.set_defaults(run=run)
 
 
-def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Look, measure, judge."""
+def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> int:
+    """Look, measure, judge; return the verdict as an exit code."""
     if not 0.0 <= args.seconds <= 3600.0:
         raise ValueError(f"--seconds {args.seconds:g}: use 0 to 3600")
     host = Host()
     status, trouble = _status(client, args.runner)
     loop = _loop(host, status)
     findings = [*_of_rtcfd(status, trouble), *diagnose(host, loop)]
-    latency: runner_pb2.Distribution | None = None
+    latency = _Latency(why_not="rtcfd does not answer" if args.seconds else "--seconds 0")
     if args.seconds and status is not None:
-        latency, why_not = _measure(client, status, args.seconds, output)
-        findings.append(_judge(latency, why_not, args.seconds))
-    else:
-        why_not = "rtcfd does not answer" if args.seconds else "--seconds 0"
-        findings.append(Finding("wake-up latency", Grade.UNKNOWN, f"not measured: {why_not}"))
-    _print(findings, latency, output)
+        latency = _measure(client, host, status, loop.cpu, args.seconds, output)
+    findings.append(_judge(latency))
+    return _print(findings, latency.figures, output)
 
 
 def _status(client: rtcf.Client, runner: str) -> tuple[runner_pb2.RunnerStatus | None, str]:
@@ -61,14 +64,9 @@ def _status(client: rtcf.Client, runner: str) -> tuple[runner_pb2.RunnerStatus |
 def _loop(host: Host, status: runner_pb2.RunnerStatus | None) -> Loop:
     if status is None:
         return Loop(max(os.sched_getaffinity(0)), 80)
-    cpu = int(status.settings.cpu)
-    if cpu < 0:
-        cpu = next(
-            (found for pid in (status.pid, os.getpid())
-             if (found := last_cpu_of(host, pid)) is not None),
-            0,
-        )  # fmt: skip
-    return Loop(cpu, status.settings.priority, status.pid, status.settings.lock_memory)
+    return Loop(
+        _cpu_of(host, status), status.settings.priority, status.pid, status.settings.lock_memory
+    )
 
 
 def _of_rtcfd(status: runner_pb2.RunnerStatus | None, trouble: str) -> list[Finding]:
@@ -83,40 +81,104 @@ def _of_rtcfd(status: runner_pb2.RunnerStatus | None, trouble: str) -> list[Find
     return [Finding(f"runner {status.runner}", Grade.GOOD, found)]
 
 
+@dataclass(frozen=True)
+class _Latency:
+    """What was measured, or why nothing was."""
+
+    figures: runner_pb2.Distribution | None = None
+    of: str = ""  # what loop
+    why_not: str = ""
+
+
 def _measure(
-    client: rtcf.Client, status: runner_pb2.RunnerStatus, seconds: float, output: Output
-) -> tuple[runner_pb2.Distribution | None, str]:
-    """Run an empty loop beside the others, as they are run, and return its wake-up latency."""
+    client: rtcf.Client,
+    host: Host,
+    status: runner_pb2.RunnerStatus,
+    cpu: int,
+    seconds: float,
+    output: Output,
+) -> _Latency:
+    """Return the wake-up latency of the loop if it runs, else of an empty one in its place.
+
+    No second loop is put beside one that runs: the two would make each other late.
+    """
+    try:
+        if _runs(status):
+            latency = client.get_statistics(status.runner).latency
+            return _Latency(latency, f"of the loop that runs, {latency.count} cycles")
+        for other in client.get_status().runners:
+            if _runs(other) and _cpu_of(host, other) == cpu:
+                return _Latency(why_not=f"the loop of {other.runner} runs on CPU {cpu}")
+        return _Latency(
+            _of_an_empty_loop(client, status, cpu, seconds, output),
+            f"on CPU {cpu} at priority {status.settings.priority} in {seconds:g} s",
+        )
+    except rtcf.RtcfError as error:
+        return _Latency(why_not=str(error))
+
+
+def _of_an_empty_loop(
+    client: rtcf.Client,
+    status: runner_pb2.RunnerStatus,
+    cpu: int,
+    seconds: float,
+    output: Output,
+) -> runner_pb2.Distribution:
+    """Run one by a hold: however we end, rtcfd removes it."""
     name = f"doctor_{os.getpid()}"
     settings = runner_pb2.RunnerSettings(
         frequency_hz=_FREQUENCY_HZ,
-        cpu=status.settings.cpu,
+        cpu=cpu,
         priority=status.settings.priority,
         realtime=runner_pb2.REALTIME_PREFERRED,
         ros=runner_pb2.RosSettings(enabled=False),
     )
     output.progress(f"measuring wake-up latency for {seconds:g} s with runner {name}")
+    token = f"{name}-{uuid.uuid4()}"
+    hold = client.hold_runner(
+        control_pb2.OpenHold(
+            runner=name,
+            settings=settings,
+            holder=f"rtcfctl doctor (pid {os.getpid()})",
+            token=token,
+        )
+    )
+    messages = iter(hold)
+    next(each for each in messages if each.WhichOneof("kind") == "taken")
     try:
-        client.add_runner(name, settings)
-        try:
-            client.start(name)
-            time.sleep(seconds)
-            latency = client.get_statistics(name).latency
-        finally:
-            client.remove_runner(name)
-    except rtcf.RtcfError as error:
-        return None, str(error)
-    return latency, ""
+        client.start(name)
+        time.sleep(seconds)
+        return client.get_statistics(name).latency
+    finally:
+        hold.end()
+        for _ in messages:  # until it is gone
+            pass
 
 
-def _judge(latency: runner_pb2.Distribution | None, why_not: str, seconds: float) -> Finding:
-    topic = "wake-up latency"
-    if latency is None:
-        return Finding(topic, Grade.UNKNOWN, f"not measured: {why_not}")
-    worst_us = latency.max_ns / 1000
+def _runs(status: runner_pb2.RunnerStatus) -> bool:
+    return bool(status.state == runner_pb2.RUNNER_STATE_RUNNING)
+
+
+def _cpu_of(host: Host, status: runner_pb2.RunnerStatus) -> int:
+    """Return the CPU of a runner's real-time thread, or the one it would get."""
+    thread = f"/proc/{status.pid}/task/{status.realtime_tid}/status"
+    found = re.search(r"^Cpus_allowed_list:\s*(\d+)$", host.read(thread) or "", re.MULTILINE)
+    if status.realtime_tid and found:
+        return int(found[1])
+    if status.settings.cpu >= 0:
+        return int(status.settings.cpu)
+    known = (last_cpu_of(host, pid) for pid in (status.pid, os.getpid()))
+    return next((cpu for cpu in known if cpu is not None), 0)
+
+
+def _judge(latency: _Latency) -> Finding:
+    topic, figures = "wake-up latency", latency.figures
+    if figures is None:
+        return Finding(topic, Grade.UNKNOWN, f"not measured: {latency.why_not}")
+    worst_us = figures.max_ns / 1000
     found = (
-        f"{latency.p50_ns / 1000:.1f} µs median, {latency.p999_ns / 1000:.1f} µs p99.9, "
-        f"{worst_us:.1f} µs worst of {latency.count} cycles in {seconds:g} s"
+        f"{figures.p50_ns / 1000:.1f} µs median, {figures.p999_ns / 1000:.1f} µs p99.9, "
+        f"{worst_us:.1f} µs worst, {latency.of}"
     )
     if worst_us <= _GOOD_US:
         return Finding(topic, Grade.GOOD, found)
@@ -135,9 +197,7 @@ def verdict(findings: list[Finding]) -> tuple[Grade, str]:
     return Grade.GOOD, "this machine is fit for real time"
 
 
-def _print(
-    findings: list[Finding], latency: runner_pb2.Distribution | None, output: Output
-) -> None:
+def _print(findings: list[Finding], latency: runner_pb2.Distribution | None, output: Output) -> int:
     grade, sentence = verdict(findings)
     if not output.for_people:
         document: dict[str, Any] = {
@@ -161,7 +221,7 @@ def _print(
                 "max_ns": latency.max_ns,
             }
         output.data(document)
-        return
+        return _EXIT_CODES[grade]
     for each in findings:
         output.line(f"{each.grade.name.lower():<8} {each.topic}: {each.found}", _STYLES[each.grade])
         if each.wanted and each.grade != Grade.GOOD:
@@ -169,3 +229,4 @@ def _print(
         if each.remedy and each.grade != Grade.GOOD:
             output.line(f"{'':<8} mend it:   {each.remedy}")
     output.line(sentence, _STYLES[grade])
+    return _EXIT_CODES[grade]

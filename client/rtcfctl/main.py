@@ -55,8 +55,10 @@ def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None)
     output = Output(args.output, args.verbose)
     try:
         with rtcf.Client(args.socket) as client:
-            args.run(client, args, output)
+            # What a verb returns is its own verdict, e.g. doctor's.
+            code = args.run(client, args, output)
             sys.stdout.flush()
+            return code or DONE
     except rtcf.DaemonUnreachableError as error:
         return _fail(error, UNREACHABLE)
     except rtcf.RtcfError as error:

@@ -4,8 +4,9 @@ import json
 from pathlib import Path
 
 import pytest
-from daemon_under_test import DaemonUnderTest
+from daemon_under_test import DaemonUnderTest, wait_for
 from rtcf.diagnosis import Finding, Grade, Host, Loop, cpus, diagnose
+from rtcf.v1 import runner_pb2
 
 PID = 42
 CPU = "/sys/devices/system/cpu"
@@ -129,18 +130,43 @@ def test_it_measures_and_judges_for_real_and_leaves_nothing_behind(
     daemon: DaemonUnderTest,
 ) -> None:
     done = daemon.ctl("-o", "json", "doctor", "--seconds", "0.2")
-    assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
     grades = {each["topic"]: each["grade"] for each in document["findings"]}
     assert {"kernel preemption", "wake-up latency", "runner rt_runner"} <= set(grades)
-    assert document["verdict"]["grade"] in ("good", "warning", "bad")
+    # The verdict is the exit code, too.
+    assert done.returncode == {"good": 0, "warning": 4, "bad": 5}[document["verdict"]["grade"]]
     with daemon.client() as client:
         assert [each.runner for each in client.get_status().runners] == ["rt_runner"]
 
 
 def test_without_rtcfd_it_looks_all_the_same(tmp_path: Path, daemon: DaemonUnderTest) -> None:
     done = daemon.ctl("--socket", str(tmp_path / "none"), "doctor")
-    assert done.returncode == 0
+    assert done.returncode == 5
     assert "bad      rtcfd: rtcfd is not running" in done.stdout
     assert "kernel preemption" in done.stdout
     assert "not measured: rtcfd does not answer" in done.stdout
+
+
+def test_no_loop_is_put_beside_one_that_runs(daemon: DaemonUnderTest) -> None:
+    with daemon.client() as client:
+        client.add_runner("arm", runner_pb2.RunnerSettings(cpu=0))
+        client.set_runner(runner_pb2.RunnerSettings(cpu=0))
+        client.start("arm")
+        said = daemon.ctl("doctor", "--seconds", "0.2").stdout
+        assert "not measured: the loop of arm runs on CPU 0" in said
+        # What runs tells more than an empty loop would.
+        said = daemon.ctl("-r", "arm", "doctor", "--seconds", "60").stdout
+        assert "worst, of the loop that runs, 10 cycles" in said
+
+
+def test_it_leaves_nothing_behind_when_it_is_ended(daemon: DaemonUnderTest) -> None:
+    doctor = daemon.ctl_process("doctor", "--seconds", "3000")
+
+    def runners() -> list[str]:
+        return [each.runner for each in client.get_status().runners]
+
+    with daemon.client() as client:
+        wait_for(lambda: f"doctor_{doctor.pid}" in runners(), "its loop")
+        doctor.terminate()
+        doctor.communicate()
+        wait_for(lambda: runners() == ["rt_runner"], "the end of its loop")
