@@ -6,7 +6,7 @@ BUILD := build
 export CMAKE_CXX_COMPILER_LAUNCHER = $(wildcard /usr/bin/ccache)
 export CMAKE_BUILD_PARALLEL_LEVEL ?= $(shell nproc)
 
-tasks := all build demo test test-long bench bench-rt deb lint
+tasks := all build demo checker test test-long bench bench-rt deb lint
 elsewhere := $(filter-out $(shell tools/release codename),$(RELEASE))
 
 .PHONY: $(tasks) dependencies clean help
@@ -26,8 +26,16 @@ build:
 	@cmake -S . -B $(BUILD) -G Ninja
 	@cmake --build $(BUILD)
 
-demo: all ## run Fig. 1 of the paper at 2 kHz for 10 s, with ROS nodes talking to it
+demo: dependencies ## run Fig. 1 of the paper at 2 kHz for 10 s, with ROS nodes talking to it
+	@cmake -S . -B $(BUILD) -G Ninja
+	@echo "building what the demo needs: some minutes the first time"
+	@cmake --build $(BUILD) --target rtcf_demo
 	@components/rtcf_examples/demo/demo
+
+checker: dependencies ## build the executor that `build/bin/rtcfctl check` runs components in
+	@cmake -S . -B $(BUILD)-rtsan -G Ninja -DRTCF_SANITIZE=realtime \
+	  -DCMAKE_CXX_COMPILER=clang++-22
+	@cmake --build $(BUILD)-rtsan --target rtcf-executor
 
 test: all ## all checks: lint, unit, sanitizers, integration, packages
 	@tools/install-dependencies test

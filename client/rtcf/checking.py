@@ -20,7 +20,8 @@ from rtcf.sanitizer import Violation, violations
 INSTALLED = Path("/usr/lib/rtcf/rtcf-executor-rtsan")
 CONFIGURATION = Path("/etc/rtcfd/rtcfd.toml")
 _DESCRIBE_TIMEOUT_S = 30.0
-# The sanitizer knows by its name how to speak with each. The first is what rtcf-check depends on.
+# The sanitizer knows by its name how to speak with each. The last is what rtcf-check depends on:
+# the others are faster, and come with all of LLVM.
 _SYMBOLIZERS = ("llvm-symbolizer-22", "llvm-symbolizer", "addr2line")
 
 
@@ -51,9 +52,11 @@ def check(
 ) -> Checked:
     """Run a component for some cycles; `parameters` are "name:=value".  Raises RtcfError."""
     if not os.access(executor, os.X_OK):
+        how = "install rtcf-check"
+        if build_tree is not None and executor == executor_of(build_tree):
+            how = f"`make -C {build_tree.parent} checker` builds it"
         raise RtcfError(
-            f"no executor with RealtimeSanitizer at {executor}: install rtcf-check, "
-            "or name one with --executor"
+            f"no executor with RealtimeSanitizer at {executor}: {how}, or name one with --executor"
         )
     searched = component_folders([*folders, *_configured()], build_tree)
     library = _find(executor, searched, package, type_name)

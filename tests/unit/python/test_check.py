@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 from daemon_under_test import BUILD_TREE
+from rtcf import checking
+from rtcf.errors import RtcfError
 from rtcf.sanitizer import Frame, violations
 
 REPORT = """\
@@ -115,6 +117,15 @@ def test_what_cannot_be_checked_is_refused(
     done = check(executor, *words.split(), says=says, status=status)
     assert done.returncode == 1
     assert text in done.stderr
+
+
+def test_no_executor_in_a_build_tree_names_the_command_that_builds_it(tmp_path: Path) -> None:
+    with pytest.raises(RtcfError, match=f"`make -C {tmp_path} checker` builds it"):
+        checking.check(
+            checking.executor_of(tmp_path / "build"), "pkg", "T", 1, build_tree=tmp_path / "build"
+        )
+    goals = (Path(__file__).parents[3] / "Makefile").read_text()
+    assert "\nchecker: " in goals
 
 
 def test_no_executor_names_the_package(executor: Path) -> None:
