@@ -24,11 +24,11 @@ from rtcfd.configuration import options
 from rtcfd.executor import frames
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.executor import left_overs
-from rtcfd.notify import Notify
+from rtcfd.notify import Notify, machine_goes_down
+from rtcfd.operations.runner_core import Surroundings
 from rtcfd.reload import Reloads
 from rtcfd.runners.held_runners import await_holder
 from rtcfd.runners.ros_services import RosServices
-from rtcfd.runners.runner import Surroundings
 from rtcfd.runners.runners import Runners
 from rtcfd.service.control import Control
 from rtcfd.state import handover
@@ -57,13 +57,14 @@ class Daemon:
         self._clients = Clients(self._private, given.limits.clients)
         admission = Admission(self._clients, given.access)
         catalog = Catalog(given.folders, Describer(given.executor))
+        ros_services = RosServices(given.ros_services)
         shared = Surroundings(
             command=self._command,
             catalog=catalog,
             store=self._store,
             defaults=given.defaults,
             on_change=self._tell,
-            serve_ros=RosServices(given.ros_services).serve,
+            serve_ros=ros_services.serve,
             limits=given.limits,
         )
         self._runners = Runners(shared)
@@ -76,6 +77,7 @@ class Daemon:
             self._clients,
             admission,
             self._store,
+            ros_services,
         )
         self._server = grpc.aio.server(options=_server_options(given), interceptors=[admission])
         self._left_over: list[str] = []  # runners of executors that outlived another rtcfd
@@ -115,8 +117,15 @@ class Daemon:
         await self._server.start()
         await self._clients.serve(listener)
         log.info("rtcfd %s serves %s", VERSION, self._endpoint.path)
+        self._notify.starting()
         starting = asyncio.create_task(self._start())
-        await end.wait()
+        ending = asyncio.create_task(end.wait())
+        await asyncio.wait({starting, ending}, return_when=asyncio.FIRST_COMPLETED)
+        if starting.done() and (problem := starting.exception()):
+            # What works is served; what does not shows in the status.
+            log.error("not all of the start was done", exc_info=problem)
+            self._ready()
+        await ending
         await (self._let_go() if self._leaving else self._stop())
         starting.cancel()
         await asyncio.gather(starting, return_exceptions=True)
@@ -132,7 +141,7 @@ class Daemon:
         log.info("stopping all loops")
         self._notify.stopping("stopping all loops")
         serving = asyncio.create_task(self._server.stop(_GRACE_S))
-        await self._runners.close()
+        await self._runners.close(in_order=not await machine_goes_down())
         await asyncio.wait({serving}, timeout=_LAST_WORDS_S)
         await self._server.stop(None)
         self._clients.close()
@@ -161,6 +170,9 @@ class Daemon:
         for runner in self._runners.all():
             await_holder(self._runners, runner)
         await self._reloads.catch_up()
+        self._ready()
+
+    def _ready(self) -> None:
         self._notify.ready(self._runners.summary())
         log.info("ready; runners: %s", self._runners.summary())
 
@@ -176,13 +188,7 @@ class Daemon:
             )
 
     def _reload(self) -> None:
-        async def reload() -> None:
-            try:
-                await self._reloads.reload()
-            except Refusal as refusal:
-                log.error("not reloaded: %s", refusal)
-
-        self._reloading = asyncio.create_task(reload())
+        self._runners.operations.in_background("the reload", self._reloads.reload())
 
     def _tell(self) -> None:
         self._notify.status(self._runners.summary())

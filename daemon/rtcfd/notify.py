@@ -7,6 +7,30 @@ import asyncio
 import os
 from collections.abc import Callable
 
+_EXTEND_EVERY_S = 10
+_ASKING_TIMEOUT_S = 2.0
+
+
+async def machine_goes_down() -> bool:
+    """Tell whether we are to end because the machine is, by systemd's word: what ran then is to
+    run again after the boot; what an administrator ends is not."""
+    if not os.environ.get("NOTIFY_SOCKET"):
+        return False
+    try:
+        process = await asyncio.create_subprocess_exec(
+            "systemctl", "is-system-running",
+            stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.DEVNULL,
+        )  # fmt: skip
+    except OSError:
+        return False
+    try:
+        async with asyncio.timeout(_ASKING_TIMEOUT_S):
+            return (await process.communicate())[0].strip() == b"stopping"
+    except TimeoutError:
+        process.kill()
+        await process.wait()
+        return False
+
 
 def _sender() -> Callable[[str], object]:
     if not os.environ.get("NOTIFY_SOCKET"):
@@ -22,9 +46,16 @@ class Notify:
     def __init__(self) -> None:
         self._send = _sender()
         self._watchdog: asyncio.Task[None] | None = None
+        self._starting: asyncio.Task[None] | None = None
+
+    def starting(self) -> None:
+        """Ask for more time again and again until all is started, however long that takes."""
+        self._starting = asyncio.create_task(self._extend())
 
     def ready(self, status: str) -> None:
         """Say that clients are served, and begin to feed the watchdog."""
+        if self._starting is not None:
+            self._starting.cancel()
         self._send(f"READY=1\nSTATUS={status}")
         usec = os.environ.get("WATCHDOG_USEC", "")
         pid = os.environ.get("WATCHDOG_PID", str(os.getpid()))
@@ -41,8 +72,15 @@ class Notify:
 
     def close(self) -> None:
         """Feed the watchdog no more."""
-        if self._watchdog is not None:
-            self._watchdog.cancel()
+        for task in (self._watchdog, self._starting):
+            if task is not None:
+                task.cancel()
+
+    async def _extend(self) -> None:
+        while True:
+            # From now on, see sd_notify(3): an event loop that hangs asks for no more.
+            self._send(f"EXTEND_TIMEOUT_USEC={2 * _EXTEND_EVERY_S * 1_000_000}")
+            await asyncio.sleep(_EXTEND_EVERY_S)
 
     async def _feed(self, every_s: float) -> None:
         # From the event loop itself: the watchdog is to see that this one runs.

@@ -17,7 +17,8 @@ from rtcfd.catalog.catalog import Catalog
 from rtcfd.common import runner_settings
 from rtcfd.common.refusals import Refusal
 from rtcfd.configuration.options import Options
-from rtcfd.runners.runner import Surroundings
+from rtcfd.operations.runner_core import Surroundings
+from rtcfd.runners.ros_services import RosServices
 from rtcfd.runners.runners import Runners
 from rtcfd.state import handover
 from rtcfd.state.boot_graphs import BootGraphs, Given, become
@@ -44,6 +45,7 @@ class Reloads:
         clients: Clients,
         admission: Admission,
         store: Store,
+        ros_services: RosServices,
     ) -> None:
         self._given = given
         self._command_folder = shared.command.folder
@@ -54,6 +56,7 @@ class Reloads:
         self._clients = clients
         self._admission = admission
         self._store = store
+        self._ros_services = ros_services
         self._left: Handover | None = None  # by the rtcfd before this one
         self._graphs = BootGraphs(given.graphs_dir, {})
         self._late: list[Given] = []  # for runners that are adopted first
@@ -104,7 +107,11 @@ class Reloads:
         return lines
 
     async def reload(self) -> list[str]:
-        """Read settings and graphs.d again; refused as a whole if the settings are not valid."""
+        """Read settings and graphs.d again; refused as a whole if the settings are not valid.
+        One at a time; a caller that leaves holds up nothing."""
+        return await self._runners.operations.take_turn("a reload", self._reload, None)
+
+    async def _reload(self) -> list[str]:
         new = self._read_options()
         lines = [
             f"{name} changes with the next restart of rtcfd"
@@ -114,12 +121,11 @@ class Reloads:
         if new.limits.message_kb != self._given.limits.message_kb:
             lines.append("limits.message_kb changes with the next restart of rtcfd")
         for part in fields(new):
-            if part.name in ("folders", "access", "limits", "defaults") and (
-                getattr(new, part.name) != getattr(self._given, part.name)
-            ):
+            if part.name in _WORDS and (getattr(new, part.name) != getattr(self._given, part.name)):
                 lines.append(f"{_WORDS[part.name]} changed")
         self._catalog.folders = new.folders
         self._admission.access = new.access
+        self._ros_services.access = new.ros_services
         self._clients.limit = new.limits.clients
         taps, self._shared.limits = self._shared.limits.taps, new.limits
         self._given = new
@@ -158,13 +164,14 @@ class Reloads:
             except Refusal as refusal:
                 problem = f"{given.file}: {refusal}"
                 self._graph_problems.append(problem)
+                self._graphs.forget(given.file)  # tried again by the next reload
                 log.error("%s", problem)
                 lines.append(problem)
         return lines
 
 
 _WORDS = {"folders": "component folders", "access": "access rights", "limits": "limits",
-          "defaults": "defaults of runners"}  # fmt: skip
+          "defaults": "defaults of runners", "ros_services": "rights of ROS services"}  # fmt: skip
 
 
 def _identity(file: Path) -> tuple[int, int] | None:

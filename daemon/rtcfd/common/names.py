@@ -1,6 +1,7 @@
 """Names of runners, packages, types and components: checking and resolving."""
 
 import re
+from collections.abc import Sequence
 
 from rtcf.v1 import graph_pb2
 
@@ -33,3 +34,13 @@ def full_name(spec: graph_pb2.ComponentSpec) -> str:
     """Return namespace and name of a component as the executor makes them."""
     parts = [part for part in spec.ns.split("/") if part]
     return "/" + "/".join([*parts, spec.name or spec.type])
+
+
+def check_graph(specs: Sequence[graph_pb2.ComponentSpec]) -> None:
+    """Refuse a graph with two components of one name."""
+    seen: set[str] = set()
+    for spec in specs:
+        name = full_name(spec)
+        if name in seen:
+            raise InvalidArgument(f"component {name} is there twice in the graph")
+        seen.add(name)

@@ -48,15 +48,8 @@ class Options:
 def parse(arguments: Sequence[str] | None, build_tree: Path | None) -> Options:
     """Return the options; raises Refusal for a bad file, exits with 2 on bad usage."""
     args = _parser(build_tree).parse_args(arguments)
-    file = settings_file.Config()
-    if args.config is not None:
-        file = settings_file.read(args.config)
-    elif not args.foreground and settings_file.DEFAULT_FILE.exists():
-        file = settings_file.read(settings_file.DEFAULT_FILE)
-    from_environment = os.environ.get("RTCF_SOCKET")
-    socket = _absolute(
-        args.socket or file.socket or (Path(from_environment) if from_environment else paths.SOCKET)
-    )
+    file = _settings(args)
+    socket = _socket(args, file)
     realtime = args.realtime or file.realtime or ("preferred" if args.foreground else "required")
     runtime_dir = args.runtime_dir or file.runtime_dir
     state_dir = args.state_dir or file.state_dir
@@ -203,7 +196,21 @@ def reload_wanted(arguments: Sequence[str] | None) -> Path | None:
     args = _parser(None).parse_args(arguments)
     if not args.reload:
         return None
-    return Path(args.socket or os.environ.get("RTCF_SOCKET") or paths.SOCKET)
+    return _socket(args, _settings(args))
+
+
+def _settings(args: argparse.Namespace) -> settings_file.Config:
+    if args.config is not None:
+        return settings_file.read(args.config)
+    if not args.foreground and settings_file.DEFAULT_FILE.exists():
+        return settings_file.read(settings_file.DEFAULT_FILE)
+    return settings_file.Config()
+
+
+def _socket(args: argparse.Namespace, file: settings_file.Config) -> Path:
+    return _absolute(
+        args.socket or file.socket or Path(os.environ.get("RTCF_SOCKET") or paths.SOCKET)
+    )
 
 
 def _folders(named: Sequence[Path], build_tree: Path | None) -> list[Folder]:

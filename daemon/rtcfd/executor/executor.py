@@ -18,7 +18,7 @@ from rtcfd.common.limits import Limits
 from rtcfd.common.refusals import FailedPrecondition, Refusal, Unavailable
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.flight_recorder import FlightRecorder, Note
-from rtcfd.executor.link import LIMITS_PROTOCOL, PROTOCOL, Link, Progress, Unasked
+from rtcfd.executor.link import LIMITS_PROTOCOL, PROTOCOL, Link, OnAnswer, Progress, Unasked
 from rtcfd.executor.process import Child, End, Process
 
 log = logging.getLogger(__name__)
@@ -102,13 +102,13 @@ class Executor:
         except FileNotFoundError:
             return None
         except ConnectionRefusedError:
-            socket.unlink(missing_ok=True)
+            _remove_dead(socket)
             return None
         try:
             process = Process(link.peer_pid)
         except OSError:
             await link.close()  # it has just ended
-            socket.unlink(missing_ok=True)
+            _remove_dead(socket)
             return None
         executor = cls(runner, process, socket, on_unasked, on_end)
         try:
@@ -146,13 +146,14 @@ class Executor:
         request: wire.Request,
         timeout_s: float | None = QUERY_TIMEOUT_S,
         on_progress: Progress | None = None,
+        on_answer: OnAnswer | None = None,
     ) -> wire.Response:
         """Send one request; see Link.request."""
         if self._link is None:
             raise Unavailable(f"{self._peer} is not connected")
         if self.foreign and request.WhichOneof("kind") not in ("stop", "exit"):
             raise FailedPrecondition(self.foreign)
-        return await self._link.request(request, timeout_s, on_progress)
+        return await self._link.request(request, timeout_s, on_progress, on_answer)
 
     async def limit(self, limits: Limits) -> None:
         """Tell it what its graph may have; one that does not know of limits goes without."""
@@ -266,6 +267,15 @@ async def _end(process: Process, peer: str) -> None:
             log.warning("%s does not end: sending %s", peer, harder.name)
             process.signal(harder)
     await process.wait()
+
+
+def _remove_dead(socket: Path) -> None:
+    try:
+        socket.unlink(missing_ok=True)
+    except OSError as error:
+        raise FailedPrecondition(
+            f"{socket} is in the way and is no socket of an executor: remove it ({error.strerror})"
+        ) from None
 
 
 def left_overs(folder: Path) -> list[str]:

@@ -26,6 +26,7 @@ _CREDENTIALS = struct.Struct("3i")  # struct ucred, unix(7)
 
 Progress = Callable[[str], None]
 Unasked = Callable[[wire.Response], None]
+OnAnswer = Callable[[wire.Response], None]
 
 _REFUSALS: dict[int, type[refusals.Refusal]] = {
     wire.Error.CODE_INVALID_ARGUMENT: refusals.InvalidArgument,
@@ -41,8 +42,9 @@ _REFUSALS: dict[int, type[refusals.Refusal]] = {
 class _Pending:
     """A request on its way."""
 
-    def __init__(self, on_progress: Progress | None) -> None:
+    def __init__(self, on_progress: Progress | None, on_answer: OnAnswer | None) -> None:
         self.on_progress = on_progress
+        self.on_answer = on_answer
         self.result: asyncio.Future[wire.Response] = asyncio.get_running_loop().create_future()
 
 
@@ -88,9 +90,16 @@ class Link:
         return (await self.request(request, timeout_s)).hello
 
     async def request(
-        self, request: wire.Request, timeout_s: float | None, on_progress: Progress | None = None
+        self,
+        request: wire.Request,
+        timeout_s: float | None,
+        on_progress: Progress | None = None,
+        on_answer: OnAnswer | None = None,
     ) -> wire.Response:
         """Send a request (its id is set here) and return the response that ends it.
+
+        `on_answer` is called with it when it arrives, unless it is a refusal: before any frame
+        that comes after it is looked at.
 
         Raises the executor's refusal, or Unavailable when the link ends or
         `timeout_s` of wall-clock time passes (None: for callers with an own limit).
@@ -99,7 +108,7 @@ class Link:
             raise refusals.Unavailable(self._lost())
         request.id = self._next_id
         self._next_id += 1
-        pending = self._pending[request.id] = _Pending(on_progress)
+        pending = self._pending[request.id] = _Pending(on_progress, on_answer)
         try:
             self._writer.write(frames.pack(request.SerializeToString()))
             async with asyncio.timeout(timeout_s):
@@ -149,6 +158,8 @@ class Link:
             if pending.on_progress is not None:
                 pending.on_progress(response.progress)
         elif not pending.result.done():
+            if pending.on_answer is not None and response.WhichOneof("kind") != "error":
+                pending.on_answer(response)
             pending.result.set_result(response)
 
     def _fail_pending(self) -> None:

@@ -1,11 +1,10 @@
 """Changes of a runner's graph: the executor adopts, then rtcfd notes and saves.
 
-Functions on a Runner; each is one transaction of its executor.
+Functions on a RunnerCore; each is one transaction of its executor.
 """
 
 import asyncio
-from collections.abc import Awaitable, Callable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Awaitable, Callable
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, graph_pb2
@@ -13,19 +12,17 @@ from rtcf_shared.naming import listing, suggestion
 
 from rtcfd.catalog.catalog import loads
 from rtcfd.common import runner_settings
-from rtcfd.common.names import absolute, full_name
+from rtcfd.common.names import absolute, check_graph
 from rtcfd.common.refusals import InvalidArgument, NoMaster, NotFound, Refusal
 from rtcfd.executor.link import Progress
+from rtcfd.operations.runner_core import RunnerCore
 from rtcfd.state.desired import replacement
-
-if TYPE_CHECKING:
-    from rtcfd.runners.runner import Runner
 
 _MASTER_POLL_S = 0.5
 
 
 async def load(
-    runner: "Runner", spec: graph_pb2.ComponentSpec, progress: Progress
+    runner: RunnerCore, spec: graph_pb2.ComponentSpec, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Load a component."""
     library = await runner.catalog.find(spec.package, spec.type)
@@ -45,7 +42,7 @@ async def load(
 
 
 async def load_when_master(
-    runner: "Runner", spec: graph_pb2.ComponentSpec, progress: Progress
+    runner: RunnerCore, spec: graph_pb2.ComponentSpec, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Load a component; wait for a ROS master if its hooks need one and there is none."""
     return await when_master(lambda: load(runner, spec, progress), progress)
@@ -68,7 +65,7 @@ async def when_master(
 
 
 async def unload(
-    runner: "Runner", names: list[str], progress: Progress
+    runner: RunnerCore, names: list[str], progress: Progress
 ) -> control_pb2.ChangeResult:
     """Unload components.
 
@@ -99,7 +96,7 @@ async def unload(
 
 
 async def replace(
-    runner: "Runner", request: control_pb2.ReplaceRequest, progress: Progress
+    runner: RunnerCore, request: control_pb2.ReplaceRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Put a new component in the place of an old one; parameters stay unless they are named."""
     old, given = absolute(request.component), request.replacement
@@ -135,7 +132,7 @@ async def replace(
 
 
 async def release(
-    runner: "Runner", names: list[str], progress: Progress
+    runner: RunnerCore, names: list[str], progress: Progress
 ) -> control_pb2.ChangeResult:
     """Load components again that were left out of the loop."""
     if not names:
@@ -168,7 +165,7 @@ async def release(
 
 
 async def apply(
-    runner: "Runner", request: control_pb2.ApplyRequest, progress: Progress
+    runner: RunnerCore, request: control_pb2.ApplyRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Make the graph, and the settings that are given, what a request says."""
     check_graph(request.components)
@@ -207,7 +204,7 @@ async def apply(
     return result
 
 
-def left_out(runner: "Runner") -> list[graph_pb2.ComponentInfo]:
+def left_out(runner: RunnerCore) -> list[graph_pb2.ComponentInfo]:
     """Return what belongs to the graph but is not loaded, with the reason."""
     return [
         graph_pb2.ComponentInfo(
@@ -220,18 +217,8 @@ def left_out(runner: "Runner") -> list[graph_pb2.ComponentInfo]:
     ]
 
 
-def check_graph(specs: Sequence[graph_pb2.ComponentSpec]) -> None:
-    """Refuse a graph with two components of one name."""
-    seen: set[str] = set()
-    for spec in specs:
-        name = full_name(spec)
-        if name in seen:
-            raise InvalidArgument(f"component {name} is there twice in the graph")
-        seen.add(name)
-
-
 async def set_breaks(
-    runner: "Runner", request: control_pb2.SetBreaksRequest, progress: Progress
+    runner: RunnerCore, request: control_pb2.SetBreaksRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Set or remove loop breaks."""
 
@@ -247,7 +234,7 @@ async def set_breaks(
 
 
 async def set_parameters(
-    runner: "Runner", request: control_pb2.SetParametersRequest, progress: Progress
+    runner: RunnerCore, request: control_pb2.SetParametersRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Change parameters of one component."""
     name = absolute(request.component)
@@ -263,12 +250,12 @@ async def set_parameters(
     return result
 
 
-async def _saved(runner: "Runner", result: control_pb2.ChangeResult) -> control_pb2.ChangeResult:
+async def _saved(runner: RunnerCore, result: control_pb2.ChangeResult) -> control_pb2.ChangeResult:
     result.notes.extend(await runner.save())
     return result
 
 
-def _check_known(runner: "Runner", full_names: list[str]) -> None:
+def _check_known(runner: RunnerCore, full_names: list[str]) -> None:
     known = runner.desired.components
     for name in full_names:
         if name not in known:

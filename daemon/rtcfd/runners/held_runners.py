@@ -13,7 +13,14 @@ from rtcf_shared.naming import listing
 
 from rtcfd.common import runner_settings
 from rtcfd.common.names import DEFAULT_RUNNER
-from rtcfd.common.refusals import FailedPrecondition, InvalidArgument, NotFound, Refusal
+from rtcfd.common.refusals import (
+    FailedPrecondition,
+    InvalidArgument,
+    NotFound,
+    Refusal,
+    Unavailable,
+)
+from rtcfd.operations.loop import stop_quietly
 from rtcfd.runners.leases import RETURN_S
 from rtcfd.runners.outbox import Outbox
 from rtcfd.runners.runner import Runner
@@ -39,19 +46,17 @@ class Hold:
         self._outbox.progress(f"taking runner {name}")
         if request.attach:
             runner = _attach(self._runners, name, request.token)
+            self._taken(runner)
         else:
-            runner = await _take(self._runners, name, request)
-        self._runner = runner
-        runner.hold_outbox = self._outbox
+            runner = await self._take(name)
         self._outbox.say(taken=await runner.status())
-        if self._outbox.gone:
-            self.lost()
         runner.tell()
 
     async def end(self) -> None:
         """Give the runner back, at its holder's word."""
         if self._runner is not None:
-            await release(self._runners, self._runner, self._outbox)
+            work = release(self._runners, self._runner, self._outbox)
+            await self._runners.operations.begin("the end of a launch", lambda: work)
 
     def lost(self) -> None:
         """The holder has died: likewise."""
@@ -61,7 +66,52 @@ class Hold:
             return
         if runner.hold_outbox is self._outbox and runner.desired.hold:
             runner.log.error("%s has died: stopping the loop", runner.desired.hold.holder)
-            self._runners.in_background(release(self._runners, runner, self._outbox))
+            self._runners.operations.in_background(
+                "the end of a launch", release(self._runners, runner, self._outbox)
+            )
+
+    def _taken(self, runner: Runner) -> None:
+        # From here on the death of the holder gives it back.
+        self._runner = runner
+        runner.hold_outbox = self._outbox
+
+    async def _take(self, name: str) -> Runner:
+        request = self._request
+        runner_settings.check(request.settings)
+        terms = HoldTerms(request.token, request.holder or "a client", runner_pb2.RunnerSettings())
+        try:
+            runner = self._runners.get(name)
+        except NotFound:
+            terms.added = True
+
+            def taken(added: Runner) -> None:
+                added.desired.hold = terms
+                self._taken(added)
+
+            return await self._runners.add(name, request.settings, taken)
+
+        async def work() -> None:
+            if self._outbox.gone:
+                raise Unavailable(f"{terms.holder}, which wanted runner {name}, has left")
+            _require_free(runner)
+            desired = runner.desired
+            terms.parked.CopyFrom(desired.chosen)
+            desired.hold = terms
+            desired.choose(request.settings)
+            self._taken(runner)
+            try:
+                await runner.restart_in_turn()
+            except BaseException:
+                desired.let_go()
+                runner.hold_outbox = None
+                if not runner.up:
+                    await runner.restart_in_turn()
+                raise
+            await runner.save()
+            runner.log.info("held by %s", terms.holder)
+
+        await runner.change("the begin of a launch", work)
+        return runner
 
 
 def await_holder(runners: Runners, runner: Runner) -> None:
@@ -78,7 +128,7 @@ def await_holder(runners: Runners, runner: Runner) -> None:
             await release(runners, runner, None)
 
     if runner.desired.hold:
-        runners.in_background(wait())
+        runners.operations.in_background("waiting for a holder", wait())
 
 
 async def release(runners: Runners, runner: Runner, outbox: Outbox | None) -> None:
@@ -87,10 +137,7 @@ async def release(runners: Runners, runner: Runner, outbox: Outbox | None) -> No
     if hold is None or runner.hold_outbox is not outbox or runner.closing:
         return
     runner.hold_outbox = None
-    try:
-        await runner.stop(lambda _: None)
-    except Refusal as refusal:
-        runner.log.error("%s", refusal)
+    await stop_quietly(runner)
     runner.leases.end_all(
         control_pb2.LeaseEnded.WHY_RUNNER_ENDED, f"{hold.holder}, which held its runner, has ended"
     )
@@ -100,7 +147,7 @@ async def release(runners: Runners, runner: Runner, outbox: Outbox | None) -> No
 
     async def work() -> None:
         runner.desired.let_go()
-        await runner.restart_executor()
+        await runner.restart_in_turn()
         await runner.save()
 
     try:
@@ -119,44 +166,20 @@ def _attach(runners: Runners, name: str, token: str) -> Runner:
     return runner
 
 
-async def _take(runners: Runners, name: str, request: control_pb2.OpenHold) -> Runner:
-    runner_settings.check(request.settings)
-    terms = HoldTerms(request.token, request.holder or "a client", runner_pb2.RunnerSettings())
-    try:
-        runner = runners.get(name)
-    except NotFound:
-        terms.added = True
-        return await runners.add(name, request.settings, terms)
-
-    async def work() -> None:
-        desired = runner.desired
-        if desired.hold is not None:
-            raise FailedPrecondition(
-                f"runner {name} is held by {desired.hold.holder}: end that launch, "
-                "or give the runner of this one another name"
-            )
-        if desired.components:
-            raise FailedPrecondition(
-                f"runner {name} has components of its own ({listing(desired.components)}): "
-                "unload them, or give the runner of this launch another name"
-            )
-        if runner.running:
-            raise FailedPrecondition(
-                f"the loop of runner {name} runs: stop it, or give the runner of this launch "
-                "another name"
-            )
-        terms.parked.CopyFrom(desired.chosen)
-        desired.hold = terms
-        desired.choose(request.settings)
-        try:
-            await runner.restart_executor()
-        except BaseException:
-            desired.let_go()
-            if not runner.up:
-                await runner.restart_executor()
-            raise
-        await runner.save()
-
-    await runner.change("the begin of a launch", work)
-    runner.log.info("held by %s", terms.holder)
-    return runner
+def _require_free(runner: Runner) -> None:
+    desired = runner.desired
+    if desired.hold is not None:
+        raise FailedPrecondition(
+            f"runner {runner.name} is held by {desired.hold.holder}: end that launch, "
+            "or give the runner of this one another name"
+        )
+    if desired.components:
+        raise FailedPrecondition(
+            f"runner {runner.name} has components of its own ({listing(desired.components)}): "
+            "unload them, or give the runner of this launch another name"
+        )
+    if runner.loop.running:
+        raise FailedPrecondition(
+            f"the loop of runner {runner.name} runs: stop it, or give the runner of this launch "
+            "another name"
+        )

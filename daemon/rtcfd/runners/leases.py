@@ -6,8 +6,7 @@ components themselves are not saved.
 """
 
 import asyncio
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2
@@ -15,11 +14,10 @@ from rtcf.v1 import control_pb2
 from rtcfd.common.names import full_name
 from rtcfd.common.refusals import AlreadyExists, FailedPrecondition, NotFound, Refusal, Unavailable
 from rtcfd.operations import graph
+from rtcfd.operations.loop import stop_quietly
+from rtcfd.operations.runner_core import RunnerCore
 from rtcfd.runners.outbox import Outbox
 from rtcfd.state.desired import LeaseTerms
-
-if TYPE_CHECKING:
-    from rtcfd.runners.runner import Runner
 
 # For holders to come back after a restart of rtcfd.
 RETURN_S = 10.0
@@ -33,8 +31,8 @@ _Ended = control_pb2.LeaseEnded
 class Lease:
     """One call's component.  `open` or `attach` first, then `end` or `lost`."""
 
-    def __init__(self, runner: "Runner", request: control_pb2.OpenLease, outbox: Outbox) -> None:
-        self._leases = runner.leases
+    def __init__(self, leases: "Leases", request: control_pb2.OpenLease, outbox: Outbox) -> None:
+        self._leases = leases
         self._request = request
         self._outbox = outbox
 
@@ -63,8 +61,9 @@ class Lease:
 class Leases:
     """All leases of a runner's components."""
 
-    def __init__(self, runner: "Runner") -> None:
+    def __init__(self, runner: RunnerCore, alarm: Callable[[str], None]) -> None:
         self._runner = runner
+        self._alarm = alarm
         self._outboxes: dict[str, Outbox] = {}  # by component; of holders that are there
         self._loading: set[str] = set()
         self._leaving: dict[str, asyncio.Task[None]] = {}
@@ -108,20 +107,21 @@ class Leases:
                 result = (await runner.ask(load, outbox.progress)).change
                 runner.desired.put(name, spec)
             except BaseException:
-                self._terms.pop(name, None)
                 self._outboxes.pop(name, None)
-                await runner.save()
+                # Left to the next rtcfd, the executor may load it yet: then it is still leased.
+                if not runner.leaving:
+                    self._terms.pop(name, None)
+                    await runner.save()
                 raise
             finally:
                 self._loading.discard(name)
+            runner.log.info("%s loaded (%s) for %s", name, what, request.holder or "a lease")
             if outbox.gone:  # it was never seen: no reason to stop the loop
                 self._leave(name)
             return result
 
         what = f"{spec.package}/{spec.type}"
-        result = await runner.change(f"the load of {what}", work)
-        runner.log.info("%s loaded (%s) for %s", name, what, request.holder or "a lease")
-        return result
+        return await runner.change(f"the load of {what}", work)
 
     def attach(self, request: control_pb2.OpenLease, outbox: Outbox) -> control_pb2.ChangeResult:
         """Give a component back to its holder."""
@@ -152,13 +152,17 @@ class Leases:
         if name in self._loading:
             return  # open() sees to it
         del self._outboxes[name]
-        self._runner.in_background(self._lose(name, "has died"))
+        self._runner.operations.in_background(
+            f"the end of the lease of {name}", self._lose(name, "has died")
+        )
 
     def await_holders(self) -> None:
         """After a restart of rtcfd: give holders time to come back."""
         waiting = [name for name in self._terms if name not in self._outboxes]
         if waiting:
-            self._patience = asyncio.create_task(self._await(waiting))
+            self._patience = self._runner.operations.in_background(
+                "waiting for holders", self._await(waiting)
+            )
 
     def take_log(self, record: control_pb2.LogRecord) -> None:
         """Hand a record to the holder of its component."""
@@ -187,11 +191,15 @@ class Leases:
 
     def end_all(self, why: "control_pb2.LeaseEnded.Why", message: str) -> None:
         """Tell all holders that it is over; what they hold is ended by the caller."""
-        if self._patience is not None:
-            self._patience.cancel()
+        self.lose_patience()
         for outbox in self._outboxes.values():
             outbox.end(why, message)
         self._outboxes.clear()
+
+    def lose_patience(self) -> None:
+        """Wait for holders no more: their runner ends, or rtcfd does."""
+        if self._patience is not None:
+            self._patience.cancel()
 
     def _check_hold(self, token: str) -> None:
         hold = self._runner.desired.hold
@@ -214,12 +222,9 @@ class Leases:
             self._terms.pop(name, None)
             await runner.save()
             return
-        if terms.on_lost != control_pb2.ON_LEASE_LOST_UNLOAD and runner.running:
-            runner.alarm(f"{name}: {lost}: stopping the loop")
-            try:
-                await runner.stop(lambda _: None)
-            except Refusal as refusal:
-                runner.log.error("%s", refusal)
+        if terms.on_lost != control_pb2.ON_LEASE_LOST_UNLOAD and runner.loop.running:
+            self._alarm(f"{name}: {lost}: stopping the loop")
+            await stop_quietly(runner)
         else:
             runner.log.warning("%s: %s", name, lost)
         self._leave(name)
@@ -231,7 +236,9 @@ class Leases:
         group = self._groups.get(run)
         if group is None:
             group = self._groups[run] = []
-            task = self._runner.in_background(self._unload(run, group))
+            task = self._runner.operations.in_background(
+                f"the end of {run}", self._unload(run, group)
+            )
         else:
             task = self._leaving[group[0]]
         group.append(name)

@@ -12,7 +12,9 @@ from rtcf.v1 import control_pb2
 from rtcfd.access.rights import Level
 from rtcfd.common.refusals import FailedPrecondition, Refusal
 from rtcfd.operations import graph
-from rtcfd.runners.runner import Runner
+from rtcfd.operations.loop import stop
+from rtcfd.operations.runner_core import RunnerCore
+from rtcfd.recovery.starting import start
 
 _NEEDED = {
     "start": Level.OPERATE,
@@ -28,9 +30,9 @@ class RosServices:
     """Does what is called for, or refuses it; `access` is what all callers may do."""
 
     def __init__(self, access: Level) -> None:
-        self._access = access
+        self.access = access
 
-    async def serve(self, runner: Runner, call: wire.ServiceCall) -> wire.ServiceAnswer:
+    async def serve(self, runner: RunnerCore, call: wire.ServiceCall) -> wire.ServiceAnswer:
         """Return the answer to a call; never raises."""
         answer = wire.ServiceAnswer(call=call.call)
         try:
@@ -47,7 +49,7 @@ class RosServices:
             log.exception("internal error")
         return answer
 
-    def _allowed(self, runner: Runner, call: wire.ServiceCall) -> str:
+    def _allowed(self, runner: RunnerCore, call: wire.ServiceCall) -> str:
         kind = call.WhichOneof("kind")
         if kind is None:
             raise FailedPrecondition(
@@ -55,9 +57,9 @@ class RosServices:
                 "the same version"
             )
         needed = _NEEDED[kind]
-        if self._access < needed:
+        if self.access < needed:
             raise FailedPrecondition(
-                f"rtcfd lets callers on ROS only {self._access.word}, and `{kind}` needs "
+                f"rtcfd lets callers on ROS only {self.access.word}, and `{kind}` needs "
                 f'{needed.word}: set ros_services = "{needed.word}" in [daemon] of '
                 "/etc/rtcfd/rtcfd.toml, or use "
                 f"rtcfctl -r {runner.name} {kind}"
@@ -65,13 +67,13 @@ class RosServices:
         return str(kind)
 
 
-async def _change(runner: Runner, call: wire.ServiceCall) -> control_pb2.ChangeResult:
+async def _change(runner: RunnerCore, call: wire.ServiceCall) -> control_pb2.ChangeResult:
     kind = call.WhichOneof("kind")
     if kind == "load":
         return await graph.load(runner, call.load, _ignore)
     if kind == "unload":
         return await graph.unload(runner, [call.unload], _ignore)
-    return await (runner.start if kind == "start" else runner.stop)(_ignore)
+    return await (start if kind == "start" else stop)(runner, _ignore)
 
 
 def _ignore(_line: str) -> None:

@@ -1,21 +1,23 @@
 """All runners of this rtcfd.  Owned by the daemon (main.py)."""
 
 import asyncio
+import contextlib
 import logging
-from collections.abc import Coroutine, Iterable
-from typing import Any
+from collections.abc import Callable, Iterable
 
 from rtcf.v1 import control_pb2, runner_pb2
 from rtcf_shared.naming import listing, suggestion
 
 from rtcfd.catalog.catalog import loads
 from rtcfd.common import runner_settings
-from rtcfd.common.names import DEFAULT_RUNNER, check_base_name, full_name
+from rtcfd.common.names import DEFAULT_RUNNER, check_base_name, check_graph, full_name
 from rtcfd.common.refusals import AlreadyExists, NotFound, Refusal, Unavailable
 from rtcfd.executor.link import Progress
 from rtcfd.operations import graph
-from rtcfd.runners.runner import Runner, Surroundings
-from rtcfd.state.desired import Desired, HoldTerms
+from rtcfd.operations.operations import Operations
+from rtcfd.operations.runner_core import Surroundings
+from rtcfd.runners.runner import LEAVE_TIMEOUT_S, Runner
+from rtcfd.state.desired import Desired
 
 log = logging.getLogger(__name__)
 
@@ -27,7 +29,7 @@ class Runners:
         self._shared = surroundings
         self._runners: dict[str, Runner] = {}
         self.closing = asyncio.Event()
-        self._background: set[asyncio.Task[None]] = set()
+        self.operations = Operations("rtcfd", log)
 
     def adopt(self, states: Iterable[Desired]) -> None:
         """Take runners as they were kept, without starting them yet."""
@@ -43,9 +45,11 @@ class Runners:
                 if runner.desired.hold or runner.desired.leased:
                     await self._bring_up_held(runner)
                 else:
-                    await runner.bring_up()
+                    await runner.bring_up(boot=True)
             except Refusal as refusal:
                 runner.log.error("%s", refusal)
+            except Exception:  # the others are not to suffer for it
+                runner.log.exception("its executor does not start")
 
         unknown = [name for name in left_over if name not in self._runners]
         await asyncio.gather(
@@ -55,26 +59,28 @@ class Runners:
 
     async def _bring_up_held(self, runner: Runner) -> None:
         """Of a launch: it goes on if its loop does; otherwise it is over."""
-        if await runner.bring_up(only_left_over=True):
+        if await runner.bring_up(only_left_over=True, boot=True):
             return
         hold = runner.desired.hold
         runner.desired.let_go()
-        runner.desired.running = False  # that was the launch's loop
+        runner.loop.want(False)  # that was the launch's loop
         if hold is not None and hold.added:
             await self.remove(runner.name)
             return
         await runner.save()
-        await runner.bring_up()
+        await runner.bring_up(boot=True)
 
     async def _take_left_over(self, name: str) -> None:
         runner = self._runners[name] = Runner(Desired(name), self._shared)
         try:
-            if await runner.bring_up(only_left_over=True):
+            if await runner.bring_up(only_left_over=True, boot=True):
                 runner.log.warning("runner %s was not in the saved state", name)
                 await runner.save()
                 return
         except Refusal as refusal:
             runner.log.error("%s", refusal)
+        except Exception:
+            runner.log.exception("its executor cannot be adopted")
         del self._runners[name]
 
     def get(self, name: str) -> Runner:
@@ -97,9 +103,25 @@ class Runners:
         return ", ".join(f"{runner.name} {runner.summary()}" for runner in self.all()) or "none"
 
     async def add(
-        self, name: str, chosen: runner_pb2.RunnerSettings, hold: HoldTerms | None = None
+        self,
+        name: str,
+        chosen: runner_pb2.RunnerSettings,
+        on_added: Callable[[Runner], None] | None = None,
     ) -> Runner:
-        """Add a runner and start its executor; if that fails there is no such runner."""
+        """Add a runner and start its executor; if that fails there is no such runner.
+        `on_added` is called with it before anything can fail."""
+
+        async def work() -> Runner:
+            return await self._add(name, chosen, on_added)
+
+        return await self.operations.begin(f"the addition of runner {name}", work)
+
+    async def _add(
+        self,
+        name: str,
+        chosen: runner_pb2.RunnerSettings,
+        on_added: Callable[[Runner], None] | None = None,
+    ) -> Runner:
         if self.closing.is_set():
             raise Unavailable("rtcfd is ending")
         name = check_base_name("runner", name or DEFAULT_RUNNER)
@@ -111,12 +133,13 @@ class Runners:
         runner_settings.check(chosen)
         desired = Desired(name)
         desired.choose(chosen)
-        desired.hold = hold
         runner = self._runners[name] = Runner(desired, self._shared)
+        if on_added is not None:
+            on_added(runner)
         try:
             await runner.bring_up()
         except BaseException:
-            del self._runners[name]
+            self._runners.pop(name, None)
             await runner.shut_down()
             raise
         await runner.save()
@@ -132,7 +155,7 @@ class Runners:
             return await graph.apply(self._runners[name], request, progress)
         check_base_name("runner", name)
         runner_settings.check(request.settings)
-        graph.check_graph(request.components)
+        check_graph(request.components)
         self._shared.limits.check_components(len(request.components))
         if request.dry_run:
             await loads(self._shared.catalog, request.components)
@@ -146,40 +169,53 @@ class Runners:
                 ],
             )
         progress(f"adding runner {name}")
-        runner = await self.add(name, request.settings)
-        try:
-            return await graph.apply(runner, request, progress)
-        except Refusal:
-            await self.remove(name)
-            raise
+
+        async def work() -> control_pb2.ChangeResult:
+            runner = await self._add(name, request.settings)
+            try:
+                return await graph.apply(runner, request, progress)
+            except BaseException:
+                await self._remove(runner)
+                raise
+
+        return await self.operations.begin(f"the application of a graph to {name}", work)
 
     async def remove(self, name: str) -> None:
         """Stop a runner and forget it."""
         runner = self.get(name)
+        if runner.closing:
+            raise Unavailable(f"runner {runner.name} is being ended")
+
+        async def work() -> None:
+            await self._remove(runner)
+
+        await self.operations.begin(f"the removal of runner {runner.name}", work)
+
+    async def _remove(self, runner: Runner) -> None:
         await runner.shut_down()
-        self._runners.pop(runner.name, None)
         try:
-            self._shared.store.remove(runner.name)
+            await asyncio.to_thread(self._shared.store.remove, runner.name)
         except OSError as error:
             runner.log.error("its state stays on disk: %s", error.strerror)
+        self._runners.pop(runner.name, None)
         runner.log.info("runner removed")
         self._shared.on_change()
 
-    async def close(self) -> None:
-        """Stop all loops in order and end all executors, at once."""
+    async def close(self, in_order: bool) -> None:
+        """Stop all loops in order and end all executors, at once.  `in_order`: for good, and not
+        because the machine goes down."""
         self.closing.set()
+        self.operations.withdraw("rtcfd is ending")
         why = control_pb2.LeaseEnded.WHY_DAEMON_ENDED
         runners = list(self._runners.values())
-        await asyncio.gather(*(each.shut_down(why, "rtcfd is being ended") for each in runners))
-        await asyncio.gather(*self._background)
+        await asyncio.gather(
+            *(each.shut_down(why, "rtcfd is being ended", in_order) for each in runners)
+        )
+        await self.operations.drain()
 
     async def leave(self) -> None:
         """Let go of all executors, whose loops go on: the next rtcfd adopts them."""
         self.closing.set()
         await asyncio.gather(*(runner.leave() for runner in self._runners.values()))
-
-    def in_background(self, work: Coroutine[Any, Any, None]) -> None:
-        """Do what nobody waits for; it is waited for at the end."""
-        task = asyncio.create_task(work)
-        self._background.add(task)
-        task.add_done_callback(self._background.discard)
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(self.operations.drain(), LEAVE_TIMEOUT_S)

@@ -20,6 +20,8 @@ from rtcfd.common.refusals import InvalidArgument
 from rtcfd.common.status_codes import abort
 from rtcfd.executor.link import Progress
 from rtcfd.operations import graph
+from rtcfd.operations.loop import stop
+from rtcfd.recovery import starting
 from rtcfd.runners.held_runners import Hold
 from rtcfd.runners.leases import Lease
 from rtcfd.runners.outbox import Outbox
@@ -65,7 +67,7 @@ def _changing(
             await abort(context, error)
         finally:
             if task is not None:
-                task.cancel()  # a change that has begun goes on: see operations/queue.py
+                task.cancel()  # one that has begun goes on: see operations/operations.py
 
     return wrapper
 
@@ -195,23 +197,25 @@ class Control(control_pb2_grpc.ControlServicer):
     @_changing
     def Start(self, request: control_pb2.StartRequest) -> Any:
         """Start the loop."""
-        return self._runners.get(request.runner).start
+        runner = self._runners.get(request.runner)
+        return lambda progress: starting.start(runner, progress)
 
     @_changing
     def Stop(self, request: control_pb2.StopRequest) -> Any:
         """Stop the loop."""
-        return self._runners.get(request.runner).stop
+        runner = self._runners.get(request.runner)
+        return lambda progress: stop(runner, progress)
 
     @_changing
     def Step(self, request: control_pb2.StepRequest) -> Any:
         """Run cycles on a simulated clock."""
         runner = self._runners.get(request.runner)
-        return lambda progress: runner.step(request.cycles, progress)
+        return lambda progress: starting.step(runner, request.cycles, progress)
 
     @_answering
     async def Replay(self, request: control_pb2.ReplayRequest) -> Any:
         """Run a piece of a recording."""
-        return await self._runners.get(request.runner).replay(request)
+        return await starting.replay(self._runners.get(request.runner), request)
 
     @_changing
     def Load(self, request: control_pb2.LoadRequest) -> Any:
@@ -265,7 +269,7 @@ class Control(control_pb2_grpc.ControlServicer):
     def LeaseComponent(self, request: control_pb2.OpenLease) -> Any:
         """A component, for as long as the call lasts."""
         outbox = Outbox(control_pb2.LeaseComponentResponse)
-        return outbox, Lease(self._runners.get(request.runner), request, outbox)
+        return outbox, Lease(self._runners.get(request.runner).leases, request, outbox)
 
     @_answering
     async def ListComponents(self, request: control_pb2.ListComponentsRequest) -> Any:

@@ -14,9 +14,8 @@ from rtcf_shared.errors import RtcfError
 from rtcf_shared.graph_reader import Graph, read_graphs
 
 from rtcfd.common import runner_settings
-from rtcfd.common.names import DEFAULT_RUNNER, check_base_name
+from rtcfd.common.names import DEFAULT_RUNNER, check_base_name, check_graph
 from rtcfd.common.refusals import Refusal
-from rtcfd.operations.graph import check_graph
 from rtcfd.state.desired import Desired
 
 log = logging.getLogger(__name__)
@@ -80,6 +79,10 @@ class BootGraphs:
         for problem in problems:
             log.error("%s", problem)
         return graphs, problems
+
+    def forget(self, file: Path) -> None:
+        """Count a file as changed by the next read()."""
+        self.digests.pop(str(file), None)
 
     def _files(self, problems: list[str]) -> Iterator[Path]:
         if self._folder is None:

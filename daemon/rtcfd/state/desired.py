@@ -39,6 +39,7 @@ class Desired:
         self.runner = runner
         self.chosen = runner_pb2.RunnerSettings()
         self.running = False  # the loop was started, and neither stopped nor ended by a fault
+        self.ended_boot = ""  # the boot of the machine in which it was; empty: never, or runs
         self.quarantined: dict[str, str] = {}  # components that a fault took out, and why
         self.left_out: dict[str, str] = {}  # components that are not loaded, and why
         self.leased: dict[str, LeaseTerms] = {}  # components that are held; not saved themselves

@@ -96,6 +96,7 @@ class Store:
             f'  "runner": {json.dumps(desired.runner)},\n'
             f'  "settings": {chosen},\n'
             f'  "running": {json.dumps(desired.running)},\n'
+            f'  "ended_boot": {json.dumps(desired.ended_boot)},\n'
             f'  "quarantined": {json.dumps(_staying(desired, desired.quarantined))},\n'
             f'  "left_out": {json.dumps(_staying(desired, desired.left_out))},\n'
             f'  "leased": {json.dumps(_leased(desired))},\n'
@@ -207,6 +208,7 @@ def _parse(runner: str, document: _Document) -> Desired:
         spec = json_format.ParseDict(entry, graph_pb2.ComponentSpec())
         desired.put(full_name(spec), spec)
     desired.running = document["running"] is True
+    desired.ended_boot = str(document.get("ended_boot", ""))
     for name, terms in document["leased"].items():
         desired.leased[name] = LeaseTerms(**terms)
     if hold := document["hold"]:

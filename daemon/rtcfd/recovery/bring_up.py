@@ -1,12 +1,11 @@
-"""How an executor gets its graph: followed when it is adopted, restored when it is
-new, restored without the culprit when the last one crashed.
+"""How a runner gets its executor, and that its graph: followed when it is adopted, restored
+when it is new, restored without the culprit when the last one crashed.
 
-Functions on a Runner; each runs in a turn of it, except recover().
+Functions on a RunnerCore; each runs in a turn of it, except recover().
 """
 
 import time
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
@@ -15,11 +14,10 @@ from rtcf_shared.naming import listing
 
 from rtcfd.catalog.catalog import loads
 from rtcfd.common.refusals import InvalidArgument, Refusal
+from rtcfd.operations.loop import start_in_turn
+from rtcfd.operations.runner_core import RunnerCore
 from rtcfd.recovery.follow import follow_components, follow_settings
-from rtcfd.recovery.verdict import MOST_ATTEMPTS, MOST_CRASHES, WINDOW_S, Verdict
-
-if TYPE_CHECKING:
-    from rtcfd.runners.runner import Runner
+from rtcfd.recovery.verdict import MOST_ATTEMPTS, MOST_CRASHES, WINDOW_S, Crashes, Verdict
 
 _WORDS = {
     runner_pb2.RUNNER_STATE_STOPPED: "stopped",
@@ -30,14 +28,35 @@ _WORDS = {
 }
 
 
-async def follow(runner: "Runner") -> None:
+async def bring_up(runner: RunnerCore, only_left_over: bool = False, boot: bool = False) -> bool:
+    """Adopt the executor that is there, or start one (unless `only_left_over`), and load the
+    components; held, or at `boot` as `on_boot` says.  Tell whether there is one."""
+    asked = runner.loop.stops
+    adopted = await runner.take_executor(only_left_over)
+    if adopted is None:
+        return False
+    executor = runner.executor
+    if executor is not None and executor.foreign:
+        runner.loop.told(runner.loop.wanted)  # as far as can be known
+        return True
+    await runner.limit()
+    await (_follow(runner) if adopted else _restore(runner))
+    if boot:
+        await _start_at_boot(runner, asked)
+    runner.tell()
+    return True
+
+
+async def _follow(runner: RunnerCore) -> None:
     """Make the desired state that of an executor that was adopted.
 
     What its loop lacks is loaded if it does not run: then the rtcfd before this
     one died while it restored it.
     """
     await _settle(runner)
-    status = (await runner.ask(wire.Request(get_status=wire.GetStatus()))).status
+    was_running = runner.loop.wanted
+    request = wire.Request(get_status=wire.GetStatus())
+    status = (await runner.ask(request, None, lambda answer: _told(runner, answer.status))).status
     listed = await runner.ask(wire.Request(list_components=wire.ListComponents()))
     runner.log.info(
         "adopted: loop %s, iteration %d", _WORDS.get(status.state, "in an unknown state"),
@@ -51,18 +70,22 @@ async def follow(runner: "Runner") -> None:
     )
     for line in lines + more:
         runner.log.warning("%s: the executor's is kept", line)
-    was_running = runner.desired.running
-    runner.running = status.state == runner_pb2.RUNNER_STATE_RUNNING
-    runner.desired.running = runner.running or (fresh and was_running)
+    if not runner.loop.running and was_running and not fresh:
+        runner.loop.want(False)
     if status.state == runner_pb2.RUNNER_STATE_STOPPED:
         missing = [name for name in runner.left_out if name not in runner.desired.quarantined]
         await _load_each(runner, missing)
-    if lines or more or runner.desired.running != was_running:
+    if lines or more or runner.loop.wanted != was_running:
         await runner.save()
-    runner.leases.await_holders()
+    runner.adopted()
 
 
-def _follow_leased(runner: "Runner", found: Iterable[graph_pb2.ComponentInfo]) -> None:
+def _told(runner: RunnerCore, status: runner_pb2.RunnerStatus) -> None:
+    """Note what a loop does that another rtcfd started."""
+    runner.loop.told(status.state == runner_pb2.RUNNER_STATE_RUNNING, runner.loop.stops)
+
+
+def _follow_leased(runner: RunnerCore, found: Iterable[graph_pb2.ComponentInfo]) -> None:
     """Take leased components, which are not saved, from the executor that has them."""
     live = {str(info.full_name): info for info in found}
     for name in list(runner.desired.leased):
@@ -72,7 +95,7 @@ def _follow_leased(runner: "Runner", found: Iterable[graph_pb2.ComponentInfo]) -
             runner.desired.drop([name])
 
 
-async def restore(runner: "Runner") -> None:
+async def _restore(runner: RunnerCore) -> None:
     """Load what is desired into a new executor; what does not load is left out and reported."""
     runner.left_out = dict(runner.desired.quarantined)
     wanted = [name for name in runner.desired.components if name not in runner.left_out]
@@ -92,68 +115,81 @@ async def restore(runner: "Runner") -> None:
         await runner.save()
 
 
-async def resume(runner: "Runner") -> None:
-    """At the start of rtcfd: start a loop that ran, if `on_boot` says so."""
-    if runner.running or not runner.up or not runner.desired.running:
+async def _start_at_boot(runner: RunnerCore, asked: int) -> None:
+    """At the start of rtcfd: start a loop that is to run, as `on_boot` says."""
+    if runner.loop.running or not runner.up:
         return
-    if runner.settings().on_boot == runner_pb2.ON_BOOT_RESUME:
+    on_boot = runner.settings().on_boot
+    if runner.loop.starts_at_boot(
+        resume=on_boot == runner_pb2.ON_BOOT_RESUME, always=on_boot == runner_pb2.ON_BOOT_START
+    ):
+        word = "resumed" if runner.loop.wanted else "started"
         try:
-            await runner.start_loop()
-            runner.log.info("loop resumed")
+            await start_in_turn(runner, asked)
+            runner.log.info("loop %s", word)
             return
         except Refusal as refusal:
-            runner.held = f"not resumed: {refusal}"
-            runner.log.error("%s", runner.held)
-    runner.desired.running = False
-    await runner.save()
+            runner.loop.held = f"not {word}: {refusal}"
+            runner.log.error("%s", runner.loop.held)
+    if runner.loop.wanted:
+        runner.loop.want(False)
+        await runner.save()
 
 
-async def recover(runner: "Runner", verdict: Verdict, trouble: str) -> None:
+async def recover(runner: RunnerCore, verdict: Verdict, crashes: Crashes, trouble: str) -> None:
     """After a death that nobody asked for: a new executor, the graph without the culprit."""
     begin = time.monotonic()
+    asked = runner.loop.stops
 
     async def work() -> None:
         # First of all: whatever comes, the culprit is not loaded again.
         await runner.save()
         if runner.up or runner.closing:
             return
-        if runner.crashes.recent >= MOST_ATTEMPTS:
-            runner.give_up(f"{trouble}, the last of {runner.crashes.recent} in {WINDOW_S:g} s")
+        if crashes.recent >= MOST_ATTEMPTS:
+            _give_up(runner, f"{trouble}, the last of {crashes.recent} in {WINDOW_S:g} s")
             return
-        await runner.start_executor()
+        await bring_up(runner)
         if not runner.up:
             return  # that one died too: its own recovery follows
-        runner.held = _held(runner, verdict, trouble)
-        if runner.desired.running:
+        not_resumed = ""
+        if runner.loop.wanted:
             try:
-                await runner.start_loop()
-                runner.held = _held(runner, verdict, trouble)
+                await start_in_turn(runner, asked)
             except Refusal as refusal:
-                runner.held += f"; not resumed: {refusal}"
+                not_resumed = f"; not resumed: {refusal}"
+        runner.loop.held = _held(runner, verdict, trouble) + not_resumed
         took = time.monotonic() - begin
-        runner.log.warning("executor restarted in %.2f s: %s", took, runner.held)
+        runner.log.warning("executor restarted in %.2f s: %s", took, runner.loop.held)
 
     try:
         await runner.change("the recovery of its executor", work)
     except Refusal as refusal:
         if not runner.up and not runner.closing:
-            runner.give_up(f"{trouble}; not recovered: {refusal}")
+            _give_up(runner, f"{trouble}; not recovered: {refusal}")
 
 
-def resumes(runner: "Runner", verdict: Verdict) -> bool:
+def _give_up(runner: RunnerCore, trouble: str) -> None:
+    """Say why there is no executor, and no other is started by itself."""
+    runner.trouble = f"{trouble}; `rtcfctl -r {runner.name} start` tries again"
+    runner.log.error("%s", runner.trouble)
+    runner.tell()
+
+
+def resumes(runner: RunnerCore, verdict: Verdict, crashes: Crashes) -> bool:
     """Tell whether a loop that ran goes on without the culprit."""
     culprit = runner.desired.components.get(verdict.culprit)
     return (
         runner.settings().on_crash == runner_pb2.ON_CRASH_RESUME
         and culprit is not None
         and bool(culprit.optional)
-        and runner.crashes.recent <= MOST_CRASHES
+        and crashes.recent <= MOST_CRASHES
     )
 
 
-def _held(runner: "Runner", verdict: Verdict, trouble: str) -> str:
+def _held(runner: RunnerCore, verdict: Verdict, trouble: str) -> str:
     """Return what the status says after a recovery."""
-    loop = "its loop goes on" if runner.running else f"held: `rtcfctl -r {runner.name} start`"
+    loop = "its loop goes on" if runner.loop.running else f"held: `rtcfctl -r {runner.name} start`"
     if verdict.culprit not in runner.desired.quarantined:
         return f"{trouble}; {loop} with all its components"
     return (
@@ -162,7 +198,7 @@ def _held(runner: "Runner", verdict: Verdict, trouble: str) -> str:
     )
 
 
-async def _settle(runner: "Runner") -> None:
+async def _settle(runner: RunnerCore) -> None:
     """Wait until a change is done that the rtcfd before this one had asked for.
 
     An unload of nothing is refused by the thread that makes the changes, when
@@ -176,7 +212,7 @@ async def _settle(runner: "Runner") -> None:
         runner.log.warning("%s", refusal)
 
 
-async def _load_each(runner: "Runner", names: Iterable[str]) -> None:
+async def _load_each(runner: RunnerCore, names: Iterable[str]) -> None:
     """Load components one by one; what does not load is left out and reported."""
     for name in names:
         try:

@@ -1,0 +1,81 @@
+"""What makes a runner's loop run, and ends it.  `stop` is final.
+
+Functions on a RunnerCore.  What was asked for before a stop was accepted starts
+no cycle after it: what is queued is withdrawn, what has begun finds out before
+it asks the executor, and stops what it started if the stop came in between.
+"""
+
+import asyncio
+
+from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import control_pb2
+
+from rtcfd.common.refusals import FailedPrecondition, Refusal
+from rtcfd.executor.link import Progress
+from rtcfd.operations.runner_core import RunnerCore
+
+STOP_TIMEOUT_S = 30.0
+
+
+def require_no_stop(runner: RunnerCore, asked: int) -> None:
+    """Refuse what would run cycles and was asked for at the stop of number `asked`."""
+    if runner.loop.stops != asked:
+        raise FailedPrecondition(
+            f"runner {runner.name}: its loop was stopped after this was asked for: ask again"
+        )
+
+
+async def start_in_turn(
+    runner: RunnerCore, asked: int, progress: Progress | None = None
+) -> control_pb2.ChangeResult:
+    """Start the loop, in a turn; `asked`: the number of stops when that was asked for."""
+    require_no_stop(runner, asked)
+    request = wire.Request(start=wire.Start())
+    response = await runner.ask(request, progress, lambda _: runner.loop.told(True, asked))
+    if runner.loop.stops != asked:
+        await _ask_to_stop(runner, None)
+        require_no_stop(runner, asked)
+    runner.tell()
+    response.change.notes.extend(await runner.save())
+    return response.change
+
+
+async def stop(runner: RunnerCore, progress: Progress) -> control_pb2.ChangeResult:
+    """End the loop at the next boundary.  Never queues; a dead loop is a stopped loop."""
+    runner.loop.stop()
+    runner.operations.withdraw("the loop was stopped after it was asked for", only_cycles=True)
+
+    async def work() -> control_pb2.ChangeResult:
+        # Beside each other: neither a slow disk nor a slow executor holds up the other.
+        saving = asyncio.create_task(runner.save())
+        try:
+            if not runner.up:
+                await runner.settle()  # it may be adopted just now
+            if runner.up:
+                result = await _ask_to_stop(runner, progress)
+                runner.log.info("loop stopped")
+            else:
+                result = control_pb2.ChangeResult(notes=[f"no loop to stop: {runner.trouble}"])
+        finally:
+            notes = await saving
+            runner.tell()
+        result.notes.extend(notes)
+        return result
+
+    return await runner.operations.begin("the stop", work)
+
+
+async def stop_quietly(runner: RunnerCore) -> None:
+    """Stop the loop for somebody who is gone; what goes wrong is logged."""
+    try:
+        await stop(runner, lambda _: None)
+    except Refusal as refusal:
+        runner.log.error("%s", refusal)
+
+
+async def _ask_to_stop(runner: RunnerCore, progress: Progress | None) -> control_pb2.ChangeResult:
+    request = wire.Request(stop=wire.Stop())
+    response = await runner.alive().request(
+        request, STOP_TIMEOUT_S, progress, lambda _: runner.loop.told(False)
+    )
+    return response.change

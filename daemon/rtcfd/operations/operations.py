@@ -1,0 +1,169 @@
+"""What is done to one thing (a runner, or all of them), as operations of one kind.
+
+Queued: it can be withdrawn, and is when its caller leaves or runs out of time.
+Begun: it runs to its end in a task that rtcfd owns, whatever becomes of its
+caller, and what came of it is noted: by its own work, and in the log if nobody
+waits any more.  On rtcfd's one thread.
+"""
+
+import asyncio
+import logging
+import time
+from collections import deque
+from collections.abc import Awaitable, Callable, Coroutine
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from rtcfd.common.refusals import FailedPrecondition, Refusal, Unavailable
+
+Result = TypeVar("Result")
+Log = logging.Logger | logging.LoggerAdapter[logging.Logger]
+
+
+@dataclass(eq=False)
+class _Operation(Generic[Result]):
+    what: str
+    work: Callable[[], Awaitable[Result]]
+    done: "asyncio.Future[Result]"
+    runs_cycles: bool = False
+
+
+class Operations:
+    """The operations on `subject`."""
+
+    def __init__(self, subject: str, log: Log) -> None:
+        self._subject = subject
+        self._log = log
+        self._queue: deque[_Operation[Any]] = deque()
+        self._current: _Operation[Any] | None = None  # whose turn it is
+        self._since = 0.0
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    async def take_turn(
+        self,
+        what: str,
+        work: Callable[[], Awaitable[Result]],
+        timeout_s: float | None,
+        runs_cycles: bool = False,
+    ) -> Result:
+        """Do `work` when it is its turn: one at a time, in the order they came.  `timeout_s`
+        counts from now, on the wall clock (None: no limit)."""
+        operation = self._new(what, work, runs_cycles)
+        self._queue.append(operation)
+        self._next()
+        try:
+            done, _ = await asyncio.wait({operation.done}, timeout=timeout_s)
+        except asyncio.CancelledError:
+            if not self._withdraw(operation):
+                self._report_late(operation)
+            raise
+        if done:
+            return operation.done.result()
+        how = f"after {timeout_s:g} s ({self.busy() or 'waiting'})"
+        if self._withdraw(operation):
+            raise Unavailable(
+                f"{self._subject}: {what} has not begun {how}, and will not: see `rtcfctl status`"
+            )
+        self._report_late(operation)
+        raise Unavailable(
+            f"{self._subject}: {what} is not done {how}; it goes on: see `rtcfctl status`"
+        )
+
+    async def begin(self, what: str, work: Callable[[], Awaitable[Result]]) -> Result:
+        """Do `work` at once, beside others."""
+        operation = self._new(what, work)
+        self._spawn(self._do(operation))
+        try:
+            await asyncio.wait({operation.done})
+        except asyncio.CancelledError:
+            self._report_late(operation)
+            raise
+        return operation.done.result()
+
+    def in_background(self, what: str, work: Coroutine[Any, Any, object]) -> "asyncio.Task[None]":
+        """Do at once what nobody waits for; what goes wrong is logged."""
+
+        async def run() -> None:
+            try:
+                await work
+            except Refusal as refusal:
+                self._log.error("%s: %s", what, refusal)
+            except Exception:
+                self._log.exception("%s failed", what)
+
+        return self._spawn(run())
+
+    def withdraw(self, why: str, only_cycles: bool = False) -> None:
+        """Refuse what has not begun: all, or what would run cycles of a loop."""
+        for operation in list(self._queue):
+            if operation.runs_cycles or not only_cycles:
+                self._queue.remove(operation)
+                operation.done.set_exception(
+                    FailedPrecondition(f"{self._subject}: {operation.what} is withdrawn: {why}")
+                )
+
+    def busy(self, longer_than_s: float = 0.0) -> str:
+        """Return what is going on for how long, or nothing."""
+        taken_s = time.monotonic() - self._since
+        if self._current is None or taken_s <= longer_than_s:
+            return ""
+        return f"busy with {self._current.what} for {taken_s:.0f} s"
+
+    async def drain(self) -> None:
+        """Wait until nothing is left, and nothing follows from what was."""
+        while self._tasks:
+            await asyncio.wait(self._tasks)
+
+    def _new(
+        self, what: str, work: Callable[[], Awaitable[Result]], runs_cycles: bool = False
+    ) -> _Operation[Result]:
+        return _Operation(what, work, asyncio.get_running_loop().create_future(), runs_cycles)
+
+    def _next(self) -> None:
+        if self._current is None and self._queue:
+            self._current, self._since = self._queue.popleft(), time.monotonic()
+            self._spawn(self._do(self._current))
+
+    async def _do(self, operation: _Operation[Any]) -> None:
+        try:
+            result = await operation.work()
+        except Exception as error:
+            operation.done.set_exception(error)
+        except BaseException:  # rtcfd is ending by force
+            operation.done.cancel()
+            raise
+        else:
+            operation.done.set_result(result)
+        finally:
+            if operation is self._current:
+                self._current = None
+                self._next()
+
+    def _withdraw(self, operation: _Operation[Any]) -> bool:
+        if operation not in self._queue:
+            return False
+        self._queue.remove(operation)
+        operation.done.cancel()
+        return True
+
+    def _spawn(self, work: Coroutine[Any, Any, None]) -> "asyncio.Task[None]":
+        task = asyncio.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+    def _report_late(self, operation: _Operation[Any]) -> None:
+        def report(done: "asyncio.Future[Any]") -> None:
+            if done.cancelled():
+                return
+            error = done.exception()
+            if error is None:
+                self._log.info("%s is done; its caller had left", operation.what)
+            elif isinstance(error, Refusal):
+                self._log.warning("%s failed after its caller had left: %s", operation.what, error)
+            else:
+                self._log.error(
+                    "%s failed after its caller had left", operation.what, exc_info=error
+                )
+
+        operation.done.add_done_callback(report)

@@ -1,0 +1,273 @@
+"""What every operation on a runner stands on: its executor, its desired state, its loop.
+
+Base of Runner, on rtcfd's one thread.  The executor is taken, asked and let go
+here and nowhere else.
+"""
+
+import asyncio
+import contextlib
+from abc import ABC, abstractmethod
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import runner_pb2
+
+from rtcfd.catalog.catalog import Catalog
+from rtcfd.common.limits import Limits
+from rtcfd.common.refusals import Refusal, Unavailable
+from rtcfd.executor.command import ExecutorCommand
+from rtcfd.executor.events import logger_of
+from rtcfd.executor.executor import CONNECT_TIMEOUT_S, Executor
+from rtcfd.executor.link import OnAnswer, Progress
+from rtcfd.executor.process import End
+from rtcfd.operations.loop_state import LoopState
+from rtcfd.operations.operations import Operations
+from rtcfd.state.desired import Desired
+from rtcfd.state.store import Store
+
+CHANGE_TIMEOUT_S = 60.0  # for one change, waiting for those before it included
+_LAST_WORDS_S = 2.0  # from the loss of a link to the end of its executor
+
+Result = TypeVar("Result")
+
+
+@dataclass
+class Surroundings:
+    """What all runners share; a reload of rtcfd changes it."""
+
+    command: ExecutorCommand
+    catalog: Catalog
+    store: Store
+    defaults: runner_pb2.RunnerSettings  # complete
+    on_change: Callable[[], None]  # what summary() says may have changed
+    # Answers what ROS peers ask of a runner.
+    serve_ros: Callable[["RunnerCore", wire.ServiceCall], Awaitable[wire.ServiceAnswer]]
+    limits: Limits = field(default_factory=Limits)
+
+
+class RunnerCore(ABC):
+    """A runner below what clients see of it."""
+
+    def __init__(self, desired: Desired, surroundings: Surroundings) -> None:
+        self.name = desired.runner
+        self.desired = desired
+        self.log = logger_of(self.name)
+        self.loop = LoopState(desired)
+        self.operations = Operations(f"runner {self.name}", self.log)
+        self.shared = surroundings
+        self.trouble = "its executor is not started"  # why there is none
+        self.unsaved = ""  # why the desired state is not on disk
+        self.closing = False
+        self.leaving = False  # it ends for this rtcfd only
+        self._executor: Executor | None = None
+        self._changing_executor = asyncio.Lock()
+        self._settled = asyncio.Event()  # not set while an executor is being started
+        self._saving = asyncio.Lock()
+
+    # -- what a runner adds ---------------------------------------------------
+
+    @abstractmethod
+    def take_unasked(self, response: wire.Response) -> None:
+        """Take what an executor says unasked."""
+
+    @abstractmethod
+    def executor_ended(self, executor: Executor, end: End, ours: bool) -> None:
+        """See the end of an executor that nobody asked for."""
+
+    @abstractmethod
+    def adopted(self) -> None:
+        """See that the executor of an earlier rtcfd was taken over."""
+
+    def tell(self) -> None:
+        """After any change: tell who wants to know."""
+        self.shared.on_change()
+
+    # -- what is known ----------------------------------------------------------
+
+    @property
+    def up(self) -> bool:
+        """Tell whether there is an executor."""
+        return self._executor is not None
+
+    @property
+    def executor(self) -> Executor | None:
+        """The executor, if there is one: to look at."""
+        return self._executor
+
+    @property
+    def left_out(self) -> dict[str, str]:
+        """Components that are desired and not loaded, and why."""
+        return self.desired.left_out
+
+    @left_out.setter
+    def left_out(self, names: dict[str, str]) -> None:
+        self.desired.left_out = names
+
+    @property
+    def limits(self) -> Limits:
+        """What may be asked for."""
+        return self.shared.limits
+
+    @property
+    def catalog(self) -> Catalog:
+        """Where libraries are found."""
+        return self.shared.catalog
+
+    @property
+    def defaults(self) -> runner_pb2.RunnerSettings:
+        """What settings are unless chosen."""
+        return self.shared.defaults
+
+    def settings(self) -> runner_pb2.RunnerSettings:
+        """Return all settings."""
+        return self.desired.complete(self.shared.defaults)
+
+    # -- the executor -------------------------------------------------------------
+
+    async def take_executor(self, only_left_over: bool = False) -> bool | None:
+        """Adopt the executor that is there (then True), or launch one (False), unless
+        `only_left_over` (None).  One that is being ended is waited for."""
+        self._settled.clear()
+        self.trouble = "its executor is starting"
+        try:
+            async with self._changing_executor:
+                executor = await Executor.adopt(
+                    self.name,
+                    self.shared.command.socket(self.name),
+                    self.take_unasked,
+                    self._ended,
+                )
+                adopted = executor is not None
+                if executor is None and only_left_over:
+                    self.trouble = "it has no executor"
+                    return None
+                executor = executor or await self._launch()
+                if self.closing:
+                    await (executor.leave() if self.leaving else executor.shut_down())
+                    raise Unavailable(f"runner {self.name} is being ended")
+                self._executor = executor
+        except Refusal as refusal:
+            self.trouble = str(refusal)
+            raise
+        except Exception as error:
+            self.trouble = f"its executor does not start: {type(error).__name__}: {error}"
+            raise
+        finally:
+            self._settled.set()
+        self.trouble = ""
+        return adopted
+
+    async def end_executor(self, trouble: str) -> None:
+        """Stop its loop in order and end it, whatever it is busy with; `trouble` says why."""
+        executor, self._executor = self._executor, None
+        if executor is not None:
+            self.trouble = trouble
+            async with self._changing_executor:
+                await executor.shut_down()
+        self.loop.gone()
+
+    async def leave_executor(self) -> None:
+        """Let go of it: its loop goes on until the next rtcfd adopts it."""
+        executor, self._executor = self._executor, None
+        if executor is not None:
+            await executor.leave()
+
+    async def settle(self) -> None:
+        """Wait while an executor is being started, for as long as that may take."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(CONNECT_TIMEOUT_S + 1.0):
+                await self._settled.wait()
+
+    async def limit(self) -> None:
+        """Tell the executor what its graph may have."""
+        if self._executor is not None:
+            await self._executor.limit(self.limits)
+
+    async def query(self, request: wire.Request) -> wire.Response:
+        """Ask the executor what changes nothing in the graph."""
+        await self.settle()
+        return await self.alive().request(request)
+
+    async def ask(
+        self,
+        request: wire.Request,
+        progress: Progress | None = None,
+        on_answer: OnAnswer | None = None,
+    ) -> wire.Response:
+        """Ask the executor for a change; its caller's limit is change()'s."""
+        executor = self.alive()
+        try:
+            return await executor.request(request, None, progress, on_answer)
+        except Unavailable:
+            if executor.connected:
+                raise
+            # It may have died of this change: then its end says more than the lost link.
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(_LAST_WORDS_S):
+                    await executor.ended.wait()
+            if executor is self._executor or self.closing:
+                raise
+            raise Unavailable(f"runner {self.name}: {self.trouble}") from None
+
+    def alive(self) -> Executor:
+        """Return the executor, or refuse."""
+        if self._executor is None:
+            raise Unavailable(f"runner {self.name} is down: {self.trouble}")
+        return self._executor
+
+    async def _launch(self) -> Executor:
+        executor = await Executor.launch(
+            self.name, self.shared.command, self.take_unasked, self._ended
+        )
+        try:
+            await executor.request(wire.Request(configure=self.settings()))
+        except BaseException:
+            await executor.shut_down()
+            raise
+        return executor
+
+    def _ended(self, executor: Executor, end: End) -> None:
+        """An executor of ours is dead."""
+        ours = executor is self._executor
+        if ours:
+            self._executor = None
+        if executor.expected or self.closing:
+            self.loop.gone()
+            self.log.info("executor (pid %d) %s", executor.pid, end)
+            return
+        self.executor_ended(executor, end, ours)
+
+    # -- changes ------------------------------------------------------------------
+
+    async def change(
+        self,
+        what: str,
+        work: Callable[[], Awaitable[Result]],
+        timeout_s: float | None = CHANGE_TIMEOUT_S,
+        runs_cycles: bool = False,
+    ) -> Result:
+        """Do one change in its turn."""
+
+        async def told() -> Result:
+            try:
+                return await work()
+            finally:
+                self.tell()
+
+        return await self.operations.take_turn(what, told, timeout_s, runs_cycles)
+
+    async def save(self) -> list[str]:
+        """Save the desired state; return a note if that failed: the change stands."""
+        try:
+            async with self._saving:
+                text = self.shared.store.text(self.desired)
+                # Not here: fsync may take long.
+                await asyncio.to_thread(self.shared.store.save, self.name, text)
+        except OSError as error:
+            self.unsaved = f"not saved: {error.strerror}"
+            self.log.error("its state is %s", self.unsaved)
+            return [self.unsaved]
+        self.unsaved = ""
+        return []

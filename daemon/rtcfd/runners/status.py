@@ -1,0 +1,54 @@
+"""What a runner is doing, whatever state it is in.  A function on a RunnerCore."""
+
+from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import runner_pb2
+
+from rtcfd import VERSION
+from rtcfd.common import runner_settings
+from rtcfd.common.refusals import Refusal
+from rtcfd.operations.runner_core import RunnerCore
+
+_TIMEOUT_S = 2.0
+_WORTH_SAYING_S = 2.0  # a change that takes longer shows
+
+
+async def status_of(runner: RunnerCore) -> runner_pb2.RunnerStatus:
+    """Return the status, asked of the executor if there is one."""
+    status = runner_pb2.RunnerStatus(runner=runner.name, state=runner_pb2.RUNNER_STATE_DOWN)
+    executor = runner.executor
+    lines = [runner.trouble]
+    if executor is not None:
+        request = wire.Request(get_status=wire.GetStatus())
+        try:
+            status = (await executor.request(request, _TIMEOUT_S)).status
+            lines.append(status.status)
+        except Refusal as refusal:
+            if executor is runner.executor:
+                status.state = runner_pb2.RUNNER_STATE_STUCK
+                lines.append(str(refusal))
+            else:
+                lines.append(runner.trouble)  # it has just died
+        status.runner = runner.name
+        status.pid = executor.pid if executor is runner.executor else 0
+        status.version = executor.version
+        if executor.version != VERSION and not executor.foreign:
+            lines.append(
+                f"restart pending: its executor is of rtcf {executor.version}, rtcfd "
+                f"{VERSION}; `rtcfctl runner restart {runner.name}` stops the loop and starts "
+                "a new one"
+            )
+    # Some settings are rtcfd's alone.
+    status.settings.CopyFrom(runner_settings.merged(runner.settings(), status.settings))
+    desired = runner.desired
+    status.chosen.CopyFrom(desired.chosen)
+    if desired.hold is not None:
+        status.holder, status.hold = desired.hold.holder, desired.hold.token
+    if held := runner.loop.held:
+        lines.append(held)
+        if status.state == runner_pb2.RUNNER_STATE_STOPPED:
+            status.state = runner_pb2.RUNNER_STATE_FAULTED
+    lines.append(runner.operations.busy(longer_than_s=_WORTH_SAYING_S))
+    lines += [f"{name} is left out: {reason}" for name, reason in desired.left_out.items()]
+    lines.append(runner.unsaved)
+    status.status = "; ".join(line for line in lines if line)
+    return status

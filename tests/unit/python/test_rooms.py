@@ -1,0 +1,72 @@
+"""Imports among the rooms of the Python code run down, and `make lint` says where they do not."""
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+TREE = Path(__file__).resolve().parents[3]
+
+
+def check(*arguments: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [TREE / "tools" / "check-arrows", *arguments], capture_output=True, text=True
+    )
+
+
+@pytest.fixture
+def house(tmp_path: Path) -> Path:
+    """A package of two rooms, as it should be."""
+    (tmp_path / "rooms").write_text("house.attic\nhouse.cellar\nhouse\n")
+    for room in ("attic", "cellar"):
+        (tmp_path / "src" / "house" / room).mkdir(parents=True)
+        (tmp_path / "src" / "house" / room / "__init__.py").touch()
+    (tmp_path / "src" / "house" / "__init__.py").touch()
+    (tmp_path / "src" / "house" / "attic" / "box.py").write_text("from house.cellar import wine\n")
+    (tmp_path / "src" / "house" / "cellar" / "wine.py").touch()
+    return tmp_path
+
+
+def test_the_rooms_of_this_tree_are_in_order() -> None:
+    found = check()
+    assert (found.returncode, found.stderr) == (0, "")
+
+
+def test_lint_checks_them() -> None:
+    assert "tools/check-arrows" in (TREE / "tools" / "lint").read_text()
+
+
+def test_an_arrow_that_runs_down_is_in_order(house: Path) -> None:
+    assert check(house / "rooms", house).returncode == 0
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "from house.attic.box import box",
+        "def late():\n    import house.attic.box",
+        "import typing\nif typing.TYPE_CHECKING:\n    from house.attic import box",
+    ],
+)
+def test_an_arrow_that_runs_up_is_refused(house: Path, text: str) -> None:
+    (house / "src" / "house" / "attic" / "box.py").touch()
+    (house / "src" / "house" / "cellar" / "wine.py").write_text(text)
+    found = check(house / "rooms", house)
+    assert found.returncode == 1
+    assert "house.cellar must not import house.attic" in found.stderr
+
+
+def test_a_circle_within_a_room_is_refused(house: Path) -> None:
+    cellar = house / "src" / "house" / "cellar"
+    (cellar / "wine.py").write_text("from house.cellar.rack import Rack")
+    (cellar / "rack.py").write_text(
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import house.cellar.wine"
+    )
+    found = check(house / "rooms", house)
+    assert found.returncode == 1
+    assert "in a circle" in found.stderr
+
+
+def test_a_module_without_a_room_is_refused(house: Path) -> None:
+    (house / "rooms").write_text("house.attic\nhouse.cellar\n")
+    assert "is in none of the rooms" in check(house / "rooms", house).stderr
