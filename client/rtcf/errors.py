@@ -5,7 +5,7 @@ import socket as sockets
 import stat
 from typing import Any
 
-from rtcf_shared.errors import RtcfError
+from rtcf_shared.errors import RtcfError as RtcfError
 
 # Set by rtcfd on its own refusals; gRPC's word on a lost connection lacks it.
 _REFUSAL_KEY = "rtcf-refusal"

@@ -4,6 +4,7 @@ Does nothing where rtcfd was not started by systemd (no NOTIFY_SOCKET).
 """
 
 import asyncio
+import contextlib
 import os
 from collections.abc import Callable
 
@@ -37,7 +38,12 @@ def _sender() -> Callable[[str], object]:
         return lambda _: None
     import systemd.daemon
 
-    return systemd.daemon.notify  # type: ignore[no-any-return]
+    def send(text: str) -> None:
+        # Nobody listens any more: that is no reason to end.
+        with contextlib.suppress(OSError):
+            systemd.daemon.notify(text)
+
+    return send
 
 
 class Notify:

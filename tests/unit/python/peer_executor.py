@@ -9,6 +9,10 @@ exists), "logs", "chatters".
 PEER_PROTOCOL is what it speaks, PEER_LATER_PROTOCOL what it turns out to speak
 with the next rtcfd.
 
+A file named <kind of request> in the folder PEER_HELD delays the answers to requests of
+that kind until it is gone; `serve` delays the executor's start, `gone` its end. With `brief`
+there, a loop ends by a fault right after the answer to its start.
+
 A parameter `die` that is set lets it die as if in the component's update:
 "SIGSEGV" and so on with a note in the flight recorder, "stall" likewise,
 "exit" and "SIGKILL" without.  The loop counts its cycles by the wall clock.
@@ -51,6 +55,16 @@ def describe(library: Path, package: str) -> int:
     return 1 if description.problem else 0
 
 
+def is_held(kind: str) -> bool:
+    folder = os.environ.get("PEER_HELD")
+    return folder is not None and (Path(folder) / kind).exists()
+
+
+async def held(kind: str) -> None:
+    while is_held(kind):
+        await asyncio.sleep(POLL_S)
+
+
 class Refused(Exception):
     """Carries an Error code."""
 
@@ -88,13 +102,20 @@ class Peer:
 
     async def answer(self, request: wire.Request) -> None:
         kind = request.WhichOneof("kind")
+        assert kind is not None
+        await held(kind)
         try:
             response = await getattr(self, kind)(getattr(request, kind), request.id)
         except Refused as refused:
             code, text = refused.args
             response = wire.Response(error=wire.Error(code=code, message=text))
         response.id = request.id
-        self.send(response)
+        answer = frames.pack(response.SerializeToString())
+        if kind == "start" and is_held("brief"):
+            self.running = False
+            event = wire.Event(kind=wire.Event.KIND_LOOP_ENDED, message="ended by a fault")
+            answer += frames.pack(wire.Response(event=event).SerializeToString())
+        self.writer.write(answer)
         if kind == "exit":
             await self.writer.drain()
             self.end.set()
@@ -327,8 +348,10 @@ class Peer:
 async def run(runner: str, socket: str) -> None:
     peer = Peer(runner)
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, peer.end.set)
+    await held("serve")
     server = await asyncio.start_unix_server(peer.serve, socket)
     await peer.end.wait()
+    await held("gone")
     server.close()
 
 

@@ -2,6 +2,7 @@
 
 import os
 import signal
+from pathlib import Path
 
 import pytest
 import rtcf
@@ -173,8 +174,10 @@ def test_many_crashes_hold_the_loop_and_then_end_the_attempts(
         (runner_pb2.ON_BOOT_HOLD, False, runner_pb2.RUNNER_STATE_STOPPED),
         (runner_pb2.ON_BOOT_RESUME, False, runner_pb2.RUNNER_STATE_RUNNING),
         (runner_pb2.ON_BOOT_RESUME, True, runner_pb2.RUNNER_STATE_STOPPED),
+        (runner_pb2.ON_BOOT_START, False, runner_pb2.RUNNER_STATE_RUNNING),
+        (runner_pb2.ON_BOOT_START, True, runner_pb2.RUNNER_STATE_STOPPED),
     ],
-    ids=["hold", "resume", "resume what was stopped"],
+    ids=["hold", "resume", "resume what was stopped", "start", "start what was stopped"],
 )
 def test_a_loop_after_a_restart_of_both(
     daemon: DaemonUnderTest,
@@ -186,7 +189,9 @@ def test_a_loop_after_a_restart_of_both(
     running.set_runner(runner_pb2.RunnerSettings(on_boot=policy))
     if stopped:
         running.stop()
-    daemon.end()
+    pid = daemon.executor_pid()
+    daemon.end(signal.SIGKILL)
+    wait_for(lambda: not Path(f"/proc/{pid}").exists(), "the end of the executor")
     daemon.start()
     with daemon.client() as again:
         assert state(again).state == expected

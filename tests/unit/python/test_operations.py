@@ -1,0 +1,347 @@
+"""Operations of one kind: queued ones are withdrawn, begun ones run to their end; stop is final."""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rtcf
+from daemon_under_test import BUILD_TREE, DaemonUnderTest, wait_for
+from rtcf.v1 import control_pb2, runner_pb2
+
+RUNNING, STOPPED = runner_pb2.RUNNER_STATE_RUNNING, runner_pb2.RUNNER_STATE_STOPPED
+
+
+class Held:
+    """What the peer executors wait for; see peer_executor.py."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        folder.mkdir()
+
+    @contextlib.contextmanager
+    def back(self, kind: str) -> Iterator[None]:
+        (self.folder / kind).touch()
+        try:
+            yield
+        finally:
+            (self.folder / kind).unlink()
+
+
+class Call(threading.Thread):
+    """A call by a client of its own, in the background."""
+
+    def __init__(self, daemon: DaemonUnderTest, do: Callable[[rtcf.Client], Any]) -> None:
+        super().__init__()
+        self._daemon, self._do = daemon, do
+        self.refusal = ""
+        self.start()
+
+    def run(self) -> None:
+        with self._daemon.client() as client:
+            try:
+                self._do(client)
+            except rtcf.RtcfError as error:
+                self.refusal = str(error)
+
+    def end(self) -> str:
+        self.join(30)
+        assert not self.is_alive()
+        return self.refusal
+
+
+@pytest.fixture
+def held(stopped_daemon: DaemonUnderTest, tmp_path: Path) -> Held:
+    held = Held(tmp_path / "held")
+    stopped_daemon.environment["PEER_HELD"] = str(held.folder)
+    return held
+
+
+@pytest.fixture
+def service(held: Held, stopped_daemon: DaemonUnderTest) -> DaemonUnderTest:
+    stopped_daemon.start_service()
+    with stopped_daemon.client() as client:
+        client.load(rtcf.component("demo", "Fine", name="a"))
+    return stopped_daemon
+
+
+def status(daemon: DaemonUnderTest) -> runner_pb2.RunnerStatus:
+    with daemon.client() as client:
+        found: runner_pb2.RunnerStatus = client.get_status("rt_runner").runners[0]
+        return found
+
+
+def busy_with(daemon: DaemonUnderTest, what: str) -> None:
+    """Wait until an operation holds the turn: it shows after a while."""
+    wait_for(lambda: what in status(daemon).status, what)
+
+
+def ask_and_leave(daemon: DaemonUnderTest, *arguments: str) -> None:
+    """Ctrl-C on rtcfctl once it waits for its answer."""
+    before = daemon.log().count(" by ")
+    process = subprocess.Popen(
+        [str(BUILD_TREE / "bin" / "rtcfctl"), *arguments],
+        env={**os.environ, "RTCF_SOCKET": str(daemon.socket)},
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    # Connected: then its call is on the way.
+    wait_for(
+        lambda: "socket:" in "".join(_descriptors(process.pid)) or process.poll() is not None,
+        "rtcfctl to connect",
+    )
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(0.5)
+    process.send_signal(signal.SIGINT)
+    process.wait(20)
+    wait_for(lambda: daemon.log().count(" by ") > before, "the caller to be missed")
+
+
+def _descriptors(pid: int) -> Iterator[str]:
+    with contextlib.suppress(OSError):
+        for each in Path(f"/proc/{pid}/fd").iterdir():
+            with contextlib.suppress(OSError):
+                yield os.readlink(each)
+
+
+def test_what_waits_is_withdrawn_when_its_caller_leaves(
+    service: DaemonUnderTest, held: Held
+) -> None:
+    with held.back("set_parameters"):
+        call = Call(service, lambda c: c.set_parameters("a", [rtcf.parse_parameter("kp:=2.0")]))
+        busy_with(service, "a change of parameters")
+        ask_and_leave(service, "start")
+    assert call.end() == ""
+    assert status(service).state == STOPPED
+    assert "the start is done" not in service.log()
+
+
+def test_a_start_that_waits_is_withdrawn_by_a_stop(service: DaemonUnderTest, held: Held) -> None:
+    with held.back("set_parameters"):
+        call = Call(service, lambda c: c.set_parameters("a", [rtcf.parse_parameter("kp:=2.0")]))
+        busy_with(service, "a change of parameters")
+        starting = Call(service, lambda c: c.start())
+        with service.client() as client:
+            wait_for(lambda: client.stop() and not starting.is_alive(), "the start to be refused")
+    assert "withdrawn: the loop was stopped after it was asked for" in starting.end()
+    assert call.end() == ""
+    assert status(service).state == STOPPED
+    assert service.saved()["running"] is False
+
+
+def test_a_start_under_way_does_not_outlive_a_stop(service: DaemonUnderTest, held: Held) -> None:
+    with held.back("start"):
+        starting = Call(service, lambda c: c.start())
+        busy_with(service, "the start")
+        with service.client() as client:
+            client.stop()
+    assert "was stopped after this was asked for" in starting.end()
+    assert status(service).state == STOPPED
+    assert service.saved()["running"] is False
+
+
+def test_a_stop_whose_caller_leaves_is_done_and_saved(service: DaemonUnderTest, held: Held) -> None:
+    with service.client() as client:
+        client.start()
+    with held.back("stop"):
+        ask_and_leave(service, "stop")
+        wait_for(lambda: service.saved()["running"] is False, "the state on disk")
+    wait_for(lambda: status(service).state == STOPPED, "the end of the loop")
+
+
+def test_the_end_of_a_loop_is_not_overtaken_by_the_answer_to_its_start(
+    service: DaemonUnderTest, held: Held
+) -> None:
+    with held.back("brief"), service.client() as client:
+        client.start()
+    wait_for(lambda: service.saved()["running"] is False, "the state on disk")
+    service.environment.clear()
+    service.end(signal.SIGUSR1)
+    assert "rt_runner stopped" in service.start_service().log().splitlines()[-1]
+
+
+def test_a_runner_whose_holder_dies_while_it_is_taken_is_given_back(
+    service: DaemonUnderTest, held: Held
+) -> None:
+    with service.client() as client:
+        client.unload(["a"])
+        with held.back("serve"):
+            opening = control_pb2.OpenHold(runner="rt_runner", token="t", holder="somebody")
+            tenancy = client.hold_runner(opening)
+            next(iter(tenancy))
+            wait_for(lambda: status(service).holder == "somebody", "the hold")
+            tenancy.drop()
+        wait_for(lambda: not status(service).holder, "the runner to be given back")
+    wait_for(lambda: service.saved()["hold"] is None, "the state on disk")
+
+
+def test_a_leased_load_that_rtcfd_leaves_half_done_is_still_leased(
+    service: DaemonUnderTest, held: Held
+) -> None:
+    with held.back("load"), service.client() as client:
+        spec = rtcf.component("demo", "Fine", name="leased")
+        tenancy = client.lease_component(control_pb2.OpenLease(component=spec, holder="somebody"))
+        wait_for(lambda: "/leased" in service.saved()["leased"], "the terms on disk")
+        service.end(signal.SIGUSR1)
+        tenancy.drop()
+    service.start_service()
+    assert [each["name"] for each in service.saved()["components"]] == ["a"]
+    with service.client() as client:
+        wait_for(lambda: len(client.list_components()) == 1, "the end of the lease")
+
+
+def test_a_start_during_a_restart_waits_for_the_executor_to_be_gone(
+    service: DaemonUnderTest, held: Held
+) -> None:
+    before = service.executor_pid()
+    with held.back("gone"):
+        restarting = Call(service, lambda c: c.restart_runner())
+        wait_for(lambda: "being restarted" in status(service).status, "the restart")
+        starting = Call(service, lambda c: c.start())
+    assert (restarting.end(), starting.end()) == ("", "")
+    assert status(service).state == RUNNING
+    assert status(service).pid != before
+    assert "its loop is down" not in service.log()
+
+
+@pytest.mark.parametrize("verb", ["remove", "restart"])
+def test_what_has_begun_ends_without_its_caller(
+    service: DaemonUnderTest, held: Held, verb: str
+) -> None:
+    before = service.executor_pid()
+    with held.back("exit"):
+        ask_and_leave(service, "runner", verb, "rt_runner")
+    with service.client() as client:
+        if verb == "remove":
+            wait_for(lambda: not client.get_status().runners, "the runner to be gone")
+            assert not (service.state / "rt_runner.json").exists()
+        else:
+            wait_for(lambda: status(service).pid not in (0, before), "another executor")
+            assert status(service).state == STOPPED
+
+
+def test_a_refused_graph_leaves_no_runner_behind_whoever_waits(
+    service: DaemonUnderTest, held: Held, tmp_path: Path
+) -> None:
+    graph = tmp_path / "graph.yaml"
+    graph.write_text("runner: arm\ncomponents:\n  - {package: demo, type: Refused}\n")
+    with held.back("apply"):
+        ask_and_leave(service, "apply", str(graph))
+    with service.client() as client:
+        wait_for(lambda: len(client.get_status().runners) == 1, "the new runner to be gone")
+    assert not (service.state / "arm.json").exists()
+
+
+# -- what was stopped in order stays stopped ------------------------------------------
+
+
+def started(service: DaemonUnderTest, on_boot: "runner_pb2.OnBoot") -> None:
+    with service.client() as client:
+        client.set_runner(runner_pb2.RunnerSettings(on_boot=on_boot))
+        client.start()
+
+
+@pytest.mark.parametrize("on_boot", [runner_pb2.ON_BOOT_RESUME, runner_pb2.ON_BOOT_START])
+def test_what_an_administrator_ended_stays_stopped(
+    service: DaemonUnderTest, on_boot: "runner_pb2.OnBoot"
+) -> None:
+    started(service, on_boot)
+    service.end()
+    assert service.saved()["running"] is False
+    service.start_service()
+    assert status(service).state == STOPPED
+
+
+def test_what_ran_until_the_machine_went_down_runs_again(
+    service: DaemonUnderTest, tmp_path: Path
+) -> None:
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    (folder / "systemctl").write_text("#!/bin/sh\necho stopping\n")
+    (folder / "systemctl").chmod(0o755)
+    service.end()
+    service.environment |= {"PATH": f"{folder}:{os.environ['PATH']}", "NOTIFY_SOCKET": "@nobody"}
+    service.start_service()
+    started(service, runner_pb2.ON_BOOT_RESUME)
+    service.end()
+    assert service.saved()["running"] is True
+    service.start_service()
+    assert status(service).state == RUNNING
+
+
+def test_a_fresh_image_starts_its_loop(held: Held, stopped_daemon: DaemonUnderTest) -> None:
+    stopped_daemon.graphs.mkdir()
+    (stopped_daemon.graphs / "rt.yaml").write_text(
+        "runner: rt_runner\nsettings: {on_boot: start}\n"
+        "components:\n  - {package: demo, type: Fine, name: a}\n"
+    )
+    stopped_daemon.start_service()
+    assert status(stopped_daemon).state == RUNNING
+    stopped_daemon.end()
+    stopped_daemon.start_service()
+    assert status(stopped_daemon).state == STOPPED
+    # Another boot of the machine.
+    stopped_daemon.end()
+    file = stopped_daemon.state / "rt_runner.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"ended_boot": "another"}))
+    stopped_daemon.start_service()
+    assert status(stopped_daemon).state == RUNNING
+
+
+# -- the daemon's own ------------------------------------------------------------------
+
+
+def test_an_obstacle_to_one_executor_is_said_and_the_rest_is_served(
+    held: Held, stopped_daemon: DaemonUnderTest
+) -> None:
+    obstacle = stopped_daemon.folder / "run" / "executors" / "rt_runner.sock"
+    obstacle.mkdir(parents=True)
+    stopped_daemon.start_service()
+    assert f"{obstacle} is in the way" in status(stopped_daemon).status
+    with stopped_daemon.client() as client:
+        client.add_runner("other", runner_pb2.RunnerSettings())
+
+
+def test_systemd_waits_for_a_slow_start(
+    held: Held, stopped_daemon: DaemonUnderTest, tmp_path: Path
+) -> None:
+    import socket
+
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+        listener.bind(str(tmp_path / "notify"))
+        listener.settimeout(20)
+        stopped_daemon.environment["NOTIFY_SOCKET"] = str(tmp_path / "notify")
+        with held.back("serve"):
+            starting = threading.Thread(target=stopped_daemon.start_service)
+            starting.start()
+            told = listener.recv(1000)
+        starting.join()
+    assert told.startswith(b"EXTEND_TIMEOUT_USEC=")
+
+
+def reload(service: DaemonUnderTest) -> str:
+    return subprocess.run(
+        [str(BUILD_TREE / "bin" / "rtcfd"), "--reload", "--config", str(service.settings)],
+        env={key: value for key, value in os.environ.items() if key != "RTCF_SOCKET"},
+        capture_output=True, text=True, timeout=30,
+    ).stdout  # fmt: skip
+
+
+def test_a_reload_finds_its_daemon_and_says_what_ros_may_now(service: DaemonUnderTest) -> None:
+    service.settings.write_text(f'[daemon]\nsocket = "{service.socket}"\nros_services = "admin"\n')
+    assert "rights of ROS services changed" in reload(service)
+
+
+def test_a_graph_that_a_reload_refused_is_tried_again(service: DaemonUnderTest) -> None:
+    service.settings.write_text(f'[daemon]\nsocket = "{service.socket}"\n')
+    (service.graphs / "rt.yaml").write_text(
+        "runner: rt_runner\ncomponents:\n  - {package: late, type: Fine}\n"
+    )
+    assert 'no package "late"' in reload(service)
+    service.package("late", types={"Fine": "fine"})
+    assert "2 differences applied" in reload(service)
