@@ -6,10 +6,12 @@ last one being completed (see completion/rtcfctl); answers are lines.
 
 import argparse
 import contextlib
+import subprocess
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import rtcf
+from rtcf.client import DEFAULT_SOCKET
 from rtcf.v1 import graph_pb2
 
 REQUEST = "__complete"
@@ -25,6 +27,19 @@ def candidates(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[st
         return sorted({word for word in line.next(prefix) if word.startswith(prefix)})
     except rtcf.RtcfError:
         return []  # a shell's prompt is no place for errors
+
+
+def _asleep(socket: str) -> bool:
+    """Tell whether a connection would wake the system's daemon up: a shell's prompt must not."""
+    if socket != DEFAULT_SOCKET:
+        return False
+    try:
+        return (
+            subprocess.run(["systemctl", "is-active", "--quiet", "rtcfd.service"]).returncode != 0
+        )
+    except OSError:
+        return False  # no systemd, nobody to be woken up
+    return asked.returncode != 0
 
 
 class _Line:
@@ -91,7 +106,7 @@ class _Line:
         if source == "NAME" and ("runner" in self._verbs or action.dest == "runner"):
             source = "RUNNER"
         with rtcf.Client(self._values.get("socket")) as client:
-            return list(self._live(client, source))
+            return [] if _asleep(client.socket) else list(self._live(client, source))
 
     def _live(self, client: rtcf.Client, source: str) -> Iterator[str]:
         """Yield names that rtcfd knows."""

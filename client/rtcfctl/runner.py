@@ -152,7 +152,9 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
         help="stop the loop when rtcfd has been gone for so long",
     )
     to.add_argument(
-        "--on-boot", choices=_CHOICES["on_boot"], help="of a loop that ran when rtcfd ended"
+        "--on-boot",
+        choices=_CHOICES["on_boot"],
+        help="of a loop at boot: what was stopped stays so",
     )
     to.add_argument(
         "--on-crash", choices=_CHOICES["on_crash"], help="of a loop whose executor crashed"

@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 import rtcf
 from daemon_under_test import BUILD_TREE, DaemonUnderTest
+from rtcfctl import completion
+from rtcfctl.main import parser
 
 SCRIPT = Path(__file__).parents[3] / "client" / "completion" / "rtcfctl"
 
@@ -66,3 +68,18 @@ def test_without_rtcfd_there_is_nothing_to_offer_and_nothing_is_said(tmp_path: P
         check=True,
     )
     assert (done.stdout.strip(), done.stderr) == ("", "")
+
+
+@pytest.mark.parametrize("active", [True, False])
+def test_a_prompt_wakes_no_daemon_up(
+    offered: DaemonUnderTest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, active: bool
+) -> None:
+    systemctl = tmp_path / "bin" / "systemctl"
+    systemctl.parent.mkdir()
+    systemctl.write_text(f"#!/bin/sh\nexit {0 if active else 3}\n")
+    systemctl.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{systemctl.parent}:/usr/bin:/bin")
+    monkeypatch.setenv("RTCF_SOCKET", str(offered.socket))
+    monkeypatch.setattr(completion, "DEFAULT_SOCKET", str(offered.socket))
+    found = completion.candidates(parser(), ["-r", ""])
+    assert found == (["other", "rt_runner"] if active else [])
