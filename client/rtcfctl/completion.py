@@ -34,9 +34,7 @@ def _asleep(socket: str) -> bool:
     if socket != DEFAULT_SOCKET:
         return False
     try:
-        return (
-            subprocess.run(["systemctl", "is-active", "--quiet", "rtcfd.service"]).returncode != 0
-        )
+        asked = subprocess.run(["systemctl", "is-active", "--quiet", "rtcfd.service"])
     except OSError:
         return False  # no systemd, nobody to be woken up
     return asked.returncode != 0
