@@ -63,7 +63,7 @@ async def _follow(runner: RunnerCore) -> None:
         status.iteration,
     )  # fmt: skip
     lines = follow_settings(runner.desired, runner.defaults, status.settings)
-    _follow_leased(runner, listed.components.components)
+    leases_ended = _follow_leased(runner, listed.components.components)
     fresh = status.state == runner_pb2.RUNNER_STATE_STOPPED and not status.iteration
     more, runner.left_out = follow_components(
         runner.desired, listed.components.components, restored=not fresh
@@ -75,7 +75,7 @@ async def _follow(runner: RunnerCore) -> None:
     if status.state == runner_pb2.RUNNER_STATE_STOPPED:
         missing = [name for name in runner.left_out if name not in runner.desired.quarantined]
         await _load_each(runner, missing)
-    if lines or more or runner.loop.wanted != was_running:
+    if lines or more or leases_ended or runner.loop.wanted != was_running:
         await runner.save()
     runner.adopted()
 
@@ -85,14 +85,17 @@ def _told(runner: RunnerCore, status: runner_pb2.RunnerStatus) -> None:
     runner.loop.told(status.state == runner_pb2.RUNNER_STATE_RUNNING, runner.loop.stops)
 
 
-def _follow_leased(runner: RunnerCore, found: Iterable[graph_pb2.ComponentInfo]) -> None:
-    """Take leased components, which are not saved, from the executor that has them."""
+def _follow_leased(runner: RunnerCore, found: Iterable[graph_pb2.ComponentInfo]) -> bool:
+    """Take leased components, which are not saved, from the executor that has them; tell whether
+    it lacks one."""
+    before = len(runner.desired.leased)
     live = {str(info.full_name): info for info in found}
     for name in list(runner.desired.leased):
         if name in live:
             runner.desired.put(name, live_spec(live[name]))
         else:
             runner.desired.drop([name])
+    return len(runner.desired.leased) != before
 
 
 async def _restore(runner: RunnerCore) -> None:

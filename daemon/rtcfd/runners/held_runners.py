@@ -75,6 +75,10 @@ class Hold:
         self._runner = runner
         runner.hold_outbox = self._outbox
 
+    def _require_holder(self, terms: HoldTerms) -> None:
+        if self._outbox.gone:
+            raise Unavailable(f"{terms.holder}, which wanted the runner, has left")
+
     async def _take(self, name: str) -> Runner:
         request = self._request
         runner_settings.check(request.settings)
@@ -85,14 +89,14 @@ class Hold:
             terms.added = True
 
             def taken(added: Runner) -> None:
+                self._require_holder(terms)
                 added.desired.hold = terms
                 self._taken(added)
 
             return await self._runners.add(name, request.settings, taken)
 
         async def work() -> None:
-            if self._outbox.gone:
-                raise Unavailable(f"{terms.holder}, which wanted runner {name}, has left")
+            self._require_holder(terms)
             _require_free(runner)
             desired = runner.desired
             terms.parked.CopyFrom(desired.chosen)

@@ -261,8 +261,10 @@ class Leases:
         except Refusal as refusal:
             # It belongs to nobody now, and shows in the list of components.
             runner.log.error("%s stays loaded: %s", ", ".join(group), refusal)
+        forgotten = [self._terms.pop(name) for name in group if name in self._terms]
+        if forgotten and not runner.closing:
+            await runner.save()
         for name in group:
-            self._terms.pop(name, None)
             self._leaving.pop(name, None)
             self._outboxes.pop(name, None)
         runner.tell()

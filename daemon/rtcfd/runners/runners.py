@@ -109,7 +109,7 @@ class Runners:
         on_added: Callable[[Runner], None] | None = None,
     ) -> Runner:
         """Add a runner and start its executor; if that fails there is no such runner.
-        `on_added` is called with it before anything can fail."""
+        `on_added` is called with it first of all, and may refuse."""
 
         async def work() -> Runner:
             return await self._add(name, chosen, on_added)
@@ -133,9 +133,10 @@ class Runners:
         runner_settings.check(chosen)
         desired = Desired(name)
         desired.choose(chosen)
-        runner = self._runners[name] = Runner(desired, self._shared)
+        runner = Runner(desired, self._shared)
         if on_added is not None:
             on_added(runner)
+        self._runners[name] = runner
         try:
             await runner.bring_up()
         except BaseException:

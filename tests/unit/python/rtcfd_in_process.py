@@ -1,0 +1,234 @@
+"""rtcfd's service in the process of a test, with peer executors beside it.
+
+The service, the runners, their operations, the state on disk, and the frames to
+executors over unix sockets are the real ones; only processes and gRPC are left
+out, so that thousands of sequences take minutes.
+"""
+
+import asyncio
+import contextlib
+import json
+import logging
+import signal
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import grpc
+from peer_executor import Peer
+from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+from rtcfd.catalog.catalog import Catalog, Folder
+from rtcfd.catalog.describe import Describer
+from rtcfd.common import runner_settings
+from rtcfd.executor import executor
+from rtcfd.executor.command import ExecutorCommand
+from rtcfd.executor.link import Link
+from rtcfd.executor.process import End
+from rtcfd.operations.runner_core import Surroundings
+from rtcfd.runners.held_runners import await_holder
+from rtcfd.runners.runners import Runners
+from rtcfd.service.control import Control
+from rtcfd.state.desired import Desired
+from rtcfd.state.store import Store
+
+
+class Machine:
+    """The executors that run, by socket; and how slow they are."""
+
+    def __init__(self) -> None:
+        self.peers: dict[str, PeerProcess] = {}
+        self.adopted: PeerProcess | None = None  # whose socket was connected to last
+        self.delay = 0  # steps of the event loop before an executor does what it is asked
+
+    def install(self, monkeypatch: Any) -> None:
+        """Let rtcfd start executors here."""
+        monkeypatch.setattr("rtcfd.executor.executor.subprocess.Popen", self.popen)
+        monkeypatch.setattr(executor, "Child", lambda process: process)
+        monkeypatch.setattr(executor, "Process", lambda _: self.adopted)
+        connect = Link.connect.__func__  # type: ignore[attr-defined]
+
+        async def remember(cls: Any, peer: str, path: Path, on_unasked: Any) -> Any:
+            link = await connect(cls, peer, path, on_unasked)
+            self.adopted = self.peers[str(path)]
+            return link
+
+        monkeypatch.setattr(Link, "connect", classmethod(remember))
+
+    def popen(self, arguments: list[str], **_: Any) -> "PeerProcess":
+        return PeerProcess(self, arguments[2], arguments[4])
+
+
+class SlowPeer(Peer):
+    """A peer that takes its time, and makes changes one at a time as an executor does."""
+
+    def __init__(self, runner: str, machine: Machine) -> None:
+        super().__init__(runner)
+        self._machine = machine
+        self._graph = asyncio.Lock()
+
+    async def answer(self, request: wire.Request) -> None:
+        if request.WhichOneof("kind") in ("get_status", "hello", "exit"):
+            return await super().answer(request)
+        async with self._graph:
+            for _ in range(self._machine.delay):
+                await asyncio.sleep(0)
+            await super().answer(request)
+
+
+class PeerProcess:
+    """A peer executor in the place of its process."""
+
+    _last_pid = 100_000
+
+    def __init__(self, machine: Machine, runner: str, socket: str) -> None:
+        PeerProcess._last_pid += 1
+        self.pid = PeerProcess._last_pid
+        self.end: End | None = None
+        self.peer = SlowPeer(runner, machine)
+        self._machine, self._socket = machine, socket
+        self._ended = asyncio.Event()
+        self._task = asyncio.create_task(self._run())
+
+    async def wait(self) -> End:
+        await self._ended.wait()
+        return End(0)
+
+    def signal(self, _: signal.Signals) -> None:
+        self.peer.end.set()
+
+    def release(self) -> None:
+        """Watch it no more."""
+
+    async def _run(self) -> None:
+        server = await asyncio.start_unix_server(self.peer.serve, self._socket)
+        self._machine.peers[self._socket] = self
+        await self.peer.end.wait()
+        server.close()
+        self.peer.writer.close()
+        with contextlib.suppress(OSError):
+            Path(self._socket).unlink()
+        del self._machine.peers[self._socket]
+        self.end = End(0)
+        self._ended.set()
+
+
+class Refused(Exception):
+    """A call was refused."""
+
+
+class Context:
+    """Of one call."""
+
+    async def abort(self, code: grpc.StatusCode, text: str, _: Any) -> None:
+        raise Refused(code, text)
+
+
+class Rtcfd:
+    """One life of rtcfd."""
+
+    def __init__(self, folder: Path, packages: Path, machine: Machine) -> None:
+        self.machine = machine
+        self.folder = folder
+        self.state = folder / "state"
+        sockets = folder / "executors"
+        sockets.mkdir(exist_ok=True, parents=True)
+        catalog = Catalog([Folder(packages)], _Descriptions(packages))
+        self.store = Store(self.state)
+        self.store.prepare()
+        defaults = runner_settings.defaults(runner_pb2.REALTIME_PREFERRED)
+
+        async def no_ros(_: Any, call: wire.ServiceCall) -> wire.ServiceAnswer:
+            return wire.ServiceAnswer(call=call.call)
+
+        self.runners = Runners(
+            Surroundings(
+                command=ExecutorCommand(Path("/nowhere"), sockets),
+                catalog=catalog,
+                store=self.store,
+                defaults=defaults,
+                on_change=lambda: None,
+                serve_ros=no_ros,
+            )
+        )
+        self.control = Control(self.runners, catalog, self)
+
+    def notes(self) -> list[str]:
+        return []
+
+    async def reload(self) -> list[str]:
+        return []
+
+    async def start(self) -> None:
+        """Come up as main.py does."""
+        states = self.store.load()
+        assert not self.store.problems
+        if "rt_runner" not in [state.runner for state in states]:
+            states.append(Desired("rt_runner"))
+        self.runners.adopt(states)
+        await self.runners.bring_up(executor.left_overs(self.folder / "executors"))
+        for runner in self.runners.all():
+            await_holder(self.runners, runner)
+
+    async def call(self, method: str, request: Any) -> None:
+        """Make a call and read all its answers; cancelled as gRPC does when its caller leaves."""
+        answers = getattr(self.control, method)(request, Context())
+        if not hasattr(answers, "__aiter__"):
+            await answers
+            return
+        async with contextlib.aclosing(answers) as stream:
+            async for _ in stream:
+                pass
+
+    async def hold(self, method: str, opening: Any, opened: asyncio.Event) -> None:
+        """Make a call that lasts; `opened` is set when what it asks for is there."""
+
+        async def requests() -> AsyncIterator[Any]:
+            yield opening
+            await asyncio.Event().wait()
+
+        answers = getattr(self.control, method)(requests(), Context())
+        async with contextlib.aclosing(answers) as stream:
+            async for answer in stream:
+                if answer.WhichOneof("kind") in ("taken", "loaded"):
+                    opened.set()
+
+    def saved(self, runner: str) -> dict[str, Any] | None:
+        """Return the state on disk."""
+        try:
+            document: dict[str, Any] = json.loads((self.state / f"{runner}.json").read_text())
+        except FileNotFoundError:
+            return None
+        return document
+
+    def peer(self, runner: str) -> Peer | None:
+        """Return the executor that runs for a runner."""
+        found = self.machine.peers.get(str(self.folder / "executors" / f"{runner}.sock"))
+        return found.peer if found else None
+
+
+class _Descriptions(Describer):
+    """Describes the peers' libraries without a process."""
+
+    def __init__(self, packages: Path) -> None:
+        super().__init__(packages)
+
+    async def describe(
+        self, library: Path, package: str, owner: int | None = None
+    ) -> wire.LibraryDescription:
+        types = json.loads(library.read_text())["types"]
+        return wire.LibraryDescription(
+            types=[graph_pb2.ComponentType(package=package, type=name) for name in types]
+        )
+
+
+def spec(name: str) -> graph_pb2.ComponentSpec:
+    return graph_pb2.ComponentSpec(package="demo", type="Fine", name=name)
+
+
+def quiet() -> None:
+    """Log nothing: thousands of sequences say a lot."""
+    logging.disable(logging.CRITICAL)
+
+
+__all__ = ["Machine", "Refused", "Rtcfd", "control_pb2", "quiet", "spec"]

@@ -1,0 +1,251 @@
+"""Random sequences of what people do to rtcfd, compared with what they may rely on.
+
+After an answered stop no cycle runs until somebody asks for a start; nothing is
+held by the dead; and the disk says what was answered.  A few dozen sequences are
+drawn by each run; `--long` draws 10 000, or as many as RTCF_SEQUENCES says.
+Sequences depend on the seed alone: RTCF_SEED, 1 if there is none.
+"""
+
+import asyncio
+import contextlib
+import json
+import os
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, Phase, given, seed, settings
+from hypothesis import strategies as st
+from rtcf.v1 import control_pb2, runner_pb2
+from rtcfd.runners import held_runners, leases
+from rtcfd_in_process import Machine, Refused, Rtcfd, quiet, spec
+
+SEED = int(os.environ.get("RTCF_SEED", "1"))
+RUNNERS = ("rt_runner", "arm")
+NAMES = ("a", "b")
+
+runners = st.sampled_from(RUNNERS)
+actions = st.one_of(
+    st.tuples(st.sampled_from(["Start", "Stop", "RestartRunner", "AddRunner"]), runners),
+    st.tuples(st.just("RemoveRunner"), st.just("arm")),
+    st.tuples(
+        st.sampled_from(["Load", "Unload", "LeaseComponent"]), runners, st.sampled_from(NAMES)
+    ),
+    st.tuples(st.sampled_from(["Apply", "HoldRunner"]), runners),
+    st.tuples(st.sampled_from(["SIGTERM", "SIGUSR1"])),
+)
+# What the caller does: waits for the answer, goes on meanwhile, or leaves so many steps later.
+callers = st.one_of(st.just("waits"), st.just("goes on"), st.integers(0, 30))
+steps = st.tuples(actions, callers, st.integers(0, 5))
+
+
+class Sequence:
+    """One sequence: rtcfd, those who call it, and what they may rely on."""
+
+    def __init__(self, folder: Path, packages: Path, machine: Machine) -> None:
+        self._folder, self._packages, self._machine = folder, packages, machine
+        self._callers: set[asyncio.Task[None]] = set()
+        # Runners whose last word was an answered stop.
+        self._stopped: set[str] = set(RUNNERS)
+        self._starts = dict.fromkeys(RUNNERS, 0)
+        self.rtcfd = Rtcfd(folder, packages, machine)
+
+    async def play(self, sequence: list[Any]) -> None:
+        watching = asyncio.create_task(self._watch())
+        await self.rtcfd.start()
+        for action, caller, delay in sequence:
+            self._machine.delay = delay
+            await self._take(action, caller)
+            if watching.done():
+                break
+        await self._let_all_go()
+        await self._quiet()
+        watching.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await watching
+        self._check_end()
+        await self.rtcfd.runners.close(in_order=True)
+        for runner in RUNNERS:
+            saved = self.rtcfd.saved(runner)
+            assert saved is None or saved["running"] is False
+
+    async def _take(self, action: Any, caller: Any) -> None:
+        if action[0] in ("SIGTERM", "SIGUSR1"):
+            await self._restart(action[0])
+            return
+        task = asyncio.create_task(self._call(*action))
+        self._callers.add(task)
+        task.add_done_callback(self._callers.discard)
+        if caller == "waits" and action[0] not in ("HoldRunner", "LeaseComponent"):
+            await task
+        elif isinstance(caller, int):
+            for _ in range(caller):
+                await asyncio.sleep(0)
+            await self._leave({task})
+
+    async def _call(self, method: str, runner: str, name: str = "") -> None:
+        rtcfd = self.rtcfd
+        with contextlib.suppress(Refused):
+            if method == "Start":
+                self._starts[runner] += 1
+                self._stopped.discard(runner)
+                await rtcfd.call("Start", control_pb2.StartRequest(runner=runner))
+            elif method == "Stop":
+                starts = self._starts[runner]
+                await rtcfd.call("Stop", control_pb2.StopRequest(runner=runner))
+                if starts == self._starts[runner]:
+                    self._stopped.add(runner)
+                    saved = rtcfd.saved(runner)
+                    assert saved is None or not saved["running"], "a stop is on disk"
+            elif method == "Load":
+                request: Any = control_pb2.LoadRequest(runner=runner, component=spec(name))
+                await rtcfd.call("Load", request)
+            elif method == "Unload":
+                request = control_pb2.UnloadRequest(runner=runner, components=[name])
+                await rtcfd.call("Unload", request)
+            elif method == "Apply":
+                request = control_pb2.ApplyRequest(runner=runner, components=[spec("a")])
+                await rtcfd.call("Apply", request)
+            elif method == "HoldRunner":
+                opening = control_pb2.OpenHold(runner=runner, token="t", holder="somebody")
+                request = control_pb2.HoldRunnerRequest(open=opening)
+                await rtcfd.hold("HoldRunner", request, asyncio.Event())
+            elif method == "LeaseComponent":
+                lease = control_pb2.OpenLease(runner=runner, component=spec(name), holder="h")
+                request = control_pb2.LeaseComponentRequest(open=lease)
+                await rtcfd.hold("LeaseComponent", request, asyncio.Event())
+            elif method == "AddRunner":
+                chosen = runner_pb2.RunnerSettings(on_boot=runner_pb2.ON_BOOT_RESUME)
+                request = control_pb2.AddRunnerRequest(runner=runner, settings=chosen)
+                await rtcfd.call("AddRunner", request)
+            else:
+                kind = getattr(control_pb2, f"{method}Request")
+                await rtcfd.call(method, kind(runner=runner))
+
+    async def _restart(self, number: str) -> None:
+        """End rtcfd and start the next; connections end with it."""
+        if number == "SIGTERM":
+            await self.rtcfd.runners.close(in_order=True)
+            self._stopped |= set(RUNNERS)
+        else:
+            await self.rtcfd.runners.leave()
+        await self._let_all_go()
+        self.rtcfd = Rtcfd(self._folder, self._packages, self._machine)
+        await self.rtcfd.start()
+
+    async def _watch(self) -> None:
+        """No cycle runs after an answered stop."""
+        while True:
+            for runner in self._stopped:
+                peer = self.rtcfd.peer(runner)
+                assert peer is None or not peer.running, f"{runner} runs after an answered stop"
+            await asyncio.sleep(0)
+
+    async def _let_all_go(self) -> None:
+        await self._leave(set(self._callers))
+
+    async def _leave(self, tasks: set[asyncio.Task[None]]) -> None:
+        for task in tasks:
+            task.cancel()
+        for result in await asyncio.gather(*tasks, return_exceptions=True):
+            if isinstance(result, Exception):
+                raise result
+
+    async def _quiet(self) -> None:
+        """Wait until rtcfd has nothing to do."""
+        async with asyncio.timeout(20):
+            for _ in range(3):
+                await self.rtcfd.runners.operations.drain()
+                for runner in self.rtcfd.runners.all():
+                    await runner.operations.drain()
+
+    def _check_end(self) -> None:
+        for name in RUNNERS:
+            saved, peer = self.rtcfd.saved(name), self.rtcfd.peer(name)
+            known = name in [runner.name for runner in self.rtcfd.runners.all()]
+            assert (peer is not None) == known
+            if name == "arm":
+                assert (saved is not None) == known, "a runner is on disk, or is not there"
+            if saved is None or peer is None:
+                continue
+            assert saved["hold"] is None and saved["leased"] == {}, "nothing is held by the dead"
+            assert saved["running"] == peer.running
+            assert sorted(f"/{each['name']}" for each in saved["components"]) == sorted(
+                peer.components
+            )
+
+
+@pytest.fixture(scope="module")
+def place() -> Any:
+    # In memory: each save is forced out to the disk.
+    memory = Path("/dev/shm")
+    folder = Path(tempfile.mkdtemp(dir=memory if memory.is_dir() else None))
+    library = folder / "lib" / "demo" / "main.so"
+    library.parent.mkdir(parents=True)
+    library.write_text(json.dumps({"types": {"Fine": "fine"}}))
+    yield folder
+    shutil.rmtree(folder)
+
+
+@pytest.fixture(scope="module")
+def machine() -> Any:
+    machine = Machine()
+    with pytest.MonkeyPatch.context() as patch:
+        machine.install(patch)
+        patch.setattr(leases, "RETURN_S", 0.01)
+        patch.setattr(held_runners, "RETURN_S", 0.01)
+        patch.setattr(leases, "GATHER_S", 0.001)
+        patch.setattr("rtcfd.state.store.os.fsync", lambda _: None)
+        quiet()
+        yield machine
+        import logging
+
+        logging.disable(logging.NOTSET)
+
+
+def play(sequence: list[Any], place: Path, machine: Machine) -> None:
+    folder = Path(tempfile.mkdtemp(dir=place))
+
+    async def run() -> None:
+        machine.peers.clear()
+        await Sequence(folder, place / "lib", machine).play(sequence)
+
+    asyncio.run(run())
+    shutil.rmtree(folder)
+
+
+def drawn(number: int) -> Any:
+    """Let a test have so many sequences, drawn by the seed."""
+
+    def decorate(test: Any) -> Any:
+        health = [HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+        test = given(st.lists(steps, min_size=1, max_size=12))(test)
+        test = settings(
+            max_examples=number,
+            deadline=None,
+            database=None,
+            suppress_health_check=health,
+            phases=[Phase.generate, Phase.shrink],
+        )(test)
+        return seed(SEED)(test)
+
+    return decorate
+
+
+@drawn(40)  # type: ignore[misc]
+def test_random_sequences_keep_what_is_promised(
+    place: Path, machine: Machine, sequence: list[Any]
+) -> None:
+    play(sequence, place, machine)
+
+
+@pytest.mark.long
+@drawn(  # type: ignore[misc]
+    int(os.environ.get("RTCF_SEQUENCES", "10000"))
+)
+def test_ten_thousand_random_sequences_keep_what_is_promised(
+    place: Path, machine: Machine, sequence: list[Any]
+) -> None:
+    play(sequence, place, machine)
