@@ -9,23 +9,27 @@ import sysconfig
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+# Of a prefix.  Its lib/rtcf is that of the programs of the ROS package rtcf: another one in a
+# workspace would hide them.
+PREFIX_FOLDER = "rtcf-components"
+
 
 def component_folders(extra: Sequence[Path], build_tree: Path | None) -> list[Path]:
     """Return the folders that hold packages, the first ones win.
 
-    Those named come first, then the build tree, then workspaces as catkin
-    overlays them, then the system.
+    Those named come first, then workspaces as catkin overlays them, then the
+    build tree of rtcf itself, then the system.
     """
     folders = list(extra)
-    if build_tree is not None:
-        folders.append(build_tree / "lib" / "rtcf")
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep):
         if prefix.startswith("/"):
-            folders.append(Path(prefix) / "lib" / "rtcf")
+            folders.append(Path(prefix) / "lib" / PREFIX_FOLDER)
+    if build_tree is not None:
+        folders.append(build_tree / "lib" / "rtcf")
     triplet = sysconfig.get_config_var("MULTIARCH")
     if triplet:
         folders.append(Path("/usr/lib") / triplet / "rtcf")
-    folders.append(Path("/usr/lib/rtcf"))
+    folders.append(Path("/usr/lib") / PREFIX_FOLDER)
     return list(dict.fromkeys(Path(os.path.abspath(folder)) for folder in folders))
 
 

@@ -80,7 +80,7 @@ def tuned(tmp_path_factory: pytest.TempPathFactory) -> Path:
             check=False,
         )
         assert done.returncode == 0, done.stdout + done.stderr
-    return folder / "lib" / "rtcf"
+    return folder / "devel" / "lib" / "rtcf-components"
 
 
 def test_cfg_file_tunes_a_running_loop(tmp_path: Path, master: Master, tuned: Path) -> None:

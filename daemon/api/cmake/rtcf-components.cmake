@@ -1,9 +1,13 @@
 # rtcf_add_components(<target> PACKAGE <package> SOURCES <file>... [LINK <library>...])
 #
-# Builds a shared library of components. It is put where a daemon run from this
-# build tree with `--path <build>/lib/rtcf` finds it, and is installed to
-# <libdir>/rtcf/<package>, where the system daemon looks. Where no CMAKE_BUILD_TYPE
-# is set it is built as by RelWithDebInfo: a loop needs optimised code, and
+# Builds a shared library of components and puts it where daemons look:
+#   in a catkin workspace  devel/lib/rtcf-components/<package>, found by CMAKE_PREFIX_PATH
+#   elsewhere              <build>/lib/rtcf/<package>, for `rtcfd --path <build>/lib/rtcf`
+#   installed              <prefix>/lib/rtcf-components/<package>, or where the prefix has a folder
+#                          for each architecture, <libdir>/rtcf/<package>
+# The folder lib/rtcf of a prefix is that of the programs of the ROS package rtcf; another one in a
+# workspace would hide them from rosrun and roslaunch.
+# Where no CMAKE_BUILD_TYPE is set it is built as by RelWithDebInfo: a loop needs optimised code, and
 # `rtcfctl check` and crash reports need its lines.
 include(GNUInstallDirs)
 
@@ -15,15 +19,26 @@ function(rtcf_add_components target)
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "rtcf_add_components(${target}): unknown arguments ${arg_UNPARSED_ARGUMENTS}")
   endif()
+  if(CATKIN_DEVEL_PREFIX)
+    set(folder ${CATKIN_DEVEL_PREFIX}/lib/rtcf-components/${arg_PACKAGE})
+  else()
+    set(folder ${CMAKE_BINARY_DIR}/lib/rtcf/${arg_PACKAGE})
+  endif()
+  if(CMAKE_INSTALL_LIBDIR MATCHES "^lib/.")
+    set(destination ${CMAKE_INSTALL_LIBDIR}/rtcf/${arg_PACKAGE})
+  else()
+    set(destination lib/rtcf-components/${arg_PACKAGE})
+  endif()
 
   add_library(${target} MODULE ${arg_SOURCES})
-  target_link_libraries(${target} PRIVATE rtcf::rtcf ${arg_LINK})
+  # Not by target_link_libraries, whose two signatures do not mix: its caller may use either.
+  set_property(TARGET ${target} APPEND PROPERTY LINK_LIBRARIES rtcf::rtcf ${arg_LINK})
   set_target_properties(
     ${target}
     PROPERTIES PREFIX ""
                CXX_VISIBILITY_PRESET hidden
                VISIBILITY_INLINES_HIDDEN ON
-               LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib/rtcf/${arg_PACKAGE})
+               LIBRARY_OUTPUT_DIRECTORY ${folder})
   if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
     # Of these libraries alone: a catkin workspace builds other packages with them.
     separate_arguments(optimised UNIX_COMMAND "${CMAKE_CXX_FLAGS_RELWITHDEBINFO}")
@@ -47,6 +62,5 @@ function(rtcf_add_components target)
   if(NOT "${options};${directory_options};${CMAKE_CXX_FLAGS}" MATCHES "-fsanitize")
     target_link_options(${target} PRIVATE -Wl,--no-undefined)
   endif()
-  install(TARGETS ${target} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/rtcf/${arg_PACKAGE}
-                                    COMPONENT ${arg_PACKAGE})
+  install(TARGETS ${target} LIBRARY DESTINATION ${destination} COMPONENT ${arg_PACKAGE})
 endfunction()

@@ -111,7 +111,7 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
             """
         )
         + folders
-        + "\n(<prefix>/lib/rtcf of each prefix in CMAKE_PREFIX_PATH is among them.)",
+        + "\n(<prefix>/lib/rtcf-components of each prefix in CMAKE_PREFIX_PATH is among them.)",
     )
     parser.add_argument("--version", action="version", version=f"rtcfd {VERSION}")
     parser.add_argument(

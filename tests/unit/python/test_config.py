@@ -125,9 +125,9 @@ def test_the_command_line_goes_before_the_file(
     assert [str(folder.path) for folder in given.folders[:5]] == [
         "/o/lib",
         "/f/lib",
+        "/ws/devel/lib/rtcf-components",
+        "/opt/ros/lib/rtcf-components",
         "/build/lib/rtcf",
-        "/ws/devel/lib/rtcf",
-        "/opt/ros/lib/rtcf",
     ]
     assert options.parse(["--foreground"], None).socket == Path("/e")
 
