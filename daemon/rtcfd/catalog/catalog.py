@@ -42,6 +42,16 @@ class Found:
 
     path: str
     owner: int | None
+    others: tuple[str, ...] = ()  # libraries that offer it too, and are not taken
+
+    def note(self, spec: graph_pb2.ComponentSpec) -> str:
+        """Say that the type is in several places; empty = it is not."""
+        if not self.others:
+            return ""
+        return (
+            f"{spec.package}/{spec.type} is in several places: {self.path} is taken, "
+            f"not {', '.join(self.others)}"
+        )
 
     def load(self, spec: graph_pb2.ComponentSpec) -> wire.Load:
         """Return the request to load a component from it."""
@@ -53,6 +63,7 @@ class _Contents:
     """What the libraries of a package offer."""
 
     types: dict[str, graph_pb2.ComponentType] = field(default_factory=dict)
+    others: dict[str, list[str]] = field(default_factory=dict)  # libraries with a type again
     problems: list[str] = field(default_factory=list)
 
 
@@ -73,7 +84,11 @@ class Catalog:
         contents = await self._contents(package, libraries)
         found = contents.types.get(type_name)
         if found is not None:
-            return Found(str(found.library), self._owner(Path(found.library)))
+            return Found(
+                str(found.library),
+                self._owner(Path(found.library)),
+                tuple(contents.others.get(type_name, ())),
+            )
         if contents.problems:
             raise FailedPrecondition(
                 f'no type "{type_name}" in package "{package}" (types: '
@@ -114,7 +129,8 @@ class Catalog:
                 offered.CopyFrom(described)
                 offered.package = package
                 offered.library = str(library)
-                contents.types.setdefault(offered.type, offered)
+                if contents.types.setdefault(offered.type, offered) is not offered:
+                    contents.others.setdefault(offered.type, []).append(str(library))
         return contents
 
     def _packages(self) -> dict[str, list[Path]]:

@@ -26,6 +26,7 @@ async def load(
 ) -> control_pb2.ChangeResult:
     """Load a component."""
     library = await runner.catalog.find(spec.package, spec.type)
+    note = library.note(spec)
 
     async def work() -> control_pb2.ChangeResult:
         runner.limits.check_components(len(runner.desired.components) + 1)
@@ -38,6 +39,9 @@ async def load(
     what = f"{spec.package}/{spec.type}"
     result = await runner.change(f"the load of {what}", work)
     runner.log.info("%s loaded (%s)", result.component, what)
+    if note:
+        runner.log.warning(note)
+        result.notes.append(note)
     return result
 
 

@@ -66,6 +66,13 @@ def test_unknown_package_lists_the_folders(daemon: DaemonUnderTest, client: rtcf
     assert "/usr/lib/rtcf" in str(refused.value)
 
 
+def test_a_type_that_is_in_two_places_is_said(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
+    daemon.package("demo", "elsewhere", types={"Fine": "fine"})
+    (note,) = client.load(rtcf.component("demo", "Fine")).notes
+    taken, other = (daemon.packages / "demo" / f"{name}.so" for name in ("elsewhere", "main"))
+    assert note == f"demo/Fine is in several places: {taken} is taken, not {other}"
+
+
 def test_duplicate_name_is_refused(client: rtcf.Client) -> None:
     client.load(rtcf.component("demo", "Fine"))
     with pytest.raises(rtcf.RefusedError, match="/Fine is there already") as refused:
