@@ -46,7 +46,7 @@ def show_connections(client: rtcf.Client, args: argparse.Namespace, output: Outp
             (
                 each.name,
                 each.type,
-                _end(each.writer) if each.HasField("writer") else "-",
+                _writers(each) or "-",
                 ", ".join(_end(reader) for reader in each.readers) or "-",
                 _ros(each),
             )
@@ -68,7 +68,7 @@ def show_connection(client: rtcf.Client, args: argparse.Namespace, output: Outpu
         output.data(found)
         return
     output.line(f"{found.name}: {found.type}", "bold")
-    output.line(f"  written by {_end(found.writer) if found.HasField('writer') else 'nobody here'}")
+    output.line(f"  written by {_writers(found) or 'nobody here'}")
     for reader in found.readers:
         output.line(f"  read by {_end(reader)}")
     if ros := _ros(found):
@@ -81,6 +81,11 @@ def set_breaks(client: rtcf.Client, args: argparse.Namespace, output: Output) ->
     result = client.set_breaks(ports, args.broken, args.runner, output.progress)
     verb = "broken" if args.broken else "unbroken"
     output.changed(f"{verb}: {', '.join(args.ports)}", result)
+
+
+def _writers(connection: Any) -> str:
+    first = [connection.writer] if connection.HasField("writer") else []
+    return ", ".join(_end(each) for each in [*first, *connection.other_writers])
 
 
 def _end(endpoint: graph_pb2.Endpoint) -> str:

@@ -156,6 +156,7 @@ def _check_parameters(mixer: Mixer) -> None:
 def _checked(graph: Graph) -> Graph:
     types: dict[str, str] = {}
     writers: set[str] = set()
+    shared: set[str] = set()
     for mixer in graph.values():
         for port, kind in TYPES.items():
             name = mixer.mapped(port)
@@ -163,8 +164,12 @@ def _checked(graph: Graph) -> Graph:
                 raise Refused(f"types differ on {name}")
             if port in OUTPUTS:
                 if name in writers:
-                    raise Refused(f"{name} has two writers")
+                    shared.add(name)
                 writers.add(name)
+    for mixer in graph.values():
+        for port in TYPES:
+            if port not in OUTPUTS and mixer.mapped(port) in shared:
+                raise Refused(f"{mixer.mapped(port)} has two writers and a reader")
     rates = {mixer.every for mixer in graph.values()}
     if any(one % other and other % one for one in rates for other in rates):
         raise Refused(f"{rates} do not go together")

@@ -44,12 +44,24 @@ class Builder {
 
    private:
     void addConnection(const std::string& name, const ConnectionPlan& connection) {
-        if (connection.published) addTap(name, connection);
+        if (connection.published) {
+            addTap(name, name, *connection.writer);
+            // No mapped name has a blank in it.
+            for (const Writer& writer : connection.others) {
+                const Instance& instance = *plan_.graph.nodes()[writer.node].instance;
+                addTap(name + " of " + instance.fullName() + "." + writer.output->name(), name,
+                       writer);
+            }
+        }
         if (connection.writer) {
             for (const Reader& reader : connection.readers) bindToWriter(connection, reader);
             OutputBase& output = *connection.writer->output;
             const bool heard = connection.published || !connection.readers.empty();
             if (heard != output.connected()) adoption_.audiences.push_back({&output, heard});
+            for (const Writer& writer : connection.others) {
+                if (connection.published != writer.output->connected())
+                    adoption_.audiences.push_back({writer.output, connection.published});
+            }
         } else if (connection.subscribed) {
             addFeed(name, connection);
         } else {
@@ -57,10 +69,10 @@ class Builder {
         }
     }
 
-    void addTap(const std::string& name, const ConnectionPlan& connection) {
-        const OutputBase& output = *connection.writer->output;
+    void addTap(const std::string& key, const std::string& name, const Writer& writer) {
+        const OutputBase& output = *writer.output;
         std::shared_ptr<Tap> tap;
-        if (const auto found = previous_.taps.find(name);
+        if (const auto found = previous_.taps.find(key);
             found != previous_.taps.end() && found->second->source() == output.slot().get() &&
             (output.type().fixed_size || found->second->largest() == bridge_.largest_message)) {
             tap = found->second;
@@ -72,7 +84,7 @@ class Builder {
         }
         tap->setDecimation(decimated_.matches(name) ? bridge_.decimation : 1);
         plan_.schedule.taps.push_back(tap.get());
-        plan_.taps.emplace(name, std::move(tap));
+        plan_.taps.emplace(key, std::move(tap));
     }
 
     void addFeed(const std::string& name, const ConnectionPlan& connection) {

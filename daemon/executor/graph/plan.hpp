@@ -31,8 +31,9 @@ struct Plan {
     Schedule schedule;
     std::map<const InputBase*, Binding> bindings;
     std::map<const SlotHeader*, std::shared_ptr<SlotHeader>> latches;  ///< by the writer's slot
-    std::map<std::string, std::shared_ptr<Tap>> taps;                  ///< by topic
-    std::map<std::string, std::shared_ptr<Injector>> injectors;        ///< by topic
+    std::map<std::string, std::shared_ptr<Tap>>
+        taps;  ///< by topic, and by port where a topic has several writers
+    std::map<std::string, std::shared_ptr<Injector>> injectors;  ///< by topic
 
     /// Notes which earlier values inputs still refer to, once the loop has adopted the plan.
     void noteKept(const Adoption& adoption, const Plan& previous);

@@ -70,14 +70,10 @@ class Collector {
                    const std::string& name) {
         ConnectionPlan& plan = planFor(name, index, output->name(), output->type());
         if (plan.writer) {
-            throw Refusal(
-                RefusalKind::FailedPrecondition,
-                fmt::format(
-                    "{} has two writers: {} and {}; remap one of them, e.g. --remap {}:=~{}", name,
-                    portName(graph_, plan.writer->node, plan.writer->output->name()),
-                    portName(graph_, index, output->name()), output->name(), output->name()));
+            plan.others.push_back({index, port, output});
+        } else {
+            plan.writer = Writer{index, port, output};
         }
-        plan.writer = Writer{index, port, output};
     }
 
     void addInput(std::size_t index, const GraphNode& node, InputBase* input,
@@ -160,6 +156,25 @@ OrderProblem orderProblem(const Graph& graph, const Wiring& wiring) {
     return problem;
 }
 
+// Of whom would an input read? Where there is none, several may write, as several nodes may
+// publish.
+void requireOneWriter(const Graph& graph, const std::string& name, const ConnectionPlan& plan) {
+    if (plan.others.empty() || plan.readers.empty()) return;
+    const Writer& other = plan.others.front();
+    const std::string& port = other.output->name();
+    throw Refusal(
+        RefusalKind::FailedPrecondition,
+        fmt::format("{} has two writers and a reader: {} and {} write what {} reads; remap one of "
+                    "them, e.g. --remap {}:=~{}",
+                    name, portName(graph, plan.writer->node, plan.writer->output->name()),
+                    portName(graph, other.node, port),
+                    portName(graph, plan.readers[0].node, plan.readers[0].input->name()), port,
+                    port));
+}
+
+// A type of a component's own that is given no message stays inside the runner.
+bool onRos(const TypeInfo& type) { return *type.ros_type != '\0'; }
+
 // Two devices cannot both say when a cycle begins.
 void requireOneSource(const Graph& graph) {
     const Instance* present = nullptr;
@@ -184,15 +199,46 @@ Wiring wire(const Graph& graph, const MappingFilter& filter, const std::string& 
     Collector collector(graph, wiring.connections);
     for (std::size_t index = 0; index < graph.nodes().size(); ++index) collector.addNode(index);
     for (auto& [name, plan] : wiring.connections) {
-        const bool mapped = filter.matches(name);
+        const bool mapped = onRos(*plan.type) && filter.matches(name);
         plan.published = mapped && plan.writer.has_value();
         // An input that a component feeds takes nothing from ROS: no side channel past the loop.
         plan.subscribed = mapped && !plan.writer.has_value();
     }
+    for (const auto& [name, plan] : wiring.connections) requireOneWriter(graph, name, plan);
     OrderResult result = findOrder(orderProblem(graph, wiring));
     if (!result.orderable()) refuseLoop(graph, result, loading);
     wiring.order = std::move(result.order);
     return wiring;
+}
+
+std::vector<std::string> remarks(const Graph& graph, const Wiring& wiring,
+                                 const MappingFilter& filter, const std::string& component) {
+    std::vector<std::string> lines;
+    for (const auto& [name, plan] : wiring.connections) {
+        const auto ours = [&](std::size_t node) {
+            return graph.nodes()[node].instance->fullName() == component;
+        };
+        std::vector<Writer> writers = plan.others;
+        if (plan.writer) writers.insert(writers.begin(), *plan.writer);
+        const bool written = std::any_of(writers.begin(), writers.end(),
+                                         [&](const Writer& writer) { return ours(writer.node); });
+        const bool read = std::any_of(plan.readers.begin(), plan.readers.end(),
+                                      [&](const Reader& reader) { return ours(reader.node); });
+        if (written && plan.published && writers.size() > 1) {
+            std::string names;
+            for (const Writer& writer : writers) {
+                names += (names.empty() ? "" : ", ") +
+                         portName(graph, writer.node, writer.output->name());
+            }
+            lines.push_back(fmt::format("topic {} has {} writers in this runner: {}", name,
+                                        writers.size(), names));
+        }
+        if ((written || read) && !onRos(*plan.type) && filter.matches(name)) {
+            lines.push_back(fmt::format("{} is not on ROS: there is no ROS message for its type {}",
+                                        name, plan.type->name));
+        }
+    }
+    return lines;
 }
 
 }  // namespace rtcf::executor

@@ -41,6 +41,7 @@ struct Writer {
 struct ConnectionPlan {
     const TypeInfo* type = nullptr;
     std::optional<Writer> writer;
+    std::vector<Writer> others;  ///< write the name too, which then no input reads
     std::vector<Reader> readers;
     bool published = false;   ///< to ROS
     bool subscribed = false;  ///< from ROS
@@ -53,7 +54,11 @@ struct Wiring {
 
 /// Connects and orders a graph. @param loading full name of a component that is not part of the
 /// running graph yet, for the advice how to break a loop; may be empty
-/// @throws Refusal for two types or two writers of one name, and for a loop
+/// @throws Refusal for two types of one name, for two writers of one that is read, and for a loop
 Wiring wire(const Graph& graph, const MappingFilter& filter, const std::string& loading);
+
+/// What a component's ports make of the topics that is not refused and may surprise: one line each.
+std::vector<std::string> remarks(const Graph& graph, const Wiring& wiring,
+                                 const MappingFilter& filter, const std::string& component);
 
 }  // namespace rtcf::executor

@@ -605,9 +605,9 @@ void Runner::adopt(Change change, const Progress& progress) {
 }
 
 void Runner::checkTaps(const Wiring& wiring) const {
-    const auto taps = static_cast<std::size_t>(
-        std::count_if(wiring.connections.begin(), wiring.connections.end(),
-                      [](const auto& each) { return each.second.published; }));
+    std::size_t taps = 0;
+    for (const auto& [name, connection] : wiring.connections)
+        taps += connection.published ? 1 + connection.others.size() : 0;
     // What is above a limit that was lowered may stay, and shrink.
     if (taps <= most_taps_ || taps <= plan_->taps.size()) return;
     throw Refusal(RefusalKind::ResourceExhausted,
@@ -640,6 +640,7 @@ ChangeOutcome Runner::outcomeOf(const Instance& arrived) const {
     }
     result.kept = arrived.keptParameters();
     for (const std::string& line : arrived.lostParameters()) result.notes.push_back(line);
+    addRemarks(result, arrived.fullName());
     return result;
 }
 
@@ -684,6 +685,11 @@ ChangeOutcome Runner::replace(const std::string& name, ComponentDefinition defin
     return outcomeOf(*instance);
 }
 
+void Runner::addRemarks(ChangeOutcome& outcome, const std::string& component) const {
+    for (std::string& line : remarks(plan_->graph, plan_->wiring, filter(), component))
+        outcome.notes.push_back(std::move(line));
+}
+
 ChangeOutcome Runner::apply(const std::vector<WantedComponent>& wanted, bool dry_run,
                             const Progress& progress) {
     std::vector<Difference> differences = compare(plan_->graph, wanted);
@@ -711,7 +717,10 @@ ChangeOutcome Runner::apply(const std::vector<WantedComponent>& wanted, bool dry
     }
     ChangeOutcome result = outcome();
     result.differences = std::move(differences);
-    for (Difference& difference : result.differences) difference.wanted = nullptr;
+    for (Difference& difference : result.differences) {
+        difference.wanted = nullptr;
+        if (!dry_run) addRemarks(result, difference.component);
+    }
     return result;
 }
 

@@ -191,6 +191,7 @@ class Runner final : private RunnerView {
     void stopAll() noexcept;
     ChangeOutcome outcome(std::string component = {}) const;
     ChangeOutcome outcomeOf(const Instance& arrived) const;
+    void addRemarks(ChangeOutcome& outcome, const std::string& component) const;
     RealtimeProblems lockAndStart();
     LoopSettings loopSettings() const;
     bool wantsSimulation(const Progress& progress);

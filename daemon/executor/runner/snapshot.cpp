@@ -40,9 +40,11 @@ ConnectionSnapshot picture(const Graph& graph, const ConnectionPlan& plan) {
     const auto component = [&](std::size_t node) {
         return graph.nodes()[node].instance->fullName();
     };
-    ConnectionSnapshot result{plan.type->name, {}, {}, plan.published, plan.subscribed};
+    ConnectionSnapshot result{plan.type->name, {}, {}, {}, plan.published, plan.subscribed};
     if (plan.writer)
         result.writer = {component(plan.writer->node), plan.writer->output->name(), false};
+    for (const Writer& writer : plan.others)
+        result.other_writers.push_back({component(writer.node), writer.output->name(), false});
     for (const Reader& reader : plan.readers) {
         result.readers.push_back({component(reader.node), reader.input->name(), reader.broken});
     }

@@ -45,6 +45,7 @@ struct EndpointSnapshot {
 struct ConnectionSnapshot {
     std::string type;
     std::optional<EndpointSnapshot> writer;
+    std::vector<EndpointSnapshot> other_writers;  ///< of a name that no input reads
     std::vector<EndpointSnapshot> readers;
     bool published;
     bool subscribed;

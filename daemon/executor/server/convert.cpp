@@ -511,6 +511,8 @@ v1::ListConnectionsResult connectionsTo(const GraphSnapshot& snapshot) {
         message.set_name(name);
         message.set_type(connection.type);
         if (connection.writer) set(*message.mutable_writer(), *connection.writer);
+        for (const EndpointSnapshot& writer : connection.other_writers)
+            set(*message.add_other_writers(), writer);
         for (const EndpointSnapshot& reader : connection.readers)
             set(*message.add_readers(), reader);
         message.set_published(connection.published);

@@ -53,6 +53,8 @@ bool Publishing::reconcile(ros::NodeHandle& handle, const executor::BridgeSettin
         const std::lock_guard lock(mutex_);
         std::map<std::string, std::shared_ptr<TopicPublisher>> wanted;
         for (const auto& tap : taps_) {
+            // Several outputs may write one topic.
+            if (wanted.count(tap->topic()) != 0) continue;
             const bool latch = latched.matches(tap->topic());
             const auto found = publishers_.find(tap->topic());
             if (found != publishers_.end() && found->second->serves(tap->type()) &&

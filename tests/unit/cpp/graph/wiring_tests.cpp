@@ -62,12 +62,25 @@ TEST_F(WiringTest, BlacklistTakesFromTheWhitelist) {
     EXPECT_TRUE(wiring.connections.at("/H1_F1").published);
 }
 
-TEST_F(WiringTest, TwoWritersAreRefusedByName) {
+TEST_F(WiringTest, TwoWritersOfWhatIsReadAreRefusedByName) {
     const std::string text = refusalOf(graphOf(
-        {mimo("A", {{"out1", "x"}, {"out2", "a2"}}), mimo("B", {{"out1", "b1"}, {"out2", "x"}})}));
-    for (const char* part : {"/x has two writers", "/A.out1", "/B.out2"}) {
+        {mimo("A", {{"out1", "x"}, {"out2", "a2"}}), mimo("B", {{"out1", "b1"}, {"out2", "x"}}),
+         mimo("C", {{"in1", "x"}, {"out1", "c1"}, {"out2", "c2"}})}));
+    for (const char* part : {"/x has two writers", "/A.out1", "/B.out2", "/C.in1"}) {
         EXPECT_NE(text.find(part), std::string::npos) << text;
     }
+}
+
+TEST_F(WiringTest, SeveralMayWriteWhatNoInputReadsAndOfATopicThatIsSaid) {
+    const Graph graph = graphOf(
+        {mimo("A", {{"out1", "x"}, {"out2", "a2"}}), mimo("B", {{"out1", "b1"}, {"out2", "x"}})});
+    EXPECT_TRUE(remarks(graph, wire(graph, {}, {}), {}, "/B").empty());
+    const MappingFilter filter{NamePattern("whitelist", "/x"), {}};
+    const Wiring wiring = wire(graph, filter, {});
+    EXPECT_EQ(wiring.connections.at("/x").others.size(), 1U);
+    EXPECT_EQ(
+        remarks(graph, wiring, filter, "/B"),
+        (std::vector<std::string>{"topic /x has 2 writers in this runner: /A.out1, /B.out2"}));
 }
 
 TEST_F(WiringTest, TypesThatDifferAreRefusedWithBothPortsAndTypes) {
