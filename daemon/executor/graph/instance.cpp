@@ -92,7 +92,7 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
     }
     try {
         callHook(Hook::Constructor, [this] {
-            component_.reset(record_->create(definition_.name.c_str()));
+            component_.reset(record_->create(definition_.name.c_str(), &context_));
             return true;
         });
         component_->attach(context_);
@@ -101,7 +101,9 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
         }
         setFirstParameters();
     } catch (const Refusal&) {
+        component_.reset();
         log_.levels().detach(context_.log_level);
+        log_.drain();  // pending records refer to its name
         recorder_.removeSlot(slot_);
         throw;
     }

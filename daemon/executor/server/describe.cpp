@@ -42,7 +42,7 @@ int describeLibrary(const std::string& library, const std::string& package,
         const auto code = libraries->open(library);
         for (const ComponentRecord* record : code->types()) {
             try {
-                const std::unique_ptr<Component> component(record->create(record->type));
+                const std::unique_ptr<Component> component(record->create(record->type, nullptr));
                 *description.add_types() = typeTo(package, library, *record, *component);
             } catch (const std::exception& error) {
                 description.set_problem(fmt::format("library {}: constructor of {} threw: {}",

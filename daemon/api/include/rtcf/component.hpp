@@ -23,6 +23,7 @@
 #include "rtcf/parameter.hpp"
 #include "rtcf/port.hpp"
 #include "rtcf/realtime.hpp"
+#include "rtcf/registration.hpp"
 #include "rtcf/slot.hpp"
 
 namespace rtcf {
@@ -167,7 +168,8 @@ class Component {
         return context;
     }
 
-    ComponentContext* context_ = &detached();
+    ComponentContext* context_ =
+        detail::under_construction != nullptr ? detail::under_construction : &detached();
     // What the cycle does not touch, apart from what it does: the derived class's ports.
     struct Rest {
         bool frozen = false;
@@ -307,4 +309,3 @@ class Source : public Component {
 }  // namespace rtcf
 
 #include "rtcf/device_io.hpp"
-#include "rtcf/registration.hpp"

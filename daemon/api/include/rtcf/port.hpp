@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 
+#include "rtcf/any_type.hpp"
 #include "rtcf/arithmetic_type.hpp"
 #include "rtcf/message_type.hpp"
 #include "rtcf/port_type.hpp"

@@ -10,14 +10,16 @@
 namespace rtcf {
 
 class Component;
+struct ComponentContext;
 
 /// One component type of a library; static, in a list.
 struct ComponentRecord {
     const char* type;  ///< e.g. "Pid"
     const char* doc;   ///< one line
     /// A new component, which the caller owns. `name` is the one that it will have; few components
-    /// want to know it so early.
-    Component* (*create)(const char* name);
+    /// want to know it so early. `context` lets its constructor log; null where nobody listens.
+    /// One call at a time.
+    Component* (*create)(const char* name, ComponentContext* context);
     const ComponentRecord* next;
 };
 
@@ -45,6 +47,22 @@ struct __attribute__((visibility("hidden"))) Registration {
     }
 };
 
+/// What the component that is being constructed in this library has from the beginning.
+__attribute__((visibility("hidden"))) inline ComponentContext* under_construction = nullptr;
+
+/// Makes a component whose constructor may log.
+template <typename T, typename... Arguments>
+T* construct(ComponentContext* context, const Arguments&... arguments) {
+    struct Guard {
+        explicit Guard(ComponentContext* present) { under_construction = present; }
+        ~Guard() { under_construction = nullptr; }
+        Guard(const Guard&) = delete;
+        Guard& operator=(const Guard&) = delete;
+    };
+    const Guard guard(context);
+    return new T(arguments...);
+}
+
 }  // namespace detail
 
 }  // namespace rtcf
@@ -64,9 +82,13 @@ RTCF_ENTRY_POINT() {
 
 /// As RTCF_COMPONENT for a class in a namespace: `RTCF_COMPONENT_NAMED(arm::Pid, "Pid", "…",
 /// ArmPid)`; TAG is any identifier unique in the source file.
-#define RTCF_COMPONENT_NAMED(CLASS, NAME, DOC, TAG)                                         \
-    namespace {                                                                             \
-    ::rtcf::ComponentRecord rtcf_record_##TAG{                                              \
-        NAME, DOC, [](const char*) -> ::rtcf::Component* { return new CLASS(); }, nullptr}; \
-    const ::rtcf::detail::Registration rtcf_registration_##TAG{rtcf_record_##TAG};          \
+#define RTCF_COMPONENT_NAMED(CLASS, NAME, DOC, TAG)                                \
+    namespace {                                                                    \
+    ::rtcf::ComponentRecord rtcf_record_##TAG{                                     \
+        NAME, DOC,                                                                 \
+        [](const char*, ::rtcf::ComponentContext* context) -> ::rtcf::Component* { \
+            return ::rtcf::detail::construct<CLASS>(context);                      \
+        },                                                                         \
+        nullptr};                                                                  \
+    const ::rtcf::detail::Registration rtcf_registration_##TAG{rtcf_record_##TAG}; \
     }

@@ -18,6 +18,34 @@
 #include "rtcf/eigen_type.hpp"
 
 namespace rtcf::test {
+
+struct Gains {
+    std::int32_t joint;
+    double gain;
+};
+enum class Mode : std::uint8_t { Idle, Force = 7 };
+struct Target {
+    double x, y, z;
+};
+struct TargetOnRos {
+    static const char* name() { return "Target"; }
+    static void toMessage(const Target& value, geometry_msgs::Vector3& message) {
+        message.x = value.x;
+        message.y = value.y;
+        message.z = value.z;
+    }
+    static void fromMessage(const geometry_msgs::Vector3& message, Target& value) {
+        value = {message.x, message.y, message.z};
+    }
+};
+
+}  // namespace rtcf::test
+
+template <>
+struct rtcf::PortType<rtcf::test::Target>
+    : rtcf::MappedPortType<rtcf::test::Target, geometry_msgs::Vector3, rtcf::test::TargetOnRos> {};
+
+namespace rtcf::test {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -194,6 +222,50 @@ TEST(EigenType, MatrixWithoutLayoutIsTakenByItsSize) {
     ASSERT_TRUE(deserialize(roscppBytes(message), value));
     EXPECT_EQ(value(0, 1), 2.0);
     EXPECT_EQ(value(1, 0), 3.0);
+}
+
+TEST(AnyType, IsCopiedByteByByte) {
+    Gains gains{};
+    EXPECT_TRUE(deserialize(rtcfBytes(Gains{3, 0.5}), gains));
+    EXPECT_EQ(gains.joint, 3);
+    EXPECT_EQ(gains.gain, 0.5);
+    EXPECT_FALSE(deserialize(Bytes(3), gains));
+    Mode mode{};
+    EXPECT_TRUE(deserialize(rtcfBytes(Mode::Force), mode));
+    EXPECT_EQ(mode, Mode::Force);
+    std::vector<double> numbers;
+    EXPECT_TRUE(deserialize(rtcfBytes(std::vector<double>{1.0, 2.0}), numbers));
+    EXPECT_EQ(numbers, (std::vector<double>{1.0, 2.0}));
+    EXPECT_FALSE(deserialize(Bytes(9), numbers));
+    std::string text;
+    EXPECT_TRUE(deserialize(rtcfBytes(std::string("two words")), text));
+    EXPECT_EQ(text, "two words");
+}
+
+TEST(AnyType, IsNotOnRosAndHasItsNameFromCpp) {
+    EXPECT_STREQ(typeInfo<Gains>().name, "rtcf::test::Gains");
+    EXPECT_STREQ(typeInfo<std::string>().name, "std::string");
+    EXPECT_STREQ(typeInfo<Gains>().ros_type, "");
+    EXPECT_TRUE(typeInfo<Gains>().fixed_size);
+    EXPECT_FALSE(typeInfo<std::vector<Gains>>().fixed_size);
+}
+
+TEST(AnyType, IsPrintedAsFarAsItTellsWhatItIs) {
+    EXPECT_EQ(PortType<Mode>::print(Mode::Force), "7");
+    EXPECT_EQ((PortType<std::array<float, 2>>::print({0.5F, -1.0F})), "[0.5, -1]");
+    EXPECT_EQ(PortType<std::string>::print("a b"), "\"a b\"");
+    EXPECT_EQ((PortType<std::array<Mode, 2>>::print({Mode::Idle, Mode::Force})), "[0, 7]");
+    struct Pair {
+        std::uint8_t one, two;
+    };
+    EXPECT_EQ(PortType<Pair>::print({1, 255}), "0x01ff");
+}
+
+TEST(AnyType, IsOnRosIfItIsGivenAMessage) {
+    EXPECT_STREQ(typeInfo<Target>().ros_type, "geometry_msgs/Vector3");
+    geometry_msgs::Vector3 message;
+    message.y = 2.0;
+    EXPECT_EQ(rtcfBytes(Target{0.0, 2.0, 0.0}), roscppBytes(message));
 }
 
 TEST(MessageType, IsAsRoscppHasIt) {

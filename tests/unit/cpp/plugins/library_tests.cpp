@@ -26,7 +26,7 @@ std::string refusalOf(const std::string& path) {
 
 // What a Versioned component of this library writes.
 std::int32_t versionOf(const Library& library) {
-    const std::unique_ptr<Component> component(library.find("Versioned")->create("V"));
+    const std::unique_ptr<Component> component(library.find("Versioned")->create("V", nullptr));
     component->update();
     return static_cast<const Slot<std::int32_t>&>(*component->outputs()[0]->slot()).value;
 }

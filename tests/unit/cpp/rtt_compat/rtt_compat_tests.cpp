@@ -18,12 +18,18 @@ class RttCompat : public RunnerFixture {
    protected:
     ChangeOutcome loadOld(const std::string& type, const std::string& name,
                           executor::Remaps remaps = {}) {
+        return loadFrom(RTCF_UNIT_COMPONENTS "/old_style.so", type, name, std::move(remaps));
+    }
+    ChangeOutcome loadApi(const std::string& type, const std::string& name,
+                          executor::Remaps remaps = {}) {
+        return loadFrom(RTCF_UNIT_COMPONENTS "/old_api.so", type, name, std::move(remaps));
+    }
+    ChangeOutcome loadFrom(const std::string& library, const std::string& type,
+                           const std::string& name, executor::Remaps remaps) {
         ComponentDefinition component = definition(type, name);
         component.remaps = std::move(remaps);
-        return onGraphThread([&] {
-            return runner().load(component, RTCF_UNIT_COMPONENTS "/old_style.so",
-                                 [](const std::string&) {});
-        });
+        return onGraphThread(
+            [&] { return runner().load(component, library, [](const std::string&) {}); });
     }
 
     // What a component has said, in order.
@@ -185,6 +191,55 @@ TEST_F(RttCompat, NodeHandleWithoutANodeIsRefused) {
     const std::string why = refusal([this] { loadOld("NeedsRos", "N"); });
     EXPECT_NE(why.find("configure failed"), std::string::npos) << why;
     EXPECT_NE(why.find("nodeHandle()"), std::string::npos) << why;
+}
+
+TEST_F(RttCompat, PortsCarryStructsEnumsArraysStringsAndVectors) {
+    loadApi("Sender", "S",
+            {{"gains", "g"}, {"mode", "m"}, {"triple", "t"}, {"text", "s"}, {"numbers", "n"}});
+    loadApi("Receiver", "R",
+            {{"gains", "g"}, {"mode", "m"}, {"triple", "t"}, {"text", "s"}, {"numbers", "n"}});
+    step(300);
+    EXPECT_TRUE(
+        hasSaid("/R", "7 0.5 2 3 a text that is longer than what a string holds in itself 99"));
+}
+
+TEST_F(RttCompat, TypesOfAComponentsOwnStayInTheRunnerAndThatIsSaid) {
+    configure([](RunnerSettings& settings) { settings.whitelist = ".*"; });
+    const ChangeOutcome outcome = loadApi("Receiver", "R");
+    EXPECT_NE(std::find(outcome.notes.begin(), outcome.notes.end(),
+                        "/gains is not on ROS: there is no ROS message for its type "
+                        "rtcf_unit_test::Gains"),
+              outcome.notes.end());
+}
+
+TEST_F(RttCompat, LogsOfEachKindArriveThoseOfConstructorsToo) {
+    loadApi("Logger", "L");
+    step(1);
+    EXPECT_EQ(said("/L"),
+              (std::vector<std::string>{"constructed by 1", "constructed by 2", "constructed by 3",
+                                        "configured", "updated", "and again"}));
+}
+
+TEST_F(RttCompat, LogOfAConstructorThatFailsArrives) {
+    EXPECT_NE(refusal([this] { loadApi("Unlucky", "U"); }).find("no luck"), std::string::npos);
+    EXPECT_TRUE(hasSaid("/U", "about to fail"));
+}
+
+TEST_F(RttCompat, ErrorHookRunsInsteadOfUpdateHookUntilItRecovers) {
+    loadApi("Erring", "E");
+    step(5);
+    EXPECT_EQ(said("/E"),
+              (std::vector<std::string>{"update 0", "update 1", "error 2", "error 3", "update 4"}));
+}
+
+TEST_F(RttCompat, PortsAreFoundCallBackAndMayBeClearedAndDisconnected) {
+    loadOld("Third", "T", {{"out", "thirds"}});
+    loadApi("Listener", "L", {{"in", "thirds"}});
+    step(7);
+    // Written in iterations 0, 3 and 6.
+    EXPECT_EQ(said("/L"),
+              (std::vector<std::string>{"in other yesyes", "called by in", "0: 2", "1: 1", "2: 0",
+                                        "called by in", "3: 2", "4: 1", "5: 0", "6: 0"}));
 }
 
 }  // namespace

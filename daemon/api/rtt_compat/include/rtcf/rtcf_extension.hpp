@@ -3,16 +3,18 @@
 /// time. A second base class of components that ORO_CREATE_COMPONENT registers.
 #pragma once
 
-#include <ros/node_handle.h>
-#include <ros/time.h>
+#include <ros/ros.h>
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <stdexcept>
+#include <string_view>
 
 #include "rtcf/component.hpp"
 #include "rtcf/ros.hpp"
 #include "rtcf/rt_logging_macros.hpp"
+#include "rtt/current_component.hpp"
 
 class RtcfExtension {
    public:
@@ -49,6 +51,15 @@ class RtcfExtension {
     double getFrequency() const { return component().frequency(); }
     /// @}
 
+    /// @name As the RT_ macros, which once were made of these
+    /// @{
+    void rtLogDebug(std::string_view text) const { say(rtcf::LogLevel::Debug, text); }
+    void rtLogInfo(std::string_view text) const { say(rtcf::LogLevel::Info, text); }
+    void rtLogWarn(std::string_view text) const { say(rtcf::LogLevel::Warn, text); }
+    void rtLogError(std::string_view text) const { say(rtcf::LogLevel::Error, text); }
+    void rtLogFatal(std::string_view text) const { say(rtcf::LogLevel::Fatal, text); }
+    /// @}
+
     /// By ORO_CREATE_COMPONENT, after construction.
     friend void bindRtcfExtension(RtcfExtension& extension, const rtcf::Component& component) {
         extension.component_ = &component;
@@ -62,6 +73,21 @@ class RtcfExtension {
                 "component that ORO_CREATE_COMPONENT registers");
         }
         return *component_;
+    }
+
+    void say(rtcf::LogLevel level, std::string_view text) const {
+        static constexpr auto at = [](rtcf::LogLevel of) {
+            return rtcf::LogSite{of, "", 0, "rtLog", "{}"};
+        };
+        static constexpr std::array<rtcf::LogSite, 5> kSites{
+            at(rtcf::LogLevel::Debug), at(rtcf::LogLevel::Info), at(rtcf::LogLevel::Warn),
+            at(rtcf::LogLevel::Error), at(rtcf::LogLevel::Fatal)};
+        // Constructors may log too.
+        const rtcf::rtt_compat::HookSlot* const slot = rtcf::rtt_compat::hookSlot();
+        const rtcf::Component* who = component_;
+        if (who == nullptr && slot != nullptr) who = slot->component;
+        if (who == nullptr || !who->logs(level)) return;
+        rtcf::rtt_compat::log(*who, kSites.at(static_cast<std::size_t>(level) - 1), text);
     }
 
     const rtcf::Component* component_ = nullptr;

@@ -13,10 +13,12 @@ namespace rtcf::rtt_compat {
 
 /// Makes a component of OROCOS' kind: its constructor takes its name.
 template <typename T>
-Component* create(const char* name) {
+Component* create(const char* name, ComponentContext* context) {
     static_assert(std::is_base_of_v<RTT::TaskContext, T>,
                   "ORO_CREATE_COMPONENT takes a class derived from RTT::TaskContext");
-    auto* const component = new T(std::string(name));
+    // For what the constructor logs.
+    const InHook hook(nullptr);
+    auto* const component = detail::construct<T>(context, std::string(name));
     // Found by its argument: only who includes rtcf_extension.hpp has it.
     if constexpr (std::is_base_of_v<RtcfExtension, T>) bindRtcfExtension(*component, *component);
     return component;
@@ -56,5 +58,9 @@ constexpr const char* baseName(const char* qualified) {
 #define ORO_LIST_COMPONENT_TYPE(CLASS) RTCF_COMPAT_REGISTER_(CLASS, __COUNTER__)
 /// @}
 
-/// Of a library with several components; there is nothing more to be done.
-#define ORO_CREATE_COMPONENT_LIBRARY() static_assert(true, "")
+/// Of a library with several components; there is nothing more to be done. With or without a
+/// semicolon behind it.
+/// @{
+#define ORO_CREATE_COMPONENT_LIBRARY()
+#define ORO_CREATE_COMPONENT_TYPE()
+/// @}

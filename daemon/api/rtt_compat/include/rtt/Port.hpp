@@ -43,6 +43,13 @@ class PortInterface {
     }
     /// True if the port has a peer, inside the runner or on ROS. Real-time safe.
     virtual bool connected() const noexcept RTCF_NONBLOCKING = 0;
+    /// From here on the component sees no peer: an input reads NoData, an output writes nothing.
+    /// The connection itself is the graph's. Real-time safe.
+    void disconnect() noexcept RTCF_NONBLOCKING { disconnected_ = true; }
+    /// Forgets an input's value until there is a new one. Real-time safe.
+    virtual void clear() noexcept RTCF_NONBLOCKING = 0;
+    /// True if an input has what read() has not given yet. Real-time safe.
+    virtual bool hasNewData() const noexcept RTCF_NONBLOCKING { return false; }
 
     /// Makes it a port of `component`. @throws std::logic_error for a name that is taken or not
     /// legal, a port that has been added before, and after configureHook()
@@ -54,40 +61,62 @@ class PortInterface {
    protected:
     virtual bool added() const noexcept = 0;
     virtual void declare(::rtcf::Component* component) = 0;
+    bool disconnected() const noexcept RTCF_NONBLOCKING { return disconnected_; }
 
    private:
     std::string name_;
     std::string doc_;
+    bool disconnected_ = false;
+};
+
+class InputPortInterface : public PortInterface {
+   public:
+    using PortInterface::PortInterface;
+};
+class OutputPortInterface : public PortInterface {
+   public:
+    using PortInterface::PortInterface;
 };
 
 }  // namespace base
 
 /// An input port carrying values of type T.
 template <typename T>
-class InputPort final : public base::PortInterface {
+class InputPort final : public base::InputPortInterface {
    public:
-    explicit InputPort(const std::string& name = "unnamed") : PortInterface(name) {}
+    explicit InputPort(const std::string& name = "unnamed") : InputPortInterface(name) {}
 
     /// Copies the newest value if there is one; one that was read before only with
     /// `copy_old_data`. Real-time safe for types whose assignment is.
     FlowStatus read(T& sample, bool copy_old_data = true) {
-        if (!port_) return NoData;
-        switch (port_->read(sample, copy_old_data)) {
-            case ::rtcf::DataStatus::New:
-                return NewData;
-            case ::rtcf::DataStatus::Old:
-                return OldData;
-            case ::rtcf::DataStatus::None:
-                break;
+        if (!port_ || disconnected()) return NoData;
+        const ::rtcf::DataStatus status = port_->read();
+        if (status == ::rtcf::DataStatus::New) {
+            cleared_ = false;
+            sample = port_->value();
+            return NewData;
         }
-        return NoData;
+        if (status == ::rtcf::DataStatus::None || cleared_) return NoData;
+        if (copy_old_data) sample = port_->value();
+        return OldData;
     }
     /// As read(): an input keeps no more than the newest value.
     FlowStatus readNewest(T& sample, bool copy_old_data = true) {
         return read(sample, copy_old_data);
     }
+    /// Copies the value of the last read(), which tells its type's size; as it is before that.
+    void getDataSample(T& sample) {
+        if (port_) sample = port_->value();
+    }
+    void clear() noexcept RTCF_NONBLOCKING override {
+        if (port_) port_->read();
+        cleared_ = true;
+    }
+    bool hasNewData() const noexcept RTCF_NONBLOCKING override {
+        return port_ && !disconnected() && port_->newest().sequence != port_->seen();
+    }
     bool connected() const noexcept RTCF_NONBLOCKING override {
-        return port_ && port_->connected();
+        return port_ && !disconnected() && port_->connected();
     }
 
    private:
@@ -95,36 +124,48 @@ class InputPort final : public base::PortInterface {
     void declare(::rtcf::Component* component) override { port_.emplace(component, getName()); }
 
     std::optional<::rtcf::Input<T>> port_;
+    bool cleared_ = false;
 };
 
 /// An output port carrying values of type T.
 template <typename T>
-class OutputPort final : public base::PortInterface {
+class OutputPort final : public base::OutputPortInterface {
    public:
     /// @param keep_last_written_value for source compatibility: it always does
     explicit OutputPort(const std::string& name = "unnamed", bool keep_last_written_value = true)
-        : PortInterface(name) {
+        : OutputPortInterface(name) {
         (void)keep_last_written_value;
     }
 
     /// Real-time safe for types whose assignment is; for messages of variable size once
     /// setDataSample() has been given the largest one.
     WriteStatus write(const T& sample) {
-        if (!port_) return NotConnected;
+        if (!port_ || disconnected()) return NotConnected;
         port_->write(sample);
         return port_->connected() ? WriteSuccess : NotConnected;
     }
     /// Takes the capacity of `sample`. For constructor and configureHook(), before or after the
     /// port is added; not real-time safe.
-    WriteStatus setDataSample(const T& sample) {
+    WriteStatus setDataSample(const T& sample, bool reset = true) {
+        (void)reset;
         sample_ = sample;
         if (port_) port_->reserve(sample);
         return WriteSuccess;
     }
     /// The value that was written last, or default-constructed. Real-time safe as copying T is.
     T getLastWrittenValue() { return port_ ? port_->value() : T{}; }
+    /// @return false before the port is added
+    bool getLastWrittenValue(T& sample) {
+        if (!port_) return false;
+        sample = port_->value();
+        return true;
+    }
+    /// For source compatibility: it always does.
+    void keepLastWrittenValue(bool) noexcept {}
+    void keepNextWrittenValue(bool) noexcept {}
+    void clear() noexcept RTCF_NONBLOCKING override {}
     bool connected() const noexcept RTCF_NONBLOCKING override {
-        return port_ && port_->connected();
+        return port_ && !disconnected() && port_->connected();
     }
 
    private:

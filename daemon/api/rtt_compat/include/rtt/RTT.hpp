@@ -2,5 +2,9 @@
 /// What RTCF 2021's components include of OROCOS.
 #pragma once
 
+#include "rtt/Logger.hpp"
 #include "rtt/Port.hpp"
 #include "rtt/TaskContext.hpp"
+#include "rtt/Time.hpp"
+#include "rtt/os/TimeService.hpp"
+#include "rtt/rt_string.hpp"

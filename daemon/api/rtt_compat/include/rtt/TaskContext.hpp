@@ -1,18 +1,22 @@
 /// @file
-/// OROCOS' TaskContext by its name, over rtcf::Component: the five hooks, the
-/// ports and the state that RTCF 2021's components use.
+/// OROCOS' TaskContext by its name, over rtcf::Component: the hooks, the ports
+/// and the states that RTCF 2021's components use.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
+#include <functional>
+#include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "rtcf/component.hpp"
 #include "rtt/Port.hpp"
+#include "rtt/Time.hpp"
+#include "rtt/current_component.hpp"
 
 namespace RTT {
-
-using Seconds = double;
 
 namespace base {
 
@@ -29,6 +33,10 @@ class TaskCore {
 /// Ports are added to it; one belongs to each component.
 class DataFlowInterface {
    public:
+    using Ports = std::vector<base::PortInterface*>;
+    using PortNames = std::vector<std::string>;
+    using Callback = std::function<void(base::PortInterface*)>;
+
     explicit DataFlowInterface(::rtcf::Component* owner) : owner_(owner) {}
 
     /// @name In the constructor or in configureHook(); the port's address must not change any more
@@ -36,21 +44,57 @@ class DataFlowInterface {
     /// @{
     base::PortInterface& addPort(base::PortInterface& port) {
         port.addTo(owner_);
+        ports_.push_back(&port);
         return port;
     }
     base::PortInterface& addPort(const std::string& name, base::PortInterface& port) {
         port.setName(name);
         return addPort(port);
     }
-    /// As addPort(): a component is updated in every cycle, whatever arrives.
-    template <typename... Arguments>
-    base::PortInterface& addEventPort(Arguments&&... arguments) {
-        return addPort(std::forward<Arguments>(arguments)...);
+    /// As addPort(): a component is updated in every cycle, whatever arrives. `callback` is called
+    /// in front of updateHook() in cycles in which the port has new data, in the real-time thread.
+    base::PortInterface& addEventPort(base::PortInterface& port, Callback callback = {}) {
+        addPort(port);
+        if (callback) callbacks_.emplace_back(&port, std::move(callback));
+        return port;
+    }
+    base::PortInterface& addEventPort(const std::string& name, base::PortInterface& port,
+                                      Callback callback = {}) {
+        port.setName(name);
+        return addEventPort(port, std::move(callback));
     }
     /// @}
 
+    /// The ports that were added, in that order.
+    const Ports& getPorts() const noexcept { return ports_; }
+    PortNames getPortNames() const {
+        PortNames names;
+        for (const base::PortInterface* port : ports_) names.push_back(port->getName());
+        return names;
+    }
+    /// Null if there is none of that name.
+    base::PortInterface* getPort(const std::string& name) const noexcept {
+        const auto found =
+            std::find_if(ports_.begin(), ports_.end(),
+                         [&](const base::PortInterface* port) { return port->getName() == name; });
+        return found == ports_.end() ? nullptr : *found;
+    }
+    template <typename Port>
+    Port* getPortType(const std::string& name) const noexcept {
+        return dynamic_cast<Port*>(getPort(name));
+    }
+
+    /// In the real-time thread, before updateHook().
+    void callBack() {
+        for (const auto& [port, callback] : callbacks_) {
+            if (port->hasNewData()) callback(port);
+        }
+    }
+
    private:
     ::rtcf::Component* owner_;
+    Ports ports_;
+    std::vector<std::pair<base::PortInterface*, Callback>> callbacks_;
 };
 
 /// The base class of RTCF 2021's components.
@@ -62,15 +106,21 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
     explicit TaskContext(std::string name, TaskState initial_state = Stopped)
         : given_name_(std::move(name)), ports_(this) {
         (void)initial_state;
+        // Who is being constructed is not known before this.
+        if (auto* const slot = ::rtcf::rtt_compat::hookSlot(); slot != nullptr)
+            slot->component = this;
     }
 
-    /// @name Hooks, to be overridden; only updateHook() is called in the real-time thread
+    /// @name Hooks, to be overridden; only updateHook() and errorHook() are called in the real-time
+    /// thread
     /// @{
     virtual bool configureHook() { return true; }
     virtual bool startHook() { return true; }
     virtual void updateHook() {}
+    virtual void errorHook() {}  ///< instead of updateHook() from error() to recover()
     virtual void stopHook() {}
     virtual void cleanupHook() {}
+    virtual void exceptionHook() {}  ///< for source compatibility: never called
     /// @}
 
     /// @name Real-time safe
@@ -82,8 +132,10 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
         return static_cast<Seconds>(period()) * 1e-9;
     }
     /// True between the end of startHook() and the end of stopHook().
-    bool isRunning() const noexcept RTCF_NONBLOCKING { return getTaskState() == Running; }
+    bool isRunning() const noexcept RTCF_NONBLOCKING { return getTaskState() >= Running; }
+    bool isActive() const noexcept RTCF_NONBLOCKING { return isRunning(); }
     bool isConfigured() const noexcept RTCF_NONBLOCKING { return getTaskState() >= Stopped; }
+    bool inRunTimeError() const noexcept RTCF_NONBLOCKING { return getTaskState() == RunTimeError; }
     TaskState getTaskState() const noexcept RTCF_NONBLOCKING {
         return state_.load(std::memory_order_relaxed);
     }
@@ -91,12 +143,33 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
     TaskState getTargetState() const noexcept RTCF_NONBLOCKING {
         return target_.load(std::memory_order_relaxed);
     }
+    /// From the next cycle on errorHook() is called.
+    void error() noexcept RTCF_NONBLOCKING {
+        if (getTaskState() == Running) enterState(RunTimeError);
+    }
+    /// From the next cycle on updateHook() is called again.
+    bool recover() noexcept RTCF_NONBLOCKING {
+        if (inRunTimeError()) enterState(Running);
+        return getTaskState() == Running;
+    }
+    /// @}
+    /// Ends the loop in order, as any exception out of a hook does.
+    /// @{
+    [[noreturn]] void exception() const { throw std::runtime_error("exception() was called"); }
+    [[noreturn]] void fatal() const { throw std::runtime_error("fatal() was called"); }
     /// @}
 
     DataFlowInterface* ports() noexcept { return &ports_; }
     base::PortInterface& addPort(base::PortInterface& port) { return ports_.addPort(port); }
     base::PortInterface& addPort(const std::string& name, base::PortInterface& port) {
         return ports_.addPort(name, port);
+    }
+    template <typename... Arguments>
+    base::PortInterface& addEventPort(Arguments&&... arguments) {
+        return ports_.addEventPort(std::forward<Arguments>(arguments)...);
+    }
+    base::PortInterface* getPort(const std::string& name) const noexcept {
+        return ports_.getPort(name);
     }
 
    private:
@@ -106,7 +179,15 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
     bool start() final {
         return enter(Running, [this] { return startHook(); });
     }
-    void update() final { updateHook(); }
+    void update() final {
+        const ::rtcf::rtt_compat::InHook hook(this);
+        ports_.callBack();
+        if (inRunTimeError()) {
+            errorHook();
+        } else {
+            updateHook();
+        }
+    }
     void stop() final {
         enter(Stopped, [this] { return stopHook(), true; });
     }
@@ -114,9 +195,15 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
         enter(PreOperational, [this] { return cleanupHook(), true; });
     }
 
+    void enterState(TaskState next) noexcept RTCF_NONBLOCKING {
+        target_.store(next, std::memory_order_relaxed);
+        state_.store(next, std::memory_order_relaxed);
+    }
+
     // The state changes when the hook is over; an exception or a refusal leaves it as it was.
     template <typename Hook>
     bool enter(TaskState next, const Hook& hook) {
+        const ::rtcf::rtt_compat::InHook here(this);
         target_.store(next, std::memory_order_relaxed);
         try {
             if (hook()) {
@@ -133,7 +220,7 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
 
     std::string given_name_;
     DataFlowInterface ports_;
-    // Written by the graph thread, read by all hooks.
+    // Written in hooks, read by all of them.
     std::atomic<TaskState> state_{PreOperational};
     std::atomic<TaskState> target_{PreOperational};
 };

@@ -1,0 +1,167 @@
+/// @file
+/// Types of a component's own as port types: trivially copyable structs, enums, std::array, and
+/// std::string and std::vector of such. They stay inside the runner, unless they are given a ROS
+/// message:
+///
+///     struct GainsOnRos {
+///         static const char* name() { return "Gains"; }
+///         static void toMessage(const Gains& value, my_msgs::Gains& message);
+///         static void fromMessage(const my_msgs::Gains& message, Gains& value);
+///     };
+///     template <>
+///     struct rtcf::PortType<Gains> : rtcf::MappedPortType<Gains, my_msgs::Gains, GainsOnRos> {};
+///
+/// Two components exchange such a type if both were built with the same definition of it: compared
+/// are its name, size and alignment. It must hold no pointers: values are copied byte by byte.
+#pragma once
+
+#include <cxxabi.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <typeinfo>
+#include <utility>
+#include <vector>
+
+#include "rtcf/message_type.hpp"
+
+namespace rtcf {
+
+/// The base of a PortType that travels on ROS as `Message`; `Conversion` has `name()`,
+/// `toMessage(const T&, Message&)` and `fromMessage(const Message&, T&)`.
+template <typename T, typename Message, typename Conversion>
+struct MappedPortType : detail::MappedPortType<T, Message, Conversion> {
+    static constexpr bool kFixedSize = ros::message_traits::IsFixedSize<Message>::value;
+};
+
+namespace detail {
+
+/// A type's name as C++ spells it, the same in every library.
+template <typename T>
+const char* cppName() {
+    static const std::string name = [] {
+        if constexpr (std::is_same_v<T, std::string>) return std::string("std::string");
+        int status = 0;
+        const std::unique_ptr<char, void (*)(void*)> spelled(
+            abi::__cxa_demangle(typeid(T).name(), nullptr, nullptr, &status), &std::free);
+        return status == 0 ? std::string(spelled.get()) : std::string(typeid(T).name());
+    }();
+    return name.c_str();
+}
+
+template <typename T>
+constexpr bool kIsBytes = std::is_trivially_copyable_v<T> && std::is_default_constructible_v<T> &&
+                          !std::is_pointer_v<T> && !std::is_reference_v<T>;
+
+/// How the values of a type are stored byte by byte: those of one size, and sequences of them.
+template <typename T>
+struct Bytes {
+    static constexpr bool kPossible = kIsBytes<T>;
+    static constexpr bool kFixedSize = true;
+    static std::uint32_t length(const T&) { return sizeof(T); }
+    static void store(const T& value, std::uint8_t* to) { std::memcpy(to, &value, sizeof(T)); }
+    static void load(T& value, const std::uint8_t* from, std::uint32_t size) {
+        if (size != sizeof(T)) throw std::length_error("not of the type's size");
+        std::memcpy(static_cast<void*>(&value), from, sizeof(T));
+    }
+};
+
+template <typename Sequence, typename Element>
+struct SequenceBytes {
+    static constexpr bool kPossible = kIsBytes<Element>;
+    static constexpr bool kFixedSize = false;
+    static std::uint32_t length(const Sequence& value) {
+        return static_cast<std::uint32_t>(value.size() * sizeof(Element));
+    }
+    static void store(const Sequence& value, std::uint8_t* to) {
+        if (!value.empty()) std::memcpy(to, value.data(), value.size() * sizeof(Element));
+    }
+    static void load(Sequence& value, const std::uint8_t* from, std::uint32_t size) {
+        if (size % sizeof(Element) != 0) throw std::length_error("not of the elements' size");
+        value.resize(size / sizeof(Element));
+        if (size != 0) std::memcpy(static_cast<void*>(value.data()), from, size);
+    }
+};
+template <>
+struct Bytes<std::string> : SequenceBytes<std::string, char> {};
+template <typename Element, typename Allocator>
+struct Bytes<std::vector<Element, Allocator>>
+    : SequenceBytes<std::vector<Element, Allocator>, Element> {};
+template <typename Allocator>
+struct Bytes<std::vector<bool, Allocator>> {
+    static constexpr bool kPossible = false;  // has no bytes to copy
+};
+
+/// A value as text: numbers, lists of them and strings as they are read, others as hexadecimals.
+template <typename T>
+void printAny(std::string& text, const T& value) {
+    if constexpr (std::is_enum_v<T>) {
+        printAny(text, static_cast<std::underlying_type_t<T>>(value));
+    } else if constexpr (std::is_same_v<T, bool>) {
+        text += value ? "true" : "false";
+    } else if constexpr (std::is_integral_v<T>) {
+        text += std::to_string(value);
+    } else if constexpr (std::is_floating_point_v<T>) {
+        std::ostringstream number;
+        makeExact(number);
+        number << value;
+        text += number.str();
+    } else if constexpr (std::is_same_v<T, std::string>) {
+        text += '"' + value + '"';
+    } else if constexpr (IsSequence<T>::value) {
+        text += '[';
+        bool first = true;
+        for (const auto& item : value) {
+            if (!std::exchange(first, false)) text += ", ";
+            printAny(text, item);
+        }
+        text += ']';
+    } else {
+        constexpr std::size_t kShown = 32;
+        std::array<std::uint8_t, sizeof(T)> bytes;
+        std::memcpy(bytes.data(), &value, sizeof(T));
+        text += "0x";
+        for (std::size_t i = 0; i < std::min(kShown, bytes.size()); ++i) {
+            text += "0123456789abcdef"[bytes[i] >> 4];
+            text += "0123456789abcdef"[bytes[i] & 15];
+        }
+        if (bytes.size() > kShown) text += "...";
+    }
+}
+
+}  // namespace detail
+
+template <typename T>
+struct PortType<T, std::enable_if_t<detail::Bytes<T>::kPossible && !std::is_arithmetic_v<T> &&
+                                    !ros::message_traits::IsMessage<T>::value>> {
+    using Bytes = detail::Bytes<T>;
+    static constexpr bool kFixedSize = Bytes::kFixedSize;
+    static const char* name() { return detail::cppName<T>(); }
+    static const char* md5() { return ""; }
+    /// @name No ROS message carries it
+    /// @{
+    static const char* rosType() { return ""; }
+    static const char* rosMd5() { return ""; }
+    static const char* rosDefinition() { return ""; }
+    /// @}
+    static std::uint32_t length(const T& value) { return Bytes::length(value); }
+    static void serialize(const T& value, std::uint8_t* to, std::uint32_t) {
+        Bytes::store(value, to);
+    }
+    static void deserialize(T& value, const std::uint8_t* from, std::uint32_t size) {
+        Bytes::load(value, from, size);
+    }
+    static std::string print(const T& value) {
+        std::string text;
+        detail::printAny(text, value);
+        return text;
+    }
+};
+
+}  // namespace rtcf

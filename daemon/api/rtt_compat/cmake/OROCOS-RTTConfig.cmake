@@ -1,0 +1,17 @@
+# find_package(OROCOS-RTT) of packages that were written for RTCF 2021: OROCOS' variables, with
+# rtcf's headers of the same names behind them. UseOROCOS-RTT.cmake has the macros.
+get_filename_component(OROCOS-RTT_USE_FILE_PATH ${CMAKE_CURRENT_LIST_DIR} ABSOLUTE)
+set(OROCOS-RTT_USE_FILE ${OROCOS-RTT_USE_FILE_PATH}/UseOROCOS-RTT.cmake)
+set(OROCOS-RTT_FOUND TRUE)
+set(OROCOS_TARGET gnulinux)
+
+find_package(rtcf REQUIRED CONFIG)
+set(OROCOS-RTT_INCLUDE_DIRS ${rtcf_INCLUDE_DIRS})
+set(OROCOS-RTT_LIBRARIES ${rtcf_LIBRARIES})
+set(OROCOS-RTT_VERSION 2.9.0)
+# Components that are asked for (rtt-marshalling, rtt-scripting …) have nothing here.
+foreach(_oro_component IN LISTS OROCOS-RTT_FIND_COMPONENTS)
+  set(OROCOS-RTT_${_oro_component}_FOUND TRUE)
+  string(TOUPPER "${_oro_component}" _oro_upper)
+  set(OROCOS-RTT_${_oro_upper}_FOUND TRUE)
+endforeach()

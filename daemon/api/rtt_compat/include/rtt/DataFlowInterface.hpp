@@ -1,0 +1,5 @@
+/// @file
+/// By the name that OROCOS has for it.
+#pragma once
+
+#include "rtt/TaskContext.hpp"

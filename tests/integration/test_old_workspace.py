@@ -1,0 +1,135 @@
+"""A catkin workspace as people have it of RTCF 2021: messages, their typekit package, components
+with OROCOS' CMake; built by catkin_make, run from devel/ and from install/."""
+
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from daemon_process import BUILD_TREE, clean_environment, wait_for
+from launch_processes import Launching, Process, build_tree_environment
+from ros_processes import Master
+
+SOURCES = Path(__file__).with_name("old_workspace")
+BUILD_S = 900.0
+DONE = 0
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build it as its author would, in front of this build tree."""
+    folder = tmp_path_factory.mktemp("workspace")
+    shutil.copytree(SOURCES, folder / "src")
+    done = subprocess.run(
+        [
+            *(
+                "/usr/bin/catkin_make",
+                "-C",
+                str(folder),
+                "install",
+                "-DPYTHON_EXECUTABLE=/usr/bin/python3",
+            ),
+            # Nothing to debug or to be fast here.
+            *("-DCMAKE_CXX_FLAGS=-O0", "-DCATKIN_ENABLE_TESTING=OFF"),
+        ],
+        cwd=folder,
+        env=build_tree_environment(clean_environment())
+        | {"ROS_LANG_DISABLE": "genlisp:geneus:gennodejs"},
+        capture_output=True,
+        text=True,
+        timeout=BUILD_S,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+def environment(workspace: Path, space: str, base: dict[str, str]) -> dict[str, str]:
+    """Return that of a user who has sourced a space's setup.sh on top of the build tree's."""
+    done = subprocess.run(
+        ["/bin/sh", "-c", ". ./setup.sh && env -0"],
+        cwd=workspace / space,
+        env=build_tree_environment(base),
+        stdout=subprocess.PIPE,
+        check=True,
+    )
+    lines = (line.partition("=") for line in done.stdout.decode().split("\0") if line)
+    return {name: value for name, _, value in lines}
+
+
+@pytest.fixture(params=["devel", "install"])
+def launching(
+    request: pytest.FixtureRequest, workspace: Path, tmp_path: Path, master: Master
+) -> Iterator[Launching]:
+    """Start nodes in one of its spaces."""
+    launching = Launching(master, tmp_path)
+    launching.environment = environment(workspace, request.param, master.environment()) | {
+        "RTCF_SOCKET": "/nonexistent",
+        "PYTHONUNBUFFERED": "1",
+        "PATH": launching.environment["PATH"],
+    }
+    yield launching
+    launching.end()
+
+
+def test_its_launch_file_and_rosrun_work_from_both_spaces(
+    launching: Launching, master: Master, workspace: Path
+) -> None:
+    launch = launching.roslaunch("old_components", "old.launch")
+    launch.wait_for_output("the loop runs with 1 components")
+    with launching.client() as (client, runner):
+        component = client.get_component("/scaler", runner)
+        space = (
+            "devel"
+            if f"{workspace}/devel" in launching.environment["CMAKE_PREFIX_PATH"]
+            else ("install")
+        )
+        folder = workspace / space / "lib" / "rtcf-components" / "old_components"
+        assert component.library == str(folder / "old_components.so")
+        assert (component.spec.type, component.spec.package) == ("Scaler", "old_components")
+        types = {port.name: port.type for port in component.ports}
+        assert types == {"in": "std_msgs/Float64", "out": "old_msgs/Scaled"}
+        source = subprocess.Popen(
+            ["/usr/bin/rostopic", "pub", "/mapped/in", "std_msgs/Float64", "2.0"],
+            env=master.environment(),
+        )
+        try:
+            wait_for(lambda: "6" in _value(client, runner), "the scaled value")
+        finally:
+            source.terminate()
+            source.wait()
+    told = launching.tool("component_list")
+    assert "/scaler" in told.stdout, told.stderr
+    assert launch.end() == DONE
+    # Of each hook, also of those that Ctrl-C brings about.
+    for text in ("constructed", "scaling by 3", "stopped", "cleaned up"):
+        assert f"/scaler: {text}\n" in launch.output()
+
+
+def _value(client: object, runner: str) -> str:
+    component = client.get_component("/scaler", runner)  # type: ignore[attr-defined]
+    (value,) = (port.value for port in component.ports if port.name == "out")
+    return str(value)
+
+
+def test_its_rostest_passes(workspace: Path, tmp_path: Path) -> None:
+    given = environment(workspace, "devel", clean_environment()) | {
+        "ROS_HOME": str(tmp_path),
+        "ROS_HOSTNAME": "localhost",
+        "RTCF_SOCKET": "/nonexistent",
+    }
+    # publishtest takes the first python3 there is, which must be Debian's.
+    given["PATH"] = f"/usr/bin:{given['PATH']}"
+    test = Process(["/usr/bin/rostest", "old_components", "old.test"], given, tmp_path)
+    try:
+        assert test.wait() == DONE, test.output()
+        assert "RESULT: SUCCESS" in test.output()
+    finally:
+        test.make_sure()
+
+
+def test_the_workspace_has_nothing_in_the_way_of_rtcfs_own_programs(workspace: Path) -> None:
+    for space in ("devel", "install"):
+        assert not (workspace / space / "lib" / "rtcf").exists()
+    assert (BUILD_TREE / "devel" / "lib" / "rtcf" / "rt_runner").exists()
