@@ -9,6 +9,17 @@ namespace {
 constexpr const char* kRoot = "ros";
 constexpr const char* kComponents = "ros.rtcf";
 
+// RTCF 2021 called the logger of /arm/H1 `ros.rtcf./arm/H1`.
+std::string plain(const std::string& logger) {
+    if (logger.find('/') == std::string::npos) return logger;
+    std::string name;
+    for (const char c : logger) {
+        const char next = c == '/' ? '.' : c;
+        if (next != '.' || (!name.empty() && name.back() != '.')) name += next;
+    }
+    return name;
+}
+
 }  // namespace
 
 LogLevels::LogLevels() {
@@ -31,12 +42,12 @@ LogLevel LogLevels::find(const std::string& logger) const {
 
 LogLevel LogLevels::of(const std::string& logger) const {
     const std::lock_guard lock(mutex_);
-    return find(logger);
+    return find(plain(logger));
 }
 
 void LogLevels::set(const std::string& logger, LogLevel level) {
     const std::lock_guard lock(mutex_);
-    set_[logger] = level;
+    set_[plain(logger)] = level;
     for (auto& [key, component] : attached_)
         component.level->store(find(component.logger), std::memory_order_relaxed);
 }

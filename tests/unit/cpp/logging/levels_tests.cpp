@@ -26,6 +26,15 @@ TEST(LogLevels, AreTheNearestAncestors) {
     EXPECT_EQ(levels.of("elsewhere"), LogLevel::Warn);
 }
 
+TEST(LogLevels, AreThoseOfRtcf2021sNamesToo) {
+    LogLevels levels;
+    levels.set("ros.rtcf./arm/H1", LogLevel::Debug);
+    EXPECT_EQ(levels.of("ros.rtcf.arm.H1"), LogLevel::Debug);
+    levels.set("ros.rtcf.arm.H1", LogLevel::Error);
+    EXPECT_EQ(levels.of("ros.rtcf./arm/H1"), LogLevel::Error);
+    EXPECT_EQ(levels.all().count("ros.rtcf./arm/H1"), 0U);
+}
+
 TEST(LogLevels, ReachComponentsAtOnce) {
     LogLevels levels;
     std::atomic<LogLevel> one{LogLevel::Fatal};
