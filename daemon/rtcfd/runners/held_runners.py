@@ -142,6 +142,7 @@ async def release(runners: Runners, runner: Runner, outbox: Outbox | None) -> No
         return
     runner.hold_outbox = None
     await stop_quietly(runner)
+    await runner.leases.unload_all()
     runner.leases.end_all(
         control_pb2.LeaseEnded.WHY_RUNNER_ENDED, f"{hold.holder}, which held its runner, has ended"
     )

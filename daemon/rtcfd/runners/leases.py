@@ -80,6 +80,7 @@ class Leases:
         """Load a component for a holder."""
         runner, spec = self._runner, request.component
         library = await runner.catalog.find(spec.package, spec.type)
+        note = library.note(spec)
         name = full_name(spec)
         if leaving := self._leaving.get(name):
             outbox.progress(f"waiting for {name} of before to leave")
@@ -121,7 +122,11 @@ class Leases:
             return result
 
         what = f"{spec.package}/{spec.type}"
-        return await runner.change(f"the load of {what}", work)
+        result = await runner.change(f"the load of {what}", work)
+        if note:
+            runner.log.warning(note)
+            result.notes.append(note)
+        return result
 
     def attach(self, request: control_pb2.OpenLease, outbox: Outbox) -> control_pb2.ChangeResult:
         """Give a component back to its holder."""
@@ -188,6 +193,25 @@ class Leases:
                 del self._outboxes[name]
             elif runner.up and name in runner.left_out:
                 self.failed(name, runner.left_out[name])
+
+    async def unload_all(self) -> None:
+        """Unload all that is leased, while its holders still hear what it says."""
+        runner = self._runner
+        names = [
+            name
+            for name in self._outboxes
+            if name in runner.desired.components and name not in self._leaving
+        ]
+        self._loading.update(names)  # settle() passes over them
+        try:
+            if names:
+                await graph.unload(runner, names, lambda _: None)
+        except Refusal as refusal:
+            runner.log.error("%s", refusal)
+        finally:
+            self._loading.difference_update(names)
+        if self._leaving:
+            await asyncio.wait(set(self._leaving.values()))
 
     def end_all(self, why: "control_pb2.LeaseEnded.Why", message: str) -> None:
         """Tell all holders that it is over; what they hold is ended by the caller."""
