@@ -157,7 +157,12 @@ class Launching:
     def client(self, node: str = "/rt_runner") -> Iterator[tuple[rtcf.Client, str]]:
         """Give a client of the rtcfd that holds a node's runner, and the runner's name."""
         parameters = Parameters(self.master.uri, "/test")
-        meeting = wait_for(lambda: rendezvous.find(parameters, node), f"runner {node}")
+
+        def found() -> rendezvous.Meeting | None:
+            meeting = rendezvous.find(parameters, node)
+            return None if meeting is None or meeting.starting else meeting
+
+        meeting = wait_for(found, f"runner {node}")
         with rtcf.Client(meeting.socket) as client:
             yield client, meeting.runner
 

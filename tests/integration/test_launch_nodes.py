@@ -206,9 +206,6 @@ def test_a_component_that_is_refused_ends_its_launcher(alone: Launching) -> None
         status, message = cases[words]
         assert process.wait() == status, process.output()
         assert message in process.output()
-    second = alone.node("rt_runner")
-    assert second.wait() == REFUSED
-    assert "a runner /rt_runner is there already" in second.output()
     assert runner.end() == DONE
 
 
@@ -233,5 +230,5 @@ def test_a_launcher_waits_for_its_runner_and_ends_at_once_if_it_is_asked_to(
     alone: Launching,
 ) -> None:
     waiting = launcher(alone, "waiting")
-    waiting.wait_for_output("waiting for runner /rt_runner")
+    waiting.wait_for_output("for runner /rt_runner")
     assert waiting.end() == DONE

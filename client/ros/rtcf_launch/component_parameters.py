@@ -1,6 +1,6 @@
 """The private parameters of rt_launcher: its own, and load-time values of its component."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +11,7 @@ from rtcf_launch.codes import Code, Ending
 from rtcf_launch.parameters import Parameters, close_to
 
 _ON_LOST = choices(control_pb2.OnLeaseLost.DESCRIPTOR)
+PREFIX = "rtcf_"
 _LARGEST = 2**31 - 1  # XML-RPC has no larger integers
 
 
@@ -28,42 +29,84 @@ class LauncherParameters:
     others: dict[str, Any] = field(default_factory=dict)  # the component's
 
 
-def read(values: Mapping[str, Any]) -> LauncherParameters:
-    """Check the launcher's own parameters."""
+def named_runner(values: Mapping[str, Any]) -> str | None:
+    """Return the name of the runner that is asked for, if any is."""
+    for name in (PREFIX + "runner", "runner"):
+        value = values.get(name)
+        if isinstance(value, str):
+            return value
+    return None
+
+
+def read(
+    values: Mapping[str, Any], declared: Container[str] = ()
+) -> tuple[LauncherParameters, list[str]]:
+    """Check the launcher's own parameters; return them, and a line for each that gives way.
+
+    Each may be named with a prefix.  Without it, it is the component's if that declares it, or
+    if the value does not fit: components may read private parameters that they do not declare.
+    """
     given = Parameters(values)
-    on_lost = given.word("on_lease_lost", _ON_LOST)
-    return LauncherParameters(
-        runner=given.text("runner"),
+    notes: list[str] = []
+
+    def own(name: str, take: Callable[[str], Any], fits: bool = True) -> Any:
+        if given.has(PREFIX + name):
+            return take(PREFIX + name)
+        why = ""
+        if name in declared:
+            why = "the component declares it"
+        elif not fits:
+            why = "it means nothing without ~every"
+        elif given.has(name):
+            value = given.raw(name)
+            try:
+                given.put(name, value)
+                return take(name)
+            except Ending as error:
+                given.put(name, value)
+                why = str(error)
+        if given.has(name):
+            notes.append(
+                f"~{name} is left to the component, rt_launcher's is ~{PREFIX}{name}: {why}"
+            )
+        return None
+
+    every = own("every", lambda name: given.integer(name, 1, _LARGEST))
+    on_lost = own("on_lease_lost", lambda name: given.word(name, _ON_LOST))
+    found = LauncherParameters(
+        runner=own("runner", given.text),
         first=bool(given.boolean("is_first", False)),
         ignore=_ignore(given.raw("topics_ignore_for_graph")),
-        every=given.integer("every", 1, _LARGEST) or 0,
-        phase=given.integer("phase", 0, _LARGEST),
-        optional=bool(given.boolean("optional", False)),
+        every=every or 0,
+        phase=own("phase", lambda name: given.integer(name, 0, _LARGEST), every is not None),
+        optional=bool(own("optional", given.boolean)),
         on_lost=_ON_LOST[on_lost] if on_lost else control_pb2.ON_LEASE_LOST_STOP,
         others=given.rest(),
     )
+    return found, notes
 
 
 def settings(
     others: Mapping[str, Any], declared: Mapping[str, graph_pb2.ParameterInfo]
-) -> tuple[list[graph_pb2.ParameterSetting], list[str]]:
-    """Return load-time values of declared parameters, and the names of the other private ones.
+) -> tuple[list[graph_pb2.ParameterSetting], list[str], list[str]]:
+    """Return load-time values of declared parameters, the names of the other private ones, and a
+    line for each of those that may be a slip of the pen.
 
-    Those are left to the component's node handle; what looks like a slip of the pen
-    is refused.
+    The others are left to the component's node handle, for which any name is right.
     """
     result = []
     rest = []
+    slips = []
     for name, value in sorted(others.items()):
         info = declared.get(name)
         if info is not None:
             result.append(graph_pb2.ParameterSetting(name=name, value=_value(info, value)))
             continue
+        rest.append(name)
         missing = [each for each in declared if each not in others]
         if hint := close_to(name, missing):
-            raise Ending(Code.USAGE, f"the component has no parameter ~{name}{hint}")
-        rest.append(name)
-    return result, rest
+            slips.append(f"the component declares no parameter ~{name}{hint}")
+    return result, rest, slips
 
 
 def _value(info: graph_pb2.ParameterInfo, value: Any) -> graph_pb2.ParameterValue:

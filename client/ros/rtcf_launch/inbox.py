@@ -16,6 +16,8 @@ import rtcf
 class Asked:
     """The process was asked to end."""
 
+    why: str = ""  # if not by a signal
+
 
 @dataclass(frozen=True)
 class Lost:
@@ -51,6 +53,11 @@ class Inbox:
             if event is not None and not isinstance(event, Asked):
                 self._queue.put(event)
         return self.asked
+
+    def ask(self, why: str) -> None:
+        """Let the process end, as a signal does.  Any thread."""
+        self.asked = True
+        self._queue.put(Asked(why))
 
     def _signalled(self, _: int, __: Any) -> None:
         self.asked = True

@@ -13,16 +13,19 @@ from typing import Any
 import rtcf
 from rtcf.v1 import control_pb2, graph_pb2
 
-from rtcf_launch import arguments, component_parameters, rendezvous
+from rtcf_launch import arguments, component_parameters
 from rtcf_launch.codes import Code, Ending
 from rtcf_launch.inbox import Asked, Inbox, Lost
 from rtcf_launch.master import Master, MasterSilent
 from rtcf_launch.rendezvous import Meeting
+from rtcf_launch.ros_node import RosNode, wait_until_gone
+from rtcf_launch.runner_choice import RunnerChoice
 from rtcf_launch.screen import Screen
 
 _POLL_S = 0.2
-_SAY_AFTER_S = 5.0
-_SAY_AGAIN_S = 60.0
+_SAY_EVERY_S = 5.0
+_PREDECESSOR_S = 10.0
+_LAST_CALL_S = 0.5
 # rtcfd waits as long for us after its restart; a little more for the restart itself.
 _RETURN_S = 15.0
 _RETRY_S = 0.3
@@ -34,13 +37,16 @@ usage: rosrun rtcf rt_launcher PACKAGE COMPONENT [__name:=NAME] [FROM:=TO]... [_
 Loads a component into the loop of an rt_runner, and unloads it at its own end.
 
 private parameters; all others are values of parameters that the component declares:
-  runner                   name of the rt_runner (default: the nearest one named rt_runner)
+  runner                   name of the rt_runner (default: the nearest one named rt_runner, else
+                           the only one of the launch)
   is_first                 all connections into it are loop breaks
   topics_ignore_for_graph  regular expression, or a list: connections that are, for it
   every, phase             run in each n-th cycle, and in which of them
   optional                 after a fault the loop goes on without it
   on_lease_lost            if this process dies: stop the loop and unload (stop, the default),
                            unload, or keep
+Those that are not RTCF 2021's are also known as rtcf_runner, rtcf_every and so on; a component
+that declares a name of ours gets it.
 
 exit status: 0 asked to end, 1 refused, 2 wrong arguments or parameters, 3 the component failed
 or was taken out, 4 its runner has gone
@@ -64,6 +70,7 @@ class LauncherNode:
         self._screen = Screen(self._node)
         self._inbox = Inbox()
         self._master = Master(given.master_uri, self._node)
+        self._ros_node: RosNode | None = None
         self._run_id = ""
         self._spec = graph_pb2.ComponentSpec()
         self._tenancy: rtcf.Tenancy | None = None
@@ -74,7 +81,8 @@ class LauncherNode:
     def run(self) -> Code:
         """Serve until it is asked to end or something ends it."""
         try:
-            self._parameters = self._read_parameters()
+            self._read_parameters()
+            self._enter_ros()
             return self._serve()
         except (Ending, MasterSilent, rtcf.RtcfError) as error:
             code = error.code if isinstance(error, Ending) else Code.REFUSED
@@ -84,49 +92,68 @@ class LauncherNode:
         finally:
             if self._client is not None:
                 self._client.close()
+            # Last: a launcher that takes our name waits for this.
+            if self._ros_node is not None:
+                self._ros_node.end(Master(self._given.master_uri, self._node, _LAST_CALL_S))
 
-    def _read_parameters(self) -> component_parameters.LauncherParameters:
+    def _read_parameters(self) -> None:
         for name, value in self._given.private.items():
             self._master.set(f"{self._node}/{name}", value)
         values = self._master.parameter(self._node, {})
+        self._values = values if isinstance(values, dict) else {}
         self._run_id = str(self._master.parameter("/run_id", "")) or f"{os.getpid()}"
-        return component_parameters.read(values if isinstance(values, dict) else {})
+        # What is wrong whatever the component declares is said before anything is waited for.
+        component_parameters.read(self._values)
+
+    def _enter_ros(self) -> None:
+        """Become a node; wait until one of our name, which that displaces, has unloaded."""
+        self._ros_node = RosNode(self._master, self._node, self._given.hostname, self._inbox.ask)
+        before = self._ros_node.register()
+        if before and not wait_until_gone(before, self._inbox.pause, _PREDECESSOR_S):
+            raise Ending(
+                Code.DONE if self._inbox.asked else Code.REFUSED,
+                f"a node {self._node} is there already, and does not end",
+            )
 
     # -- the runner ---------------------------------------------------------
 
     def _find_runner(self) -> Meeting:
         """Wait for the runner, which may start after us."""
+        named = component_parameters.named_runner(self._values)
+        choice = RunnerChoice(self._master, self._given.ns, named)
+        self._unnamed = (
+            RunnerChoice(self._master, self._given.ns, None)
+            if named is not None and f"{component_parameters.PREFIX}runner" not in self._values
+            else None
+        )
         begin = time.monotonic()
-        say_at = begin + _SAY_AFTER_S
+        say_at = begin + _SAY_EVERY_S
         while True:
-            node, meeting = self._look()
-            if meeting is not None and meeting.host != rendezvous.host():
-                raise Ending(
-                    Code.REFUSED,
-                    f"runner {node} is on {meeting.host}, this launcher on {rendezvous.host()}: "
-                    "start both on one machine",
-                )
-            if meeting is not None and rendezvous.alive(meeting):
+            meeting = choice.look()
+            if meeting is not None:
                 return meeting
             now = time.monotonic()
+            if meeting := self._yielded(now - begin):
+                return meeting
             if now > say_at:
-                self._screen.info(f"waiting for runner {node} for {now - begin:.0f} s")
-                say_at = now + _SAY_AGAIN_S
+                self._screen.info(f"waiting for {now - begin:.0f} s for {choice.waiting}")
+                say_at = now + _SAY_EVERY_S
             if self._inbox.pause(_POLL_S):
                 raise Ending(Code.DONE)
 
-    def _look(self) -> tuple[str, Meeting | None]:
-        """Return the node of the runner, and where it is if that is known."""
-        named = self._parameters.runner
-        if named is not None:
-            node = arguments.resolve(named, self._given.ns)
-            return node, rendezvous.find(self._master, node)
-        # The nearest one: roslaunch has set the parameters of all nodes before it starts any.
-        nodes = arguments.upward("rt_runner", self._given.ns)
-        for node in nodes:
-            if self._master.has(node):
-                return node, rendezvous.find(self._master, node)
-        return nodes[0], None
+    def _yielded(self, waited_s: float) -> Meeting | None:
+        """Return the runner there is without ~runner, if that turns out to be the component's."""
+        if waited_s < _SAY_EVERY_S or self._unnamed is None:
+            return None
+        meeting = self._unnamed.look()
+        if meeting is None:
+            return None
+        package, type_name = self._given.words
+        with rtcf.Client(meeting.socket) as client:
+            types = {each.type: each for each in client.list_types(package).types}
+        declared = [each.name for each in types[type_name].parameters] if type_name in types else []
+        self._unnamed = None  # asked once
+        return meeting if "runner" in declared else None
 
     # -- the component ------------------------------------------------------
 
@@ -134,6 +161,14 @@ class LauncherNode:
         self._meeting = meeting
         self._client = rtcf.Client(meeting.socket)
         package, type_name = self._given.words
+        offered = {each.type: each for each in self._client.list_types(package).types}
+        # A type that is not there is refused by rtcfd, which knows why.
+        declared = (
+            {each.name: each for each in offered[type_name].parameters}
+            if type_name in offered
+            else {}
+        )
+        self._parameters, notes = component_parameters.read(self._values, declared)
         spec = rtcf.component(
             package,
             type_name,
@@ -147,17 +182,15 @@ class LauncherNode:
         )
         for source, target in self._given.remaps:
             spec.remaps.add(**{"from": source, "to": target})
-        offered = {each.type: each for each in self._client.list_types(package).types}
-        # A type that is not there is refused by rtcfd, which knows why.
-        declared = {each.name: each for each in offered[type_name].parameters} if (
-            type_name in offered
-        ) else {}  # fmt: skip
         if type_name in offered:
-            values, rest = component_parameters.settings(self._parameters.others, declared)
+            values, rest, slips = component_parameters.settings(self._parameters.others, declared)
             spec.parameters.extend(values)
+            notes += slips
             if rest:
                 names = ", ".join(f"~{name}" for name in rest)
                 self._screen.info(f"left to the component's node handle: {names}")
+        for note in notes:
+            self._screen.warn(note)
         self._spec = spec
         self._lease()
 
@@ -186,6 +219,8 @@ class LauncherNode:
             if event is None:
                 return Code.DONE  # rtcfd sees our end
             if isinstance(event, Asked):
+                if event.why:
+                    self._screen.warn(f"asked to end: {event.why}")
                 if self._tenancy is None or self._lost_since is not None:
                     return Code.DONE
                 if deadline is None:
@@ -260,6 +295,8 @@ def main(argv: Sequence[str] | None = None, build_tree: Path | None = None) -> i
             end="",
         )
         return Code.USAGE
+    # A class in a namespace is registered by its last name, whatever RTCF 2021 called it.
+    given.words = [given.words[0].strip(), given.words[1].strip().rpartition("::")[2]]
     # By rosrun it may have no name: then it is that of the component type.
     given.name = given.name or given.words[1]
     return LauncherNode(given).run()

@@ -1,4 +1,4 @@
-"""The parameter server of a ROS master, with a limit for each call."""
+"""A ROS master: its parameters and registrations, with a limit for each call."""
 
 import xmlrpc.client
 from http.client import HTTPException
@@ -46,6 +46,24 @@ class Master:
     def delete(self, name: str) -> None:
         """Delete a parameter, if it is there."""
         self._call("deleteParam", name)
+
+    def names(self) -> list[str]:
+        """Return the names of all parameters."""
+        code, _, names = self._call("getParamNames")
+        return [str(name) for name in names] if code == 1 else []
+
+    def node_uri(self, name: str) -> str:
+        """Return where a node is said to be; empty = there is none of that name."""
+        code, _, uri = self._call("lookupNode", name)
+        return str(uri) if code == 1 else ""
+
+    def register_service(self, service: str, service_uri: str, node_uri: str) -> None:
+        """Register a service of the caller's; another node of its name is told to shut down."""
+        self._call("registerService", service, service_uri, node_uri)
+
+    def unregister_service(self, service: str, service_uri: str) -> None:
+        """Take a service back."""
+        self._call("unregisterService", service, service_uri)
 
     def _call(self, method: str, *arguments: Any) -> Any:
         # A connection for each call: a master may be restarted between two of them.

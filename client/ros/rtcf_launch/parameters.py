@@ -60,19 +60,27 @@ class Parameters:
         return value
 
     def word(self, name: str, allowed: Iterable[str]) -> str | None:
-        """Take one of some words."""
+        """Take one of some words, in any case."""
         value = self._take(name)
         if value is _MISSING:
             return None
         words = list(allowed)
-        if value not in words:
+        if not isinstance(value, str) or value.lower() not in words:
             raise _wrong(f"~{name} must be one of {', '.join(words)}, not {_shown(value)}")
-        return str(value)
+        return value.lower()
 
     def raw(self, name: str) -> Any:
         """Take a value of any type; None if it is not there."""
         value = self._take(name)
         return None if value is _MISSING else value
+
+    def has(self, name: str) -> bool:
+        """Tell whether a parameter is there and has not been taken."""
+        return name in self._values
+
+    def put(self, name: str, value: Any) -> None:
+        """Give a value back."""
+        self._values[name] = value
 
     def rest(self) -> dict[str, Any]:
         """Return what nobody has taken."""

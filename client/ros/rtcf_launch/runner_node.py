@@ -15,7 +15,8 @@ from typing import Any
 
 import rtcf
 from rtcf.client import DEFAULT_SOCKET
-from rtcf.v1 import control_pb2
+from rtcf.v1 import control_pb2, runner_pb2
+from rtcf_shared.enums import word
 
 from rtcf_launch import arguments, rendezvous, runner_parameters
 from rtcf_launch.codes import Code, Ending
@@ -23,12 +24,14 @@ from rtcf_launch.daemon_choice import choose
 from rtcf_launch.inbox import Asked, Inbox, Lost
 from rtcf_launch.master import Master, MasterSilent
 from rtcf_launch.private_daemon import PrivateDaemon
+from rtcf_launch.ros_node import RosNode, wait_until_gone
 from rtcf_launch.screen import Screen
 
 # rtcfd waits as long for us after its restart; a little more for the restart itself.
 _RETURN_S = 15.0
 _RETRY_S = 0.3
 _PREDECESSOR_S = 5.0
+_DISPLACED_S = 10.0
 _END_S = 3.0
 _LAST_CALL_S = 0.5
 
@@ -55,6 +58,12 @@ private parameters:
                            memory that is locked and touched at the start
   stall_timeout            end a cycle that makes no progress, in s; 0: never (default: 2)
   warmup_cycles            first cycles, kept out of the statistics (default: 10)
+  ros_latch                regular expression: topics whose last message late subscribers get
+  ros_decimation, ros_decimate
+                           of the topics that match, publish each n-th value (default: 1, .*)
+  ros_largest_message_kB   of types of variable size, in both directions (default: 256)
+  sim_time                 follow /clock: auto (default: if /use_sim_time), never, always
+  max_clock_jump           a clock that goes further in one tick begins anew, in s (default: 10)
   on_crash                 hold, or resume without a component that is optional
   on_fault                 when the loop ends by a fault: exit (default), or stay
   daemon                   auto (default), system or private: whose rtcfd it is
@@ -78,14 +87,17 @@ class RunnerNode:
         self._daemon: PrivateDaemon | None = None
         self._tenancy: rtcf.Tenancy | None = None
         self._client: rtcf.Client | None = None
+        self._ros_node: RosNode | None = None
         self._announced = False
+        self._taken_once = False
+        self._token = ""
         self._lost_since: float | None = None
 
     def run(self) -> Code:
         """Serve until it is asked to end or something ends it."""
         try:
             self._parameters = self._read_parameters()
-            self._check_free()
+            self._enter_ros()
             self._take()
             return self._serve()
         except (Ending, MasterSilent, rtcf.RtcfError) as error:
@@ -95,6 +107,9 @@ class RunnerNode:
             return code
         finally:
             self._end()
+            # Last: a runner that takes our name waits for this.
+            if self._ros_node is not None:
+                self._ros_node.end(self._last_calls())
 
     # -- the begin ----------------------------------------------------------
 
@@ -110,14 +125,21 @@ class RunnerNode:
         parameters.settings.ros.ns = self._node
         return parameters
 
-    def _check_free(self) -> None:
-        there = rendezvous.find(self._master, self._node)
-        if there is not None and there.host == rendezvous.host() and rendezvous.alive(there):
+    def _enter_ros(self) -> None:
+        """Become a node; wait until one of our name, which that displaces, has given all back."""
+        self._ros_node = RosNode(self._master, self._node, self._given.hostname, self._inbox.ask)
+        before = self._ros_node.register()
+        if before and not wait_until_gone(before, self._inbox.pause, _DISPLACED_S):
             raise Ending(
-                Code.REFUSED,
-                f"a runner {self._node} is there already at this ROS master: "
+                Code.DONE if self._inbox.asked else Code.REFUSED,
+                f"a runner {self._node} is there already at this ROS master, and does not end: "
                 "end its launch, or give this one another name",
             )
+        rendezvous.announce(self._master, self._node, rendezvous.meeting(self._runner))
+        self._announced = True
+
+    def _last_calls(self) -> Master:
+        return Master(self._given.master_uri, self._node, _LAST_CALL_S)
 
     def _take(self) -> None:
         wanted = self._parameters.daemon
@@ -173,6 +195,8 @@ class RunnerNode:
         while True:
             event = self._inbox.get()
             if isinstance(event, Asked):
+                if event.why:
+                    self._screen.warn(f"asked to end: {event.why}")
                 return Code.DONE
             if isinstance(event, Lost):
                 self._reconnect(event.error)
@@ -193,19 +217,18 @@ class RunnerNode:
             self._screen.info("rtcfd is back, the runner is kept")
             return
         assert self._client is not None
-        meeting = rendezvous.Meeting(
-            self._client.socket, self._runner, self._token, rendezvous.host()
-        )
+        meeting = rendezvous.meeting(self._runner, self._client.socket, self._token)
         rendezvous.announce(self._master, self._node, meeting)
-        self._announced = True
-        frequency = status.settings.frequency_hz
+        self._taken_once = True
         if self._parameters.mode == "wait_for_components":
             what = f"waiting for {self._parameters.components} components"
         elif self._parameters.mode == "wait_for_trigger":
             what = f"waiting for `rtcfctl -r {self._runner} start` or the service activate_rt_loop"
         else:
             what = "starting"
-        self._screen.info(f"runner {self._runner} at {frequency:g} Hz: {what}")
+        self._screen.info(f"runner {self._runner} at {_shown(status.settings)}: {what}")
+        if not self._parameters.settings.HasField("frequency_hz"):
+            self._screen.warn("no ~frequency is set; RTCF 2021 took 1 Hz then")
         if self._parameters.mode == "no_wait":
             self._start()
 
@@ -245,7 +268,7 @@ class RunnerNode:
             what = "has ended" if self._daemon.ended else f"does not answer ({error})"
             raise Ending(Code.LOST, f"the private rtcfd {what}: {self._daemon.last_words()}")
         now = time.monotonic()
-        if not self._announced:
+        if not self._taken_once:
             raise Ending(Code.REFUSED, str(error))
         if self._lost_since is None:
             self._lost_since = now
@@ -262,25 +285,42 @@ class RunnerNode:
     def _end(self) -> None:
         if self._announced:
             try:
-                master = Master(self._given.master_uri, self._node, _LAST_CALL_S)
+                master = self._last_calls()
                 found = rendezvous.find(master, self._node)
-                if found is not None and found.token == self._token:
+                if found is not None and found.pid == str(os.getpid()):
                     rendezvous.withdraw(master, self._node)
             except MasterSilent:
                 pass
+        if self._tenancy is not None and (self._daemon is None or not self._daemon.ended):
+            self._give_back(self._tenancy)
         if self._daemon is not None:
             self._daemon.end()
-        elif self._tenancy is not None:
-            self._tenancy.end()
-            deadline = time.monotonic() + _END_S
-            while (left := deadline - time.monotonic()) > 0:
-                event = self._inbox.get(left)
-                if isinstance(event, Lost):
-                    break
-                if hasattr(event, "WhichOneof") and event.WhichOneof("kind") == "ended":
-                    break
         if self._client is not None:
             self._client.close()
+
+    def _give_back(self, tenancy: rtcf.Tenancy) -> None:
+        """End the hold; show what hooks say until that is done."""
+        tenancy.end()
+        deadline = time.monotonic() + _END_S
+        while (left := deadline - time.monotonic()) > 0:
+            event = self._inbox.get(left)
+            if isinstance(event, Lost):
+                return
+            if hasattr(event, "WhichOneof"):
+                kind = event.WhichOneof("kind")
+                if kind == "logs":
+                    self._screen.records(event.logs)
+                elif kind == "ended":
+                    return
+
+
+def _shown(settings: runner_pb2.RunnerSettings) -> str:
+    """Return what the loop is, with the defaults that were taken."""
+    cpu = "the last CPU" if settings.cpu < 0 else f"CPU {settings.cpu}"
+    return (
+        f"{settings.frequency_hz:g} Hz, {cpu}, priority {settings.priority}, "
+        f"overrun {word(runner_pb2.OverrunPolicy.DESCRIPTOR, settings.overrun)}"
+    )
 
 
 def _log_folder() -> str:

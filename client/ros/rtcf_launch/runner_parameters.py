@@ -22,6 +22,8 @@ _WAIT_POLICIES = {
 _OVERRUNS = choices(runner_pb2.OverrunPolicy.DESCRIPTOR)
 _REALTIME = choices(runner_pb2.Realtime.DESCRIPTOR)
 _ON_CRASH = choices(runner_pb2.OnCrash.DESCRIPTOR)
+_SIM_TIME = choices(runner_pb2.SimTime.DESCRIPTOR)
+_LEAST_STACK_KB = 16
 _LARGEST = 2**31 - 1  # XML-RPC has no larger integers
 
 _NAMES = (
@@ -29,7 +31,8 @@ _NAMES = (
     *("ros_mapping_blacklist", "ros_queue", "wait_policy", "overrun", "max_overruns"),
     *("lock_memory", "safe_heap_size_kB", "safe_stack_size_kB", "cpu_affinity_mask", "cpu"),
     *("priority", "spin", "realtime", "stall_timeout", "warmup_cycles", "on_crash"),
-    *("daemon", "on_fault"),
+    *("daemon", "on_fault", "ros_latch", "ros_decimation", "ros_decimate"),
+    *("ros_largest_message_kB", "sim_time", "max_clock_jump"),
 )
 
 
@@ -57,7 +60,9 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
     put("priority", given.integer("priority", 1, 98))
     put("lock_memory", given.boolean("lock_memory"))
     put("heap_kb", given.integer("safe_heap_size_kB", 0, 1024 * 1024))
-    put("stack_kb", given.integer("safe_stack_size_kB", 16, 64 * 1024))
+    # RTCF 2021's default of 0 means none; a thread has this much in any case.
+    stack = given.integer("safe_stack_size_kB", 0, 64 * 1024)
+    put("stack_kb", None if stack is None else max(stack, _LEAST_STACK_KB))
     put("max_overruns", given.integer("max_overruns", 0, _LARGEST))
     put("warmup_cycles", given.integer("warmup_cycles", 0, _LARGEST))
     stall_s = given.number("stall_timeout", 0.0, 3600.0)
@@ -70,6 +75,12 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
     put("whitelist", given.text("ros_mapping_whitelist"), settings.ros)
     put("blacklist", given.text("ros_mapping_blacklist"), settings.ros)
     put("queue", given.integer("ros_queue", 1, 1_000_000), settings.ros)
+    put("latch", given.text("ros_latch"), settings.ros)
+    put("decimation", given.integer("ros_decimation", 1, 1_000_000), settings.ros)
+    put("decimate", given.text("ros_decimate"), settings.ros)
+    put("largest_message_kb", given.integer("ros_largest_message_kB", 1, 65536), settings.ros)
+    put("sim_time", _value(_SIM_TIME, given.word("sim_time", _SIM_TIME)))
+    put("max_clock_jump_s", given.number("max_clock_jump", 0.001, 1e9))
 
     components = given.integer("num_components_expected", 1, _LARGEST)
     mode = given.word("mode", MODES) or ("no_wait" if components is None else MODES[0])
@@ -85,12 +96,11 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
         daemon=given.word("daemon", DAEMONS) or DAEMONS[0],
         exit_on_fault=(given.word("on_fault", ("exit", "stay")) or "exit") == "exit",
     )
-    # What is no word of ours may be somebody else's; a slip of the pen is not.
+    # What is no word of ours may be a slip of the pen, or somebody else's.
     unknown = sorted(name for name in given.rest() if name != RENDEZVOUS)
-    for name in unknown:
-        if hint := close_to(name, _NAMES):
-            raise Ending(Code.USAGE, f"no parameter ~{name} is known{hint}")
-    return result, [f"parameter ~{name} is not known to rt_runner" for name in unknown]
+    return result, [
+        f"parameter ~{name} is not known to rt_runner{close_to(name, _NAMES)}" for name in unknown
+    ]
 
 
 def _overrun(given: Parameters) -> int | None:

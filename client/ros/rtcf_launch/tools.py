@@ -84,7 +84,7 @@ def _place(args: argparse.Namespace, given: arguments.Arguments) -> tuple[str | 
     try:
         for node in arguments.upward(args.runner, given.ns):
             meeting = rendezvous.find(master, node)
-            if meeting is not None and meeting.host == rendezvous.host():
+            if meeting is not None and not meeting.starting and meeting.host == rendezvous.host():
                 return meeting.socket, meeting.runner
     except MasterSilent:
         pass

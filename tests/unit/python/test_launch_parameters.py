@@ -41,6 +41,12 @@ def test_each_parameter_of_a_runner_is_a_setting() -> None:
             "stall_timeout": 1.5,
             "warmup_cycles": 3,
             "on_crash": "resume",
+            "ros_latch": "/l",
+            "ros_decimation": 4,
+            "ros_decimate": "/d",
+            "ros_largest_message_kB": 512,
+            "sim_time": "never",
+            "max_clock_jump": 2.5,
             "daemon": "private",
             "on_fault": "stay",
         }
@@ -66,8 +72,13 @@ def test_each_parameter_of_a_runner_is_a_setting() -> None:
         stall_timeout_ms=1500,
         warmup_cycles=3,
         on_crash=runner_pb2.ON_CRASH_RESUME,
-        ros=runner_pb2.RosSettings(whitelist="/a", blacklist="/b", queue=7),
-    )
+        sim_time=runner_pb2.SIM_TIME_NEVER,
+        max_clock_jump_s=2.5,
+        ros=runner_pb2.RosSettings(
+            whitelist="/a", blacklist="/b", queue=7,
+            latch="/l", decimation=4, decimate="/d", largest_message_kb=512,
+        ),
+    )  # fmt: skip
 
 
 def test_what_is_not_said_is_left_to_the_daemon() -> None:
@@ -76,6 +87,11 @@ def test_what_is_not_said_is_left_to_the_daemon() -> None:
     assert (found.mode, found.daemon, found.exit_on_fault, lines) == ("no_wait", "auto", True, [])
     found, _ = runner_parameters.read({"num_components_expected": 2})
     assert found.mode == "wait_for_components"
+
+
+def test_what_rtcf_2021_took_is_taken() -> None:
+    found, lines = runner_parameters.read({"mode": "No_Wait", "safe_stack_size_kB": 0})
+    assert (found.mode, found.settings.stack_kb, lines) == ("no_wait", 16, [])
 
 
 @pytest.mark.parametrize(
@@ -96,7 +112,9 @@ def test_what_is_not_said_is_left_to_the_daemon() -> None:
         ({"wait_policy": "relative", "overrun": "skip"}, "say the same thing"),
         ({"lock_memory": "yes"}, '~lock_memory must be true or false, not "yes"'),
         ({"safe_heap_size_kB": -1}, "~safe_heap_size_kB of -1 is out of range"),
-        ({"safe_stack_size_kB": 8}, "~safe_stack_size_kB of 8 is out of range: 16 to"),
+        ({"safe_stack_size_kB": -8}, "~safe_stack_size_kB of -8 is out of range: 0 to"),
+        ({"ros_decimation": 0}, "~ros_decimation of 0 is out of range: 1 to"),
+        ({"sim_time": "sometimes"}, "~sim_time must be one of auto, never, always"),
         ({"cpu_affinity_mask": 0}, "~cpu_affinity_mask must be an integer with a bit"),
         ({"cpu_affinity_mask": 1 << 30}, "has none of the CPUs that may be used"),
         ({"cpu_affinity_mask": 1, "cpu": 0}, "say the same thing"),
@@ -104,7 +122,6 @@ def test_what_is_not_said_is_left_to_the_daemon() -> None:
         ({"spin": "a lot"}, "~spin must be a number of µs or"),
         ({"daemon": "mine"}, "~daemon must be one of auto, system, private"),
         ({"on_fault": 1}, "~on_fault must be one of exit, stay, not 1"),
-        ({"freqency": 1000}, "no parameter ~freqency is known; did you mean ~frequency?"),
     ],
 )
 def test_a_wrong_parameter_of_a_runner_is_one_clear_line(
@@ -113,13 +130,18 @@ def test_a_wrong_parameter_of_a_runner_is_one_clear_line(
     assert message in refusal_of(values)
 
 
-def test_a_parameter_that_resembles_none_is_somebody_elses() -> None:
-    _, lines = runner_parameters.read({"robot": "r1", "rtcf_runner": {"socket": "/s"}})
-    assert lines == ["parameter ~robot is not known to rt_runner"]
+def test_a_parameter_that_is_not_known_is_a_warning_with_what_it_resembles() -> None:
+    _, lines = runner_parameters.read(
+        {"freqency": 1000, "robot": "r1", "rtcf_runner": {"socket": "/s"}}
+    )
+    assert lines == [
+        "parameter ~freqency is not known to rt_runner; did you mean ~frequency?",
+        "parameter ~robot is not known to rt_runner",
+    ]
 
 
 def test_a_launcher_keeps_its_own_parameters_and_leaves_the_component_the_others() -> None:
-    found = component_parameters.read(
+    found, notes = component_parameters.read(
         {
             "runner": "arm",
             "is_first": True,
@@ -134,6 +156,32 @@ def test_a_launcher_keeps_its_own_parameters_and_leaves_the_component_the_others
     assert (found.runner, found.first, found.ignore) == ("arm", True, "/a|/b.*")
     assert (found.every, found.phase, found.optional) == (4, 1, True)
     assert (found.on_lost, found.others) == (control_pb2.ON_LEASE_LOST_KEEP, {"kp": 2})
+    assert notes == []
+
+
+def test_a_launchers_own_parameters_give_way_to_the_components() -> None:
+    values = {"every": 0.5, "phase": 1, "optional": True, "runner": "arm", "rtcf_every": 2}
+    found, notes = component_parameters.read(values, ["every", "phase", "optional", "runner"])
+    assert (found.every, found.phase, found.optional, found.runner) == (2, None, False, None)
+    assert found.others == {"every": 0.5, "phase": 1, "optional": True, "runner": "arm"}
+    assert notes[-1] == (
+        "~optional is left to the component, rt_launcher's is ~rtcf_optional: "
+        "the component declares it"
+    )
+
+
+def test_values_that_do_not_fit_a_launcher_are_the_components_and_that_is_said() -> None:
+    found, notes = component_parameters.read({"every": 0.5, "phase": 2, "on_lease_lost": "die"})
+    assert (found.every, found.phase) == (0, None)
+    assert found.others == {"every": 0.5, "phase": 2, "on_lease_lost": "die"}
+    assert notes == [
+        "~every is left to the component, rt_launcher's is ~rtcf_every: "
+        "~every must be an integer, not 0.5",
+        "~on_lease_lost is left to the component, rt_launcher's is ~rtcf_on_lease_lost: "
+        '~on_lease_lost must be one of stop, unload, keep, not "die"',
+        "~phase is left to the component, rt_launcher's is ~rtcf_phase: "
+        "it means nothing without ~every",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -142,10 +190,9 @@ def test_a_launcher_keeps_its_own_parameters_and_leaves_the_component_the_others
         {"is_first": "yes"},
         {"topics_ignore_for_graph": 3},
         {"topics_ignore_for_graph": ["/a", 3]},
-        {"every": 0},
-        {"phase": -1},
-        {"on_lease_lost": "die"},
-        {"runner": 7},
+        {"rtcf_every": 0},
+        {"rtcf_on_lease_lost": "die"},
+        {"rtcf_runner": 7},
     ],
 )
 def test_a_wrong_parameter_of_a_launcher_is_named(values: dict[str, Any]) -> None:
@@ -157,11 +204,12 @@ def test_a_wrong_parameter_of_a_launcher_is_named(values: dict[str, Any]) -> Non
 
 def test_declared_parameters_get_values_of_their_kind() -> None:
     declared = {name: graph_pb2.ParameterInfo(name=name, type="double") for name in ("kp", "limit")}
-    settings, rest = component_parameters.settings({"kp": 2, "gains": {"a": 1}}, declared)
+    settings, rest, slips = component_parameters.settings({"kp": 2, "gains": {"a": 1}}, declared)
     assert [(each.name, each.value.int_value) for each in settings] == [("kp", 2)]
-    assert rest == ["gains"]
-    with pytest.raises(Ending, match="no parameter ~limt; did you mean ~limit"):
-        component_parameters.settings({"limt": 1.0}, declared)
+    assert (rest, slips) == (["gains"], [])
+    settings, rest, slips = component_parameters.settings({"limt": 1.0}, declared)
+    assert (settings, rest) == ([], ["limt"])
+    assert slips == ["the component declares no parameter ~limt; did you mean ~limit?"]
     with pytest.raises(Ending, match="~kp must be one double, not a list"):
         component_parameters.settings({"kp": [1, 2]}, declared)
 

@@ -1,0 +1,117 @@
+"""rt_runner and rt_launcher as ROS nodes, and how a launcher finds its runner."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rosgraph
+from daemon_process import wait_for
+from launch_processes import Launching, Process
+from ros_processes import Master
+
+DONE, _, USAGE, _, LOST = range(5)
+
+
+@pytest.fixture
+def launching(tmp_path: Path, master: Master) -> Iterator[Launching]:
+    launching = Launching(master, tmp_path)
+    launching.forget()
+    yield launching
+    launching.end()
+
+
+def identity(launching: Launching, name: str, *words: str) -> Process:
+    return launching.node(
+        "rt_launcher", "rtcf_examples", "Identity", f"__name:={name}", "out:=~out", *words
+    )
+
+
+def running(launching: Launching, *words: str) -> Process:
+    runner = launching.node("rt_runner", *words)
+    runner.wait_for_output("the loop runs")
+    return runner
+
+
+def nodes(master: Master) -> set[str]:
+    return set(master.run("/usr/bin/rosnode", "list").split())
+
+
+def test_nodes_are_seen_pinged_and_killed_as_others(launching: Launching, master: Master) -> None:
+    runner = running(launching)
+    launcher = identity(launching, "mine", "__ns:=/arm")
+    launcher.wait_for_output("loaded into runner")
+    assert {"/rt_runner", "/arm/mine"} <= nodes(master)
+    assert "xmlrpc reply from" in master.run("/usr/bin/rosnode", "ping", "-c", "1", "/rt_runner")
+    told = master.run("/usr/bin/rosnode", "info", "/arm/mine")
+    assert f"Pid: {launcher.pid}" in told
+    assert master.call("/rt_runner/get_loggers")["loggers"] == [
+        {"name": "ros.rtcf", "level": "info"}
+    ]
+    master.run("/usr/bin/rosnode", "kill", "/arm/mine")
+    assert launcher.wait() == DONE
+    assert "asked to end: " in launcher.output()
+    with launching.client() as (client, name):
+        assert client.get_order(name) == []
+    assert "/arm/mine" not in nodes(master)
+    assert runner.end() == DONE
+    assert "/rt_runner" not in nodes(master)
+
+
+def test_a_second_node_of_a_name_displaces_the_first(launching: Launching) -> None:
+    runner = running(launching)
+    first = identity(launching, "it")
+    first.wait_for_output("loaded into runner")
+    second = identity(launching, "it")
+    assert first.wait() == DONE
+    assert "new node registered with same name" in first.output()
+    second.wait_for_output("loaded into runner")
+    successor = launching.node("rt_runner")
+    assert runner.wait() == DONE
+    assert second.wait() == LOST
+    successor.wait_for_output("the loop runs")
+    assert successor.end() == DONE
+
+
+def test_a_left_over_runner_holds_up_nobody_and_waiting_says_for_what(
+    launching: Launching, master: Master
+) -> None:
+    rosgraph.Master("/test", master.uri).setParam("/left/rt_runner/frequency", 100)
+    named = identity(launching, "named", "_runner:=/left/rt_runner")
+    near = identity(launching, "near", "__ns:=/left")
+    near.wait_for_output("no rt_runner runs at this ROS master")
+    runner = running(launching)
+    near.wait_for_output("loaded into runner rt_runner")
+    named.wait_for_output(
+        "for runner /left/rt_runner: its parameters are there, it is not (there are: /rt_runner; "
+        "~runner names another)"
+    )
+    assert (near.end(), named.end(), runner.end()) == (DONE, DONE, DONE)
+
+
+def test_the_only_runner_is_taken_whatever_its_name_and_of_several_none(
+    launching: Launching,
+) -> None:
+    runner = running(launching, "__name:=control", "__ns:=/arm")
+    launcher = identity(launching, "one", "__ns:=/leg")
+    launcher.wait_for_output("loaded into runner arm_control")
+    other = running(launching, "__name:=other")
+    undecided = identity(launching, "two")
+    assert undecided.wait() == USAGE
+    assert "which runner? There are /arm/control, /other: name one by ~runner" in undecided.output()
+    assert (launcher.end(), runner.end(), other.end()) == (DONE, DONE, DONE)
+
+
+def test_parameters_of_a_components_own_names_reach_it_and_slips_are_said(
+    launching: Launching,
+) -> None:
+    runner = running(launching, "_freqency:=5")
+    runner.wait_for_output("~freqency is not known to rt_runner; did you mean ~frequency?")
+    launcher = launching.node(
+        "rt_launcher", " rtcf_examples ", " waves::Wave", "__name:=wave", "_amplitud:=2.0",
+        "_every:=0.5", "_rtcf_every:=2",
+    )  # fmt: skip
+    launcher.wait_for_output("loaded into runner")
+    assert "declares no parameter ~amplitud; did you mean ~amplitude?" in launcher.output()
+    with launching.client() as (client, name):
+        wait_for(lambda: client.get_component("/wave", name).spec.every == 2, "the component")
+    assert (launcher.end(), runner.end()) == (DONE, DONE)
