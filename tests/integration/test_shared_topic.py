@@ -20,7 +20,7 @@ def test_two_writers_share_a_topic_until_somebody_reads_it(daemon: Daemon, maste
             *("--param", f"amplitude:={amplitude}", "--param", "shape:=square"),
         )
         assert done.returncode == 0, done.stderr
-    assert "topic /shared has 2 writers in this runner: /one.wave, /five.wave" in done.stdout
+    assert "topic /shared has 2 writers in this runner: /one.wave, /five.wave" in done.stderr
     assert "/one.wave, /five.wave" in daemon.ctl("connections").stdout
     assert daemon.ctl("start").returncode == 0
     echo = subprocess.run(

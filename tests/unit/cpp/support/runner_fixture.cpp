@@ -43,7 +43,7 @@ RunnerFixture::RunnerFixture()
 RunnerFixture::~RunnerFixture() { journal().gate_open.store(true); }
 
 ChangeOutcome RunnerFixture::load(const ComponentDefinition& component) {
-    return onGraphThread([&] { return runner_->load(component, kLibrary, false, kSilent); });
+    return onGraphThread([&] { return runner_->load(component, kLibrary, kSilent); });
 }
 
 Pending<ChangeOutcome> RunnerFixture::beginLoad(const ComponentDefinition& component) {
@@ -85,7 +85,8 @@ ChangeOutcome RunnerFixture::unload(const std::string& name) {
 
 ChangeOutcome RunnerFixture::replace(const std::string& name,
                                      const ComponentDefinition& component) {
-    return onGraphThread([&] { return runner_->replace(name, component, kLibrary, kSilent); });
+    return onGraphThread(
+        [&] { return runner_->replace(name, component, kLibrary, false, kSilent); });
 }
 
 ChangeOutcome RunnerFixture::setBreak(const std::string& name, const std::string& port,
