@@ -194,7 +194,6 @@ def test_a_component_that_is_refused_ends_its_launcher(alone: Launching) -> None
         ("rtcf_examples", "Mino"): (REFUSED, 'did you mean "Mimo"'),
         ("rtcf_exmples", "Mimo"): (REFUSED, 'no package "rtcf_exmples"'),
         ("rtcf_examples", "Wave", "_amplitude:=11"): (REFUSED, "amplitude"),
-        ("rtcf_examples", "Wave", "_amplitud:=1"): (USAGE, "did you mean ~amplitude?"),
         ("rtcf_examples", "Wave", "_is_first:=3"): (USAGE, "~is_first must be true or false"),
         ("rtcf_examples",): (USAGE, "name a package and a component"),
     }

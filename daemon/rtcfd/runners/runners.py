@@ -141,6 +141,7 @@ class Runners:
             await runner.bring_up()
         except BaseException:
             self._runners.pop(name, None)
+            runner.hold_outbox = None  # its holder is told by the refusal
             await runner.shut_down()
             raise
         await runner.save()
