@@ -14,8 +14,6 @@ import rtcf
 from rtcf.client import DEFAULT_SOCKET
 from rtcf.v1 import graph_pb2
 
-REQUEST = "__complete"
-
 
 def candidates(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str]:
     """Return what the last word may become; nothing where that is a file or a free value."""

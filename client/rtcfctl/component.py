@@ -103,7 +103,7 @@ def show_all(client: rtcf.Client, args: argparse.Namespace, output: Output) -> N
                 each.full_name,
                 f"{each.spec.package}/{each.spec.type}",
                 (enumerator(each, "state").replace("_", " "), _STYLES.get(each.state, "")),
-                _notes(each),
+                ", ".join(filter(None, (_notes(each.spec, each.holder), each.fault))),
             )
             for each in components
         ),
@@ -127,7 +127,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     output.line(f"  from {found.library}")
     if found.fault:
         output.line(f"  fault: {found.fault}", "bold red")
-    if notes := _notes(found):
+    if notes := _notes(found.spec, found.holder):
         output.line(f"  {notes}")
     if found.ports:
         print_ports(list(found.ports), output)
@@ -145,10 +145,10 @@ def print_ports(ports: list[graph_pb2.PortInfo], output: Output) -> None:
                 enumerator(port, "direction").removesuffix("put"),
                 port.mapped_name,
                 port.type,
-                port.value if port.HasField("value") else "-",
+                words.port_value(port.value) if port.HasField("value") else "",
                 port.unit,
-                words.age(port.age_ns) if port.HasField("age_ns") else "-",
-                port.count,
+                words.age(port.age_ns) if port.HasField("age_ns") else "",
+                port.count or "",
                 _flags(port),
             )
             for port in ports
@@ -232,8 +232,7 @@ def _spec(args: argparse.Namespace) -> graph_pb2.ComponentSpec:
     )
 
 
-def _notes(found: graph_pb2.ComponentInfo) -> str:
-    spec = found.spec
+def _notes(spec: graph_pb2.ComponentSpec, holder: str) -> str:
     notes = ["first"] if spec.first else []
     if spec.ignore:
         notes.append(f"ignores {spec.ignore}")
@@ -244,15 +243,17 @@ def _notes(found: graph_pb2.ComponentInfo) -> str:
         notes.append(f"every {spec.every} cycles{phase}")
     if spec.optional:
         notes.append("optional")
-    if found.holder:
-        notes.append(f"held by {found.holder}")
-    if found.fault:
-        notes.append(found.fault)
+    if holder:
+        notes.append(f"held by {holder}")
     return ", ".join(notes)
 
 
 def _flags(port: graph_pb2.PortInfo) -> str:
-    flags = ((port.connected, "connected"), (port.broken, "broken"), (port.mapped, "ROS"))
+    flags = (
+        (port.mapped_name and not port.connected and not port.mapped, "open"),
+        (port.broken, "loop break"),
+        (port.mapped, "ROS"),
+    )
     return " ".join(word for condition, word in flags if condition)
 
 

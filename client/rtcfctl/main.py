@@ -1,6 +1,7 @@
 """rtcfctl's command line: global options, dispatch to the verbs, exit codes."""
 
 import argparse
+import importlib
 import os
 import sys
 from collections.abc import Sequence
@@ -8,50 +9,53 @@ from pathlib import Path
 
 import rtcf
 
-from rtcfctl import (
-    check,
-    completion,
-    component,
-    doctor,
-    files,
-    graph,
-    loop,
-    parameter,
-    replay,
-    runner,
-    stats,
-    status,
-    types,
-)
-from rtcfctl.output import Output
-
 DONE, REFUSED, USAGE, UNREACHABLE = range(4)
 
-_NOUNS = (
-    status,
-    runner,
-    loop,
-    replay,
-    component,
-    graph,
-    files,
-    parameter,
-    types,
-    stats,
-    check,
-    doctor,
-)
+# The module of each verb; only that of the one that is called is imported, as each import is time.
+_MODULES = {
+    "status": "status",
+    "runner": "runner",
+    "start": "loop",
+    "stop": "loop",
+    "step": "loop",
+    "replay": "replay",
+    "load": "component",
+    "unload": "component",
+    "replace": "component",
+    "release": "component",
+    "list": "component",
+    "info": "component",
+    "order": "graph",
+    "connections": "graph",
+    "break": "graph",
+    "unbreak": "graph",
+    "apply": "files",
+    "save": "files",
+    "set": "parameter",
+    "types": "types",
+    "stats": "stats",
+    "check": "check",
+    "doctor": "doctor",
+}
+_COMPLETION = "__complete"
+# Global options that are followed by a word of theirs.
+_WITH_VALUE = ("--socket", "-r", "--runner", "-o", "--output")
+_WITH_EQUALS = ("--socket=", "--runner=", "--output=")
 
 
 def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None) -> int:
     """Run one command; return its exit code."""
     words = sys.argv[1:] if arguments is None else list(arguments)
-    if words[:1] == [completion.REQUEST]:
+    if words[:1] == [_COMPLETION]:
+        from rtcfctl import completion
+
         for candidate in completion.candidates(parser(), words[1:]):
             print(candidate)
         return DONE
-    args = parser().parse_args(words)
+    args = parser(verb_of(words)).parse_args(words)
     args.build_tree = build_tree
+    from rtcfctl.output import Output
+
     output = Output(args.output, args.verbose)
     try:
         with rtcf.Client(args.socket) as client:
@@ -73,8 +77,8 @@ def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None)
     return DONE
 
 
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of the whole command line."""
+def parser(verb: str = "") -> argparse.ArgumentParser:
+    """Return the parser of the whole command line, or of a line with that verb."""
     result = argparse.ArgumentParser(
         prog="rtcfctl",
         description="Controls the real-time loops of rtcfd.",
@@ -87,9 +91,22 @@ def parser() -> argparse.ArgumentParser:
     # which would hide one that was given before it.
     common = argparse.ArgumentParser(add_help=False)
     _global_options(common, defaults=False)
-    for noun in _NOUNS:
-        noun.register(verbs, common)
+    for module in [_MODULES[verb]] if verb else dict.fromkeys(_MODULES.values()):
+        importlib.import_module(f"rtcfctl.{module}").register(verbs, common)
     return result
+
+
+def verb_of(words: Sequence[str]) -> str:
+    """Return the verb of a command line, or nothing where it takes the whole parser to tell."""
+    left = iter(words)
+    for word in left:
+        if word in _MODULES:
+            return word
+        if word in _WITH_VALUE:
+            next(left, None)
+        elif word not in ("-v", "--verbose") and not word.startswith(_WITH_EQUALS):
+            return ""
+    return ""
 
 
 def _global_options(to: argparse.ArgumentParser, defaults: bool) -> None:

@@ -1,18 +1,19 @@
-"""What rtcfctl prints: tables for people, JSON or YAML for machines.
+"""What rtcfctl prints: tables and sentences for people, JSON or YAML for machines.
 
-rich and yaml are imported only where they are used: a call of rtcfctl is short.
+yaml and json are imported only where they are used: a call of rtcfctl is short.
 """
 
+import os
 import sys
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, TextIO
 
 from rtcf.v1 import control_pb2
 
 from rtcfctl.plain import plain
+from rtcfctl.table import format_table
 
-# Where the output is no terminal nothing may be folded to a terminal's width.
-_UNLIMITED_WIDTH = 10_000
+_ANSI = {"bold": "1", "red": "31", "green": "32", "yellow": "33"}
 
 
 class Output:
@@ -21,7 +22,6 @@ class Output:
     def __init__(self, kind: str, verbose: bool = False) -> None:
         self._kind = kind
         self._verbose = verbose or sys.stderr.isatty()
-        self._console: Any = None
 
     @property
     def for_people(self) -> bool:
@@ -40,38 +40,24 @@ class Output:
 
             print(json.dumps(document, indent=2, ensure_ascii=False))
 
-    def line(self, text: str, style: str = "") -> None:
-        """Print a line for people."""
-        from rich.text import Text
-
-        self._rich().print(Text(text, style=style), soft_wrap=True)
+    def line(self, text: str, style: str = "", to: TextIO | None = None) -> None:
+        """Print a line for people; `style` is of words like "bold red"."""
+        stream = to or sys.stdout
+        print(_styled(text, style, _coloured(stream)), file=stream)
 
     def table(
-        self,
-        columns: Sequence[str],
-        rows: Iterable[Sequence[Any]],
-        right: Sequence[str] = (),
-        title: str = "",
+        self, columns: Sequence[str], rows: Iterable[Sequence[Any]], right: Sequence[str] = ()
     ) -> None:
         """Print a table; `right` names the columns of numbers.
 
-        A cell is a string, or a string and its style.
+        A cell is a string, or a string and its style.  Columns in which nothing stands are
+        left out.  On a terminal it is folded to its width; elsewhere nothing is.
         """
-        from rich import box
-        from rich.table import Table
-        from rich.text import Text
-
-        table = Table(box=box.SIMPLE_HEAD, pad_edge=False, title=title, title_justify="left")
-        for column in columns:
-            table.add_column(
-                column, justify="right" if column in right else "left", overflow="fold"
-            )
-        for row in rows:
-            # Text, not str: brackets in names are no markup.
-            table.add_row(
-                *(Text(*cell) if isinstance(cell, tuple) else Text(str(cell)) for cell in row)
-            )
-        self._rich().print(table)
+        cells = [[each if isinstance(each, tuple) else (str(each), "") for each in row]
+                 for row in rows]  # fmt: skip
+        coloured = _coloured(sys.stdout)
+        for text_of_line in format_table(columns, cells, right, _width()):
+            print("".join(_styled(text, style, coloured) for text, style in text_of_line).rstrip())
 
     def begin_anew(self) -> None:
         """Before output that takes the place of the last: clear a terminal; elsewhere begin
@@ -80,12 +66,20 @@ class Output:
             if self._kind == "yaml":
                 print("---")
         elif sys.stdout.isatty():
-            self._rich().clear()
+            print("\x1b[2J\x1b[H", end="")
 
     def progress(self, line: str) -> None:
         """Show what a long call is doing."""
         if self._verbose:
             print(line, file=sys.stderr)
+
+    def alarm(self, runner: str, reasons: Iterable[str], to: TextIO | None = None) -> None:
+        """Say loudly what is missing for real time."""
+        lines = list(reasons)
+        if lines:
+            self.line(f"!! {runner} IS NOT REAL TIME:", "bold red", to)
+        for reason in lines:
+            self.line(f"!!   {reason}", "red", to)
 
     def changed(self, sentence: str, result: control_pb2.ChangeResult) -> None:
         """Print the outcome of a change."""
@@ -100,13 +94,24 @@ class Output:
         for note in result.notes:
             print(f"rtcfctl: note: {note}", file=sys.stderr)
 
-    def _rich(self) -> Any:
-        if self._console is None:
-            from rich.console import Console
 
-            width = None if sys.stdout.isatty() else _UNLIMITED_WIDTH
-            self._console = Console(width=width, highlight=False, markup=False)
-        return self._console
+def _width() -> int | None:
+    """Return how wide a table may be; None where it is not for a terminal."""
+    if not sys.stdout.isatty():
+        return None
+    try:
+        return max(os.get_terminal_size(sys.stdout.fileno()).columns, 40)
+    except OSError:
+        return 80
+
+
+def _coloured(stream: TextIO) -> bool:
+    return stream.isatty() and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"
+
+
+def _styled(text: str, style: str, coloured: bool) -> str:
+    codes = ";".join(_ANSI[word] for word in style.split())
+    return f"\x1b[{codes}m{text}\x1b[0m" if coloured and codes and text.strip() else text
 
 
 def _plain(value: Any) -> Any:

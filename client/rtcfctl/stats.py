@@ -67,14 +67,18 @@ def _print(found: runner_pb2.RunnerStatistics, output: Output) -> None:
         rows.append(_row("adoption of a change", found.adoption))
     output.table((f"{found.runner} (µs)", *_COLUMNS), rows, right=_COLUMNS)
     output.line(
-        f"{found.iterations} cycles, {found.overruns} overruns, {found.missed} missed; "
-        f"{found.minor_faults} minor and {found.major_faults} major page faults, "
+        f"{found.iterations} cycles, {found.overruns} overruns, {found.missed} missed",
+        "bold red" if found.overruns or found.missed else "",
+    )
+    output.line(
+        f"{found.minor_faults} minor, {found.major_faults} major page faults, "
         f"{found.involuntary_switches} involuntary context switches",
-        "bold red" if found.overruns or found.missed or found.major_faults else "",
+        "bold red" if found.major_faults else "",
     )
     for count, what in ((found.log_dropped, "log records"), (found.tap_dropped, "mapped values")):
         if count:
             output.line(f"{count} {what} lost in full rings", "yellow")
+    output.line("")
     output.table(
         ("component (µs)", *_COLUMNS, "overruns"),
         ((*_row(each.component, each.duration), each.overruns) for each in found.components),
@@ -83,6 +87,7 @@ def _print(found: runner_pb2.RunnerStatistics, output: Output) -> None:
     devices = [each for each in found.components if each.device_calls]
     if devices:
         columns = ("calls", "mean")
+        output.line("")
         output.table(
             ("device I/O in (µs)", *columns),
             (

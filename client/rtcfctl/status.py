@@ -39,7 +39,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     for note in response.notes:
         output.line(f"rtcfd: {note}", "yellow")
     for runner in response.runners:
-        _alarms(runner, output)
+        output.alarm(runner.runner, runner.degraded)
     print_runners(list(response.runners), output)
     for runner in response.runners:
         _details(runner, output)
@@ -67,14 +67,6 @@ def print_runners(runners: list[runner_pb2.RunnerStatus], output: Output) -> Non
         ),
         right=numbers,
     )
-
-
-def _alarms(runner: runner_pb2.RunnerStatus, output: Output) -> None:
-    """Say loudly what is missing for real time."""
-    if runner.degraded:
-        output.line(f"!! {runner.runner} IS NOT REAL TIME:", "bold red")
-        for reason in runner.degraded:
-            output.line(f"!!   {reason}", "red")
 
 
 def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:

@@ -1,11 +1,15 @@
 """Figures and values as words for tables."""
 
+import re
 from typing import Any
 
 from rtcf.v1 import graph_pb2
 
 from rtcfctl.plain import plain
 
+# Of what somebody has chosen, and of what is measured or computed.
+_CHOSEN_DIGITS, _MEASURED_DIGITS = 10, 6
+_LONG_NUMBER = re.compile(r"(?<![\w.])-?\d*\.\d{5,}(e[-+]?\d+)?(?![\w.])")
 _UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"), (1.0, "ns"))
 
 
@@ -27,7 +31,18 @@ def value(found: graph_pb2.ParameterValue) -> str:
     content: Any = plain(found)
     if isinstance(content, bool):
         return "true" if content else "false"
+    if isinstance(content, float):
+        return f"{content:.{_CHOSEN_DIGITS}g}"
     return "" if content is None else str(content)
+
+
+def port_value(text: str) -> str:
+    """Return a port's value, of a message with one field that field's, with the digits that
+    matter to the eye."""
+    lines = text.split("\n")
+    if len(lines) == 1:
+        text = text.removeprefix("data: ")
+    return _LONG_NUMBER.sub(lambda found: f"{float(found[0]):.{_MEASURED_DIGITS}g}", text)
 
 
 def yes(condition: bool, word: str = "yes") -> str:

@@ -75,6 +75,8 @@ def test_the_system_daemon_is_taken_where_it_may_be_and_given_back(
         (status,) = client.get_status("rt_runner").runners
         assert status.settings.frequency_hz == 321.0
         assert "rt_runner /rt_runner" in status.holder
+        for reason in status.degraded:
+            runner.wait_for_output(f"!! rt_runner IS NOT REAL TIME: {reason}")
         # The name by which peers reach the loop's node is that of the launch.
         graph = rosgraph.Master("/test", master.uri)
         wait_for(lambda: client.get_status("rt_runner").runners[0].ros.connected, "the ROS node")

@@ -60,5 +60,5 @@ def test_values_have_the_types_they_were_declared_with(daemon: Daemon) -> None:
     assert parameters["mode"]["choices"] == ["idle", "run"]
     assert parameters["enabled"]["minimum"] is None
     ports = {each["name"]: each for each in found["ports"]}
-    assert (ports["product"]["value"], ports["product"]["count"]) == ("data: 3", 1)
+    assert (ports["product"]["value"], ports["product"]["count"]) == ({"data": 3}, 1)
     assert ports["product"]["direction"] == "output"

@@ -235,6 +235,7 @@ class RunnerNode:
     def _report(self, report: control_pb2.HoldReport) -> None:
         if report.running and not self._was_running:
             self._screen.info(f"the loop runs with {report.components} components")
+            self._say_what_is_missing()
         elif self._was_running and not report.running and not report.fault:
             self._screen.info("the loop is stopped")
         self._was_running = report.running
@@ -250,6 +251,14 @@ class RunnerNode:
         if due and not report.running:
             self._start()
 
+    def _say_what_is_missing(self) -> None:
+        """Say as loudly as a refusal that the loop is not real-time, whoever started it."""
+        assert self._client is not None
+        with contextlib.suppress(rtcf.RtcfError):
+            for runner in self._client.get_status(self._runner).runners:
+                for reason in runner.degraded:
+                    self._screen.error(f"!! {self._runner} IS NOT REAL TIME: {reason}")
+
     def _start(self) -> None:
         assert self._client is not None
         try:
@@ -257,7 +266,8 @@ class RunnerNode:
         except rtcf.RefusedError as refusal:
             raise Ending(Code.REFUSED, f"the loop does not start: {refusal}") from None
         for note in result.notes:
-            self._screen.warn(note)
+            if not note.startswith("degraded"):  # said when it runs
+                self._screen.warn(note)
 
     def _reconnect(self, error: rtcf.RtcfError) -> None:
         if isinstance(error, rtcf.RefusedError):

@@ -5,13 +5,16 @@ import os
 import shutil
 import signal
 import socket
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 import rtcf
 import yaml
-from daemon_under_test import DaemonUnderTest
+from daemon_under_test import BUILD_TREE, DaemonUnderTest
 from rtcf.v1 import runner_pb2
-from rtcfctl.main import parser
+from rtcfctl.main import parser, verb_of
 from rtcfctl.plain import plain
 from rtcfctl.runner import settings_of
 
@@ -162,3 +165,28 @@ def test_watched_figures_are_documents_until_ctrl_c(daemon: DaemonUnderTest) -> 
         text += process.stdout.read()
         assert process.wait() == 0
     assert [each["iterations"] for each in yaml.safe_load_all(text)][:2] == [10, 10]
+
+
+def test_a_call_imports_what_its_verb_takes_and_no_more(tmp_path: Path) -> None:
+    script = (
+        "import sys; from rtcfctl.main import main;"
+        f"main(['--socket', {str(tmp_path / 'none')!r}, 'status']); print(*sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=BUILD_TREE / "python", capture_output=True, text=True,
+        check=True,
+    )  # fmt: skip
+    loaded = set(done.stdout.split())
+    assert "rtcfctl.status" in loaded
+    for heavy in ("rich", "yaml", "difflib", "rtcf.replay", "rtcf_shared.graph_reader"):
+        assert heavy not in loaded, heavy
+    assert not {"rtcfctl.doctor", "rtcfctl.check", "rtcfctl.completion"} & loaded
+
+
+@pytest.mark.parametrize(
+    "line", ["status", "-r stats load a b", "--socket x -v -o json stop", "--output=yaml info a"]
+)
+def test_the_verb_is_found_among_global_options(line: str) -> None:
+    words = line.split()
+    whole = parser().parse_args(words)
+    assert vars(parser(verb_of(words)).parse_args(words)) == vars(whole)

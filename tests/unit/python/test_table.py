@@ -1,0 +1,55 @@
+"""Tables that rtcfctl prints: they fit the terminal, and no figure is cut."""
+
+from rtcf.v1 import graph_pb2
+from rtcfctl import words
+from rtcfctl.plain import plain
+from rtcfctl.table import Cell, format_table
+
+
+def lines(
+    columns: tuple[str, ...], *rows: tuple[str, ...], right: tuple[str, ...] = (), width: int = 80
+) -> list[str]:
+    cells: list[list[Cell]] = [[(text, "") for text in row] for row in rows]
+    folded = format_table(columns, cells, right, width)
+    return ["".join(text for text, _ in line).rstrip() for line in folded]
+
+
+def test_columns_are_as_wide_as_what_stands_in_them() -> None:
+    assert lines(("name", "Hz"), ("arm", "50"), ("rt_runner", "2000"), right=("Hz",)) == [
+        "name         Hz",
+        "arm          50",
+        "rt_runner  2000",
+    ]
+
+
+def test_columns_without_content_are_left_out() -> None:
+    assert lines(("name", "unit", "value"), ("a", "", "1"), ("b", "", "2"))[0] == "name  value"
+
+
+def test_text_is_folded_and_figures_are_not() -> None:
+    text = "ignores /arm/.*, loop break at in1, in2, held by rt_launcher /arm/filter (pid 4711)"
+    found = lines(("component", "notes", "µs"), ("/arm/filter", text, "123456.78"),
+                  right=("µs",), width=60)  # fmt: skip
+    assert max(map(len, found)) <= 60
+    assert "123456.78" in found[1]
+    assert "4711)" in found[-1]
+    # Where there is no terminal nothing is folded.
+    cells: list[list[Cell]] = [[(text, ""), ("1", "")]]
+    assert len(list(format_table(("notes", "µs"), cells))) == 2
+
+
+def test_values_have_the_digits_that_matter() -> None:
+    assert words.port_value("data: 0.30000000000000004") == "0.3"
+    assert words.port_value("{x: 1.23456789012, y: -2e-07}") == "{x: 1.23457, y: -2e-07}"
+    chosen = graph_pb2.ParameterValue(double_value=0.1 + 0.2)
+    assert words.value(chosen) == "0.3"
+    assert words.value(graph_pb2.ParameterValue(double_value=12345678.9)) == "12345678.9"
+    assert words.value(graph_pb2.ParameterValue(int_value=12345678901)) == "12345678901"
+
+
+def test_values_of_ports_are_numbers_and_objects_for_machines() -> None:
+    port = graph_pb2.PortInfo(name="out", value="{x: 1.5, y: [1, 2]}")
+    assert plain(port)["value"] == {"x": 1.5, "y": [1, 2]}
+    assert plain(graph_pb2.PortInfo(value="2.5"))["value"] == 2.5
+    assert plain(graph_pb2.PortInfo(value="{x: 1, ..."))["value"] == "{x: 1, ..."
+    assert plain(graph_pb2.PortInfo())["value"] is None
