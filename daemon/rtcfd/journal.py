@@ -30,7 +30,7 @@ class JournalHandler(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Send one record."""
         try:
-            self._send(self.format(record), **fields(record))
+            self._send(standing_alone(record, self.format(record)), **fields(record))
         except Exception:  # logging must not end the daemon
             self.handleError(record)
 
@@ -42,11 +42,8 @@ class LineFormatter(logging.Formatter):
         """Return the line."""
         clock = time.strftime("%H:%M:%S", time.localtime(record.created))
         words = [f"{clock}.{int(record.msecs):03d}", f"{record.levelname:<7}"]
-        runner = getattr(record, "runner", "")
         component = getattr(record, "component", "")
-        if runner:
-            words.append(f"{runner}{' ' if component else ''}{component}:")
-        words.append(" ".join(record.getMessage().splitlines()))
+        words.append(standing_alone(record, " ".join(record.getMessage().splitlines())))
         if component and record.pathname:
             iteration = getattr(record, "iteration", 0)
             words.append(f"({os.path.basename(record.pathname)}:{record.lineno}, #{iteration})")
@@ -54,6 +51,18 @@ class LineFormatter(logging.Formatter):
         if record.exc_info:
             line += "\n" + self.formatException(record.exc_info)
         return line
+
+
+def standing_alone(record: logging.LogRecord, message: str) -> str:
+    """Return a message that says what runner and component it is about: a line is read without
+    the journal's fields, too."""
+    runner = getattr(record, "runner", "")
+    component = getattr(record, "component", "")
+    if component and not message.startswith(f"{component}:"):
+        message = f"{component}: {message}"
+    if runner and not message.startswith((f"{runner}:", f"runner {runner}:")):
+        message = f"{runner}{' ' if component else ': '}{message}"
+    return message
 
 
 def fields(record: logging.LogRecord) -> dict[str, str | int]:

@@ -32,6 +32,7 @@ from rtcfd.runners.ros_services import RosServices
 from rtcfd.runners.runners import Runners
 from rtcfd.service.control import Control
 from rtcfd.state import handover
+from rtcfd.state.boot_graphs import BootGraphs
 from rtcfd.state.desired import Desired
 from rtcfd.state.store import Store
 
@@ -107,6 +108,7 @@ class Daemon:
             raise FailedPrecondition(
                 f"cannot make the state folder {self._options.state_dir}: {error.strerror}"
             ) from None
+        self._options.settings.keep()
         listener = self._endpoint.listen()
         self._serve_privately()
         self._left_over = left_overs(self._command.folder)
@@ -153,10 +155,7 @@ class Daemon:
         try:
             self._read_options()
         except Refusal as refusal:
-            log.error(
-                "the next rtcfd will not start, and loops stop after their orphan_timeout_s: %s",
-                refusal,
-            )
+            log.error("the next rtcfd will take the last good settings: %s", refusal)
         self._clients.close_door()
         serving = asyncio.create_task(self._server.stop(_GRACE_S))
         await self._runners.leave()
@@ -242,12 +241,28 @@ def _reload(socket: Path) -> int:
     try:
         with grpc.insecure_channel(f"unix:{socket}") as channel:
             daemon = control_pb2_grpc.ControlStub(channel)  # type: ignore[no-untyped-call]
-            for line in daemon.Reload(control_pb2.ReloadRequest()).notes:
-                print(line)
+            response = daemon.Reload(control_pb2.ReloadRequest())
+            for line in response.notes:
+                if line not in response.refused:
+                    print(line)
+            for line in response.refused:
+                print(f"rtcfd: not applied: {line}", file=sys.stderr)
     except grpc.RpcError as error:
         print(f"rtcfd: not reloaded: {error.details()}", file=sys.stderr)
         return REFUSED
-    return 0
+    return REFUSED if response.refused else 0
+
+
+def _check(arguments: Sequence[str] | None, build_tree: Path | None) -> int:
+    """Say whether settings and graphs are valid."""
+    log.addHandler(logging.NullHandler())  # what is wrong is printed
+    given = options.parse(arguments, build_tree)
+    _, problems = BootGraphs(given.graphs_dir, {}).read()
+    for problem in problems:
+        print(f"rtcfd: {problem}", file=sys.stderr)
+    if not problems:
+        print("settings and graphs are valid")
+    return REFUSED if problems else 0
 
 
 def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None) -> int:
@@ -255,8 +270,12 @@ def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None)
     try:
         if socket := options.reload_wanted(arguments):
             return _reload(socket)
-        given = options.parse(arguments, build_tree)
+        if options.check_wanted(arguments):
+            return _check(arguments, build_tree)
+        given = options.parse(arguments, build_tree, last_good=True)
         journal.set_up(given.verbose)
+        if given.settings.problem:
+            log.error("%s", given.settings.problem)
         asyncio.run(_run(given, lambda: options.parse(arguments, build_tree)))
     except Refusal as refusal:
         print(f"rtcfd: {refusal}", file=sys.stderr)

@@ -96,7 +96,8 @@ class Reloads:
 
     def notes(self) -> list[str]:
         """Return what is to be said about rtcfd itself."""
-        lines = [f"not applied: {problem}" for problem in self._graph_problems]
+        lines = [self._given.settings.problem] if self._given.settings.problem else []
+        lines += [f"not applied: {problem}" for problem in self._graph_problems]
         lines += self._store.problems
         if [_identity(file) for file in self._files] != self._identities:
             lines.insert(
@@ -106,6 +107,11 @@ class Reloads:
             )
         return lines
 
+    @property
+    def refused(self) -> list[str]:
+        """What of graphs.d is not applied, a line each."""
+        return list(self._graph_problems)
+
     async def reload(self) -> list[str]:
         """Read settings and graphs.d again; refused as a whole if the settings are not valid.
         One at a time; a caller that leaves holds up nothing."""
@@ -113,6 +119,7 @@ class Reloads:
 
     async def _reload(self) -> list[str]:
         new = self._read_options()
+        new.settings.keep()
         lines = [
             f"{name} changes with the next restart of rtcfd"
             for name in _FIXED

@@ -17,6 +17,7 @@ from rtcfd.catalog.catalog import Folder
 from rtcfd.common import runner_settings
 from rtcfd.common.limits import Limits
 from rtcfd.configuration import paths, settings_file
+from rtcfd.configuration.last_good import Settings
 
 _REALTIME = {
     "required": runner_pb2.REALTIME_REQUIRED,
@@ -43,12 +44,22 @@ class Options:
     end_with_stdin: bool
     foreground: bool
     verbose: bool
+    settings: Settings  # as they were read
 
 
-def parse(arguments: Sequence[str] | None, build_tree: Path | None) -> Options:
-    """Return the options; raises Refusal for a bad file, exits with 2 on bad usage."""
+def parse(
+    arguments: Sequence[str] | None, build_tree: Path | None, *, last_good: bool = False
+) -> Options:
+    """Return the options; raises Refusal for a bad file, exits with 2 on bad usage.
+
+    With `last_good`, the service takes the last good settings in the place of bad ones.
+    """
     args = _parser(build_tree).parse_args(arguments)
-    file = _settings(args)
+    kept = None
+    if not args.foreground:
+        kept = _absolute(args.state_dir or _from_systemd("STATE_DIRECTORY", paths.STATE_DIR))
+    settings = Settings.read(_file(args), kept, last_good)
+    file = settings.found
     socket = _socket(args, file)
     realtime = args.realtime or file.realtime or ("preferred" if args.foreground else "required")
     runtime_dir = args.runtime_dir or file.runtime_dir
@@ -89,6 +100,7 @@ def parse(arguments: Sequence[str] | None, build_tree: Path | None) -> Options:
         end_with_stdin=args.end_with_stdin,
         foreground=args.foreground,
         verbose=args.verbose,
+        settings=settings,
     )
 
 
@@ -187,6 +199,11 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
         action="store_true",
         help="make the rtcfd that runs read its settings and graphs again, and exit",
     )
+    parser.add_argument(
+        "--check-config",
+        action="store_true",
+        help="only say whether settings and graphs are valid: exit status 0 or 1",
+    )
     parser.add_argument("--verbose", action="store_true", help="log debugging messages too")
     return parser
 
@@ -196,21 +213,25 @@ def reload_wanted(arguments: Sequence[str] | None) -> Path | None:
     args = _parser(None).parse_args(arguments)
     if not args.reload:
         return None
-    return _socket(args, _settings(args))
+    return _socket(args, Settings.read(_file(args), None, last_good=False).found)
 
 
-def _settings(args: argparse.Namespace) -> settings_file.Config:
-    if args.config is not None:
-        return settings_file.read(args.config)
-    if not args.foreground and settings_file.DEFAULT_FILE.exists():
-        return settings_file.read(settings_file.DEFAULT_FILE)
-    return settings_file.Config()
+def _file(args: argparse.Namespace) -> Path | None:
+    if args.config is None and not args.foreground and settings_file.DEFAULT_FILE.exists():
+        return settings_file.DEFAULT_FILE
+    chosen: Path | None = args.config
+    return chosen
 
 
 def _socket(args: argparse.Namespace, file: settings_file.Config) -> Path:
     return _absolute(
         args.socket or file.socket or Path(os.environ.get("RTCF_SOCKET") or paths.SOCKET)
     )
+
+
+def check_wanted(arguments: Sequence[str] | None) -> bool:
+    """Tell whether settings are only to be checked."""
+    return bool(_parser(None).parse_args(arguments).check_config)
 
 
 def _folders(named: Sequence[Path], build_tree: Path | None) -> list[Folder]:

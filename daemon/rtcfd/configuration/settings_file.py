@@ -52,6 +52,7 @@ class Config:
     runner: runner_pb2.RunnerSettings = field(default_factory=runner_pb2.RunnerSettings)
     access: Access = field(default_factory=Access)
     limits: Limits = field(default_factory=Limits)
+    text: str = field(default="", repr=False)  # of the file
 
 
 class _Wrong(InvalidArgument):
@@ -71,7 +72,7 @@ def read(file: Path) -> Config:
         raise InvalidArgument(f"cannot read {file}: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InvalidArgument(f"{file}: {error}") from None
-    config = Config()
+    config = Config(text=text)
     try:
         _check_keys("", document, ("daemon", "access", "limits", "runner"))
         _read_daemon(_table(document, "daemon"), config)

@@ -135,6 +135,10 @@ async def _listen(
 class Daemon(Protocol):
     """What the daemon itself does for its clients."""
 
+    @property
+    def refused(self) -> list[str]:
+        """What of graphs.d is not applied, a line each."""
+
     def notes(self) -> list[str]:
         """Return what is to be said about rtcfd itself, a line each."""
 
@@ -166,7 +170,8 @@ class Control(control_pb2_grpc.ControlServicer):
     @_answering
     async def Reload(self, request: control_pb2.ReloadRequest) -> Any:
         """Read the settings and graphs.d again."""
-        return control_pb2.ReloadResponse(notes=await self._daemon.reload())
+        notes = await self._daemon.reload()
+        return control_pb2.ReloadResponse(notes=notes, refused=self._daemon.refused)
 
     @_answering
     async def AddRunner(self, request: control_pb2.AddRunnerRequest) -> Any:

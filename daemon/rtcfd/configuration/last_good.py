@@ -1,0 +1,57 @@
+"""The settings of the service, and a copy of those that were good last.
+
+A file that cannot be read must not keep rtcfd from supervising loops that run:
+at a start, the copy in the state folder is taken in its place.
+"""
+
+import logging
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rtcfd.common.refusals import Refusal
+from rtcfd.configuration import settings_file
+
+log = logging.getLogger(__name__)
+
+_NAME = "rtcfd.toml.last-good"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What was read, and what was wrong with the file if the copy was taken."""
+
+    found: settings_file.Config = field(default_factory=settings_file.Config)
+    problem: str = ""
+    _copy: Path | None = None
+
+    @staticmethod
+    def read(file: Path | None, folder: Path | None, last_good: bool) -> "Settings":
+        """Read a file, if one is given; `folder` is that of the copy.
+
+        Raises Refusal, with `last_good` only if there is no good copy either.
+        """
+        copy = folder / _NAME if folder else None
+        if file is None:
+            return Settings()
+        try:
+            return Settings(settings_file.read(file), _copy=copy)
+        except Refusal as refusal:
+            if not last_good or copy is None or not copy.exists():
+                raise
+            return Settings(
+                settings_file.read(copy), f"{refusal}; the last good settings are taken instead"
+            )
+
+    def keep(self) -> None:
+        """Make a copy of settings that were good."""
+        if self._copy is None or self.problem:
+            return
+        new = self._copy.with_name(f"{_NAME}.new")
+        try:
+            if self._copy.exists() and self._copy.read_text(encoding="utf-8") == self.found.text:
+                return
+            new.write_text(self.found.text, encoding="utf-8")
+            os.replace(new, self._copy)
+        except OSError as error:
+            log.warning("no copy of the settings at %s: %s", self._copy, error.strerror)

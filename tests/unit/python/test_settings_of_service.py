@@ -1,0 +1,92 @@
+"""Settings and graphs of the service: checked, reloaded, and what stands in for bad ones."""
+
+import logging
+import subprocess
+
+from daemon_under_test import BUILD_TREE, DaemonUnderTest
+from rtcfd.journal import standing_alone
+
+GOOD = "[runner]\nfrequency_hz = 250.0\n"
+BAD = '[runner]\nfrequency_hz = "fast"\n'
+GRAPH = "components:\n  - {package: demo, type: Fine, name: a}\n"
+REFUSED = "runner: arm\ncomponents:\n  - {package: demo, type: Nothing}\n"
+
+
+def rtcfd(daemon: DaemonUnderTest, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [str(BUILD_TREE / "bin" / "rtcfd"), "--socket", str(daemon.socket), *arguments],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+def test_a_start_with_bad_settings_takes_the_last_good_ones_and_says_so(
+    stopped_daemon: DaemonUnderTest,
+) -> None:
+    daemon = stopped_daemon
+    daemon.settings.write_text(GOOD)
+    daemon.start_service()
+    daemon.end()
+    daemon.settings.write_text(BAD)
+    daemon.start_service()
+    with daemon.client() as client:
+        status = client.get_status()
+    assert status.runners[0].settings.frequency_hz == 250.0
+    said = f"{daemon.settings}:2: runner.frequency_hz must be a number"
+    assert status.notes[0].startswith(said)
+    assert status.notes[0].endswith("; the last good settings are taken instead")
+    assert said in daemon.log()
+    # Mended ones are read without a restart.
+    daemon.settings.write_text(GOOD.replace("250", "500"))
+    assert rtcfd(daemon, "--reload").returncode == 0
+    with daemon.client() as client:
+        status = client.get_status()
+    assert (status.runners[0].settings.frequency_hz, list(status.notes)) == (500.0, [])
+
+
+def test_a_reload_fails_when_a_graph_is_refused(stopped_daemon: DaemonUnderTest) -> None:
+    daemon = stopped_daemon.start_service()
+    (daemon.graphs / "a.yaml").write_text(GRAPH)
+    done = rtcfd(daemon, "--reload")
+    assert (done.returncode, done.stderr) == (0, "")
+    refused = daemon.graphs / "b.yaml"
+    refused.write_text(REFUSED)
+    done = rtcfd(daemon, "--reload")
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"rtcfd: not applied: {refused}: ")
+    assert 'no type "Nothing"' in done.stderr
+    assert str(refused) not in done.stdout
+
+
+def test_settings_and_graphs_are_checked_without_a_daemon(stopped_daemon: DaemonUnderTest) -> None:
+    daemon = stopped_daemon
+    daemon.graphs.mkdir()
+    daemon.settings.write_text(GOOD)
+    (daemon.graphs / "a.yaml").write_text(GRAPH)
+    arguments = (
+        *("--check-config", "--config", str(daemon.settings)),
+        *("--graphs-dir", str(daemon.graphs)),
+    )
+    done = rtcfd(daemon, *arguments)
+    assert (done.returncode, done.stdout) == (0, "settings and graphs are valid\n")
+    (daemon.graphs / "a.yaml").write_text("components: 5\n")
+    done = rtcfd(daemon, *arguments)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == f"rtcfd: {daemon.graphs}/a.yaml:1: components must be a list\n"
+    daemon.settings.write_text(BAD)
+    done = rtcfd(daemon, *arguments)
+    assert done.returncode == 1
+    assert f"{daemon.settings}:2: runner.frequency_hz must be a number" in done.stderr
+
+
+def test_a_line_of_the_journal_stands_by_itself() -> None:
+    def line(message: str, **fields: str) -> str:
+        record = logging.makeLogRecord(fields)
+        return standing_alone(record, message)
+
+    assert line("ready") == "ready"
+    assert line("its executor is gone", runner="arm") == "arm: its executor is gone"
+    assert line("no reply", runner="arm", component="/pid") == "arm /pid: no reply"
+    # Nothing is said twice.
+    said = "/pid: iteration 5: output out is not finite"
+    assert line(said, runner="arm", component="/pid") == f"arm {said}"
+    assert line("arm: stuck", runner="arm") == "arm: stuck"
