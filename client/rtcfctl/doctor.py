@@ -13,6 +13,7 @@ from rtcf.diagnosis import Finding, Grade, Host, Loop, diagnose, last_cpu_of
 from rtcf.v1 import control_pb2, runner_pb2
 
 from rtcfctl.output import Output
+from rtcfctl.words import amount
 
 _SECONDS = 10.0
 _FREQUENCY_HZ = 1000.0
@@ -31,7 +32,7 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     )
     doctor.add_argument(
         "--seconds",
-        type=float,
+        type=amount("s"),
         default=_SECONDS,
         metavar="S",
         help="how long to measure wake-up latency; 0: not at all (default: 10)",

@@ -11,7 +11,7 @@ from typing import Any, TextIO
 from rtcf.v1 import control_pb2
 
 from rtcfctl.plain import plain
-from rtcfctl.table import format_table
+from rtcfctl.table import Cell, format_table
 
 _ANSI = {"bold": "1", "red": "31", "green": "32", "yellow": "33"}
 
@@ -53,8 +53,10 @@ class Output:
         A cell is a string, or a string and its style.  Columns in which nothing stands are
         left out.  On a terminal it is folded to its width; elsewhere nothing is.
         """
-        cells = [[each if isinstance(each, tuple) else (str(each), "") for each in row]
-                 for row in rows]  # fmt: skip
+        cells: list[list[Cell]] = [
+            [(each[0], each[1]) if isinstance(each, tuple) else (str(each), "") for each in row]
+            for row in rows
+        ]
         coloured = _coloured(sys.stdout)
         for text_of_line in format_table(columns, cells, right, _width()):
             print("".join(_styled(text, style, coloured) for text, style in text_of_line).rstrip())

@@ -6,9 +6,11 @@ from typing import Any
 import rtcf
 from rtcf.v1 import runner_pb2
 from rtcf_shared.enums import choices
+from rtcf_shared.quantities import ROS, RUNNER
 
 from rtcfctl.output import Output
 from rtcfctl.status import print_runners
+from rtcfctl.words import amount
 
 # Fields of RunnerSettings whose values are words.
 _CHOICES = {
@@ -120,36 +122,28 @@ def _take(message: Any, field: str, value: Any) -> None:
 
 def _settings_options(to: argparse.ArgumentParser) -> None:
     switch = argparse.BooleanOptionalAction
-    to.add_argument(
-        "--frequency", dest="frequency_hz", type=float, metavar="HZ", help="0.1 to 20000"
-    )
+    add_quantity(to, "--frequency", "frequency_hz", "cycles a second, e.g. 2kHz")
     to.add_argument("--cpu", type=int, metavar="N", help="CPU of the loop; -1: the last allowed")
-    to.add_argument("--priority", type=int, metavar="N", help="SCHED_FIFO, 1 to 98")
-    to.add_argument(
-        "--spin", dest="spin_us", type=int, metavar="µS", help="busy wait before each deadline"
-    )
+    add_quantity(to, "--priority", "priority", "of SCHED_FIFO")
+    add_quantity(to, "--spin", "spin_us", "busy wait before each deadline, e.g. 30us")
     to.add_argument(
         "--spin-auto", action=switch, help="choose --spin from the observed wake-up latency"
     )
     to.add_argument("--realtime", choices=_CHOICES["realtime"], help="may the loop run without it?")
     to.add_argument("--overrun", choices=_CHOICES["overrun"], help="what follows a late cycle")
-    to.add_argument("--max-overruns", type=int, metavar="N", help="stop the loop above; 0: never")
-    to.add_argument(
-        "--warmup-cycles", type=int, metavar="N", help="first cycles, kept out of the statistics"
-    )
-    to.add_argument(
+    add_quantity(to, "--max-overruns", "max_overruns", "stop the loop above; 0: never")
+    add_quantity(to, "--warmup-cycles", "warmup_cycles", "first cycles, kept out of the statistics")
+    add_quantity(
+        to,
         "--stall-timeout",
-        dest="stall_timeout_ms",
-        type=int,
-        metavar="MS",
-        help="end the executor when a cycle makes no progress for so long; 0: never",
+        "stall_timeout_ms",
+        "end the executor when a cycle makes no progress for so long, e.g. 2s; 0: never",
     )
-    to.add_argument(
+    add_quantity(
+        to,
         "--orphan-timeout",
-        dest="orphan_timeout_s",
-        type=float,
-        metavar="S",
-        help="stop the loop when rtcfd has been gone for so long",
+        "orphan_timeout_s",
+        "stop the loop when rtcfd has been gone for so long",
     )
     to.add_argument(
         "--on-boot",
@@ -162,16 +156,15 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
     to.add_argument(
         "--sim-time", choices=_CHOICES["sim_time"], help="follow /clock; auto: if /use_sim_time"
     )
-    to.add_argument(
+    add_quantity(
+        to,
         "--max-clock-jump",
-        dest="max_clock_jump_s",
-        type=float,
-        metavar="S",
-        help="a simulated clock that goes further at once begins anew",
+        "max_clock_jump_s",
+        "a simulated clock that goes further at once begins anew",
     )
     to.add_argument("--lock-memory", action=switch, help="lock the executor's memory")
-    to.add_argument("--heap-kb", type=int, metavar="KIB", help="heap touched at start")
-    to.add_argument("--stack-kb", type=int, metavar="KIB", help="stack of the real-time thread")
+    add_quantity(to, "--heap-kb", "heap_kb", "heap touched at start")
+    add_quantity(to, "--stack-kb", "stack_kb", "stack of the real-time thread")
     to.add_argument("--ros", dest="ros_enabled", action=switch, help="have a ROS node")
     to.add_argument("--master-uri", dest="ros_master_uri", metavar="URI", help="the ROS master")
     to.add_argument(
@@ -195,25 +188,15 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
     to.add_argument(
         "--blacklist", dest="ros_blacklist", metavar="REGEX", help="exceptions from --whitelist"
     )
-    to.add_argument(
-        "--queue",
-        dest="ros_queue",
-        type=int,
-        metavar="N",
-        help="messages kept for a slow subscriber",
-    )
+    add_quantity(to, "--queue", "ros_queue", "messages kept for a slow subscriber")
     to.add_argument(
         "--latch",
         dest="ros_latch",
         metavar="REGEX",
         help="published connections whose last message late subscribers get",
     )
-    to.add_argument(
-        "--decimation",
-        dest="ros_decimation",
-        type=int,
-        metavar="N",
-        help="of the values of outputs, publish each n-th",
+    add_quantity(
+        to, "--decimation", "ros_decimation", "of the values of outputs, publish each n-th"
     )
     to.add_argument(
         "--decimate",
@@ -221,12 +204,31 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
         metavar="REGEX",
         help="published connections that --decimation holds for (default: .*)",
     )
+    add_quantity(
+        to, "--largest-message", "ros_largest_message_kb", "of variable size, in both directions"
+    )
+
+
+def add_quantity(to: argparse.ArgumentParser, option: str, dest: str, text: str) -> None:
+    """Add an option for a setting that is a number, with its unit and range."""
+    ros = dest.startswith("ros_")
+    quantity = ROS[dest.removeprefix("ros_")] if ros else RUNNER[dest]
+
+    def value(text: str) -> float | int:
+        number = amount(quantity.unit)(text)
+        if isinstance(quantity.default, int):
+            if number != int(number):
+                raise argparse.ArgumentTypeError(f"{text} is no whole number of {quantity.unit}")
+            return int(number)
+        return number
+
+    unit = {"µs": "us"}.get(quantity.unit, quantity.unit)
     to.add_argument(
-        "--largest-message",
-        dest="ros_largest_message_kb",
-        type=int,
-        metavar="KIB",
-        help="of variable size, in both directions; 1 to 65536",
+        option,
+        dest=dest,
+        type=value,
+        metavar=unit.upper() or "N",
+        help=f"{text} ({quantity.range()}, default {quantity.default:g})",
     )
 
 

@@ -8,7 +8,7 @@ import rtcf
 from rtcf.v1 import runner_pb2
 
 from rtcfctl.output import Output
-from rtcfctl.words import microseconds
+from rtcfctl.words import amount, microseconds
 
 _FIGURES = ("min_ns", "mean_ns", "p50_ns", "p99_ns", "p999_ns", "max_ns")
 _SHORTEST_WATCH_S = 0.1
@@ -21,11 +21,11 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     stats.add_argument("--reset", action="store_true", help="begin the figures anew afterwards")
     stats.add_argument(
         "--watch",
-        type=float,
+        type=amount("s"),
         nargs="?",
         const=1.0,
         metavar="S",
-        help="again and again, each second or each S seconds, until Ctrl-C",
+        help="again and again, each second or each S seconds (or 500ms), until Ctrl-C",
     )
     stats.set_defaults(run=show)
 

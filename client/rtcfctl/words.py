@@ -1,9 +1,12 @@
 """Figures and values as words for tables."""
 
+import argparse
 import re
+from collections.abc import Callable
 from typing import Any
 
 from rtcf.v1 import graph_pb2
+from rtcf_shared.quantities import parse
 
 from rtcfctl.plain import plain
 
@@ -19,6 +22,18 @@ def age(nanoseconds: int) -> str:
         if abs(nanoseconds) >= size:
             return f"{nanoseconds / size:.3g} {unit}"
     return "0 ns"
+
+
+def amount(unit: str) -> Callable[[str], float]:
+    """Return what argparse reads a number by, with or without a unit of the kind of `unit`."""
+
+    def value(text: str) -> float:
+        try:
+            return parse(text, unit)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    return value
 
 
 def microseconds(nanoseconds: float) -> str:

@@ -116,7 +116,7 @@ REFUSALS = {
     "frequency that is no number": Refusal("runner set --frequency nan", ["nan Hz", "0.1 to"]),
     "new runner with a bad frequency": Refusal("runner add arm --frequency 1e9", ["0.1 to 20000"]),
     "CPU that is not there": Refusal("runner set --cpu 4000", ["CPU 4000", "-1"]),
-    "priority out of range": Refusal("runner set --priority 99", ["priority 99", "1 to 98"]),
+    "priority out of range": Refusal("runner set --priority 99", ["priority of 99", "1 to 98"]),
     "bad expression to ignore": Refusal(f"{NEW} --ignore '['", ["ignore", "/new", "'['"]),
     "bad whitelist": Refusal("runner set --whitelist '(a'", ["whitelist", "'(a'"]),
     "bad blacklist": Refusal("runner set --blacklist '*x'", ["blacklist", "'*x'"]),

@@ -7,6 +7,7 @@ from typing import Any
 
 from rtcf.v1 import runner_pb2
 from rtcf_shared.enums import choices
+from rtcf_shared.quantities import ROS, RUNNER, Quantity
 
 from rtcf_launch.codes import Code, Ending
 from rtcf_launch.parameters import Parameters, close_to
@@ -23,7 +24,6 @@ _OVERRUNS = choices(runner_pb2.OverrunPolicy.DESCRIPTOR)
 _REALTIME = choices(runner_pb2.Realtime.DESCRIPTOR)
 _ON_CRASH = choices(runner_pb2.OnCrash.DESCRIPTOR)
 _SIM_TIME = choices(runner_pb2.SimTime.DESCRIPTOR)
-_LEAST_STACK_KB = 16
 _LARGEST = 2**31 - 1  # XML-RPC has no larger integers
 
 _NAMES = (
@@ -56,16 +56,17 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
         if value is not None:
             setattr(message, field, value)
 
-    put("frequency_hz", given.number("frequency", 0.1, 20000.0))
-    put("priority", given.integer("priority", 1, 98))
+    put("frequency_hz", given.number("frequency", *_range("frequency_hz")))
+    put("priority", given.integer("priority", *_whole("priority")))
     put("lock_memory", given.boolean("lock_memory"))
-    put("heap_kb", given.integer("safe_heap_size_kB", 0, 1024 * 1024))
+    put("heap_kb", given.integer("safe_heap_size_kB", *_whole("heap_kb")))
     # RTCF 2021's default of 0 means none; a thread has this much in any case.
-    stack = given.integer("safe_stack_size_kB", 0, 64 * 1024)
-    put("stack_kb", None if stack is None else max(stack, _LEAST_STACK_KB))
-    put("max_overruns", given.integer("max_overruns", 0, _LARGEST))
-    put("warmup_cycles", given.integer("warmup_cycles", 0, _LARGEST))
-    stall_s = given.number("stall_timeout", 0.0, 3600.0)
+    least, most = _whole("stack_kb")
+    stack = given.integer("safe_stack_size_kB", 0, most)
+    put("stack_kb", None if stack is None else max(stack, least))
+    put("max_overruns", given.integer("max_overruns", *_whole("max_overruns")))
+    put("warmup_cycles", given.integer("warmup_cycles", *_whole("warmup_cycles")))
+    stall_s = given.number("stall_timeout", *(ms / 1000 for ms in _range("stall_timeout_ms")))
     put("stall_timeout_ms", None if stall_s is None else round(stall_s * 1000))
     put("realtime", _value(_REALTIME, given.word("realtime", _REALTIME)))
     put("on_crash", _value(_ON_CRASH, given.word("on_crash", _ON_CRASH)))
@@ -74,13 +75,14 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
     _spin(given, settings)
     put("whitelist", given.text("ros_mapping_whitelist"), settings.ros)
     put("blacklist", given.text("ros_mapping_blacklist"), settings.ros)
-    put("queue", given.integer("ros_queue", 1, 1_000_000), settings.ros)
+    put("queue", given.integer("ros_queue", *_whole("queue", ROS)), settings.ros)
     put("latch", given.text("ros_latch"), settings.ros)
-    put("decimation", given.integer("ros_decimation", 1, 1_000_000), settings.ros)
+    put("decimation", given.integer("ros_decimation", *_whole("decimation", ROS)), settings.ros)
     put("decimate", given.text("ros_decimate"), settings.ros)
-    put("largest_message_kb", given.integer("ros_largest_message_kB", 1, 65536), settings.ros)
+    largest = given.integer("ros_largest_message_kB", *_whole("largest_message_kb", ROS))
+    put("largest_message_kb", largest, settings.ros)
     put("sim_time", _value(_SIM_TIME, given.word("sim_time", _SIM_TIME)))
-    put("max_clock_jump_s", given.number("max_clock_jump", 0.001, 1e9))
+    put("max_clock_jump_s", given.number("max_clock_jump", *_range("max_clock_jump_s")))
 
     components = given.integer("num_components_expected", 1, _LARGEST)
     mode = given.word("mode", MODES) or ("no_wait" if components is None else MODES[0])
@@ -101,6 +103,14 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
     return result, [
         f"parameter ~{name} is not known to rt_runner{close_to(name, _NAMES)}" for name in unknown
     ]
+
+
+def _range(field: str) -> tuple[float, float]:
+    return RUNNER[field].low, RUNNER[field].high
+
+
+def _whole(field: str, table: Mapping[str, Quantity] = RUNNER) -> tuple[int, int]:
+    return int(table[field].low), int(table[field].high)
 
 
 def _overrun(given: Parameters) -> int | None:
@@ -139,7 +149,7 @@ def _spin(given: Parameters, settings: runner_pb2.RunnerSettings) -> None:
         return
     if spin == "auto":
         settings.spin_auto = True
-    elif isinstance(spin, int) and not isinstance(spin, bool) and 0 <= spin <= 1_000_000:
+    elif isinstance(spin, int) and not isinstance(spin, bool) and RUNNER["spin_us"].holds(spin):
         settings.spin_us = spin
     else:
         raise Ending(Code.USAGE, f'~spin must be a number of µs or "auto", not {spin}')

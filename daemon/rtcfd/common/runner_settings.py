@@ -6,23 +6,26 @@ engine that will use them.
 
 import math
 import os
+from collections.abc import Mapping
 from typing import Any, TypeVar
 
+from google.protobuf.descriptor import FieldDescriptor
 from rtcf.v1 import runner_pb2
+from rtcf_shared import quantities
 from rtcf_shared.enums import word
+from rtcf_shared.quantities import Quantity
 
 from rtcfd.common.refusals import InvalidArgument
 
 Settings = TypeVar("Settings", runner_pb2.RunnerSettings, runner_pb2.RosSettings)
 
-FREQUENCY_HZ = (0.1, 20000.0)
-PRIORITY = (1, 98)  # 99 is the kernel's own watchdog and migration threads'
+_DOUBLE = FieldDescriptor.CPPTYPE_DOUBLE
+# Of the units in names of settings.
+_SUFFIXES = {"Hz": "hz", "µs": "us", "ms": "ms", "s": "s", "KiB": "kb"}
 LAST_CPU = -1  # the last one that is allowed
-ORPHAN_TIMEOUT_S = 60.0
+ORPHAN_TIMEOUT_S = quantities.RUNNER["orphan_timeout_s"].default
 # A private rtcfd takes its executors with it, however it ends.
 PRIVATE_ORPHAN_TIMEOUT_S = 2.0
-_LONGEST_S = 86400.0
-_MAX_MEMORY_KB = 64 * 1024 * 1024
 _DEFAULT_MASTER = "http://localhost:11311"
 
 
@@ -30,39 +33,35 @@ def defaults(
     realtime: runner_pb2.Realtime, orphan_timeout_s: float = ORPHAN_TIMEOUT_S
 ) -> runner_pb2.RunnerSettings:
     """Return complete settings; ROS_MASTER_URI of our environment is part of them."""
-    return runner_pb2.RunnerSettings(
-        frequency_hz=1000.0,
+    result = runner_pb2.RunnerSettings(
         cpu=LAST_CPU,
-        priority=80,
-        spin_us=0,
         realtime=realtime,
         overrun=runner_pb2.OVERRUN_POLICY_SKIP,
-        max_overruns=0,
         lock_memory=True,
-        heap_kb=8192,
-        stack_kb=256,
-        warmup_cycles=10,
-        stall_timeout_ms=2000,
-        orphan_timeout_s=orphan_timeout_s,
         spin_auto=False,
         on_boot=runner_pb2.ON_BOOT_HOLD,
         on_crash=runner_pb2.ON_CRASH_HOLD,
         sim_time=runner_pb2.SIM_TIME_AUTO,
-        max_clock_jump_s=10.0,
         ros=runner_pb2.RosSettings(
             enabled=True,
             master_uri=os.environ.get("ROS_MASTER_URI") or _DEFAULT_MASTER,
             whitelist="",
             blacklist="",
-            queue=1000,
             hostname="",
             ns="",
             latch="",
-            decimation=1,
             decimate=".*",
-            largest_message_kb=256,
         ),
     )
+    tables: list[tuple[Any, Mapping[str, Quantity]]] = [
+        (result, quantities.RUNNER), (result.ros, quantities.ROS),
+    ]  # fmt: skip
+    for message, known in tables:
+        for field, quantity in known.items():
+            whole = message.DESCRIPTOR.fields_by_name[field].cpp_type != _DOUBLE
+            setattr(message, field, int(quantity.default) if whole else quantity.default)
+    result.orphan_timeout_s = orphan_timeout_s
+    return result
 
 
 def merged(
@@ -122,13 +121,8 @@ def _text(field: Any, value: Any) -> str:
 
 def check(settings: runner_pb2.RunnerSettings) -> None:
     """Refuse settings that are set and not allowed."""
-    if settings.HasField("frequency_hz"):
-        low, high = FREQUENCY_HZ
-        value = settings.frequency_hz
-        if not (math.isfinite(value) and low <= value <= high):
-            raise InvalidArgument(
-                f"frequency of {value:g} Hz is out of range: {low:g} to {high:g} Hz"
-            )
+    _check_ranges(settings, quantities.RUNNER)
+    _check_ranges(settings.ros, quantities.ROS)
     if settings.HasField("cpu") and settings.cpu != LAST_CPU:
         allowed = os.sched_getaffinity(0)
         if settings.cpu not in allowed:
@@ -136,33 +130,20 @@ def check(settings: runner_pb2.RunnerSettings) -> None:
                 f"CPU {settings.cpu} is not one rtcfd may use: choose of "
                 f"{_ranges(allowed)}, or -1 for the last of them"
             )
-    if settings.HasField("priority") and not PRIORITY[0] <= settings.priority <= PRIORITY[1]:
-        raise InvalidArgument(
-            f"priority {settings.priority} is out of range: {PRIORITY[0]} to {PRIORITY[1]}"
-        )
-    for field in ("heap_kb", "stack_kb"):
-        if settings.HasField(field) and getattr(settings, field) > _MAX_MEMORY_KB:
-            raise InvalidArgument(
-                f"{field} of {getattr(settings, field)} is out of range: at most {_MAX_MEMORY_KB}"
-            )
-    if settings.HasField("orphan_timeout_s"):
-        value = settings.orphan_timeout_s
-        if not (math.isfinite(value) and 0.0 <= value <= _LONGEST_S):
-            raise InvalidArgument(
-                f"orphan timeout of {value:g} s is out of range: 0 to {_LONGEST_S:g} s"
-            )
-    if settings.HasField("max_clock_jump_s"):
-        value = settings.max_clock_jump_s
-        if not (math.isfinite(value) and 0.0 <= value <= _LONGEST_S):
-            raise InvalidArgument(
-                f"max clock jump of {value:g} s is out of range: 0 to {_LONGEST_S:g} s"
-            )
     if settings.HasField("ros") and settings.ros.HasField("master_uri"):
         uri = settings.ros.master_uri
         if not uri.startswith(("http://", "https://")):
             raise InvalidArgument(
                 f'ROS master URI "{uri}" is not valid: write it as http://HOST:PORT'
             )
+
+
+def _check_ranges(message: Any, known: Mapping[str, Quantity]) -> None:
+    for field, quantity in known.items():
+        if message.HasField(field) and not quantity.holds(value := getattr(message, field)):
+            name = field.removesuffix("_" + _SUFFIXES.get(quantity.unit, "")).replace("_", " ")
+            unit = quantity.unit and f" {quantity.unit}"
+            raise InvalidArgument(f"{name} of {value:g}{unit} is out of range: {quantity.range()}")
 
 
 def _ranges(numbers: set[int]) -> str:

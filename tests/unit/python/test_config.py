@@ -72,7 +72,7 @@ def test_a_file_is_read(tmp_path: Path) -> None:
         ("daemon = 1", "daemon must be a table"),
         ("[runner]\npriority = true", "runner.priority must be an integer"),
         ("[runner]\npriority = -1", "runner.priority is out of range"),
-        ("[runner]\npriority = 99", "priority 99 is out of range: 1 to 98"),
+        ("[runner]\npriority = 99", "priority of 99 is out of range: 1 to 98"),
         ('[runner]\nlock_memory = "yes"', "runner.lock_memory must be true or false"),
         ("[runner]\nros = 1", "runner.ros must be a table"),
         ("[runner]\n!", "line 2"),
