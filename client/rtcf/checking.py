@@ -16,6 +16,7 @@ from rtcf_shared.folders import component_folders, packages
 from rtcf_shared.naming import listing, suggestion
 
 from rtcf.sanitizer import Violation, violations
+from rtcf.watched import Watched
 
 INSTALLED = Path("/usr/lib/rtcf/rtcf-executor-rtsan")
 CONFIGURATION = Path("/etc/rtcfd/rtcfd.toml")
@@ -31,6 +32,8 @@ class Checked:
 
     library: str
     violations: list[Violation] = field(default_factory=list)
+    not_finite: list[str] = field(default_factory=list)  # outputs that carried NaN or infinity
+    ended: str = ""  # how the component ended its process, or did not end; empty = in order
     log: list[str] = field(default_factory=list)  # what else was said
 
 
@@ -64,23 +67,15 @@ def check(
                "--cycles", str(cycles)]  # fmt: skip
     for parameter in parameters:
         command += ["--param", parameter]
-    done = subprocess.run(
-        command,
-        env=os.environ | {"RTSAN_OPTIONS": _options()},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        errors="replace",
-        check=False,
-    )
-    lines = done.stderr.splitlines()
+    watched = Watched(command, os.environ | {"RTSAN_OPTIONS": _options()})
+    status = watched.wait()
+    lines = watched.errors
     found = Checked(str(library), list(violations(lines)))
     found.log = [line for line in lines if line.startswith("/checked: ")]
-    if done.returncode and not found.violations:
-        raise RtcfError(_why(done.returncode, lines))
-    if done.returncode:
-        found.log.append(_why(done.returncode, lines))
+    found.not_finite = [
+        line.removeprefix("not finite: /") for line in lines if line.startswith("not finite: /")
+    ]
+    found.ended = watched.hang or (_why(status, lines, watched.stage) if status else "")
     return found
 
 
@@ -151,10 +146,11 @@ def _configured() -> list[Path]:
         return []  # rtcfd itself says what is wrong with it
 
 
-def _why(status: int, lines: Sequence[str]) -> str:
+def _why(status: int, lines: Sequence[str], stage: str) -> str:
+    where = f" while {stage}" if stage else ""
     if status < 0:
-        return f"the component ended its process: {signal.Signals(-status).name}"
+        return f"the component crashed{where}: {signal.Signals(-status).name}"
     said = [line for line in lines if line.startswith("rtcf-executor: ")]
     if said:
         return said[-1].removeprefix("rtcf-executor: ")
-    return f"the process of the component ended with exit status {status}"
+    return f"the component ended its process{where}: exit status {status}"

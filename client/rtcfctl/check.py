@@ -57,6 +57,8 @@ def run(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
                 "library": found.library,
                 "cycles": args.cycles,
                 "violations": [_plain(each) for each in found.violations],
+                "not_finite": found.not_finite,
+                "ended": found.ended,
                 "log": found.log,
             }
         )
@@ -65,11 +67,15 @@ def run(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
             _print(number, each, output)
         for line in found.log:
             print(line, file=sys.stderr)
-    if found.violations:
-        raise rtcf.RtcfError(
-            f"{name}: {len(found.violations)} calls that are not safe in real time "
-            f"in {args.cycles} cycles"
-        )
+        for port in found.not_finite:
+            output.line(f"{name}: output {port} carried NaN or infinity", "yellow")
+    unsafe = (
+        f"{len(found.violations)} calls that are not safe in real time" if found.violations else ""
+    )
+    if found.ended:
+        raise rtcf.RtcfError(f"{name}: {found.ended}{unsafe and f'; and {unsafe}'}")
+    if unsafe:
+        raise rtcf.RtcfError(f"{name}: {unsafe} in {args.cycles} cycles")
     if output.for_people:
         output.line(f"{name}: clean in {args.cycles} cycles", "green")
 

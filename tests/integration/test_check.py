@@ -61,3 +61,38 @@ def test_a_component_that_faults_is_refused() -> None:
     done = check("rtcf_faults", "NotFiniteStops")
     assert done.returncode == 1
     assert "is not finite" in done.stderr
+
+
+def check_plainly(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Check in the ordinary executor, as what is shown here is no sanitizer's."""
+    return subprocess.run(
+        [str(BUILD_TREE / "bin" / "rtcfctl"), "check", *arguments,
+         "--executor", str(BUILD_TREE / "bin" / "rtcf-executor")],
+        env=clean_environment(), capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("NullDereference", "the component crashed while updating, from cycle 20 on: SIGSEGV"),
+        ("CallsAbort", "the component crashed while updating, from cycle 20 on: SIGABRT"),
+        ("CrashingConfigure", "the component crashed while configuring /checked: SIGSEGV"),
+        ("CallsExit", "the component ended its process while updating, from cycle 20 on: exit"),
+        ("NeverReturns", "the component does not return: nothing for 10 s while updating, from"),
+    ],
+)
+def test_what_ends_the_process_is_told_as_what_it_is(name: str, said: str) -> None:
+    done = check_plainly("rtcf_faults", name)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].startswith(f"rtcfctl: rtcf_faults/{name}: {said}")
+
+
+def test_outputs_that_carry_nan_are_told() -> None:
+    done = check_plainly("rtcf_faults", "WritesNan", "--cycles", "50")
+    assert "rtcf_faults/WritesNan: output value carried NaN or infinity\n" in done.stdout
+    found = json.loads(check_plainly("rtcf_faults", "WritesNan", "-o", "json").stdout)
+    assert found["not_finite"] == ["value"]
+    assert check_plainly("rtcf_faults", "WritesNan", "--cycles", "9").stdout == (
+        "rtcf_faults/WritesNan: clean in 9 cycles\n"
+    )

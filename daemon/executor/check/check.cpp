@@ -7,6 +7,8 @@
 #include <exception>
 #include <future>
 #include <memory>
+#include <set>
+#include <string>
 
 #include "bridge/bridge.hpp"
 #include "faults/crash_handler.hpp"
@@ -41,13 +43,22 @@ class ValueSource final : public Bridge {
             injector->deliver(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
         }
         for (const auto& tap : table_->outputs) {
-            while (tap->pop([](const std::uint8_t*, std::uint32_t) {})) {
+            const TypeInfo& type = tap->type();
+            const std::shared_ptr<SlotHeader> value = type.make_slot(nullptr);
+            while (tap->pop([&](const std::uint8_t* bytes, std::uint32_t size) {
+                if (type.deserialize(*value, bytes, size) && !type.finite(*value))
+                    not_finite_.insert(tap->topic());
+            })) {
             }
         }
     }
 
+    /// Mapped names of outputs that carried NaN or infinity.
+    const std::set<std::string>& notFinite() const noexcept { return not_finite_; }
+
    private:
     std::shared_ptr<const BridgeTable> table_ = std::make_shared<BridgeTable>();
+    std::set<std::string> not_finite_;
 };
 
 ParameterValue parseValue(const std::string& text) {
@@ -80,6 +91,12 @@ ComponentDefinition definitionOf(const CheckRequest& request) {
     return definition;
 }
 
+// On standard output: what runs, for whoever waits for it to return.
+void say(const std::string& what) {
+    fmt::print("{}\n", what);
+    std::fflush(stdout);
+}
+
 void run(const CheckRequest& request, Runner& runner, ValueSource& values) {
     const Runner::Progress silent = [](const std::string&) {};
     RunnerSettings settings = runner.settings();
@@ -88,15 +105,20 @@ void run(const CheckRequest& request, Runner& runner, ValueSource& values) {
     // A report is made inside the cycle, and finding its source lines may take seconds.
     settings.stall_timeout_ns = kStallTimeout;
     runner.configure(settings);
-    runner.load(definitionOf(request), request.library, silent);
+    runner.load(definitionOf(request), request.library, say);
     for (std::uint64_t done = 0; done < request.cycles; done += kCyclesPerValue) {
         values.exchange();
+        say(fmt::format("updating, from cycle {} on", done));
         runner.step(std::min(kCyclesPerValue, request.cycles - done), silent);
         if (runner.loop().fault().kind != LoopFault::Kind::None) {
             throw Refusal(RefusalKind::FailedPrecondition, runner.picture().status);
         }
     }
+    say("stopping");
     runner.stop(silent);
+    values.exchange();
+    for (const std::string& topic : values.notFinite())
+        fmt::print(stderr, "not finite: {}\n", topic);
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 /// all its inputs and taps on all its outputs, in this process, which does
 /// nothing else and then ends. In the build with RealtimeSanitizer
 /// (rtcf-executor-rtsan) everything that is not real-time safe is reported on
-/// standard error.
+/// standard error. Standard output tells line by line what runs.
 #pragma once
 
 #include <cstdint>

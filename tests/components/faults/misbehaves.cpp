@@ -37,6 +37,11 @@ class NotFinite final : public Faulty {
     rtcf::Output<double> value_{this, "value", "", rtcf::Finite()};
 };
 
+class WritesNan final : public Faulty {
+    void fault() override { value_.write(std::numeric_limits<double>::quiet_NaN()); }
+    rtcf::Output<double> value_{this, "value"};
+};
+
 class NotFiniteStops final : public Faulty {
     void fault() override { value_.write(std::numeric_limits<double>::infinity()); }
     void safe() noexcept override { RTCF_INFO(this, "hook {}", "safe"); }
@@ -50,4 +55,5 @@ RTCF_COMPONENT(Allocates, "Allocates 10 MB in each update")
 RTCF_COMPONENT(Hoards, "Takes 1 MB more in each update, until there is no memory left")
 RTCF_COMPONENT(Sleeps, "Sleeps in each update")
 RTCF_COMPONENT(NotFinite, "Writes NaN to an output that is declared finite")
+RTCF_COMPONENT(WritesNan, "Writes NaN to an output that is not declared finite")
 RTCF_COMPONENT(NotFiniteStops, "Writes infinity to an output that stops the loop then")
