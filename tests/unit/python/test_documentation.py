@@ -1,0 +1,72 @@
+"""What README, docs and manual pages name is there: pages, packages, commands and their options."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from rtcfctl.main import parser
+
+TREE = Path(__file__).parents[3]
+PAGES = [TREE / "README.md", *sorted((TREE / "docs").glob("*.md"))]
+NAMES = [page.name for page in PAGES]
+CONTROL = (TREE / "debian" / "control").read_text()
+OURS = set(re.findall(r"^Package: (\S+)", CONTROL, re.MULTILINE))
+
+
+def shell_lines(page: Path) -> list[str]:
+    """Return the commands in a page's shell blocks, comments and continuations resolved."""
+    blocks = re.findall(r"^```sh\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
+    lines = "".join(blocks).replace("\\\n", " ").splitlines()
+    return [line for line in lines if line.strip() and not line.startswith("#")]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_links_lead_to_pages_that_are_installed_under_these_names(page: Path) -> None:
+    for link in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
+        if not link.startswith("http"):
+            assert (page.parent / link).exists(), link
+    for name in re.findall(r"/usr/share/doc/rtcf/(\S+?\.md)", page.read_text()):
+        assert (TREE / name).exists(), name
+
+
+def test_each_page_is_linked_from_the_readme() -> None:
+    readme = (TREE / "README.md").read_text()
+    assert [page.name for page in PAGES[1:] if f"(docs/{page.name})" not in readme] == []
+
+
+def test_manual_pages_name_files_of_the_documentation_as_they_are_installed() -> None:
+    installed = (TREE / "debian" / "rtcf-doc.install").read_text()
+    assert "README.md usr/share/doc/rtcf\n" in installed
+    assert "docs/*.md usr/share/doc/rtcf/docs\n" in installed
+    for manual in (TREE / "docs" / "man").iterdir():
+        text = manual.read_text().replace("\\-", "-")
+        for name in re.findall(r"/usr/share/doc/(\S+\.md)", text):
+            assert name.startswith("rtcf/"), f"{manual.name}: {name}"
+            assert (TREE / name.removeprefix("rtcf/")).exists(), f"{manual.name}: {name}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_commands_in_pages_are_commands_of_rtcfctl(page: Path) -> None:
+    for line in shell_lines(page):
+        words = shlex.split(line, comments=True)
+        if words[:1] == ["sudo"]:
+            words = words[1:]
+        if words[:1] != ["rtcfctl"]:
+            continue
+        # In a text, what a reader fills in stands in capitals or as "…".
+        given = ["1" if re.fullmatch(r"N|S|…", word) else word for word in words[1:]]
+        cut = next((at for at, word in enumerate(given) if word in ("|", "&&", ";", ">")), None)
+        try:
+            parser().parse_args(given[:cut])
+        except SystemExit:
+            pytest.fail(f"{page.name}: {line}")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_our_packages_in_pages_exist(page: Path) -> None:
+    for line in shell_lines(page):
+        if " apt install " not in line:
+            continue
+        for word in re.findall(r"(?:build/deb/)?((?:lib|ros-|python3-)?rtcf[a-z-]*)", line):
+            assert word.rstrip("_") in OURS, f"{page.name}: {word}"
