@@ -183,13 +183,20 @@ class Client:
         settings: runner_pb2.RunnerSettings | None = None,
         dry_run: bool = False,
         on_progress: OnProgress | None = None,
+        *,
+        rebuilt: bool = False,
     ) -> control_pb2.ChangeResult:
         """Make the graph what `components` say, all at one cycle boundary.
 
-        The result's `differences` tell what was changed, or would be.
+        With `rebuilt`, components whose library has changed since they were loaded are
+        replaced, too.  The result's `differences` tell what was changed, or would be.
         """
         request = control_pb2.ApplyRequest(
-            runner=runner, components=components, settings=settings, dry_run=dry_run
+            runner=runner,
+            components=components,
+            settings=settings,
+            dry_run=dry_run,
+            rebuilt=rebuilt,
         )
         return self._change(self._stub.Apply, request, on_progress)
 

@@ -33,7 +33,10 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
         "replace", parents=[common], help="put a new component in the place of an old one"
     )
     replacing.add_argument("old", metavar="NAME")
-    _component_options(replacing)
+    replacing.add_argument(
+        "--rebuilt", action="store_true", help="by its own type, from its library as it is now"
+    )
+    _component_options(replacing, needed=False)
     replacing.add_argument(
         "--reset-parameters",
         action="store_true",
@@ -69,6 +72,8 @@ def unload(client: rtcf.Client, args: argparse.Namespace, output: Output) -> Non
 
 def replace(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Replace a component."""
+    if args.rebuilt == bool(args.type):
+        raise ValueError("replace: name PKG COMPONENT, or --rebuilt")
     result = client.replace(
         args.old,
         _spec(args),
@@ -103,7 +108,9 @@ def show_all(client: rtcf.Client, args: argparse.Namespace, output: Output) -> N
                 each.full_name,
                 f"{each.spec.package}/{each.spec.type}",
                 (enumerator(each, "state").replace("_", " "), _STYLES.get(each.state, "")),
-                ", ".join(filter(None, (_notes(each.spec, each.holder), each.fault))),
+                ", ".join(
+                    filter(None, (_notes(each.spec, each.holder), _changed(each), each.fault))
+                ),
             )
             for each in components
         ),
@@ -125,6 +132,12 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         return
     output.line(f"  {enumerator(found, 'state')}, {found.position} in the schedule")
     output.line(f"  from {found.library}")
+    if found.library_changed:
+        output.line(
+            "  which is another file now than it was loaded from: "
+            f"`rtcfctl replace {found.full_name} --rebuilt` takes it",
+            "yellow",
+        )
     if found.fault:
         output.line(f"  fault: {found.fault}", "bold red")
     if notes := _notes(found.spec, found.holder):
@@ -181,9 +194,10 @@ def left_out(found: graph_pb2.ComponentInfo) -> bool:
     return bool(found.state == graph_pb2.COMPONENT_STATE_LEFT_OUT)
 
 
-def _component_options(to: argparse.ArgumentParser) -> None:
-    to.add_argument("package", metavar="PKG")
-    to.add_argument("type", metavar="COMPONENT", help="a component type of the package")
+def _component_options(to: argparse.ArgumentParser, needed: bool = True) -> None:
+    maybe: dict[str, Any] = {} if needed else {"nargs": "?", "default": ""}
+    to.add_argument("package", metavar="PKG", **maybe)
+    to.add_argument("type", metavar="COMPONENT", help="a component type of the package", **maybe)
     to.add_argument("--name", default="", help="its name (default: the type's)")
     to.add_argument("--ns", default="", help="its namespace (default: /)")
     to.add_argument("--remap", action="append", default=[], metavar="FROM:=TO")
@@ -246,6 +260,10 @@ def _notes(spec: graph_pb2.ComponentSpec, holder: str) -> str:
     if holder:
         notes.append(f"held by {holder}")
     return ", ".join(notes)
+
+
+def _changed(found: graph_pb2.ComponentInfo) -> str:
+    return "library changed" if found.library_changed else ""
 
 
 def _flags(port: graph_pb2.PortInfo) -> str:

@@ -24,6 +24,11 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     )
     applying.add_argument("file", metavar="FILE", help="a graph file; - is standard input")
     applying.add_argument("--dry-run", action="store_true", help="only show what would change")
+    applying.add_argument(
+        "--rebuilt",
+        action="store_true",
+        help="also replace components whose library has changed since they were loaded",
+    )
     applying.set_defaults(run=apply)
 
     saving = verbs.add_parser("save", parents=[common], help="write the graph as `apply` reads it")
@@ -36,11 +41,11 @@ def apply(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None
     """Apply a graph file; of several runners none is changed if one is refused."""
     graphs = _chosen(rtcf.read_graphs(*_read(args.file)), args)
     if args.dry_run or len(graphs) > 1:
-        dry = [_apply(client, graph, True, output) for graph in graphs]
+        dry = [_apply(client, graph, True, args.rebuilt, output) for graph in graphs]
     if args.dry_run:
         _print(graphs, dry, output, "would change nothing", "nothing was changed")
         return
-    done = [_apply(client, graph, False, output) for graph in graphs]
+    done = [_apply(client, graph, False, args.rebuilt, output) for graph in graphs]
     _print(graphs, done, output, "nothing to change", "applied")
 
 
@@ -64,9 +69,11 @@ def save(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 
 def _apply(
-    client: rtcf.Client, graph: rtcf.Graph, dry_run: bool, output: Output
+    client: rtcf.Client, graph: rtcf.Graph, dry_run: bool, rebuilt: bool, output: Output
 ) -> control_pb2.ChangeResult:
-    return client.apply(graph.components, graph.runner, graph.settings, dry_run, output.progress)
+    return client.apply(
+        graph.components, graph.runner, graph.settings, dry_run, output.progress, rebuilt=rebuilt
+    )
 
 
 def _chosen(graphs: list[rtcf.Graph], args: argparse.Namespace) -> list[rtcf.Graph]:

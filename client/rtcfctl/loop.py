@@ -49,4 +49,8 @@ def step(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     if args.cycles < 1:
         raise ValueError(f"step {args.cycles}: name at least 1 cycle")
     result = client.step(args.cycles, args.runner, output.progress)
-    output.changed(f"stepped {args.cycles} cycles", result)
+    if result.cycles < args.cycles:
+        output.changed(f"stepped {result.cycles} of {args.cycles} cycles", result)
+        status = client.get_status(args.runner or "rt_runner").runners[0]
+        raise rtcf.RtcfError(f"step ended early: {status.status or 'the loop was stopped'}")
+    output.changed(f"stepped {result.cycles} cycles", result)

@@ -40,6 +40,8 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         output.line(f"rtcfd: {note}", "yellow")
     for runner in response.runners:
         output.alarm(runner.runner, runner.degraded)
+        if runner.late:
+            output.line(f"!! {runner.runner} IS LATE: {runner.late}", "bold red")
     print_runners(list(response.runners), output)
     for runner in response.runners:
         _details(runner, output)
@@ -73,6 +75,12 @@ def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
     """Print what a table has no room for."""
     if runner.status:
         output.line(f"{runner.runner}: {runner.status}", "yellow")
+    for library in runner.libraries_changed:
+        output.line(
+            f"{runner.runner}: {library} is another file now than components were loaded from: "
+            "`rtcfctl list` shows which, `rtcfctl replace NAME --rebuilt` takes it",
+            "yellow",
+        )
     if runner.holder:
         output.line(f"{runner.runner}: held by {runner.holder}")
     ros = runner.ros

@@ -1,11 +1,13 @@
 """`rtcfctl apply` and `save` against a loop that runs."""
 
+import json
+import shutil
 from pathlib import Path
 
 import pytest
 import rtcf
 import yaml
-from daemon_process import Daemon, wait_for
+from daemon_process import BUILD_TREE, Daemon, wait_for
 
 GRAPH = """\
 settings:
@@ -120,3 +122,34 @@ def test_the_graph_of_a_file_comes_back_after_a_crash(
         assert again.get_order() == order
         assert again.get_component("slow").spec.every == 4
     assert changes(daemon, str(file)) == set()
+
+
+def test_apply_takes_a_rebuilt_library_when_it_is_asked_to(tmp_path: Path) -> None:
+    built = BUILD_TREE / "lib" / "rtcf" / "rtcf_examples" / "rtcf_examples.so"
+    library = tmp_path / "packages" / "rtcf_mine" / "mine.so"
+    library.parent.mkdir(parents=True)
+    shutil.copy(built, library)
+    daemon = Daemon(tmp_path, arguments=["--path", str(tmp_path / "packages")])
+    daemon.start()
+    try:
+        graph = tmp_path / "graph.yaml"
+        graph.write_text(
+            "components:\n"
+            "  - {package: rtcf_mine, type: Mimo}\n"
+            "  - {package: rtcf_examples, type: Identity}\n"
+        )
+        assert daemon.ctl("apply", str(graph)).returncode == 0
+        assert daemon.ctl("start").returncode == 0
+        shutil.copy(built, library.with_suffix(".new"))
+        library.with_suffix(".new").rename(library)
+        assert "library changed" in daemon.ctl("list").stdout
+        assert daemon.ctl("apply", str(graph)).stdout == "nothing to change\n"
+        done = daemon.ctl("apply", str(graph), "--rebuilt", "-o", "json")
+        (difference,) = json.loads(done.stdout)["rt_runner"]["differences"]
+        assert (difference["component"], difference["detail"]) == (
+            "/Mimo", "its library has changed",
+        )  # fmt: skip
+        assert "library changed" not in daemon.ctl("list").stdout
+        assert daemon.ctl("apply", str(graph), "--rebuilt").stdout == "nothing to change\n"
+    finally:
+        daemon.end()

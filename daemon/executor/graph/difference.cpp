@@ -25,6 +25,7 @@ std::string replacementReason(const Instance& present, const WantedComponent& wa
     if (present.library().path() != wanted.library) {
         return fmt::format("{} -> {}", present.library().path(), wanted.library);
     }
+    if (wanted.anew) return "its library has changed";
     if (is.remaps != shall.remaps) return "other remaps";
     if (is.first != shall.first) return shall.first ? "first" : "not first";
     if (is.ignore != shall.ignore)

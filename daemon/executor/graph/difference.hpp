@@ -16,6 +16,7 @@ namespace rtcf::executor {
 struct WantedComponent {
     ComponentDefinition definition;
     std::string library;
+    bool anew = false;  ///< from the library as it is now, also if it is loaded from there already
 };
 
 /// One component that is not as it shall be.

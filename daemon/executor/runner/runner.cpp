@@ -407,7 +407,8 @@ ChangeOutcome Runner::step(std::uint64_t cycles, const Progress& progress) {
         status_.clear();
         publish();
     }
-    for (std::uint64_t left = cycles; left > 0;) {
+    std::uint64_t left = cycles;
+    while (left > 0) {
         const std::uint64_t wanted = std::min(left, kChunk);
         const std::uint64_t done = loop_.step(wanted);
         left -= done;
@@ -417,7 +418,9 @@ ChangeOutcome Runner::step(std::uint64_t cycles, const Progress& progress) {
         if (left > 0) progress(fmt::format("{} of {} cycles", cycles - left, cycles));
     }
     if (loop_.fault().kind != LoopFault::Kind::None || loop_.stopRequested()) endStepping();
-    return outcome();
+    ChangeOutcome result = outcome();
+    result.cycles = cycles - left;
+    return result;
 }
 
 ReplayOutcome Runner::replay(const ReplayChunk& chunk, const Progress& progress) {

@@ -45,6 +45,7 @@ struct ChangeOutcome {
     std::string component;           ///< full name of the one the change was about; may be empty
     std::vector<std::string> notes;  ///< one line each
     std::vector<Difference> differences;  ///< of apply()
+    std::uint64_t cycles = 0;             ///< of step(): how many were run
     /// Of replace(): what the new component has of the old one's values.
     std::vector<std::pair<std::string, ParameterValue>> kept;
 };

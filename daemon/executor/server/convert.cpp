@@ -402,6 +402,7 @@ pb::ChangeResult outcomeTo(const ChangeOutcome& outcome) {
         message.set_component(difference.component);
         message.set_detail(difference.detail);
     }
+    result.set_cycles(outcome.cycles);
     for (const auto& [name, value] : outcome.kept) {
         pb::ParameterSetting& setting = *result.add_kept();
         setting.set_name(name);

@@ -522,7 +522,7 @@ ChangeOutcome Server::change(const v1::Request& request, const Runner::Progress&
             std::vector<WantedComponent> wanted;
             for (const v1::Load& load : request.apply().components()) {
                 trustOwnerOf(load);
-                wanted.push_back({definitionFrom(load.component()), load.library()});
+                wanted.push_back({definitionFrom(load.component()), load.library(), load.anew()});
             }
             return runner_->apply(wanted, request.apply().dry_run(), progress);
         }

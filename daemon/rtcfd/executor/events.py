@@ -43,6 +43,9 @@ class Audience(Protocol):
     def loop_ended(self, component: str, reason: str) -> None:
         """The loop has ended by itself."""
 
+    def late(self, message: str) -> None:
+        """Cycles ended late."""
+
     def component_failed(self, component: str, reason: str) -> None:
         """A component has failed; the loop goes on."""
 
@@ -135,6 +138,8 @@ class Events:
             self._audience.loop_ended(event.component, event.message)
         elif event.kind == wire.Event.KIND_COMPONENT_FAILED:
             self._audience.component_failed(event.component, event.message)
+        elif event.kind == wire.Event.KIND_OVERRUNS:
+            self._audience.late(event.message)
 
 
 def logger_of(runner: str) -> "logging.LoggerAdapter[logging.Logger]":

@@ -12,7 +12,7 @@ from rtcf_shared.naming import listing, suggestion
 
 from rtcfd.catalog.catalog import loads
 from rtcfd.common import runner_settings
-from rtcfd.common.names import absolute, check_graph
+from rtcfd.common.names import absolute, check_graph, full_name
 from rtcfd.common.refusals import InvalidArgument, NoMaster, NotFound, Refusal
 from rtcfd.executor.link import Progress
 from rtcfd.operations.runner_core import RunnerCore
@@ -104,7 +104,10 @@ async def replace(
 ) -> control_pb2.ChangeResult:
     """Put a new component in the place of an old one; parameters stay unless they are named."""
     old, given = absolute(request.component), request.replacement
-    library = await runner.catalog.find(given.package, given.type)
+    before = runner.desired.components.get(old)
+    package = given.package or (before.package if before else "")
+    type_name = given.type or (before.type if before else "")
+    library = await runner.catalog.find(package, type_name)
 
     async def work() -> control_pb2.ChangeResult:
         spec = replacement(runner.desired.components.get(old), given)
@@ -129,7 +132,7 @@ async def replace(
         runner.desired.put(result.component, spec)
         return await _saved(runner, result)
 
-    what = f"{given.package}/{given.type}"
+    what = f"{package}/{type_name}"
     result = await runner.change(f"the replacement of {old} by {what}", work)
     runner.log.info("%s replaced by %s (%s)", old, result.component, what)
     return result
@@ -180,6 +183,9 @@ async def apply(
         before = runner.settings()
         changes = runner_settings.differences(before, request.settings)
         apply = wire.Apply(components=await loads(runner.catalog, request.components), dry_run=True)
+        rebuilt = await asyncio.to_thread(runner.code.changed)
+        for load in apply.components:
+            load.anew = request.rebuilt and full_name(load.component) in rebuilt
         if changes and not request.dry_run:
             # So that a graph that is refused changes no settings, for however short a time.
             await runner.ask(wire.Request(apply=apply), progress)
@@ -194,6 +200,12 @@ async def apply(
         for text in changes:
             kind = control_pb2.Difference.KIND_SETTINGS
             result.differences.append(control_pb2.Difference(kind=kind, detail=text))
+        stale = sorted({full_name(each) for each in request.components} & rebuilt.keys())
+        if stale and not request.rebuilt:
+            result.notes.append(
+                f"another library than {', '.join(stale)} was loaded from is there now: "
+                "--rebuilt takes it"
+            )
         if request.dry_run:
             return result
         runner.desired.become(request.components)

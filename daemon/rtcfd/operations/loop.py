@@ -30,6 +30,9 @@ async def start_in_turn(
 ) -> control_pb2.ChangeResult:
     """Start the loop, in a turn; `asked`: the number of stops when that was asked for."""
     require_no_stop(runner, asked)
+    if not runner.loop.running:
+        await runner.begin_figures(reset=True)
+        require_no_stop(runner, asked)
     request = wire.Request(start=wire.Start())
     response = await runner.ask(request, progress, lambda _: runner.loop.told(True, asked))
     if runner.loop.stops != asked:

@@ -22,6 +22,8 @@ from rtcfd.executor.events import logger_of
 from rtcfd.executor.executor import CONNECT_TIMEOUT_S, Executor
 from rtcfd.executor.link import OnAnswer, Progress
 from rtcfd.executor.process import End
+from rtcfd.operations.figures import Figures
+from rtcfd.operations.loaded_code import LoadedCode
 from rtcfd.operations.loop_state import LoopState
 from rtcfd.operations.operations import Operations
 from rtcfd.state.desired import Desired
@@ -61,6 +63,9 @@ class RunnerCore(ABC):
         self.unsaved = ""  # why the desired state is not on disk
         self.closing = False
         self.leaving = False  # it ends for this rtcfd only
+        self.code = LoadedCode()
+        self.figures = Figures()
+        self._code_file = surroundings.command.folder / f"{self.name}.libraries"
         self._executor: Executor | None = None
         self._changing_executor = asyncio.Lock()
         self._settled = asyncio.Event()  # not set while an executor is being started
@@ -148,6 +153,11 @@ class RunnerCore(ABC):
                     await (executor.leave() if self.leaving else executor.shut_down())
                     raise Unavailable(f"runner {self.name} is being ended")
                 self._executor = executor
+                self.figures = Figures()
+                if adopted:
+                    self.code.restore(self._code_file)
+                else:
+                    self.code.clear()
         except Refusal as refusal:
             self.trouble = str(refusal)
             raise
@@ -172,6 +182,7 @@ class RunnerCore(ABC):
         """Let go of it: its loop goes on until the next rtcfd adopts it."""
         executor, self._executor = self._executor, None
         if executor is not None:
+            self.code.store(self._code_file)
             await executor.leave()
 
     async def settle(self) -> None:
@@ -198,8 +209,11 @@ class RunnerCore(ABC):
     ) -> wire.Response:
         """Ask the executor for a change; its caller's limit is change()'s."""
         executor = self.alive()
+        seen = self.code.before(request)
         try:
-            return await executor.request(request, None, progress, on_answer)
+            response = await executor.request(request, None, progress, on_answer)
+            self.code.after(request, response.change, seen)
+            return response
         except Unavailable:
             if executor.connected:
                 raise
@@ -210,6 +224,14 @@ class RunnerCore(ABC):
             if executor is self._executor or self.closing:
                 raise
             raise Unavailable(f"runner {self.name}: {self.trouble}") from None
+
+    async def begin_figures(self, reset: bool) -> None:
+        """Count from here on (`reset`), or from where the executor's statistics do."""
+        if reset:
+            await self.ask(wire.Request(reset_statistics=wire.ResetStatistics()))
+        status = (await self.ask(wire.Request(get_status=wire.GetStatus()))).status
+        counted = await self.ask(wire.Request(get_statistics=wire.GetStatistics()))
+        self.figures.begin(status, counted.statistics)
 
     def alive(self) -> Executor:
         """Return the executor, or refuse."""

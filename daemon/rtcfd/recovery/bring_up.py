@@ -58,6 +58,7 @@ async def _follow(runner: RunnerCore) -> None:
     request = wire.Request(get_status=wire.GetStatus())
     status = (await runner.ask(request, None, lambda answer: _told(runner, answer.status))).status
     listed = await runner.ask(wire.Request(list_components=wire.ListComponents()))
+    await runner.begin_figures(reset=False)
     runner.log.info(
         "adopted: loop %s, iteration %d", _WORDS.get(status.state, "in an unknown state"),
         status.iteration,

@@ -163,6 +163,16 @@ class Runner(RunnerCore):
         """A component was taken out of the loop, which goes on."""
         self.leases.failed(component, reason)
 
+    def late(self, message: str) -> None:
+        """Cycles ended late: find out how many."""
+
+        async def look() -> None:
+            with contextlib.suppress(Refusal):
+                answer = await self.query(wire.Request(get_status=wire.GetStatus()))
+                self.figures.told_of_late_cycles(answer.status, message)
+
+        self.operations.in_background("counting late cycles", look())
+
     def take_log(self, record: wire.LogRecord) -> None:
         """Hand a record to whom it concerns: the holder of the component, or of the runner."""
         if self.hold_outbox is None and not self.desired.leased:

@@ -1,5 +1,7 @@
 """What a runner is doing, whatever state it is in.  A function on a RunnerCore."""
 
+import asyncio
+
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import runner_pb2
 
@@ -22,6 +24,7 @@ async def status_of(runner: RunnerCore) -> runner_pb2.RunnerStatus:
         try:
             status = (await executor.request(request, _TIMEOUT_S)).status
             lines.append(status.status)
+            runner.figures.put_into(status)
         except Refusal as refusal:
             if executor is runner.executor:
                 status.state = runner_pb2.RUNNER_STATE_STUCK
@@ -40,6 +43,8 @@ async def status_of(runner: RunnerCore) -> runner_pb2.RunnerStatus:
     # Some settings are rtcfd's alone.
     status.settings.CopyFrom(runner_settings.merged(runner.settings(), status.settings))
     desired = runner.desired
+    rebuilt = await asyncio.to_thread(runner.code.changed)
+    status.libraries_changed.extend(sorted(set(rebuilt.values())))
     status.chosen.CopyFrom(desired.chosen)
     if desired.hold is not None:
         status.holder, status.hold = desired.hold.holder, desired.hold.token

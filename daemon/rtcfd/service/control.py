@@ -282,7 +282,9 @@ class Control(control_pb2_grpc.ControlServicer):
         components = await self._components(request.runner)
         runner = self._runners.get(request.runner)
         found = components + graph.left_out(runner)
+        rebuilt = await asyncio.to_thread(runner.code.changed)
         for info in found:
+            info.library_changed = info.full_name in rebuilt
             _add_holder(runner, info)
         return control_pb2.ListComponentsResponse(components=found)
 
@@ -296,6 +298,8 @@ class Control(control_pb2_grpc.ControlServicer):
             if info.full_name == name:
                 return _add_holder(runner, info)
         found = await runner.query(wire.Request(get_component=query))
+        rebuilt = await asyncio.to_thread(runner.code.changed)
+        found.component.library_changed = name in rebuilt
         return _add_holder(runner, found.component)
 
     @_answering
@@ -341,7 +345,8 @@ class Control(control_pb2_grpc.ControlServicer):
     async def ResetStatistics(self, request: control_pb2.ResetStatisticsRequest) -> Any:
         """New figures."""
         runner = self._runners.get(request.runner)
-        await runner.query(wire.Request(reset_statistics=wire.ResetStatistics()))
+        await runner.settle()
+        await runner.begin_figures(reset=True)
         return control_pb2.ResetStatisticsResponse()
 
     async def _statistics(self, name: str) -> runner_pb2.RunnerStatistics:

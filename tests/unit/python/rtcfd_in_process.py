@@ -153,6 +153,10 @@ class Rtcfd:
         )
         self.control = Control(self.runners, catalog, self)
 
+    @property
+    def refused(self) -> list[str]:
+        return []
+
     def notes(self) -> list[str]:
         return []
 

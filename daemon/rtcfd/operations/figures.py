@@ -1,0 +1,57 @@
+"""From when on a loop's figures count, and whether its cycles keep ending late.
+
+Owned by a RunnerCore.  An executor counts overruns from its own start and
+statistics from their last reset: both are told from one moment, the start of
+the loop or the reset.
+"""
+
+import time
+from dataclasses import dataclass
+
+from rtcf.v1 import runner_pb2
+
+# An executor tells of late cycles at most each 10 s, as long as there are any.
+_FRESH_S = 15.0
+_MUCH = 0.01  # of the cycles
+
+
+@dataclass
+class _Told:
+    at: float
+    iteration: int
+    overruns: int
+
+
+class Figures:
+    """What was counted before the moment, and what was told last of late cycles."""
+
+    def __init__(self) -> None:
+        self.overruns = 0
+        self.missed = 0
+        self._last: _Told | None = None
+        self._late = ""
+
+    def begin(self, status: runner_pb2.RunnerStatus, counted: runner_pb2.RunnerStatistics) -> None:
+        """Count from where the statistics do."""
+        self.overruns = max(status.overruns - counted.overruns, 0)
+        self.missed = max(status.missed - counted.missed, 0)
+        self._last, self._late = None, ""
+
+    def told_of_late_cycles(self, status: runner_pb2.RunnerStatus, message: str) -> None:
+        """Note that cycles ended late, with cause and component."""
+        before, now = self._last, time.monotonic()
+        self._last = _Told(now, status.iteration, status.overruns)
+        self._late = ""
+        if before is None or now - before.at > _FRESH_S or status.iteration <= before.iteration:
+            return
+        share = (status.overruns - before.overruns) / (status.iteration - before.iteration)
+        if share >= _MUCH:
+            self._late = f"{min(share, 1.0):.0%} of its cycles: {message}"
+
+    def put_into(self, status: runner_pb2.RunnerStatus) -> None:
+        """Make the counters of a status those since the moment; say what is late."""
+        status.overruns = max(status.overruns - self.overruns, 0)
+        status.missed = max(status.missed - self.missed, 0)
+        fresh = self._last is not None and time.monotonic() - self._last.at <= _FRESH_S
+        if fresh and status.state == runner_pb2.RUNNER_STATE_RUNNING:
+            status.late = self._late

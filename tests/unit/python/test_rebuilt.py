@@ -1,0 +1,68 @@
+"""A library that changes on disk: said wherever one looks, and taken when it is asked for."""
+
+import os
+import signal
+from pathlib import Path
+
+import rtcf
+from daemon_under_test import DaemonUnderTest, wait_for
+
+
+def rebuild(library: Path) -> None:
+    """Put another file with the same content there, as a package manager does."""
+    new = library.with_suffix(".new")
+    new.write_text(library.read_text())
+    os.replace(new, library)
+
+
+def test_a_library_that_changed_is_said_by_list_info_and_status_and_taken_by_replace(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
+    library = daemon.package("late", types={"Late": "fine"})
+    client.load(rtcf.component("late", "Late", name="a"))
+    client.load(rtcf.component("demo", "Fine", name="b"))
+    assert not client.get_status().runners[0].libraries_changed
+    rebuild(library)
+    assert list(client.get_status().runners[0].libraries_changed) == [str(library)]
+    assert f"{library} is another file now" in daemon.ctl("status").stdout
+    assert [each.library_changed for each in client.list_components()] == [True, False]
+    assert "library changed" in daemon.ctl("list").stdout
+    assert "`rtcfctl replace /a --rebuilt` takes it" in daemon.ctl("info", "a").stdout
+    done = daemon.ctl("replace", "a", "--rebuilt")
+    assert done.stdout == "replaced a by /a\n", done.stderr
+    assert not client.get_status().runners[0].libraries_changed
+    assert not client.get_component("a").library_changed
+
+
+def test_replace_wants_a_type_or_the_rebuilt_library(daemon: DaemonUnderTest) -> None:
+    for words in (["a"], ["a", "demo"], ["a", "demo", "Fine", "--rebuilt"]):
+        done = daemon.ctl("replace", *words)
+        assert done.returncode == 2, words
+        assert "name PKG COMPONENT, or --rebuilt" in done.stderr
+
+
+def test_apply_says_that_it_left_old_code_running(
+    daemon: DaemonUnderTest, client: rtcf.Client, tmp_path: Path
+) -> None:
+    library = daemon.package("late", types={"Late": "fine"})
+    graph = tmp_path / "graph.yaml"
+    graph.write_text("components:\n  - {package: late, type: Late}\n")
+    assert daemon.ctl("apply", str(graph)).stderr == ""
+    rebuild(library)
+    said = daemon.ctl("apply", str(graph)).stderr
+    assert said.startswith("rtcfctl: note: another library than /Late was loaded from is there now")
+    assert said.endswith("--rebuilt takes it\n")
+
+
+def test_what_changed_while_rtcfd_was_restarted_is_said_by_the_next(
+    stopped_daemon: DaemonUnderTest,
+) -> None:
+    daemon = stopped_daemon.start_service()
+    library = daemon.package("late", types={"Late": "fine"})
+    with daemon.client() as client:
+        client.load(rtcf.component("late", "Late"))
+    daemon.end(signal.SIGUSR1)
+    rebuild(library)
+    daemon.start_service()
+    with daemon.client() as client:
+        wait_for(lambda: client.get_status().runners[0].libraries_changed, "what has changed")
