@@ -212,7 +212,8 @@ TEN_RUNNER = """
 TEN_PARAMETERS = {
     *(f"/rt_runner/{name}" for name in (
         "mode", "frequency", "ros_queue", "ros_mapping_whitelist", "ros_mapping_blacklist",
-        "rtcf_runner/host", "rtcf_runner/runner", "rtcf_runner/socket", "rtcf_runner/token")),
+        "rtcf_runner/host", "rtcf_runner/launch", "rtcf_runner/pid",
+        "rtcf_runner/runner", "rtcf_runner/socket", "rtcf_runner/token")),
     "/drive/is_first",
     *(f"/{ns}/{base}/topics_ignore_for_graph" for ns in "lr" for base in ("velocity", "current")),
 }  # fmt: skip
@@ -279,7 +280,8 @@ def test_ten_components_in_nested_loops_and_namespaces_give_the_numbers_wanted(
             ("/target", "/l/effort", "/watch/sum"), "std_msgs/Float64"
         )
         loop = next(name for name in nodes(master) if name.startswith("/rtcfd/"))
-        assert len(nodes(master) - {loop}) == 2  # ours
+        # The runner, ten launchers, and the two of this test.
+        assert len(nodes(master) - {loop}) == 13
         assert services(master, loop) == {
             *(f"/rt_runner/{name}" for name in RUNNER_SERVICES),
             *(f"{loop}/{name}" for name in ("get_loggers", "set_logger_level")),

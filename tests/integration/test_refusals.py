@@ -264,5 +264,5 @@ def test_what_is_not_trusted_is_not_to_be_given_to_others(tmp_path: Path) -> Non
     finally:
         daemon.end()
     assert "rtcf_open can be written by everybody, so its code is not trusted" in said
-    assert "install it as root (components into /usr/lib/rtcf/PACKAGE)" in said
+    assert "install it as root (components into /usr/lib/rtcf-components/PACKAGE)" in said
     assert "chmod" not in said and "chown" not in said

@@ -109,11 +109,11 @@ class Walk {
 
     // No advice to change the rights of what is there: it may be a home, or /tmp.
     [[noreturn]] void distrust(const std::string& why) const {
-        refuse(
-            fmt::format("{} {}, so its code is not trusted: install it as root (components into "
-                        "/usr/lib/rtcf/PACKAGE), or name the component folder of a trusted user "
-                        "under path in rtcfd's settings",
-                        seen_.string(), why));
+        refuse(fmt::format(
+            "{} {}, so its code is not trusted: install it as root (components into "
+            "/usr/lib/rtcf-components/PACKAGE), or name the component folder of a trusted user "
+            "under path in rtcfd's settings",
+            seen_.string(), why));
     }
 
     const std::string subject_;
