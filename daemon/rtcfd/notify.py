@@ -8,6 +8,8 @@ import contextlib
 import os
 from collections.abc import Callable
 
+from rtcfd.common.tasks import looked_at
+
 _EXTEND_EVERY_S = 10
 _ASKING_TIMEOUT_S = 2.0
 
@@ -56,7 +58,7 @@ class Notify:
 
     def starting(self) -> None:
         """Ask for more time again and again until all is started, however long that takes."""
-        self._starting = asyncio.create_task(self._extend())
+        self._starting = looked_at(asyncio.create_task(self._extend()), "asking systemd for time")
 
     def ready(self, status: str) -> None:
         """Say that clients are served, and begin to feed the watchdog."""
@@ -66,7 +68,9 @@ class Notify:
         usec = os.environ.get("WATCHDOG_USEC", "")
         pid = os.environ.get("WATCHDOG_PID", str(os.getpid()))
         if usec.isdigit() and pid == str(os.getpid()):
-            self._watchdog = asyncio.create_task(self._feed(int(usec) / 2e6))
+            self._watchdog = looked_at(
+                asyncio.create_task(self._feed(int(usec) / 2e6)), "the watchdog's feeding"
+            )
 
     def status(self, status: str) -> None:
         """Say what is going on, in a line."""

@@ -16,6 +16,7 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcfd import VERSION
 from rtcfd.common.limits import Limits
 from rtcfd.common.refusals import FailedPrecondition, Refusal, Unavailable
+from rtcfd.common.tasks import looked_at
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.flight_recorder import FlightRecorder, Note
 from rtcfd.executor.link import LIMITS_PROTOCOL, PROTOCOL, Link, OnAnswer, Progress, Unasked
@@ -85,7 +86,7 @@ class Executor:
             process.signal(signal.SIGKILL)
             await process.wait()
             raise
-        executor._watching = asyncio.create_task(executor._watch())
+        executor._begin_to_watch()
         return executor
 
     @classmethod
@@ -129,7 +130,7 @@ class Executor:
                     f"`kill {executor.pid}` ends it"
                 ) from None
             raise
-        executor._watching = asyncio.create_task(executor._watch())
+        executor._begin_to_watch()
         return executor
 
     @property
@@ -226,6 +227,10 @@ class Executor:
             except (OSError, ValueError) as error:
                 log.warning("%s: no flight recorder: %s", self._peer, error)
         self._link = link
+
+    def _begin_to_watch(self) -> None:
+        watching = asyncio.create_task(self._watch())
+        self._watching = looked_at(watching, f"the watch over {self._peer}")
 
     async def _watch(self) -> None:
         """See the process end; a link lost before that is made anew."""

@@ -15,6 +15,7 @@ from google.protobuf.message import DecodeError
 from rtcf.executor.v1 import executor_pb2 as wire
 
 from rtcfd.common import refusals
+from rtcfd.common.tasks import looked_at
 from rtcfd.executor import frames
 
 # The protocol that this rtcfd speaks.  A number is added for what a peer cannot do without
@@ -70,7 +71,7 @@ class Link:
         )
         # Of the process that listens, by the kernel's word.
         self.peer_pid, self.peer_uid, _ = _CREDENTIALS.unpack(credentials)
-        self._reading = asyncio.create_task(self._read(reader))
+        self._reading = looked_at(asyncio.create_task(self._read(reader)), f"the link to {peer}")
 
     @classmethod
     async def connect(cls, peer: str, path: Path, on_unasked: Unasked) -> "Link":

@@ -70,6 +70,7 @@ class RunnerCore(ABC):
         self._changing_executor = asyncio.Lock()
         self._settled = asyncio.Event()  # not set while an executor is being started
         self._saving = asyncio.Lock()
+        self._forgotten = False
 
     # -- what a runner adds ---------------------------------------------------
 
@@ -284,6 +285,8 @@ class RunnerCore(ABC):
         """Save the desired state; return a note if that failed: the change stands."""
         try:
             async with self._saving:
+                if self._forgotten:
+                    return []
                 text = self.shared.store.text(self.desired)
                 # Not here: fsync may take long.
                 await asyncio.to_thread(self.shared.store.save, self.name, text)
@@ -293,3 +296,12 @@ class RunnerCore(ABC):
             return [self.unsaved]
         self.unsaved = ""
         return []
+
+    async def forget(self) -> None:
+        """Take it off the disk, for good."""
+        try:
+            async with self._saving:
+                self._forgotten = True
+                await asyncio.to_thread(self.shared.store.remove, self.name)
+        except OSError as error:
+            self.log.error("its state stays on disk: %s", error.strerror)

@@ -140,9 +140,8 @@ class Runners:
         try:
             await runner.bring_up()
         except BaseException:
-            self._runners.pop(name, None)
             runner.hold_outbox = None  # its holder is told by the refusal
-            await runner.shut_down()
+            await self._remove(runner)
             raise
         await runner.save()
         runner.log.info("runner added")
@@ -195,11 +194,10 @@ class Runners:
 
     async def _remove(self, runner: Runner) -> None:
         await runner.shut_down()
-        try:
-            await asyncio.to_thread(self._shared.store.remove, runner.name)
-        except OSError as error:
-            runner.log.error("its state stays on disk: %s", error.strerror)
-        self._runners.pop(runner.name, None)
+        await runner.forget()
+        # Not before: its executor must be gone when another takes the name.
+        if self._runners.get(runner.name) is runner:
+            del self._runners[runner.name]
         runner.log.info("runner removed")
         self._shared.on_change()
 

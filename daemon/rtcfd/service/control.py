@@ -127,7 +127,10 @@ async def _listen(
     async for message in messages:
         if message.WhichOneof("kind") == "end":
             await asyncio.wait({opening})
-            await tenancy.end()
+            try:
+                await tenancy.end()
+            except Exception as error:
+                outbox.refuse(error)
             outbox.end(control_pb2.LeaseEnded.WHY_ASKED)
             return
 

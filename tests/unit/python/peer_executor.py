@@ -61,6 +61,8 @@ def is_held(kind: str) -> bool:
 
 
 async def held(kind: str) -> None:
+    if is_held(kind):
+        (Path(os.environ["PEER_HELD"]) / f"{kind} waits").touch()
     while is_held(kind):
         await asyncio.sleep(POLL_S)
 

@@ -25,6 +25,10 @@ class Held:
         self.folder = folder
         folder.mkdir()
 
+    def waits(self, kind: str) -> Callable[[], bool]:
+        """Return what tells whether an executor has come to it."""
+        return (self.folder / f"{kind} waits").exists
+
     @contextlib.contextmanager
     def back(self, kind: str) -> Iterator[None]:
         (self.folder / kind).touch()
@@ -82,31 +86,21 @@ def busy_with(daemon: DaemonUnderTest, what: str) -> None:
     wait_for(lambda: what in status(daemon).status, what)
 
 
-def ask_and_leave(daemon: DaemonUnderTest, *arguments: str) -> None:
-    """Ctrl-C on rtcfctl once it waits for its answer."""
-    before = daemon.log().count(" by ")
-    process = subprocess.Popen(
-        [str(BUILD_TREE / "bin" / "rtcfctl"), *arguments],
-        env={**os.environ, "RTCF_SOCKET": str(daemon.socket)},
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
-    # Connected: then its call is on the way.
-    wait_for(
-        lambda: "socket:" in "".join(_descriptors(process.pid)) or process.poll() is not None,
-        "rtcfctl to connect",
-    )
-    with contextlib.suppress(subprocess.TimeoutExpired):
-        process.wait(0.5)
-    process.send_signal(signal.SIGINT)
-    process.wait(20)
-    wait_for(lambda: daemon.log().count(" by ") > before, "the caller to be missed")
-
-
-def _descriptors(pid: int) -> Iterator[str]:
-    with contextlib.suppress(OSError):
-        for each in Path(f"/proc/{pid}/fd").iterdir():
-            with contextlib.suppress(OSError):
-                yield os.readlink(each)
+def ask_and_leave(
+    daemon: DaemonUnderTest, method: str, request: Any, until: Callable[[], Any] | None = None
+) -> None:
+    """Ctrl-C on a client: once `until` is true, or its call is surely queued."""
+    before = daemon.log().count("its caller left")
+    with daemon.client() as client:
+        stub = client._stub
+        streams = method in ("Start", "Stop", "Apply")
+        call = getattr(stub, method)(request) if streams else getattr(stub, method).future(request)
+        # Calls of one connection are taken in their order.
+        client.get_status()
+        if until is not None:
+            wait_for(until, "the call to begin")
+        call.cancel()
+    wait_for(lambda: daemon.log().count("its caller left") > before, "the caller to be missed")
 
 
 def test_what_waits_is_withdrawn_when_its_caller_leaves(
@@ -115,7 +109,7 @@ def test_what_waits_is_withdrawn_when_its_caller_leaves(
     with held.back("set_parameters"):
         call = Call(service, lambda c: c.set_parameters("a", [rtcf.parse_parameter("kp:=2.0")]))
         busy_with(service, "a change of parameters")
-        ask_and_leave(service, "start")
+        ask_and_leave(service, "Start", control_pb2.StartRequest())
     assert call.end() == ""
     assert status(service).state == STOPPED
     assert "the start is done" not in service.log()
@@ -149,7 +143,7 @@ def test_a_stop_whose_caller_leaves_is_done_and_saved(service: DaemonUnderTest, 
     with service.client() as client:
         client.start()
     with held.back("stop"):
-        ask_and_leave(service, "stop")
+        ask_and_leave(service, "Stop", control_pb2.StopRequest(), held.waits("stop"))
         wait_for(lambda: service.saved()["running"] is False, "the state on disk")
     wait_for(lambda: status(service).state == STOPPED, "the end of the loop")
 
@@ -209,15 +203,16 @@ def test_a_start_during_a_restart_waits_for_the_executor_to_be_gone(
     assert "its loop is down" not in service.log()
 
 
-@pytest.mark.parametrize("verb", ["remove", "restart"])
+@pytest.mark.parametrize("method", ["RemoveRunner", "RestartRunner"])
 def test_what_has_begun_ends_without_its_caller(
-    service: DaemonUnderTest, held: Held, verb: str
+    service: DaemonUnderTest, held: Held, method: str
 ) -> None:
     before = service.executor_pid()
     with held.back("exit"):
-        ask_and_leave(service, "runner", verb, "rt_runner")
+        request = getattr(control_pb2, f"{method}Request")(runner="rt_runner")
+        ask_and_leave(service, method, request, held.waits("exit"))
     with service.client() as client:
-        if verb == "remove":
+        if method == "RemoveRunner":
             wait_for(lambda: not client.get_status().runners, "the runner to be gone")
             assert not (service.state / "rt_runner.json").exists()
         else:
@@ -226,12 +221,12 @@ def test_what_has_begun_ends_without_its_caller(
 
 
 def test_a_refused_graph_leaves_no_runner_behind_whoever_waits(
-    service: DaemonUnderTest, held: Held, tmp_path: Path
+    service: DaemonUnderTest, held: Held
 ) -> None:
-    graph = tmp_path / "graph.yaml"
-    graph.write_text("runner: arm\ncomponents:\n  - {package: demo, type: Refused}\n")
+    spec = rtcf.component("demo", "Refused")
+    request = control_pb2.ApplyRequest(runner="arm", components=[spec])
     with held.back("apply"):
-        ask_and_leave(service, "apply", str(graph))
+        ask_and_leave(service, "Apply", request, held.waits("apply"))
     with service.client() as client:
         wait_for(lambda: len(client.get_status().runners) == 1, "the new runner to be gone")
     assert not (service.state / "arm.json").exists()
