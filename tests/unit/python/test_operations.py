@@ -323,7 +323,7 @@ def reload(service: DaemonUnderTest) -> str:
     return subprocess.run(
         [str(BUILD_TREE / "bin" / "rtcfd"), "--reload", "--config", str(service.settings)],
         env={key: value for key, value in os.environ.items() if key != "RTCF_SOCKET"},
-        capture_output=True, text=True, timeout=30,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=30,
     ).stdout  # fmt: skip
 
 
