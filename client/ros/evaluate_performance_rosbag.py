@@ -1,7 +1,7 @@
 #!/usr/bin/python3 -I
 """Evaluates a loop's recorded cycles, as Fig. 2 of the paper does: two histograms and numbers.
 
-rosbag record /rt_runner/iteration_info
+rosbag record /rt_runner/cycles
 rosrun rtcf evaluate_performance_rosbag BAG FREQUENCY
 """
 
@@ -13,7 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-_TYPE = "rtcf_msgs/IterationInfo"
+# Ours, and RTCF 2021's, which has no number of the cycle.
+_TYPES = ("rtcf_msgs/Cycle", "rtcf_msgs/IterationInfo")
+_OF = " or ".join(_TYPES)
 _QUANTILES = {"p50": 0.5, "p99": 0.99, "p999": 0.999}
 _US = 1e-3  # of a ns
 
@@ -33,18 +35,18 @@ class Cycles:
 
 
 def read(bag: Path, topic: str) -> tuple[str, Cycles]:
-    """Return the topic and its cycles; without a topic, the only one of that type."""
+    """Return the topic and its cycles; without a topic, the only loop's."""
     try:
         import rosbag  # takes a while
     except ImportError:
         raise Unusable("reading bags needs the package python3-rosbag: install it") from None
     try:
         with rosbag.Bag(str(bag)) as opened:
-            found = [
-                name
+            found = {
+                name: info.msg_type
                 for name, info in opened.get_type_and_topic_info().topics.items()
-                if info.msg_type.endswith("/IterationInfo")
-            ]
+                if info.msg_type.endswith(("/Cycle", "/IterationInfo"))
+            }
             chosen = _choose(bag, topic, found)
             return chosen, _cycles(message for _, message, _ in opened.read_messages([chosen]))
     except OSError as error:
@@ -53,36 +55,45 @@ def read(bag: Path, topic: str) -> tuple[str, Cycles]:
         raise Unusable(f"{bag}: {error}; `rosbag reindex` may mend it") from None
 
 
-def _choose(bag: Path, topic: str, found: list[str]) -> str:
+def _choose(bag: Path, topic: str, found: dict[str, str]) -> str:
     if topic:
         if topic not in found:
             raise Unusable(
-                f"{bag} has no {topic} of type {_TYPE}; it has: {', '.join(found) or 'none'}"
+                f"{bag} has no {topic} of type {_OF}; it has: {', '.join(found) or 'none'}"
             )
         return topic
     if not found:
         raise Unusable(
-            f"{bag} has no topic of type {_TYPE}: record it with "
-            "`rosbag record /rt_runner/iteration_info`"
+            f"{bag} has no topic of type {_OF}: record it with `rosbag record /rt_runner/cycles`"
         )
-    if len(found) > 1:
-        raise Unusable(f"{bag} has several loops: choose one by --topic: {', '.join(found)}")
-    return found[0]
+    # Of a loop whose both topics were recorded, the one that tells more.
+    better = {name.rpartition("/")[0] for name, kind in found.items() if kind.endswith("/Cycle")}
+    loops = [
+        name
+        for name, kind in found.items()
+        if kind.endswith("/Cycle") or name.rpartition("/")[0] not in better
+    ]
+    if len(loops) > 1:
+        raise Unusable(f"{bag} has several loops: choose one by --topic: {', '.join(loops)}")
+    return loops[0]
 
 
 def _cycles(messages: Iterable[Any]) -> Cycles:
     cycles = Cycles([], [], 0, [0])
     last = -1
     for message in messages:
-        # Bags of RTCF 2021 have neither.
-        latency = getattr(message, "latency_ns", 0)
-        iteration = getattr(message, "iteration", last + 1)
+        if hasattr(message, "header"):
+            begin = message.header.stamp.to_nsec() + message.latency_ns
+            iteration = message.iteration
+        else:
+            begin = message.stamp.to_nsec()
+            iteration = last + 1
         if iteration <= last:
             cycles.runs.append(len(cycles.begins))
         elif last >= 0:
             cycles.lost += iteration - last - 1
         last = iteration
-        cycles.begins.append(message.stamp.to_nsec() + latency)
+        cycles.begins.append(begin)
         cycles.durations.append(int(message.duration_ns))
     return cycles
 
@@ -184,7 +195,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("bag", type=Path, metavar="BAG", help="a bag with an iteration_info topic")
+    parser.add_argument("bag", type=Path, metavar="BAG", help="a bag with a loop's topic cycles or iteration_info")
     parser.add_argument(
         "frequency", type=_frequency, metavar="FREQUENCY", help="nominal frequency of the loop, Hz"
     )

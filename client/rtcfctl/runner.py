@@ -177,7 +177,7 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
         "--namespace",
         dest="ros_ns",
         metavar="NAMESPACE",
-        help="of iteration_info and the runner's services; \"\": the runner's name",
+        help="of cycles and the runner's services; \"\": the runner's name",
     )
     to.add_argument(
         "--whitelist",

@@ -1,7 +1,8 @@
 """A ROS node that listens to what a runner tells of itself; the tests start it.
 
-introspection_peer.py cycles TOPIC COUNT      prints `connected`, then iteration, stamp and
-                                              duration (ns) of so many cycles
+introspection_peer.py cycles TOPIC COUNT      prints `connected`, then iteration, stamp, latency
+                                              and duration (ns) of so many cycles
+introspection_peer.py info TOPIC COUNT        the same of RTCF 2021's messages: stamp and duration
 introspection_peer.py diagnostics NAME LEVEL  prints all statuses, until that name has that level:
                                               name|level|message|key=value|...
 """
@@ -12,23 +13,30 @@ from typing import Any
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
-from rtcf_msgs.msg import IterationInfo
+from rtcf_msgs.msg import Cycle, IterationInfo
 
 _POLL_S = 0.01
 _DEADLINE_S = 60.0
+_KINDS = {"cycles": Cycle, "info": IterationInfo}
+_TEXT = {
+    Cycle: lambda each: (
+        f"{each.iteration} {each.header.stamp.to_nsec()} {each.latency_ns} {each.duration_ns}"
+    ),
+    IterationInfo: lambda each: f"{each.stamp.to_nsec()} {each.duration_ns}",
+}
 
 
-def _cycles(topic: str, count: int) -> None:
+def _cycles(topic: str, kind: Any, count: int) -> None:
     cycles: list[str] = []
     full = threading.Event()
 
     def take(message: Any) -> None:
         if len(cycles) < count:
-            cycles.append(f"{message.iteration} {message.stamp.to_nsec()} {message.duration_ns}")
+            cycles.append(_TEXT[kind](message))
         else:
             full.set()
 
-    peer = rospy.Subscriber(topic, IterationInfo, take, tcp_nodelay=True)
+    peer = rospy.Subscriber(topic, kind, take, tcp_nodelay=True)
     while peer.get_num_connections() == 0 and not rospy.is_shutdown():
         full.wait(_POLL_S)
     print("connected", flush=True)
@@ -59,8 +67,8 @@ def main() -> None:
     """Do what the command line says."""
     action, what, number = sys.argv[1:]
     rospy.init_node("introspection_peer", anonymous=True)
-    if action == "cycles":
-        _cycles(what, int(number))
+    if action in _KINDS:
+        _cycles(what, _KINDS[action], int(number))
     else:
         _diagnostics(what, int(number))
     sys.stdout.flush()

@@ -2,17 +2,19 @@
 
 import json
 import subprocess
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 import genpy
 import pytest
 import rosbag
-from rtcf_msgs.msg import IterationInfo
-from std_msgs.msg import Float64
+from rtcf_msgs.msg import Cycle, IterationInfo
+from std_msgs.msg import Float64, Header
 
 PROGRAM = Path(__file__).parents[2] / "client" / "ros" / "evaluate_performance_rosbag.py"
 PERIOD_NS = 500_000
-TOPIC = "/rt_runner/iteration_info"
+TOPIC = "/rt_runner/cycles"
 
 
 def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -21,25 +23,38 @@ def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def _info(iteration: int, duration_ns: int, latency_ns: int) -> IterationInfo:
-    stamp = genpy.Time()
-    stamp.secs, stamp.nsecs = divmod(1_700_000_000_000_000_000 + iteration * PERIOD_NS, 10**9)
-    return IterationInfo(  # type: ignore[no-untyped-call]
-        stamp=stamp, iteration=iteration, duration_ns=duration_ns, latency_ns=latency_ns
+def _stamp(iteration: int, latency_ns: int = 0) -> genpy.Time:
+    ns = 1_700_000_000_000_000_000 + iteration * PERIOD_NS + latency_ns
+    return genpy.Time(*divmod(ns, 10**9))
+
+
+def _cycle(iteration: int, duration_ns: int, latency_ns: int) -> Cycle:
+    return Cycle(  # type: ignore[no-untyped-call]
+        header=Header(stamp=_stamp(iteration)),
+        iteration=iteration,
+        duration_ns=duration_ns,
+        latency_ns=latency_ns,
     )
 
 
-def _record(file: Path, infos: list[IterationInfo], topic: str = TOPIC) -> Path:
+def _info_2021(iteration: int, duration_ns: int, latency_ns: int) -> IterationInfo:
+    return IterationInfo(  # type: ignore[no-untyped-call]
+        stamp=_stamp(iteration, latency_ns), duration_ns=duration_ns
+    )
+
+
+def _record(file: Path, cycles: Iterable[Any], topic: str = TOPIC) -> Path:
     with rosbag.Bag(str(file), "a" if file.exists() else "w") as bag:
-        for info in infos:
-            bag.write(topic, info, info.stamp)
+        for at, cycle in enumerate(cycles):
+            bag.write(topic, cycle, genpy.Time(100, at))
     return file
 
 
-def test_numbers_of_a_bag_are_exact(tmp_path: Path) -> None:
+@pytest.mark.parametrize("make", [_cycle, _info_2021])
+def test_numbers_of_a_bag_are_exact(tmp_path: Path, make: Callable[..., Any]) -> None:
     # 1000 durations of 1 to 1000 µs; each second cycle begins 2 µs late.
-    infos = [_info(i, (i + 1) * 1000, 2000 * (i % 2)) for i in range(1000)]
-    done = _run(str(_record(tmp_path / "a.bag", infos)), "2000", "--json")
+    cycles = [make(i, (i + 1) * 1000, 2000 * (i % 2)) for i in range(1000)]
+    done = _run(str(_record(tmp_path / "a.bag", cycles)), "2000", "--json")
     assert done.stderr == ""
     assert json.loads(done.stdout) == {
         "cycles": 1000,
@@ -56,11 +71,8 @@ def test_numbers_of_a_bag_are_exact(tmp_path: Path) -> None:
 
 def test_lost_messages_and_restarts_of_the_loop_are_told_apart(tmp_path: Path) -> None:
     iterations = [0, 1, 2, 5, 6, 0, 1, 2]
-    infos = [_info(iteration, 1000, 0) for iteration in iterations]
-    with rosbag.Bag(str(tmp_path / "a.bag"), "w") as bag:
-        for at, info in enumerate(infos):
-            bag.write(TOPIC, info, genpy.Time(100, at))
-    done = _run(str(tmp_path / "a.bag"), "2000", "--json")
+    cycles = [_cycle(iteration, 1000, 0) for iteration in iterations]
+    done = _run(str(_record(tmp_path / "a.bag", cycles)), "2000", "--json")
     numbers = json.loads(done.stdout)
     assert (numbers["cycles"], numbers["lost"]) == (8, 2)
     # Neither is jitter.
@@ -68,7 +80,7 @@ def test_lost_messages_and_restarts_of_the_loop_are_told_apart(tmp_path: Path) -
 
 
 def test_people_get_a_table(tmp_path: Path) -> None:
-    bag = _record(tmp_path / "a.bag", [_info(i, 1000, 0) for i in range(10)])
+    bag = _record(tmp_path / "a.bag", [_cycle(i, 1000, 0) for i in range(10)])
     done = _run(str(bag), "2000", "--png", str(tmp_path / "b.png"))
     assert done.stdout.splitlines() == [
         f"{TOPIC}: 10 cycles, 0 messages lost, 0 overruns",
@@ -80,12 +92,14 @@ def test_people_get_a_table(tmp_path: Path) -> None:
 
 
 def test_one_of_several_loops_is_chosen(tmp_path: Path) -> None:
-    bag = _record(tmp_path / "a.bag", [_info(i, 1000, 0) for i in range(10)])
-    _record(bag, [_info(i, 2000, 0) for i in range(10)], "/other/iteration_info")
+    bag = _record(tmp_path / "a.bag", [_cycle(i, 1000, 0) for i in range(10)])
+    _record(bag, [_cycle(i, 2000, 0) for i in range(10)], "/other/cycles")
+    # Of the same loop.
+    _record(bag, [_info_2021(i, 2000, 0) for i in range(10)], "/other/iteration_info")
     refused = _run(str(bag), "2000")
     assert (refused.returncode, refused.stdout) == (1, "")
     assert "--topic" in refused.stderr
-    done = _run(str(bag), "2000", "--topic", "/other/iteration_info", "--json")
+    done = _run(str(bag), "2000", "--topic", "/other/cycles", "--json")
     assert json.loads(done.stdout)["duration_us"]["max"] == 2.0
 
 
@@ -95,12 +109,12 @@ def test_bad_input_is_refused_in_one_line(tmp_path: Path) -> None:
         bag.write("/x", Float64(data=1.0), genpy.Time(1, 0))
     no_bag = tmp_path / "no.bag"
     no_bag.write_text("this is no bag")
-    short = _record(tmp_path / "short.bag", [_info(0, 1000, 0)])
-    good = _record(tmp_path / "good.bag", [_info(i, 1000, 0) for i in range(10)])
+    short = _record(tmp_path / "short.bag", [_cycle(0, 1000, 0)])
+    good = _record(tmp_path / "good.bag", [_cycle(i, 1000, 0) for i in range(10)])
     for arguments, status, said in (
         ((str(tmp_path / "none.bag"), "2000"), 1, "No such file"),
         ((str(no_bag), "2000"), 1, str(no_bag)),
-        ((str(other), "2000"), 1, "rosbag record /rt_runner/iteration_info"),
+        ((str(other), "2000"), 1, "rosbag record /rt_runner/cycles"),
         ((str(short), "2000"), 1, "too few"),
         ((str(good), "2000", "--topic", "/x"), 1, "/x"),
         ((str(good), "2000", "--png", str(tmp_path / "nowhere" / "a.png")), 1, "cannot write"),

@@ -19,7 +19,10 @@ SERVICES = {
     "/rt_runner/activate_rt_loop",
     "/rt_runner/deactivate_rt_loop",
     "/rt_runner/get_introspection_information",
+    "/rt_runner/get_loop",
+    "/rt_runner/load_component",
     "/rt_runner/load_orocos_component",
+    "/rt_runner/unload_component",
     "/rt_runner/unload_orocos_component",
 }
 
@@ -74,29 +77,68 @@ def test_every_cycle_is_published_with_stamp_and_duration(
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=2000.0))
     fig_1.load(client)
     _wait_for_services(master)
-    peer = _peer(master, "cycles", "/rt_runner/iteration_info", "6000")
-    assert peer.stdout is not None
-    assert peer.stdout.readline() == "connected\n"
+    peers = [
+        _peer(master, "cycles", "/rt_runner/cycles", "6000"),
+        _peer(master, "info", "/rt_runner/iteration_info", "6000"),
+    ]
+    for peer in peers:
+        assert peer.stdout is not None
+        assert peer.stdout.readline() == "connected\n"
     client.start()
-    cycles = [[int(word) for word in line.split()] for line in _lines(peer)]
+    cycles, infos = ([list(map(int, line.split())) for line in _lines(peer)] for peer in peers)
     client.stop()
     assert [each[0] for each in cycles] == list(range(6000))  # none lost, from the first on
     stamps = [each[1] for each in cycles]
     assert all(later > earlier for earlier, later in itertools.pairwise(stamps))
-    assert all(duration > 0 for _, _, duration in cycles)
+    assert all(duration > 0 for _, _, _, duration in cycles)
+    # RTCF 2021's has the time at which the cycle began.
+    assert infos == [[stamp + latency, duration] for _, stamp, latency, duration in cycles]
 
 
-def test_rostopic_knows_the_type_of_iteration_info(daemon: Daemon, master: Master) -> None:
+def test_rostopic_knows_the_types_of_the_cycles(daemon: Daemon, master: Master) -> None:
     _wait_for_services(master)
-    done = subprocess.run(
-        ["/usr/bin/rostopic", "info", "/rt_runner/iteration_info"],
-        env=_environment(master),
-        capture_output=True,
-        text=True,
-        timeout=DEADLINE_S,
-        check=True,
+    for topic, kind in (("iteration_info", "IterationInfo"), ("cycles", "Cycle")):
+        done = subprocess.run(
+            ["/usr/bin/rostopic", "info", f"/rt_runner/{topic}"],
+            env=_environment(master),
+            capture_output=True,
+            text=True,
+            timeout=DEADLINE_S,
+            check=True,
+        )
+        assert f"Type: rtcf_msgs/{kind}" in done.stdout
+
+
+def test_a_peer_of_rtcf_2021_loads_looks_and_unloads(
+    daemon: Daemon, client: rtcf.Client, master: Master
+) -> None:
+    _wait_for_services(master)
+    load = (
+        "{component_name: {data: Sum}, component_type: {data: Mimo},"
+        " component_pkg: {data: rtcf_examples}, ns: {data: /arm}, is_first: {data: true},"
+        " topics_ignore_for_graph: {data: '/nothing'},"
+        " mappings: [{from_topic: {data: out1}, to_topic: {data: total}}]}"
     )
-    assert "Type: rtcf_msgs/IterationInfo" in done.stdout
+    assert _call(master, "load_orocos_component", load) == {"success": {"data": True}}
+    told = _call(master, "get_introspection_information")["runner_info"]
+    assert isinstance(told, dict)
+    assert told["component_order"] == ["/arm/Sum"]
+    (component,) = told["components"]
+    assert (component["name"], component["package"]) == ("/arm/Sum", "rtcf_examples")
+    assert {
+        "port_type": 1, "name_remapped": "/arm/total", "name_unresolved": "out1",
+        "msg_type": "std_msgs/Float64", "connected_to_ROS": False,
+    } in component["output_ports"]  # fmt: skip
+    assert len(component["input_ports"]) == 3
+    assert {
+        "name": "/arm/total", "type": "std_msgs/Float64", "publishing_components": ["/arm/Sum"],
+        "subscribing_components": [], "connected_to_ROS": False,
+    } in told["connections"]  # fmt: skip
+    unload = "{component_name: {data: Sum}, ns: {data: /arm}}"
+    assert _call(master, "unload_orocos_component", unload) == {"success": {"data": True}}
+    # Its answer has no room for the reason.
+    assert _call(master, "unload_orocos_component", unload) == {"success": {"data": False}}
+    wait_for(lambda: "refused by service: " in daemon.log(), "the reason")
 
 
 def test_diagnostics_tell_the_health_of_loop_and_components(
@@ -118,7 +160,7 @@ def test_diagnostics_tell_the_health_of_loop_and_components(
     keys = {pair.partition("=")[0] for pair in loop[-1][3:]}
     assert {"state", "frequency wanted (Hz)", "iteration", "overruns", "missed cycles",
             "values lost on the way to topics", "log records lost",
-            "iteration_info messages lost", "real time"} <= keys  # fmt: skip
+            "cycle messages lost", "real time"} <= keys  # fmt: skip
     assert "state=faulted" in loop[-1]
 
 
@@ -127,18 +169,18 @@ def test_services_load_run_and_unload_as_rtcfctl_does(
 ) -> None:
     _wait_for_services(master)
     sum_1 = "{name: Sum, ns: arm, package: rtcf_examples, type: Mimo, remaps: ['out1:=total']}"
-    assert _call(master, "load_orocos_component", sum_1) == {"success": True, "message": ""}
+    assert _call(master, "load_component", sum_1) == {"success": True, "message": ""}
     sum_2 = (
         "{name: Second, package: rtcf_examples, type: Mimo, is_first: true,"
         " remaps: ['in1:=/arm/total', 'in2:=loop', 'out1:=/arm/in3'],"
         " topics_ignore_for_graph: '/nothing'}"
     )
-    assert _call(master, "load_orocos_component", sum_2)["success"] is True
+    assert _call(master, "load_component", sum_2)["success"] is True
     assert daemon.ctl("order").stdout.split() == ["/Second", "/arm/Sum"]
 
     assert _call(master, "activate_rt_loop")["success"] is True
     wait_for(lambda: iteration(client) > 10, "the loop")
-    told = _call(master, "get_introspection_information")
+    told = _call(master, "get_loop")
     assert (told["runner"], told["state"], told["frequency"]) == ("rt_runner", "running", 1000.0)
     assert told["component_order"] == ["/Second", "/arm/Sum"]
     components = told["components"]
@@ -161,8 +203,8 @@ def test_services_load_run_and_unload_as_rtcfctl_does(
 
     assert _call(master, "deactivate_rt_loop")["success"] is True
     assert client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_STOPPED
-    assert _call(master, "unload_orocos_component", "{name: Sum, ns: /arm}")["success"] is True
-    assert _call(master, "unload_orocos_component", "{name: /Second}")["success"] is True
+    assert _call(master, "unload_component", "{name: Sum, ns: /arm}")["success"] is True
+    assert _call(master, "unload_component", "{name: /Second}")["success"] is True
     assert daemon.ctl("order").stdout.split() == []
 
 
@@ -171,7 +213,7 @@ def test_what_services_change_is_the_desired_state(
 ) -> None:
     _wait_for_services(master)
     spec = "{name: Sum, package: rtcf_examples, type: Mimo}"
-    assert _call(master, "load_orocos_component", spec)["success"] is True
+    assert _call(master, "load_component", spec)["success"] is True
     daemon.end()
     daemon.start()
     wait_for(lambda: "/Sum" in daemon.ctl("order").stdout, "the component after a restart")
@@ -180,11 +222,11 @@ def test_what_services_change_is_the_desired_state(
 @pytest.mark.parametrize(
     ("service", "request_text", "why"),
     [
-        ("load_orocos_component", "{package: nowhere, type: Mimo}", "nowhere"),
-        ("load_orocos_component", "{package: rtcf_examples, type: Mimoo}", "Mimoo"),
-        ("load_orocos_component", "{package: rtcf_examples, type: Mimo, remaps: [a]}", "from:=to"),
-        ("load_orocos_component", "{name: '1', package: rtcf_examples, type: Mimo}", "'1'"),
-        ("unload_orocos_component", "{name: Nobody}", "/Nobody"),
+        ("load_component", "{package: nowhere, type: Mimo}", "nowhere"),
+        ("load_component", "{package: rtcf_examples, type: Mimoo}", "Mimoo"),
+        ("load_component", "{package: rtcf_examples, type: Mimo, remaps: [a]}", "from:=to"),
+        ("load_component", "{name: '1', package: rtcf_examples, type: Mimo}", "'1'"),
+        ("unload_component", "{name: Nobody}", "/Nobody"),
     ],
 )
 def test_refusals_say_what_is_wrong(
@@ -208,13 +250,13 @@ def test_ros_may_do_what_the_settings_allow(
     daemon.start()
     try:
         _wait_for_services(master)
-        load = _call(master, "load_orocos_component", "{package: rtcf_examples, type: Mimo}")
+        load = _call(master, "load_component", "{package: rtcf_examples, type: Mimo}")
         assert load["success"] is loads
         assert 'ros_services = "admin"' in str(load["message"])
         start = _call(master, "activate_rt_loop")
         assert start["success"] is starts
         assert _call(master, "deactivate_rt_loop")["success"] is starts
-        assert _call(master, "get_introspection_information")["state"] == "stopped"
+        assert _call(master, "get_loop")["state"] == "stopped"
     finally:
         daemon.end()
 
@@ -232,7 +274,7 @@ def test_services_and_topics_are_there_again_after_a_restart_of_the_master(
         master.start()
         _wait_for_services(master)
         published, _ = master.topics()
-        assert {"/rt_runner/iteration_info", "/diagnostics"} <= published
+        assert {"/rt_runner/cycles", "/rt_runner/iteration_info", "/diagnostics"} <= published
         assert _call(master, "activate_rt_loop")["success"] is True
     finally:
         daemon.end()

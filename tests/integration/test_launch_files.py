@@ -18,7 +18,7 @@ from rtcf.v1 import runner_pb2
 from values import iteration
 
 RUNNER_SERVICES = (
-    "activate_rt_loop", "deactivate_rt_loop", "get_introspection_information",
+    "activate_rt_loop", "deactivate_rt_loop", "get_introspection_information", "get_loop",
     "load_orocos_component", "unload_orocos_component",
 )  # fmt: skip
 # What roscore itself has.

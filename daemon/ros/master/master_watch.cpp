@@ -32,6 +32,7 @@ MasterWatch::MasterWatch(const std::string& runner, executor::BridgeReport repor
                          executor::Log& log, Rosout& rosout)
     : name_(nodeName(runner)),
       report_(std::move(report)),
+      log_(log),
       console_(log),
       rosout_(rosout),
       node_(
@@ -56,7 +57,7 @@ MasterWatch::MasterWatch(const std::string& runner, executor::BridgeReport repor
 }
 
 void MasterWatch::attach(executor::RunnerView& runner, const executor::AskSupervisor& ask) {
-    auto introspection = std::make_unique<Introspection>(runner, ask);
+    auto introspection = std::make_unique<Introspection>(runner, ask, log_);
     const std::lock_guard lock(mutex_);
     introspection_ = std::move(introspection);
 }

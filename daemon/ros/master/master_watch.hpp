@@ -93,6 +93,7 @@ class MasterWatch {
     executor::BridgeStatus status_;
 
     const executor::BridgeReport report_;
+    executor::Log& log_;
     Hooks hooks_{[this] { awaitNode(); }};
 
     // The watch thread's alone, but for what is thread-safe in itself.

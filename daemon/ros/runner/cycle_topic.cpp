@@ -1,8 +1,10 @@
 #include "ros/runner/cycle_topic.hpp"
 
 #include <ros/node_handle.h>
+#include <rtcf_msgs/Cycle.h>
 #include <rtcf_msgs/IterationInfo.h>
 
+#include <algorithm>
 #include <chrono>
 
 #include "graph/names.hpp"
@@ -15,9 +17,20 @@ namespace {
 
 constexpr std::uint32_t kQueue = 20000;  // messages for a slow subscriber: a second at the most
 
-rtcf_msgs::IterationInfo messageOf(const executor::CycleRecord& record) {
+ros::Time timeOf(std::int64_t ns) {
+    return ros::Time().fromNSec(static_cast<std::uint64_t>(std::max<std::int64_t>(ns, 0)));
+}
+
+rtcf_msgs::IterationInfo infoOf(const executor::CycleRecord& record) {
     rtcf_msgs::IterationInfo message;
-    message.stamp.fromNSec(static_cast<std::uint64_t>(record.stamp_ns));
+    message.stamp = timeOf(record.stamp_ns + record.latency_ns);
+    message.duration_ns = static_cast<std::uint64_t>(std::max<std::int64_t>(record.duration_ns, 0));
+    return message;
+}
+
+rtcf_msgs::Cycle cycleOf(const executor::CycleRecord& record) {
+    rtcf_msgs::Cycle message;
+    message.header.stamp = timeOf(record.stamp_ns);
     message.iteration = record.iteration;
     message.duration_ns = record.duration_ns;
     message.latency_ns = record.latency_ns;
@@ -35,19 +48,25 @@ CycleTopic::~CycleTopic() {
 }
 
 void CycleTopic::open(ros::NodeHandle& handle, const std::string& name_space) {
-    ros::Publisher publisher = handle.advertise<rtcf_msgs::IterationInfo>(
+    ros::Publisher cycles =
+        handle.advertise<rtcf_msgs::Cycle>(executor::joinName(name_space, "cycles"), kQueue);
+    ros::Publisher iteration_info = handle.advertise<rtcf_msgs::IterationInfo>(
         executor::joinName(name_space, "iteration_info"), kQueue);
     const std::lock_guard lock(mutex_);
-    publisher_ = publisher;
+    cycles_ = cycles;
+    iteration_info_ = iteration_info;
 }
 
 void CycleTopic::close() {
-    ros::Publisher closing;
+    ros::Publisher cycles;
+    ros::Publisher iteration_info;
     {
         const std::lock_guard lock(mutex_);
-        std::swap(closing, publisher_);
+        std::swap(cycles, cycles_);
+        std::swap(iteration_info, iteration_info_);
     }
-    closing.shutdown();
+    cycles.shutdown();
+    iteration_info.shutdown();
 }
 
 void CycleTopic::run() {
@@ -61,10 +80,15 @@ void CycleTopic::run() {
 
 void CycleTopic::publishAll() {
     const std::lock_guard lock(mutex_);
-    const bool wanted = static_cast<bool>(publisher_) && publisher_.getNumSubscribers() > 0;
+    const auto wanted = [](const ros::Publisher& publisher) {
+        return static_cast<bool>(publisher) && publisher.getNumSubscribers() > 0;
+    };
+    const bool cycles = wanted(cycles_);
+    const bool iteration_info = wanted(iteration_info_);
     executor::CycleRecord record{};
     while (!stop_ && runner_.popCycle(record)) {
-        if (wanted) publisher_.publish(messageOf(record));
+        if (cycles) cycles_.publish(cycleOf(record));
+        if (iteration_info) iteration_info_.publish(infoOf(record));
     }
 }
 

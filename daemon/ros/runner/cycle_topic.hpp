@@ -1,5 +1,6 @@
 /// @file
-/// The topic `<namespace>/iteration_info`: one message for each cycle.
+/// The topics `<namespace>/cycles` and `<namespace>/iteration_info`, which is RTCF 2021's: one
+/// message for each cycle.
 #pragma once
 
 #include <ros/publisher.h>
@@ -38,7 +39,8 @@ class CycleTopic {
 
     executor::RunnerView& runner_;
     std::mutex mutex_;  // publisher_
-    ros::Publisher publisher_;
+    ros::Publisher cycles_;
+    ros::Publisher iteration_info_;
     std::atomic<bool> stop_{false};
     std::thread thread_;
 };

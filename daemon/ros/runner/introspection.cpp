@@ -16,8 +16,9 @@ std::string hostName() {
 
 }  // namespace
 
-Introspection::Introspection(executor::RunnerView& runner, const executor::AskSupervisor& ask)
-    : cycles_(runner), report_(runner, hostName()), services_(runner, ask) {}
+Introspection::Introspection(executor::RunnerView& runner, const executor::AskSupervisor& ask,
+                             executor::Log& log)
+    : cycles_(runner), report_(runner, hostName()), services_(runner, ask, log) {}
 
 void Introspection::open(ros::NodeHandle& handle, const std::string& name_space) {
     if (open_ && name_space == name_space_) return;

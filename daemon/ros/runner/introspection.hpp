@@ -1,6 +1,6 @@
 /// @file
 /// What ROS peers see of a runner besides its ports: every cycle on
-/// `<namespace>/iteration_info`, its health on `/diagnostics`, and services.
+/// `<namespace>/cycles` and `iteration_info`, its health on `/diagnostics`, and services.
 #pragma once
 
 #include <ros/publisher.h>
@@ -18,7 +18,9 @@ namespace rtcf::ros1 {
 /// Owned by the ROS node; all but the constructor and the destructor by the watch thread.
 class Introspection {
    public:
-    Introspection(executor::RunnerView& runner, const executor::AskSupervisor& ask);
+    /// @param log gets why services refused; outlives this
+    Introspection(executor::RunnerView& runner, const executor::AskSupervisor& ask,
+                  executor::Log& log);
 
     /// Opens what is not open yet, in this namespace and no other. With a master.
     void open(ros::NodeHandle& handle, const std::string& name_space);

@@ -64,12 +64,11 @@ std::string joined(const std::vector<std::string>& lines) {
 
 }  // namespace
 
-rtcf_msgs::GetIntrospectionInformation::Response describeRunner(
-    const executor::RunnerView& runner) {
+rtcf_msgs::GetLoop::Response describeRunner(const executor::RunnerView& runner) {
     const executor::RunnerPicture picture = runner.picture();
     const std::shared_ptr<const executor::GraphSnapshot> graph = runner.snapshot();
     const executor::LoopFigures& figures = runner.loop().figures();
-    rtcf_msgs::GetIntrospectionInformation::Response response;
+    rtcf_msgs::GetLoop::Response response;
     response.runner = runner.name();
     response.state = stateName(picture.state);
     response.status = picture.status;
@@ -79,15 +78,15 @@ rtcf_msgs::GetIntrospectionInformation::Response describeRunner(
     response.generation = graph->generation;
     response.degraded = picture.degraded;
     for (const auto& component : graph->components) {
-        rtcf_msgs::ComponentInfo info;
+        rtcf_msgs::LoopComponent info;
         info.name = component->full_name;
         info.package = component->definition.package;
         info.type = component->definition.type;
         info.is_first = component->definition.first ? 1 : 0;
         info.fault = component->fault;
         for (const executor::PortSnapshot& port : component->ports) {
-            rtcf_msgs::PortInfo line;
-            line.direction = port.output ? rtcf_msgs::PortInfo::OUTPUT : rtcf_msgs::PortInfo::INPUT;
+            rtcf_msgs::LoopPort line;
+            line.direction = port.output ? rtcf_msgs::LoopPort::OUTPUT : rtcf_msgs::LoopPort::INPUT;
             line.name = port.name;
             line.mapped_name = port.mapped_name;
             line.type = port.type->name;
@@ -109,7 +108,7 @@ rtcf_msgs::GetIntrospectionInformation::Response describeRunner(
         response.components.push_back(std::move(info));
     }
     for (const auto& [name, connection] : graph->connections) {
-        rtcf_msgs::ConnectionInfo info;
+        rtcf_msgs::LoopConnection info;
         info.name = name;
         info.type = connection.type;
         if (connection.writer) info.writer = connection.writer->component;
@@ -119,6 +118,39 @@ rtcf_msgs::GetIntrospectionInformation::Response describeRunner(
         response.connections.push_back(std::move(info));
     }
     return response;
+}
+
+rtcf_msgs::RunnerInfo runnerInfo(const rtcf_msgs::GetLoop::Response& loop) {
+    rtcf_msgs::RunnerInfo info;
+    for (const rtcf_msgs::LoopComponent& component : loop.components) {
+        rtcf_msgs::ComponentInfo to;
+        to.name = component.name;
+        to.package = component.package;
+        to.type = component.type;
+        for (const rtcf_msgs::LoopPort& port : component.ports) {
+            const bool output = port.direction == rtcf_msgs::LoopPort::OUTPUT;
+            rtcf_msgs::PortInfo line;
+            line.port_type =
+                output ? rtcf_msgs::PortInfo::TYPE_OUTPUT : rtcf_msgs::PortInfo::TYPE_INPUT;
+            line.name_remapped = port.mapped_name;
+            line.name_unresolved = port.name;
+            line.msg_type = port.type;
+            line.connected_to_ROS = port.mapped;
+            (output ? to.output_ports : to.input_ports).push_back(std::move(line));
+        }
+        info.components.push_back(std::move(to));
+    }
+    for (const rtcf_msgs::LoopConnection& connection : loop.connections) {
+        rtcf_msgs::ConnectionInfo to;
+        to.name = connection.name;
+        to.type = connection.type;
+        if (!connection.writer.empty()) to.publishing_components.push_back(connection.writer);
+        to.subscribing_components = connection.readers;
+        to.connected_to_ROS = connection.published != 0 || connection.subscribed != 0 ? 1 : 0;
+        info.connections.push_back(std::move(to));
+    }
+    info.component_order = loop.component_order;
+    return info;
 }
 
 DiagnosticReport::DiagnosticReport(const executor::RunnerView& runner, std::string hardware)
@@ -199,7 +231,7 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
     addValue(status, "missed cycles", missed_);
     addValue(status, "values lost on the way to topics", taps);
     addValue(status, "log records lost", logs);
-    addValue(status, "iteration_info messages lost", cycles);
+    addValue(status, "cycle messages lost", cycles);
     addValue(status, "real time", picture.degraded.empty() ? "yes" : joined(picture.degraded));
     addMicroseconds(status, "calculation",
                     summarize(difference(duration, duration_), loop.counter().nsPerTick()));

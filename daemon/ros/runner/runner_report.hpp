@@ -4,7 +4,8 @@
 #pragma once
 
 #include <diagnostic_msgs/DiagnosticArray.h>
-#include <rtcf_msgs/GetIntrospectionInformation.h>
+#include <rtcf_msgs/GetLoop.h>
+#include <rtcf_msgs/RunnerInfo.h>
 
 #include <cstdint>
 #include <map>
@@ -21,7 +22,10 @@ class RunnerView;
 namespace rtcf::ros1 {
 
 /// The whole graph, and what the runner does.
-rtcf_msgs::GetIntrospectionInformation::Response describeRunner(const executor::RunnerView& runner);
+rtcf_msgs::GetLoop::Response describeRunner(const executor::RunnerView& runner);
+
+/// The part of it that RTCF 2021 tells, as it tells it.
+rtcf_msgs::RunnerInfo runnerInfo(const rtcf_msgs::GetLoop::Response& loop);
 
 /// The runner's health, and what its figures were since the last report.
 class DiagnosticReport {

@@ -1,8 +1,11 @@
 #include "ros/runner/runner_services.hpp"
 
 #include <ros/node_handle.h>
-#include <rtcf_msgs/GetIntrospectionInformation.h>
+#include <rtcf_msgs/GetLoop.h>
+#include <rtcf_msgs/GetRunnerInfo.h>
+#include <rtcf_msgs/LoadComponent.h>
 #include <rtcf_msgs/LoadOrocosComponent.h>
+#include <rtcf_msgs/UnloadComponent.h>
 #include <rtcf_msgs/UnloadOrocosComponent.h>
 #include <std_srvs/Trigger.h>
 
@@ -18,7 +21,7 @@ namespace {
 using executor::OutsideCall;
 
 // @return false, and says why, if a remap is not one
-bool loadCall(const rtcf_msgs::LoadOrocosComponent::Request& request, OutsideCall& call,
+bool loadCall(const rtcf_msgs::LoadComponent::Request& request, OutsideCall& call,
               std::string& why) {
     call.kind = OutsideCall::Kind::Load;
     executor::ComponentDefinition& component = call.component;
@@ -39,14 +42,29 @@ bool loadCall(const rtcf_msgs::LoadOrocosComponent::Request& request, OutsideCal
     return true;
 }
 
-OutsideCall unloadCall(const rtcf_msgs::UnloadOrocosComponent::Request& request) {
+OutsideCall loadCall(const rtcf_msgs::LoadOrocosComponent::Request& request) {
+    OutsideCall call;
+    call.kind = OutsideCall::Kind::Load;
+    executor::ComponentDefinition& component = call.component;
+    component.name = request.component_name.data;
+    component.ns = request.ns.data;
+    component.package = request.component_pkg.data;
+    component.type = request.component_type.data;
+    component.first = request.is_first.data != 0;
+    component.ignore = request.topics_ignore_for_graph.data;
+    for (const rtcf_msgs::Mapping& remap : request.mappings)
+        component.remaps.emplace_back(remap.from_topic.data, remap.to_topic.data);
+    return call;
+}
+
+OutsideCall unloadCall(const std::string& name, std::string ns) {
     OutsideCall call;
     call.kind = OutsideCall::Kind::Unload;
-    const bool absolute = !request.name.empty() && request.name.front() == '/';
-    std::string ns = absolute || request.ns.empty() ? "/" : request.ns;
+    const bool absolute = !name.empty() && name.front() == '/';
+    if (absolute || ns.empty()) ns = "/";
     if (ns.front() != '/') ns.insert(0, "/");
     if (ns.back() != '/') ns += '/';
-    call.name = absolute ? request.name : ns + request.name;
+    call.name = absolute ? name : ns + name;
     return call;
 }
 
@@ -58,8 +76,9 @@ OutsideCall simpleCall(OutsideCall::Kind kind) {
 
 }  // namespace
 
-RunnerServices::RunnerServices(const executor::RunnerView& runner, executor::AskSupervisor ask)
-    : runner_(runner), ask_(std::move(ask)) {
+RunnerServices::RunnerServices(const executor::RunnerView& runner, executor::AskSupervisor ask,
+                               executor::Log& log)
+    : runner_(runner), ask_(std::move(ask)), log_(log) {
     const auto serve = [this](ros::CallbackQueue& queue) {
         while (!stop_) queue.callOne(ros::WallDuration(0.1));
     };
@@ -83,6 +102,13 @@ bool RunnerServices::change(const OutsideCall& call, Response& response) {
     return true;
 }
 
+// RTCF 2021's answers have no room for the reason.
+void RunnerServices::changeAndLog(const OutsideCall& call, std_msgs::Bool& success) {
+    const executor::OutsideAnswer answer = ask_(call, cancel_);
+    success.data = answer.success ? 1 : 0;
+    if (!answer.success) log_.write(LogLevel::Error, "", "refused by service: " + answer.message);
+}
+
 template <typename Service, typename Callback>
 void RunnerServices::advertise(ros::NodeHandle& handle, const std::string& name,
                                ros::CallbackQueue& queue, Callback callback) {
@@ -93,30 +119,27 @@ void RunnerServices::advertise(ros::NodeHandle& handle, const std::string& name,
 }
 
 void RunnerServices::open(ros::NodeHandle& handle, const std::string& name_space) {
-    using rtcf_msgs::GetIntrospectionInformation;
-    using rtcf_msgs::LoadOrocosComponent;
-    using rtcf_msgs::UnloadOrocosComponent;
     using std_srvs::Trigger;
     const auto at = [&](const char* name) { return executor::joinName(name_space, name); };
-    advertise<GetIntrospectionInformation>(handle, at("get_introspection_information"), looks_,
-                                           [this](GetIntrospectionInformation::Request&,
-                                                  GetIntrospectionInformation::Response& response) {
-                                               response = describeRunner(runner_);
-                                               return true;
-                                           });
-    advertise<LoadOrocosComponent>(
-        handle, at("load_orocos_component"), changes_,
-        [this](LoadOrocosComponent::Request& request, LoadOrocosComponent::Response& response) {
-            OutsideCall call;
-            response.success = 0;
-            if (!loadCall(request, call, response.message)) return true;
-            return change(call, response);
-        });
-    advertise<UnloadOrocosComponent>(
-        handle, at("unload_orocos_component"), changes_,
-        [this](UnloadOrocosComponent::Request& request, UnloadOrocosComponent::Response& response) {
-            return change(unloadCall(request), response);
-        });
+    openLikeRtcf2021(handle, name_space);
+    using Get = rtcf_msgs::GetLoop;
+    advertise<Get>(handle, at("get_loop"), looks_, [this](Get::Request&, Get::Response& response) {
+        response = describeRunner(runner_);
+        return true;
+    });
+    using Load = rtcf_msgs::LoadComponent;
+    advertise<Load>(handle, at("load_component"), changes_,
+                    [this](Load::Request& request, Load::Response& response) {
+                        OutsideCall call;
+                        response.success = 0;
+                        if (!loadCall(request, call, response.message)) return true;
+                        return change(call, response);
+                    });
+    using Unload = rtcf_msgs::UnloadComponent;
+    advertise<Unload>(handle, at("unload_component"), changes_,
+                      [this](Unload::Request& request, Unload::Response& response) {
+                          return change(unloadCall(request.name, request.ns), response);
+                      });
     advertise<Trigger>(handle, at("activate_rt_loop"), changes_,
                        [this](Trigger::Request&, Trigger::Response& response) {
                            return change(simpleCall(OutsideCall::Kind::Start), response);
@@ -126,6 +149,29 @@ void RunnerServices::open(ros::NodeHandle& handle, const std::string& name_space
                        [this](Trigger::Request&, Trigger::Response& response) {
                            return change(simpleCall(OutsideCall::Kind::Stop), response);
                        });
+}
+
+void RunnerServices::openLikeRtcf2021(ros::NodeHandle& handle, const std::string& name_space) {
+    const auto at = [&](const char* name) { return executor::joinName(name_space, name); };
+    using Get = rtcf_msgs::GetRunnerInfo;
+    advertise<Get>(handle, at("get_introspection_information"), looks_,
+                   [this](Get::Request&, Get::Response& response) {
+                       response.runner_info = runnerInfo(describeRunner(runner_));
+                       return true;
+                   });
+    using Load = rtcf_msgs::LoadOrocosComponent;
+    advertise<Load>(handle, at("load_orocos_component"), changes_,
+                    [this](Load::Request& request, Load::Response& response) {
+                        changeAndLog(loadCall(request), response.success);
+                        return true;
+                    });
+    using Unload = rtcf_msgs::UnloadOrocosComponent;
+    advertise<Unload>(
+        handle, at("unload_orocos_component"), changes_,
+        [this](Unload::Request& request, Unload::Response& response) {
+            changeAndLog(unloadCall(request.component_name.data, request.ns.data), response.success);
+            return true;
+        });
 }
 
 void RunnerServices::close() {

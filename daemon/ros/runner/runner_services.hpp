@@ -1,11 +1,12 @@
 /// @file
 /// The services of a runner, by which ROS peers look at a loop and ask for
 /// changes. Looks are answered here; changes are handed to the supervisor, who
-/// decides.
+/// decides. Those that RTCF 2021 has answer as it does; ours tell more.
 #pragma once
 
 #include <ros/callback_queue.h>
 #include <ros/service_server.h>
+#include <std_msgs/Bool.h>
 
 #include <atomic>
 #include <string>
@@ -18,6 +19,7 @@ namespace ros {
 class NodeHandle;
 }
 namespace rtcf::executor {
+class Log;
 class RunnerView;
 }
 
@@ -28,7 +30,9 @@ namespace rtcf::ros1 {
 class RunnerServices {
    public:
     /// @param ask called by a thread of this object, which waits for the answer
-    RunnerServices(const executor::RunnerView& runner, executor::AskSupervisor ask);
+    /// @param log gets what answers have no room for; outlives this
+    RunnerServices(const executor::RunnerView& runner, executor::AskSupervisor ask,
+                   executor::Log& log);
     ~RunnerServices();
     RunnerServices(const RunnerServices&) = delete;
     RunnerServices& operator=(const RunnerServices&) = delete;
@@ -40,14 +44,17 @@ class RunnerServices {
     /// @}
 
    private:
+    void openLikeRtcf2021(ros::NodeHandle& handle, const std::string& name_space);
     template <typename Service, typename Callback>
     void advertise(ros::NodeHandle& handle, const std::string& name, ros::CallbackQueue& queue,
                    Callback callback);
     template <typename Response>
     bool change(const executor::OutsideCall& call, Response& response);
+    void changeAndLog(const executor::OutsideCall& call, std_msgs::Bool& success);
 
     const executor::RunnerView& runner_;
     const executor::AskSupervisor ask_;
+    executor::Log& log_;
     std::atomic<bool> stop_{false};
     std::atomic<bool> cancel_{false};  // waits for the supervisor
     ros::CallbackQueue looks_;
