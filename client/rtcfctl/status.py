@@ -88,6 +88,7 @@ def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
         state = (
             f"registered at {ros.master_uri}, "
             f"{ros.publications} topics published, {ros.subscriptions} subscribed"
+            + (f", {ros.passed_over} messages passed over for newer ones" * bool(ros.passed_over))
             if ros.connected
             else f"no master at {ros.master_uri}"
         )

@@ -162,24 +162,14 @@ def test_a_loop_that_is_not_to_follow_the_clock_does_not(client: rtcf.Client) ->
     assert not state(client).simulated
 
 
-def test_a_bag_that_is_played_loses_no_input_and_no_cycle(
-    client: rtcf.Client, simulated: Master, tmp_path: Path
-) -> None:
-    values = [float(k) for k in range(1, 201)]
-    bag_file = tmp_path / "in.bag"
+def _play(simulated: Master, folder: Path, values: list[float]) -> None:
+    """Play a bag of these values, 100 a second, and a second more."""
+    bag_file = folder / "in.bag"
     with rosbag.Bag(str(bag_file), "w") as bag:
         for index, value in enumerate(values):
             bag.write("/in", Float64(value), rospy.Time.from_sec(1000.0 + index / 100.0))
         # A tick is to come after the last value.
-        bag.write("/end", Float64(), rospy.Time.from_sec(1003.0))
-    client.start()
-    out = simulated.node("record", "/out")
-    ticks = subprocess.Popen(
-        ["/usr/bin/python3", str(_PEER), "record"],
-        env=simulated.environment(),
-        stdout=subprocess.PIPE,
-        text=True,
-    )
+        bag.write("/end", Float64(), rospy.Time.from_sec(1001.0 + len(values) / 100.0))
     played = subprocess.run(
         ["/usr/bin/rosbag", "play", "--clock", "--hz=50", "--delay=2", "--quiet", str(bag_file)],
         env=simulated.environment(),
@@ -189,6 +179,37 @@ def test_a_bag_that_is_played_loses_no_input_and_no_cycle(
         check=False,
     )
     assert played.returncode == 0, played.stderr
+
+
+def test_a_topic_faster_than_the_loop_is_not_delayed_but_passed_over(
+    client: rtcf.Client, simulated: Master, tmp_path: Path
+) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=10.0))
+    client.start()
+    out = simulated.node("record", "/out")
+    _play(simulated, tmp_path, [float(k) for k in range(1, 201)])
+    wait_for(lambda: 200.0 in out.values(), "the newest value")
+    passed = out.values()
+    # One a cycle; two seconds of input and one without.
+    assert len(passed) <= 22
+    assert passed == sorted(passed)
+    wait_for(lambda: state(client).ros.passed_over == 200 - len(passed), "the count of the others")
+    out.end()
+
+
+def test_a_bag_that_is_played_loses_no_input_and_no_cycle(
+    client: rtcf.Client, simulated: Master, tmp_path: Path
+) -> None:
+    values = [float(k) for k in range(1, 201)]
+    client.start()
+    out = simulated.node("record", "/out")
+    ticks = subprocess.Popen(
+        ["/usr/bin/python3", str(_PEER), "record"],
+        env=simulated.environment(),
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    _play(simulated, tmp_path, values)
     out.wait_for_values(len(values))
     assert out.values() == values
     out.end()

@@ -5,36 +5,57 @@ namespace rtcf::executor {
 Injector::Injector(std::string topic, const TypeInfo& type)
     : topic_(std::move(topic)), type_(type) {
     for (auto& slot : slots_) slot = type_.make_slot(nullptr);
+    if (type_.fixed_size) fixed_size_ = static_cast<std::uint32_t>(type_.length(*slots_[0]));
 }
 
-bool Injector::deliver(const std::uint8_t* bytes, std::uint32_t size) {
-    if (size > largest_.load(std::memory_order_relaxed)) {
-        too_large_.fetch_add(1, std::memory_order_relaxed);
-        return false;
-    }
+bool Injector::deliver(const std::uint8_t* bytes, std::uint32_t size, std::int64_t arrived_ns) {
+    if (!admits(size)) return false;
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!queueing_) return store(bytes, size);
-    waiting_.emplace_back(bytes, bytes + size);
-    if (waiting_.size() <= kMaxWaiting) return true;
-    waiting_.pop_front();
-    refused_.fetch_add(1, std::memory_order_relaxed);
+    while (!waiting_.empty() &&
+           (waiting_.size() >= kMaxWaiting || waiting_bytes_ + size > kMaxWaitingBytes))
+        dropOldest();
+    waiting_.push_back({arrived_ns, {bytes, bytes + size}});
+    waiting_bytes_ += size;
     return true;
 }
 
-void Injector::setQueueing(bool queueing) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    queueing_ = queueing;
-    if (queueing) return;
-    for (const auto& message : waiting_)
-        store(message.data(), static_cast<std::uint32_t>(message.size()));
-    waiting_.clear();
+bool Injector::admits(std::uint32_t size) {
+    if (type_.fixed_size) {
+        if (size <= fixed_size_) return true;
+        refuse();
+        return false;
+    }
+    if (size <= largest_.load(std::memory_order_relaxed)) return true;
+    too_large_.fetch_add(1, std::memory_order_relaxed);
+    return false;
 }
 
-void Injector::deliverNext() {
+void Injector::setQueueing(bool queueing) {
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        queueing_ = queueing;
+    }
+    if (!queueing) deliverUntil(INT64_MAX);
+}
+
+void Injector::deliverUntil(std::int64_t arrived_ns) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (waiting_.empty()) return;
-    store(waiting_.front().data(), static_cast<std::uint32_t>(waiting_.front().size()));
+    const auto ready = [&](std::size_t at) {
+        return waiting_.size() > at && waiting_[at].arrived_ns <= arrived_ns;
+    };
+    while (ready(1)) dropOldest();
+    if (!ready(0)) return;
+    const std::vector<std::uint8_t>& bytes = waiting_.front().bytes;
+    store(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+    waiting_bytes_ -= bytes.size();
     waiting_.pop_front();
+}
+
+void Injector::dropOldest() {
+    waiting_bytes_ -= waiting_.front().bytes.size();
+    waiting_.pop_front();
+    passed_over_.fetch_add(1, std::memory_order_relaxed);
 }
 
 bool Injector::store(const std::uint8_t* bytes, std::uint32_t size) {
@@ -42,7 +63,9 @@ bool Injector::store(const std::uint8_t* bytes, std::uint32_t size) {
         refused_.fetch_add(1, std::memory_order_relaxed);
         return false;
     }
-    back_ = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel) & ~kFresh;
+    const std::uint32_t before = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel);
+    if ((before & kFresh) != 0) passed_over_.fetch_add(1, std::memory_order_relaxed);
+    back_ = before & ~kFresh;
     delivered_.fetch_add(1, std::memory_order_relaxed);
     return true;
 }

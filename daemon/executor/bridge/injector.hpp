@@ -2,8 +2,8 @@
 /// An injector brings values into the loop: one thread deserialises a message
 /// into the free slot of a triple buffer, the real-time thread takes the newest
 /// at the next cycle boundary. Neither ever waits; only the newest value counts.
-/// Under a simulated clock, where cycles come in bursts, all values count: they
-/// queue up, and each cycle is given one.
+/// Under a simulated clock, whose cycles come in bursts, values queue up until
+/// it is known which cycle is the first after them.
 #pragma once
 
 #include <array>
@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "loop/cycle_counter.hpp"
 #include "rtcf/port.hpp"
 #include "rtcf/port_type.hpp"
 #include "rtcf/realtime.hpp"
@@ -34,17 +35,25 @@ class Injector {
     /// Takes one serialised message. One thread at a time; not real-time safe.
     /// @return false if the bytes are not a message of this type or too many; nothing has changed
     /// then
-    bool deliver(const std::uint8_t* bytes, std::uint32_t size);
+    /// @param arrived_ns when it came, CLOCK_MONOTONIC; never before the last one
+    bool deliver(const std::uint8_t* bytes, std::uint32_t size,
+                 std::int64_t arrived_ns = monotonicNow());
 
-    /// Whether messages wait for a deliverNext() each. What still waits when that ends is
-    /// delivered. Any thread; not real-time safe.
+    /// Whether a message of so many bytes may come at all; counts it if not. Any thread.
+    bool admits(std::uint32_t size);
+    /// A message was lost on its way here. Any thread.
+    void refuse() { refused_.fetch_add(1, std::memory_order_relaxed); }
+
+    /// Whether messages wait for deliverUntil(). What still waits when that ends is delivered. Any
+    /// thread; not real-time safe.
     void setQueueing(bool queueing);
 
-    /// Delivers the oldest message that waits, if any. Any thread; not real-time safe.
-    void deliverNext();
+    /// Delivers the newest message that came until then, if any; the older ones are passed over.
+    /// Any thread; not real-time safe.
+    void deliverUntil(std::int64_t arrived_ns);
     /// Bytes that a message of a type of variable size may have. Any thread.
     void setLargest(std::uint32_t bytes) noexcept {
-        largest_.store(type_.fixed_size ? UINT32_MAX : bytes, std::memory_order_relaxed);
+        largest_.store(bytes, std::memory_order_relaxed);
     }
     /// Messages refused as they were larger. Any thread.
     std::uint64_t tooLarge() const noexcept { return too_large_.load(std::memory_order_relaxed); }
@@ -52,6 +61,10 @@ class Injector {
     /// Messages delivered and refused so far. Any thread.
     std::uint64_t delivered() const noexcept { return delivered_.load(std::memory_order_relaxed); }
     std::uint64_t refused() const noexcept { return refused_.load(std::memory_order_relaxed); }
+    /// Messages that no cycle has seen, as a newer one was there. Any thread.
+    std::uint64_t passedOver() const noexcept {
+        return passed_over_.load(std::memory_order_relaxed);
+    }
 
     /// The slot that inputs read. Loop side only.
     const SlotHeader* front() const noexcept { return slots_[front_].get(); }
@@ -69,9 +82,16 @@ class Injector {
     }
 
    private:
-    // A loop that cannot keep up with its simulation loses the oldest beyond this.
+    struct Waiting {
+        std::int64_t arrived_ns;
+        std::vector<std::uint8_t> bytes;
+    };
+    // While the clock stands, or a loop cannot keep up with it, the oldest beyond these are passed
+    // over.
     static constexpr std::size_t kMaxWaiting = 10000;
+    static constexpr std::size_t kMaxWaitingBytes = 1024 * 1024;
 
+    void dropOldest();
     bool store(const std::uint8_t* bytes, std::uint32_t size);
 
     static constexpr std::uint32_t kFresh =
@@ -80,16 +100,19 @@ class Injector {
     std::string topic_;
     const TypeInfo& type_;
     std::array<std::shared_ptr<SlotHeader>, 3> slots_;
-    std::uint32_t front_ = 0;     // loop side
+    std::uint32_t fixed_size_ = 0;  // bytes of each message of a type of fixed size
+    std::uint32_t front_ = 0;       // loop side
     std::uint64_t sequence_ = 0;  // loop side
     std::atomic<std::uint32_t> middle_{1};
     std::mutex mutex_;  // of the delivering side: back_ and what waits
     std::uint32_t back_ = 2;
     bool queueing_ = false;
-    std::deque<std::vector<std::uint8_t>> waiting_;
+    std::deque<Waiting> waiting_;
+    std::size_t waiting_bytes_ = 0;
     std::atomic<std::uint64_t> delivered_{0};
     std::atomic<std::uint64_t> refused_{0};
     std::atomic<std::uint64_t> too_large_{0};
+    std::atomic<std::uint64_t> passed_over_{0};
     std::atomic<std::uint32_t> largest_{UINT32_MAX};
 };
 

@@ -245,15 +245,15 @@ void Loop::followClock() noexcept {
     constexpr auto kPatience = std::chrono::milliseconds(10);
     while (!stop_requested_.load(std::memory_order_acquire) &&
            fault_.kind == LoopFault::Kind::None) {
-        const std::optional<std::int64_t> stamp = simulation_->next(clock_.period_ns, kPatience);
-        if (!stamp) {
+        const std::optional<SimulatedCycle> due = simulation_->next(clock_.period_ns, kPatience);
+        if (!due) {
             takeProbe();
             takeAdoption();
             continue;
         }
-        for (const Feed& feed : schedule_->feeds) feed.injector->deliverNext();
+        for (const Feed& feed : schedule_->feeds) feed.injector->deliverUntil(due->arrived_ns);
         const std::int64_t now = clock_.iteration == 0 ? 0 : clock_.time_ns + clock_.period_ns;
-        stamp_offset_ns_.store(*stamp - now, std::memory_order_relaxed);
+        stamp_offset_ns_.store(due->time_ns - now, std::memory_order_relaxed);
         cycle(now, now);
     }
 }

@@ -1,14 +1,16 @@
 #include "loop/simulated_clock.hpp"
 
+#include <utility>
+
 namespace rtcf::executor {
 
-void SimulatedClock::tick(std::int64_t now_ns) {
+void SimulatedClock::tick(std::int64_t now_ns, std::int64_t arrived_ns) {
     {
         const std::lock_guard<std::mutex> lock(mutex_);
         if (ticks_.size() < kMaxTicks) {
-            ticks_.push_back(now_ns);
+            ticks_.push_back({now_ns, arrived_ns});
         } else {
-            ticks_.back() = now_ns;
+            ticks_.back() = {now_ns, arrived_ns};
         }
     }
     ticked_.notify_one();
@@ -22,22 +24,40 @@ void SimulatedClock::reset(std::int64_t max_jump_ns) {
     max_jump_ns_ = max_jump_ns;
 }
 
-std::optional<std::int64_t> SimulatedClock::next(std::int64_t period_ns,
-                                                 std::chrono::milliseconds patience) {
+std::optional<SimulatedCycle> SimulatedClock::next(std::int64_t period_ns,
+                                                   std::chrono::milliseconds patience) {
     const auto until = std::chrono::steady_clock::now() + patience;
     std::unique_lock<std::mutex> lock(mutex_);
     while (true) {
-        if (tick_ && *tick_ - cycle_ns_ >= period_ns) return cycle_ns_ += period_ns;
-        if (!ticked_.wait_until(lock, until, [this] { return !ticks_.empty(); })) return {};
-        const std::int64_t tick = ticks_.front();
-        ticks_.pop_front();
-        if (!tick_ || tick < *tick_ || tick - *tick_ > max_jump_ns_) {
-            if (jumps_.size() < kMaxJumps) jumps_.push_back({tick_, tick});
-            tick_ = tick;
-            return cycle_ns_ = tick;
+        if (tick_ && tick_->time_ns - cycle_ns_ >= period_ns) {
+            cycle_ns_ += period_ns;
+            return cycle();
         }
-        tick_ = tick;
+        if (!ticked_.wait_until(lock, until, [this] { return !ticks_.empty(); })) return {};
+        const Tick tick = ticks_.front();
+        ticks_.pop_front();
+        const std::optional<Tick> last = std::exchange(tick_, tick);
+        before_ = last.value_or(tick);
+        const std::int64_t leap = tick.time_ns - before_.time_ns;
+        if (last && leap >= 0 && leap <= max_jump_ns_) continue;
+        if (jumps_.size() < kMaxJumps) {
+            jumps_.push_back({last ? std::optional(last->time_ns) : std::nullopt, tick.time_ns});
+        }
+        before_ = tick;
+        cycle_ns_ = tick.time_ns;
+        return cycle();
     }
+}
+
+// Between two ticks time is taken to have gone on evenly: what came halfway between them, came
+// halfway between their times.
+SimulatedCycle SimulatedClock::cycle() const {
+    const std::int64_t span = tick_->time_ns - before_.time_ns;
+    if (span <= 0) return {cycle_ns_, tick_->arrived_ns};
+    const double left =
+        static_cast<double>(tick_->time_ns - cycle_ns_) / static_cast<double>(span);
+    const auto wait = static_cast<double>(tick_->arrived_ns - before_.arrived_ns);
+    return {cycle_ns_, tick_->arrived_ns - static_cast<std::int64_t>(left * wait)};
 }
 
 std::optional<ClockJump> SimulatedClock::takeJump() {
@@ -50,7 +70,7 @@ std::optional<ClockJump> SimulatedClock::takeJump() {
 
 std::optional<std::int64_t> SimulatedClock::now() const {
     const std::lock_guard<std::mutex> lock(mutex_);
-    return tick_;
+    return tick_ ? std::optional(tick_->time_ns) : std::nullopt;
 }
 
 }  // namespace rtcf::executor

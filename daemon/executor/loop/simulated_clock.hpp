@@ -14,6 +14,12 @@
 
 namespace rtcf::executor {
 
+/// A cycle that is due.
+struct SimulatedCycle {
+    std::int64_t time_ns = 0;     ///< simulated
+    std::int64_t arrived_ns = 0;  ///< CLOCK_MONOTONIC; what came until then is older than the cycle
+};
+
 /// A tick from which the cycles are counted anew: the clock began, went back, or leapt.
 struct ClockJump {
     std::optional<std::int64_t> from_ns;  ///< the tick before; none = this is the first
@@ -25,7 +31,8 @@ class SimulatedClock {
     /// @name The thread that brings the ticks
     /// @{
     /// The clock shows `now_ns` (since 1970 or any other zero). Returns at once.
-    void tick(std::int64_t now_ns);
+    /// @param arrived_ns when the tick came, CLOCK_MONOTONIC, on the clock by which inputs come
+    void tick(std::int64_t now_ns, std::int64_t arrived_ns);
     /// @}
 
     /// @name The thread that starts the loop, while it does not run
@@ -36,8 +43,8 @@ class SimulatedClock {
 
     /// @name The loop's thread
     /// @{
-    /// Waits for the next cycle to be due. @return its time, nothing if none was within `patience`
-    std::optional<std::int64_t> next(std::int64_t period_ns, std::chrono::milliseconds patience);
+    /// Waits for the next cycle to be due. @return nothing if none was within `patience`
+    std::optional<SimulatedCycle> next(std::int64_t period_ns, std::chrono::milliseconds patience);
     /// @}
 
     /// @name Any thread
@@ -53,10 +60,18 @@ class SimulatedClock {
     static constexpr std::size_t kMaxTicks = 65536;
     static constexpr std::size_t kMaxJumps = 64;
 
+    struct Tick {
+        std::int64_t time_ns;
+        std::int64_t arrived_ns;
+    };
+
+    SimulatedCycle cycle() const;
+
     mutable std::mutex mutex_;
     std::condition_variable ticked_;
-    std::deque<std::int64_t> ticks_;    // to be worked off
-    std::optional<std::int64_t> tick_;  // that is being worked off
+    std::deque<Tick> ticks_;    // to be worked off
+    std::optional<Tick> tick_;  // that is being worked off
+    Tick before_{};             // the one before it, or itself
     std::int64_t cycle_ns_ = 0;         // time of the last cycle
     std::int64_t max_jump_ns_ = INT64_MAX;
     std::deque<ClockJump> jumps_;

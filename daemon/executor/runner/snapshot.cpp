@@ -81,6 +81,7 @@ std::shared_ptr<const GraphSnapshot> takeSnapshot(const Plan& plan, const GraphS
         result->connections.emplace(name, picture(plan.graph, connection));
     }
     for (const auto& [name, tap] : plan.taps) result->taps.push_back(tap);
+    for (const auto& [name, injector] : plan.injectors) result->injectors.push_back(injector);
     return result;
 }
 

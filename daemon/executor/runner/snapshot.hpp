@@ -56,6 +56,7 @@ struct GraphSnapshot {
     std::vector<std::shared_ptr<const ComponentSnapshot>> components;  ///< in order of execution
     std::map<std::string, ConnectionSnapshot> connections;
     std::vector<std::shared_ptr<Tap>> taps;
+    std::vector<std::shared_ptr<const Injector>> injectors;
 
     /// @throws Refusal if there is none of that name
     const ComponentSnapshot& get(const std::string& full_name) const;

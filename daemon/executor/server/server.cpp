@@ -602,6 +602,9 @@ pb::RunnerStatus Server::status() const {
     ros.set_subscriptions(picture.bridge.subscriptions);
     ros.set_problem(picture.bridge.problem);
     ros.set_too_large(picture.too_large);
+    std::uint64_t passed_over = 0;
+    for (const auto& injector : graph->injectors) passed_over += injector->passedOver();
+    ros.set_passed_over(passed_over);
     status.set_log_dropped(log_->dropped());
     std::uint64_t dropped = 0;
     for (const auto& tap : graph->taps) dropped += tap->dropped();

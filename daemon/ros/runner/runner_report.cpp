@@ -184,6 +184,8 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
     std::uint64_t taps = 0;
     const std::shared_ptr<const executor::GraphSnapshot> graph = runner_.snapshot();
     for (const auto& tap : graph->taps) taps += tap->dropped();
+    std::uint64_t passed_over = 0;
+    for (const auto& injector : graph->injectors) passed_over += injector->passedOver();
     const std::uint64_t logs = runner_.logRecordsDropped();
     const std::uint64_t cycles = loop.recordsDropped();
     const std::uint64_t iteration = figures.iteration.load(std::memory_order_relaxed);
@@ -230,6 +232,7 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
     addValue(status, "overruns", overruns_);
     addValue(status, "missed cycles", missed_);
     addValue(status, "values lost on the way to topics", taps);
+    addValue(status, "messages passed over for newer ones", passed_over);
     addValue(status, "log records lost", logs);
     addValue(status, "cycle messages lost", cycles);
     addValue(status, "real time", picture.degraded.empty() ? "yes" : joined(picture.degraded));

@@ -3,6 +3,8 @@
 #include <ros/node_handle.h>
 #include <rosgraph_msgs/Clock.h>
 
+#include "loop/cycle_counter.hpp"
+
 namespace rtcf::ros1 {
 
 void ClockSubscription::setClock(std::shared_ptr<executor::SimulatedClock> clock) {
@@ -58,7 +60,7 @@ void ClockSubscription::deliver(std::int64_t now_ns) {
         ros::Time::setNow(now.fromNSec(static_cast<std::uint64_t>(now_ns)));
         clock = clock_;
     }
-    if (clock != nullptr) clock->tick(now_ns);
+    if (clock != nullptr) clock->tick(now_ns, executor::monotonicNow());
 }
 
 }  // namespace rtcf::ros1

@@ -22,14 +22,14 @@ constexpr std::int64_t kNoJump = INT64_MAX;
 Times due(SimulatedClock& clock, std::int64_t period) {
     Times times;
     while (const auto time = clock.next(period, std::chrono::milliseconds(0)))
-        times.push_back(*time);
+        times.push_back(time->time_ns);
     return times;
 }
 
 TEST(SimulatedClock, BeginsWithOneCycleAtItsFirstTick) {
     SimulatedClock clock;
     clock.reset(kNoJump);
-    clock.tick(5000);
+    clock.tick(5000, 0);
     EXPECT_EQ(due(clock, 10), Times{5000});
     const auto jump = clock.takeJump();
     ASSERT_TRUE(jump);
@@ -41,14 +41,14 @@ TEST(SimulatedClock, BeginsWithOneCycleAtItsFirstTick) {
 TEST(SimulatedClock, MakesACycleForEachWholePeriod) {
     SimulatedClock clock;
     clock.reset(kNoJump);
-    clock.tick(100);
-    clock.tick(135);
+    clock.tick(100, 0);
+    clock.tick(135, 0);
     EXPECT_EQ(due(clock, 10), (Times{100, 110, 120, 130}));
-    clock.tick(139);
+    clock.tick(139, 0);
     EXPECT_EQ(due(clock, 10), Times{});
-    clock.tick(140);
+    clock.tick(140, 0);
     EXPECT_EQ(due(clock, 10), Times{140});
-    clock.tick(140);  // a clock that stands still
+    clock.tick(140, 0);  // a clock that stands still
     EXPECT_EQ(due(clock, 10), Times{});
 }
 
@@ -59,7 +59,7 @@ TEST(SimulatedClock, LosesNoCycleWhateverTheRateOfTheClock) {
         clock.reset(kNoJump);
         std::size_t cycles = 0;
         for (std::int64_t tick = 0; tick <= rate * 10; ++tick) {
-            clock.tick(tick * 1'000'000'000 / rate);
+            clock.tick(tick * 1'000'000'000 / rate, 0);
             cycles += due(clock, kMillisecond).size();
         }
         EXPECT_EQ(cycles, kSpan / kMillisecond + 1) << rate << " Hz";
@@ -69,13 +69,13 @@ TEST(SimulatedClock, LosesNoCycleWhateverTheRateOfTheClock) {
 TEST(SimulatedClock, GoesOnFromAJumpWithOneCycle) {
     SimulatedClock clock;
     clock.reset(100);
-    clock.tick(1000);
-    clock.tick(1100);  // no jump yet
+    clock.tick(1000, 0);
+    clock.tick(1100, 0);  // no jump yet
     EXPECT_EQ(due(clock, 50), (Times{1000, 1050, 1100}));
-    clock.tick(1201);
+    clock.tick(1201, 0);
     EXPECT_EQ(due(clock, 50), Times{1201});
-    clock.tick(20);
-    clock.tick(75);
+    clock.tick(20, 0);
+    clock.tick(75, 0);
     EXPECT_EQ(due(clock, 50), (Times{20, 70}));
     std::vector<std::int64_t> to;
     while (const auto jump = clock.takeJump()) to.push_back(jump->to_ns);
@@ -86,23 +86,44 @@ TEST(SimulatedClock, GoesOnFromAJumpWithOneCycle) {
 TEST(SimulatedClock, ForgetsItsTicksWhenItBeginsAnew) {
     SimulatedClock clock;
     clock.reset(kNoJump);
-    clock.tick(1000);
+    clock.tick(1000, 0);
     clock.reset(kNoJump);
     EXPECT_EQ(due(clock, 10), Times{});
     EXPECT_FALSE(clock.takeJump());
     EXPECT_FALSE(clock.now());
 }
 
+TEST(SimulatedClock, SpreadsWhatCameBetweenTwoTicksOverTheirCycles) {
+    SimulatedClock clock;
+    clock.reset(1000);
+    const auto arrivals = [&] {
+        Times times;
+        while (const auto cycle = clock.next(10, std::chrono::milliseconds(0)))
+            times.push_back(cycle->arrived_ns);
+        return times;
+    };
+    clock.tick(100, 7000);
+    EXPECT_EQ(arrivals(), Times{7000});
+    clock.tick(140, 7800);
+    EXPECT_EQ(arrivals(), (Times{7200, 7400, 7600, 7800}));
+    clock.tick(145, 8000);
+    clock.tick(145, 9000);  // it stands still: nothing that comes meanwhile is of a later time
+    clock.tick(155, 9100);
+    EXPECT_EQ(arrivals(), Times{9050});
+    clock.tick(20, 9500);  // a jump: all that came before it is older
+    EXPECT_EQ(arrivals(), Times{9500});
+}
+
 class QueueingInjector : public ::testing::Test {
    protected:
-    void deliver(double value) {
+    void deliver(double value, std::int64_t arrived_ns) {
         std::vector<std::uint8_t> bytes(sizeof value);
         std::memcpy(bytes.data(), &value, sizeof value);
-        injector_.deliver(bytes.data(), sizeof value);
+        injector_.deliver(bytes.data(), sizeof value, arrived_ns);
     }
     // What a cycle sees; nothing if it is nothing new.
-    std::optional<double> cycle() {
-        injector_.deliverNext();
+    std::optional<double> cycle(std::int64_t arrived_ns) {
+        injector_.deliverUntil(arrived_ns);
         if (!injector_.adopt(clock_)) return {};
         return static_cast<const Slot<double>*>(injector_.front())->value;
     }
@@ -111,24 +132,49 @@ class QueueingInjector : public ::testing::Test {
     LoopClock clock_{};
 };
 
-TEST_F(QueueingInjector, GivesEachCycleOneValue) {
+TEST_F(QueueingInjector, GivesEachCycleTheNewestOfItsTime) {
     injector_.setQueueing(true);
-    for (const double value : {1.0, 2.0, 3.0}) deliver(value);
-    EXPECT_EQ(cycle(), 1.0);
-    EXPECT_EQ(cycle(), 2.0);
-    EXPECT_EQ(cycle(), 3.0);
-    EXPECT_EQ(cycle(), std::nullopt);
+    deliver(1.0, 10);
+    deliver(2.0, 15);
+    deliver(3.0, 25);
+    deliver(4.0, 31);
+    EXPECT_EQ(cycle(5), std::nullopt);
+    EXPECT_EQ(cycle(20), 2.0);
+    EXPECT_EQ(cycle(30), 3.0);
+    EXPECT_EQ(cycle(30), std::nullopt);
+    EXPECT_EQ(cycle(40), 4.0);
+    EXPECT_EQ(injector_.passedOver(), 1);
+}
+
+TEST_F(QueueingInjector, IsNoDelayLineForATopicThatIsFasterThanTheLoop) {
+    injector_.setQueueing(true);
+    for (int round = 1; round <= 1000; ++round) {
+        for (int part = 0; part < 4; ++part) deliver(round + part / 4.0, round * 100 + part);
+        EXPECT_EQ(cycle(round * 100 + 50), round + 0.75);
+    }
+    EXPECT_EQ(injector_.passedOver(), 3000);
 }
 
 TEST_F(QueueingInjector, GivesTheNewestOnceItQueuesNoMore) {
     injector_.setQueueing(true);
-    for (const double value : {1.0, 2.0, 3.0}) deliver(value);
-    EXPECT_EQ(cycle(), 1.0);
+    deliver(1.0, 10);
+    deliver(2.0, 20);
+    deliver(3.0, 30);
+    EXPECT_EQ(cycle(10), 1.0);
     injector_.setQueueing(false);
-    EXPECT_EQ(cycle(), 3.0);
-    deliver(4.0);
-    deliver(5.0);
-    EXPECT_EQ(cycle(), 5.0);
+    EXPECT_EQ(cycle(10), 3.0);
+    deliver(4.0, 40);
+    deliver(5.0, 50);
+    EXPECT_EQ(cycle(10), 5.0);
+    EXPECT_EQ(injector_.passedOver(), 2);
+}
+
+TEST_F(QueueingInjector, KeepsTheNewestWhileTheClockStands) {
+    injector_.setQueueing(true);
+    for (int value = 1; value <= 200'000; ++value) deliver(value, value);
+    EXPECT_EQ(injector_.passedOver(), 190'000);
+    EXPECT_EQ(cycle(190'001), 190'001.0);  // the oldest that is left
+    EXPECT_EQ(cycle(300'000), 200'000.0);
 }
 
 }  // namespace
