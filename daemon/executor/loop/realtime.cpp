@@ -16,6 +16,8 @@
 #include <fstream>
 #include <memory>
 
+#include "loop/unlocked_memory.hpp"
+
 namespace rtcf::executor {
 
 namespace {
@@ -100,6 +102,7 @@ RealtimeProblems lockMemory(const RealtimeSettings& settings) {
                  true});
         }
         dl_iterate_phdr(&releaseTextTables, nullptr);
+        UnlockedMemory::ofProcess().unlock();
     } else {
         munlockall();
         problems.push_back({"memory is not locked: the runner's lock_memory is off", false});

@@ -1,6 +1,10 @@
 #include "ros/roscpp/raw_message.hpp"
 
+#include <memory>
+#include <new>
 #include <sstream>
+
+#include "loop/unlocked_memory.hpp"
 
 namespace rtcf::ros1 {
 
@@ -22,6 +26,13 @@ bool startsWithHeader(const std::string& definition) {
         return name == "header" && (type == "Header" || type == "std_msgs/Header");
     }
     return false;
+}
+
+boost::shared_array<std::uint8_t> networkBytes(std::size_t bytes) {
+    const std::shared_ptr<std::uint8_t[]> block =
+        executor::UnlockedMemory::ofProcess().allocate(bytes);
+    if (!block) throw std::bad_alloc();
+    return {block.get(), [block](const std::uint8_t* /*bytes*/) {}};
 }
 
 }  // namespace rtcf::ros1

@@ -21,8 +21,13 @@ struct RawView {
 
 /// A message that was received.
 struct RawBytes {
-    std::vector<std::uint8_t> bytes;
+    boost::shared_array<std::uint8_t> bytes;
+    std::uint32_t size = 0;
 };
+
+/// Bytes that wait, or are on their way, outside of the memory that is locked for the loop.
+/// @throws std::bad_alloc if there are too many
+boost::shared_array<std::uint8_t> networkBytes(std::size_t bytes);
 
 /// True if a message definition's first field is `Header header`, whose
 /// sequence number roscpp counts when it publishes.
@@ -70,8 +75,22 @@ struct Serializer<rtcf::ros1::RawBytes> {
     static void read(Stream& stream, rtcf::ros1::RawBytes& message) {
         const std::uint32_t size = stream.getLength();
         const std::uint8_t* bytes = stream.advance(size);
-        message.bytes.assign(bytes, bytes + size);
+        message.bytes = rtcf::ros1::networkBytes(size);
+        message.size = size;
+        if (size != 0) std::memcpy(message.bytes.get(), bytes, size);
     }
 };
+
+/// As roscpp's, but for where the bytes are.
+template <>
+inline SerializedMessage serializeMessage(const rtcf::ros1::RawView& message) {
+    const std::uint32_t size = message.size + 4;
+    SerializedMessage serialized(rtcf::ros1::networkBytes(size), size);
+    OStream stream(serialized.buf.get(), size);
+    serialize(stream, message.size);
+    serialized.message_start = stream.getData();
+    serialize(stream, message);
+    return serialized;
+}
 
 }  // namespace ros::serialization

@@ -3,6 +3,7 @@
 #include <ros/node_handle.h>
 #include <ros/subscription_callback_helper.h>
 
+#include "ros/roscpp/bounded_transport.hpp"
 #include "ros/roscpp/raw_message.hpp"
 
 namespace rtcf::ros1 {
@@ -14,8 +15,7 @@ bool TopicSubscriber::open(ros::NodeHandle& handle, ros::CallbackQueueInterface&
     using Message = boost::shared_ptr<const RawBytes>;
     const boost::function<void(const Message)> deliver = [injector = injector_,
                                                           muted = muted_](const Message& message) {
-        const auto& bytes = message->bytes;
-        if (!*muted) injector->deliver(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+        if (!*muted) injector->deliver(message->bytes.get(), message->size);
     };
     ros::SubscribeOptions options;
     options.topic = injector_->topic();
@@ -29,6 +29,7 @@ bool TopicSubscriber::open(ros::NodeHandle& handle, ros::CallbackQueueInterface&
     options.transport_hints = ros::TransportHints().tcpNoDelay();
     ros::Subscriber subscriber;
     std::string problem;
+    boundTopic(options.topic, injector_);
     try {
         subscriber = handle.subscribe(options);
     } catch (const std::exception& error) {
