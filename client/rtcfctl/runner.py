@@ -23,9 +23,10 @@ _CHOICES = {
 # Options that are fields of RunnerSettings and of RosSettings.
 _FIELDS = ("frequency_hz", "cpu", "priority", "spin_us", "spin_auto", "max_overruns",
            "warmup_cycles", "stall_timeout_ms", "orphan_timeout_s", "lock_memory", "heap_kb",
-           "stack_kb", "max_clock_jump_s")  # fmt: skip
+           "stack_kb", "max_clock_jump_s", "log_limit")  # fmt: skip
 _ROS_FIELDS = ("enabled", "master_uri", "hostname", "ns", "whitelist", "blacklist", "queue",
-               "latch", "decimation", "decimate", "largest_message_kb")  # fmt: skip
+               "latch", "decimation", "decimate", "largest_message_kb",
+               "refuse_out_of_range")  # fmt: skip
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
@@ -162,6 +163,12 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
         "max_clock_jump_s",
         "a simulated clock that goes further at once begins anew",
     )
+    add_quantity(
+        to,
+        "--log-limit",
+        "log_limit",
+        "records of one line of a component in a second, the others are counted; 0: any number",
+    )
     to.add_argument("--lock-memory", action=switch, help="lock the executor's memory")
     add_quantity(to, "--heap-kb", "heap_kb", "heap touched at start")
     add_quantity(to, "--stack-kb", "stack_kb", "stack of the real-time thread")
@@ -229,6 +236,12 @@ def add_quantity(to: argparse.ArgumentParser, option: str, dest: str, text: str)
         type=value,
         metavar=unit.upper() or "N",
         help=f"{text} ({quantity.range()}, default {quantity.default:g})",
+    )
+    to.add_argument(
+        "--refuse-out-of-range",
+        dest="ros_refuse_out_of_range",
+        action=switch,
+        help="fail a call of dynamic_reconfigure instead of taking the nearest value",
     )
 
 

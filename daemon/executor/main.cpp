@@ -206,7 +206,7 @@ int run(const Options& options) {
                       recorder);
         server.serve(runner, log);
     }
-    log.drain();
+    log.end();
     server.deliver();
     return 0;
 }

@@ -39,6 +39,7 @@ RUNNER = {
     "stall_timeout_ms": Quantity(0, 3_600_000, 2000, "ms"),
     "orphan_timeout_s": Quantity(0.0, 86400.0, 60.0, "s"),
     "max_clock_jump_s": Quantity(0.0, 86400.0, 10.0, "s"),
+    "log_limit": Quantity(0, 1_000_000, 100),  # of one line, a second; 0 = any number
     "heap_kb": Quantity(0, 1024 * 1024, 8192, "KiB"),
     "stack_kb": Quantity(16, 64 * 1024, 256, "KiB"),
 }

@@ -102,7 +102,7 @@ class Injector {
     std::array<std::shared_ptr<SlotHeader>, 3> slots_;
     std::uint32_t fixed_size_ = 0;  // bytes of each message of a type of fixed size
     std::uint32_t front_ = 0;       // loop side
-    std::uint64_t sequence_ = 0;  // loop side
+    std::uint64_t sequence_ = 0;    // loop side
     std::atomic<std::uint32_t> middle_{1};
     std::mutex mutex_;  // of the delivering side: back_ and what waits
     std::uint32_t back_ = 2;

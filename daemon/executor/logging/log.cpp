@@ -79,7 +79,7 @@ void Log::drain() {
     // In order of time with what comes out of the rings.
     const auto handOnUntil = [&](std::int64_t time_ns) {
         while (!posted.empty() && posted.front().time_ns <= time_ns) {
-            consumer_(std::move(posted.front()));
+            handOn(std::move(posted.front()));
             posted.pop_front();
         }
     };
@@ -93,11 +93,45 @@ void Log::drain() {
         drainOne(is_realtime ? realtime_ : others_);
     }
     handOnUntil(INT64_MAX);
+    reportLeftOut(wallClockNow());
     reportDrops();
+}
+
+void Log::end() {
+    drain();
+    const std::lock_guard<std::mutex> lock(drain_mutex_);
+    reportLeftOut(INT64_MAX);
+}
+
+// What is not of a component is what the executor itself says, each once.
+void Log::handOn(LogEntry&& entry) {
+    const LogOrigin origin{entry.component, entry.file, entry.line, entry.level};
+    if (origin.component.empty() || limit_.admit(origin, entry.time_ns))
+        consumer_(std::move(entry));
+}
+
+void Log::reportLeftOut(std::int64_t now_ns) {
+    limit_.report(now_ns, [this](const LogOrigin& origin, std::uint64_t count) {
+        LogEntry entry;
+        entry.level = origin.level;
+        entry.time_ns = wallClockNow();
+        entry.iteration = iterationNow();
+        entry.component = origin.component;
+        entry.file = origin.file;
+        entry.line = origin.line;
+        entry.message = fmt::format("{} more of this line within a second were left out", count);
+        consumer_(std::move(entry));
+    });
 }
 
 void Log::drainOne(Ring& ring) {
     const LogRecord* record = ring.front();
+    const LogOrigin origin{record->component, record->site->file, record->site->line,
+                           record->site->level};
+    if (!limit_.admit(origin, record->time_ns)) {
+        ring.pop();
+        return;
+    }
     LogEntry entry;
     entry.level = record->site->level;
     entry.time_ns = record->time_ns;

@@ -13,6 +13,7 @@
 #include <string>
 
 #include "logging/levels.hpp"
+#include "logging/log_limit.hpp"
 #include "rtcf/logging.hpp"
 #include "spsc_ring.hpp"
 
@@ -57,6 +58,15 @@ class Log final : public LogSink {
     /// records refer to its name and library.
     void drain();
 
+    /// Records of components, from one line of one of them, that are handed on in a second; 0 = any
+    /// number. What is left out is counted, and the count is handed on. Any thread.
+    void setLimit(std::uint32_t records) {
+        const std::lock_guard<std::mutex> lock(drain_mutex_);
+        limit_.set(records);
+    }
+    /// Hands on all pending records, and what was left out so far: the last call of all.
+    void end();
+
     /// Records lost in full rings.
     std::uint64_t dropped() const noexcept {
         return realtime_.dropped() + others_.dropped() +
@@ -76,14 +86,17 @@ class Log final : public LogSink {
 
     std::uint64_t iterationNow() const noexcept;
     void drainOne(Ring& ring);
+    void handOn(LogEntry&& entry);
+    void reportLeftOut(std::int64_t now_ns);
     void reportDrops();
 
     Consumer consumer_;
     Ring realtime_;
     Ring others_;
     std::mutex others_mutex_;  // held from claim() to commit() by threads that are not real-time
-    std::mutex drain_mutex_;
+    std::mutex drain_mutex_;   // down to limit_
     std::uint64_t reported_drops_ = 0;
+    LogLimit limit_;
     LogLevels levels_;
     std::mutex posted_mutex_;  // posted_
     std::deque<LogEntry> posted_;

@@ -54,8 +54,7 @@ std::optional<SimulatedCycle> SimulatedClock::next(std::int64_t period_ns,
 SimulatedCycle SimulatedClock::cycle() const {
     const std::int64_t span = tick_->time_ns - before_.time_ns;
     if (span <= 0) return {cycle_ns_, tick_->arrived_ns};
-    const double left =
-        static_cast<double>(tick_->time_ns - cycle_ns_) / static_cast<double>(span);
+    const double left = static_cast<double>(tick_->time_ns - cycle_ns_) / static_cast<double>(span);
     const auto wait = static_cast<double>(tick_->arrived_ns - before_.arrived_ns);
     return {cycle_ns_, tick_->arrived_ns - static_cast<std::int64_t>(left * wait)};
 }

@@ -69,10 +69,10 @@ class SimulatedClock {
 
     mutable std::mutex mutex_;
     std::condition_variable ticked_;
-    std::deque<Tick> ticks_;    // to be worked off
-    std::optional<Tick> tick_;  // that is being worked off
-    Tick before_{};             // the one before it, or itself
-    std::int64_t cycle_ns_ = 0;         // time of the last cycle
+    std::deque<Tick> ticks_;     // to be worked off
+    std::optional<Tick> tick_;   // that is being worked off
+    Tick before_{};              // the one before it, or itself
+    std::int64_t cycle_ns_ = 0;  // time of the last cycle
     std::int64_t max_jump_ns_ = INT64_MAX;
     std::deque<ClockJump> jumps_;
 };

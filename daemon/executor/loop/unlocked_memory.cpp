@@ -76,8 +76,8 @@ void UnlockedMemory::makeRoom(std::size_t bytes) {
             free_[index].pop_back();
             munmap(block, sizeOf(index));
             mapped_bytes_ -= sizeOf(index);
-            mapped_.erase(std::find(mapped_.begin(), mapped_.end(),
-                                    std::pair{block, sizeOf(index)}));
+            mapped_.erase(
+                std::find(mapped_.begin(), mapped_.end(), std::pair{block, sizeOf(index)}));
         }
     }
 }

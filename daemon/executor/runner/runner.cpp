@@ -261,6 +261,7 @@ void Runner::configure(RunnerSettings settings) {
         }
     }
     stall_monitor_.setTimeout(settings_.stall_timeout_ns);
+    log_.setLimit(settings_.log_limit);
     if (bridge_) bridge_->configure(settings_.bridge);
     publishPicture();
 }

@@ -25,6 +25,7 @@ struct RunnerSettings {
     std::int64_t orphan_timeout_ns = 60'000'000'000;  ///< without a daemon; 0 = at once
     int on_boot = 0;                                  ///< rtcfd's, kept for it
     int on_crash = 0;                                 ///< rtcfd's, kept for it
+    std::uint32_t log_limit = 100;  ///< records of one line of a component in a second; 0 = any
     BridgeSettings bridge;
     SimTime sim_time = SimTime::Auto;
     std::int64_t max_clock_jump_ns = 10'000'000'000;  ///< further forward, a simulation begins anew

@@ -251,6 +251,7 @@ RunnerSettings settingsFrom(const pb::RunnerSettings& message, RunnerSettings ba
     if (message.has_spin_auto()) base.spin_auto = message.spin_auto();
     if (message.has_on_boot()) base.on_boot = message.on_boot();
     if (message.has_on_crash()) base.on_crash = message.on_crash();
+    if (message.has_log_limit()) base.log_limit = message.log_limit();
     if (message.has_sim_time()) base.sim_time = simTimeFrom(message.sim_time());
     if (message.has_max_clock_jump_s()) {
         base.max_clock_jump_ns = static_cast<std::int64_t>(message.max_clock_jump_s() * 1e9);
@@ -269,6 +270,7 @@ RunnerSettings settingsFrom(const pb::RunnerSettings& message, RunnerSettings ba
         base.bridge.largest_message =
             std::min(ros.largest_message_kb(), UINT32_MAX / 1024) * std::uint32_t{1024};
     }
+    if (ros.has_refuse_out_of_range()) base.bridge.refuse_out_of_range = ros.refuse_out_of_range();
     if (ros.has_whitelist()) base.whitelist = ros.whitelist();
     if (ros.has_blacklist()) base.blacklist = ros.blacklist();
     return base;
@@ -293,6 +295,7 @@ pb::RunnerSettings settingsTo(const RunnerSettings& settings) {
     message.set_spin_auto(settings.spin_auto);
     message.set_on_boot(static_cast<pb::OnBoot>(settings.on_boot));
     message.set_on_crash(static_cast<pb::OnCrash>(settings.on_crash));
+    message.set_log_limit(settings.log_limit);
     message.set_sim_time(simTimeTo(settings.sim_time));
     message.set_max_clock_jump_s(static_cast<double>(settings.max_clock_jump_ns) / 1e9);
     pb::RosSettings& ros = *message.mutable_ros();
@@ -305,6 +308,7 @@ pb::RunnerSettings settingsTo(const RunnerSettings& settings) {
     ros.set_decimation(settings.bridge.decimation);
     ros.set_decimate(settings.bridge.decimate);
     ros.set_largest_message_kb(settings.bridge.largest_message / 1024);
+    ros.set_refuse_out_of_range(settings.bridge.refuse_out_of_range);
     ros.set_whitelist(settings.whitelist);
     ros.set_blacklist(settings.blacklist);
     return message;

@@ -51,6 +51,7 @@ def defaults(
             ns="",
             latch="",
             decimate=".*",
+            refuse_out_of_range=False,
         ),
     )
     tables: list[tuple[Any, Mapping[str, Quantity]]] = [

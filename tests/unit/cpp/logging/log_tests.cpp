@@ -103,5 +103,39 @@ TEST_F(LogTest, TakesRecordsOfManyThreadsAtOnce) {
     EXPECT_EQ(seen + log.dropped(), std::uint64_t{kThreads * kEach});
 }
 
+TEST_F(LogTest, AFloodOfOneLineIsLeftOutAndCounted) {
+    log.setLimit(10);
+    BareComponent* self = &component;
+    for (int i = 0; i < 997; ++i) RTCF_INFO(self, "flood {}", i);
+    RTCF_WARN(self, "another line");
+    log.end();
+    ASSERT_EQ(entries.size(), 12U);
+    EXPECT_EQ(entries[9].message, "flood 9");
+    EXPECT_EQ(entries[10].message, "another line");
+    EXPECT_EQ(entries[11].message, "987 more of this line within a second were left out");
+    EXPECT_EQ(entries[11].line, entries[0].line);
+    EXPECT_EQ(entries[11].component, entries[0].component);
+}
+
+TEST(LogLimit, BeginsAnewAfterASecondAndKeepsComponentsApart) {
+    constexpr std::int64_t kSecond = 1'000'000'000;
+    executor::LogLimit limit;
+    limit.set(1);
+    const executor::LogOrigin one{"/one", "a.cpp", 7, LogLevel::Info};
+    const executor::LogOrigin two{"/two", "a.cpp", 7, LogLevel::Info};
+    EXPECT_TRUE(limit.admit(one, 0));
+    EXPECT_FALSE(limit.admit(one, 1));
+    EXPECT_TRUE(limit.admit(two, 1));
+    std::map<std::string, std::uint64_t> counts;
+    const auto count = [&](const executor::LogOrigin& origin, std::uint64_t left_out) {
+        counts[origin.component] += left_out;
+    };
+    limit.report(kSecond - 1, count);
+    EXPECT_TRUE(counts.empty());
+    limit.report(kSecond, count);
+    EXPECT_EQ(counts, (std::map<std::string, std::uint64_t>{{"/one", 1}}));
+    EXPECT_TRUE(limit.admit(one, kSecond + 1));
+}
+
 }  // namespace
 }  // namespace rtcf::test
