@@ -106,24 +106,49 @@ def test_the_description_has_what_was_declared(
     assert of("dflt", "doubles")["rate"] == 1.5
 
 
-def test_a_refused_batch_changes_nothing_and_the_reply_says_what_holds(
+def test_a_value_out_of_range_is_brought_into_it_with_a_warning(
     knobs: tuple[Daemon, rtcf.Client], master: Master
 ) -> None:
     _, client = knobs
+    client.set_runner(runner_pb2.RunnerSettings(ros=runner_pb2.RosSettings(whitelist="/arm/.*")))
+    listener = master.node("rosout", client.get_status("rt_runner").runners[0].ros.node)
+    listener.wait_until_connected()
+    request = "{config: {doubles: [{name: rate, value: 2.0}], ints: [{name: count, value: 11}]}}"
+    answer = master.call(f"{_NAME}/set_parameters", request)
+    assert {each["name"]: each["value"] for each in answer["config"]["ints"]} == {"count": 10}
+    assert (values(client)["count"], values(client)["rate"]) == (10, 2.0)
+    record = wait_for(
+        lambda: next((each for each in listener.records() if "maximum" in each["msg"]), None),
+        "the warning",
+    )
+    assert record["name"] == _NAME
+    assert "count = 11 is above its maximum 10: it is set to 10" in record["msg"]
+    # As rqt_console shows it: of which topics, and from where.
+    assert record["topics"] == ["/arm/length", "/arm/product"]
+    assert record["file"]
+    assert record["function"]
+    listener.end()
+
+
+def test_a_value_out_of_range_is_refused_where_that_is_set(
+    knobs: tuple[Daemon, rtcf.Client], master: Master
+) -> None:
+    daemon, client = knobs
+    daemon.ctl("runner", "set", "--refuse-out-of-range")
     node = client.get_status("rt_runner").runners[0].ros.node
     listener = master.node("rosout", node)
     listener.wait_until_connected()
     before = values(client)
-    request = "{config: {doubles: [{name: rate, value: 2.0}], ints: [{name: count, value: 11}]}}"
-    answer = master.call(f"{_NAME}/set_parameters", request)
-    assert {each["name"]: each["value"] for each in answer["config"]["doubles"]} == {"rate": 1.5}
-    assert {each["name"]: each["value"] for each in answer["config"]["ints"]} == {"count": 2}
+    master.run(
+        "rosrun", "dynamic_reconfigure", "dynparam", "set", _NAME, '{"rate": 2.0, "count": 11}',
+        ok=False,
+    )  # fmt: skip
     assert values(client) == before
     record = wait_for(
         lambda: next((each for each in listener.records() if "refused" in each["msg"]), None),
         "the record",
     )
-    assert record["name"] == "ros.rtcf.arm.knobs"
+    assert record["name"] == _NAME
     assert "count = 11 is above its maximum 10" in record["msg"]
     listener.end()
 

@@ -52,7 +52,10 @@ MasterWatch::MasterWatch(const std::string& runner, executor::BridgeReport repor
                   due_ = true;
               }
               changed_.notify_all();
-          }) {
+          }),
+      reconfiguring_([&log](const std::string& component, const std::string& line) {
+          log.write(LogLevel::Warn, component, line + " (asked for by dynamic_reconfigure)");
+      }) {
     status_.node = name_.full();
 }
 
@@ -60,9 +63,11 @@ void MasterWatch::attach(executor::RunnerView& runner, const executor::AskSuperv
     auto introspection = std::make_unique<Introspection>(runner, ask, log_);
     const std::lock_guard lock(mutex_);
     introspection_ = std::move(introspection);
+    rosout_.show(&runner);
 }
 
 void MasterWatch::configure(const executor::BridgeSettings& settings) {
+    reconfiguring_.refuseOutOfRange(settings.refuse_out_of_range);
     {
         const std::lock_guard lock(mutex_);
         if (!settings_ || settings_->master_uri != settings.master_uri)
@@ -160,7 +165,6 @@ void MasterWatch::run() {
         // What a master answers must never end the executor.
         try {
             step();
-            if (introspection_) introspection_->publishDiagnostics();
         } catch (const std::exception& error) {
             setProblem(std::string("ROS: ") + error.what());
         } catch (const XmlRpc::XmlRpcException& error) {  // not a std::exception

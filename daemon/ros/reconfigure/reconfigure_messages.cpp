@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <type_traits>
+#include <utility>
 
 namespace rtcf::ros1 {
 
@@ -17,13 +19,31 @@ using executor::ParameterSnapshot;
 // The whole is one group, as of a .cfg file without groups.
 constexpr const char* kGroup = "Default";
 
+constexpr double kLowest = std::numeric_limits<std::int32_t>::min();
+constexpr double kHighest = std::numeric_limits<std::int32_t>::max();
+
 std::int32_t narrowed(double value) {
-    return static_cast<std::int32_t>(std::clamp<double>(
-        value, std::numeric_limits<std::int32_t>::min(), std::numeric_limits<std::int32_t>::max()));
+    return static_cast<std::int32_t>(std::clamp(value, kLowest, kHighest));
 }
 
-void add(dynamic_reconfigure::Config& config, const std::string& name,
+// An integer of dynamic_reconfigure has 32 bits. One that is declared to go beyond is a double
+// there, which is exact up to 2^53.
+bool isWide(const ParameterDeclaration& declaration) {
+    const auto* normal = std::get_if<std::int64_t>(&declaration.default_value);
+    if (normal == nullptr) return false;
+    const auto beyond = [](double value) { return value < kLowest || value > kHighest; };
+    return beyond(static_cast<double>(*normal)) || beyond(declaration.minimum.value_or(0.0)) ||
+           beyond(declaration.maximum.value_or(0.0));
+}
+
+std::string typeOf(const ParameterDeclaration& declaration) {
+    if (declaration.type == "string" || declaration.type == "enum") return "str";
+    return isWide(declaration) ? "double" : declaration.type;
+}
+
+void add(dynamic_reconfigure::Config& config, const ParameterDeclaration& declaration,
          const ParameterValue& value) {
+    const std::string& name = declaration.name;
     const auto put = [&name](auto& list, const auto& content) {
         list.emplace_back();
         list.back().name = name;
@@ -32,7 +52,12 @@ void add(dynamic_reconfigure::Config& config, const std::string& name,
     if (const auto* truth = std::get_if<bool>(&value)) {
         put(config.bools, static_cast<std::uint8_t>(*truth));
     } else if (const auto* integer = std::get_if<std::int64_t>(&value)) {
-        put(config.ints, narrowed(static_cast<double>(*integer)));
+        const auto number = static_cast<double>(*integer);
+        if (isWide(declaration)) {
+            put(config.doubles, number);
+        } else {
+            put(config.ints, narrowed(number));
+        }
     } else if (const auto* real = std::get_if<double>(&value)) {
         put(config.doubles, *real);
     } else {
@@ -50,12 +75,10 @@ void addGroup(dynamic_reconfigure::Config& config) {
 ParameterValue bound(const ParameterDeclaration& declaration, bool upper) {
     const std::optional<double>& declared = upper ? declaration.maximum : declaration.minimum;
     if (declaration.type == "bool") return upper;
-    if (declaration.type == "int") {
-        constexpr double kLowest = std::numeric_limits<std::int32_t>::min();
-        constexpr double kHighest = std::numeric_limits<std::int32_t>::max();
+    if (typeOf(declaration) == "int") {
         return std::int64_t{narrowed(declared.value_or(upper ? kHighest : kLowest))};
     }
-    if (declaration.type == "double") {
+    if (typeOf(declaration) == "double") {
         constexpr double kInfinity = std::numeric_limits<double>::infinity();
         return declared.value_or(upper ? kInfinity : -kInfinity);
     }
@@ -95,7 +118,7 @@ std::string docOf(const ParameterDeclaration& declaration) {
 dynamic_reconfigure::Config valuesOf(const ParameterSet& set) {
     dynamic_reconfigure::Config config;
     for (const ParameterSnapshot& parameter : set.parameters)
-        add(config, parameter.declaration.name, parameter.value);
+        add(config, parameter.declaration, parameter.value);
     addGroup(config);
     return config;
 }
@@ -108,14 +131,13 @@ dynamic_reconfigure::ConfigDescription descriptionOf(const ParameterSet& set) {
         const ParameterDeclaration& declaration = parameter.declaration;
         dynamic_reconfigure::ParamDescription entry;
         entry.name = declaration.name;
-        const bool is_text = declaration.type == "string" || declaration.type == "enum";
-        entry.type = is_text ? "str" : declaration.type;
+        entry.type = typeOf(declaration);
         entry.description = docOf(declaration);
         entry.edit_method = enumOf(declaration);
         group.parameters.push_back(entry);
-        add(description.min, declaration.name, bound(declaration, false));
-        add(description.max, declaration.name, bound(declaration, true));
-        add(description.dflt, declaration.name, declaration.default_value);
+        add(description.min, declaration, bound(declaration, false));
+        add(description.max, declaration, bound(declaration, true));
+        add(description.dflt, declaration, declaration.default_value);
     }
     description.groups.push_back(group);
     addGroup(description.min);
@@ -126,19 +148,74 @@ dynamic_reconfigure::ConfigDescription descriptionOf(const ParameterSet& set) {
 
 executor::ParameterBatch batchOf(const dynamic_reconfigure::Config& asked,
                                  const ParameterSet& set) {
+    // As peers see it: who sends all values back changes none of them.
+    const dynamic_reconfigure::Config shown = valuesOf(set);
     executor::ParameterBatch batch;
-    const auto take = [&](const std::string& name, const ParameterValue& value) {
-        const auto same = [&](const ParameterSnapshot& parameter) {
-            return parameter.declaration.name == name && parameter.value == value;
-        };
-        if (std::none_of(set.parameters.begin(), set.parameters.end(), same))
-            batch.emplace_back(name, value);
+    const auto take = [&](const auto& list, const auto& known, const auto& value_of) {
+        for (const auto& each : list) {
+            const auto same = [&each](const auto& other) {
+                return other.name == each.name && other.value == each.value;
+            };
+            if (std::none_of(known.begin(), known.end(), same))
+                batch.emplace_back(each.name, value_of(each));
+        }
     };
-    for (const auto& each : asked.bools) take(each.name, each.value != 0);
-    for (const auto& each : asked.ints) take(each.name, std::int64_t{each.value});
-    for (const auto& each : asked.doubles) take(each.name, each.value);
-    for (const auto& each : asked.strs) take(each.name, std::string(each.value));
+    const auto isInteger = [&set](const std::string& name) {
+        return std::any_of(set.parameters.begin(), set.parameters.end(),
+                           [&name](const ParameterSnapshot& parameter) {
+                               return parameter.declaration.name == name &&
+                                      parameter.declaration.type == "int";
+                           });
+    };
+    take(asked.bools, shown.bools,
+         [](const auto& each) { return ParameterValue(each.value != 0); });
+    take(asked.ints, shown.ints,
+         [](const auto& each) { return ParameterValue(std::int64_t{each.value}); });
+    take(asked.doubles, shown.doubles, [&](const auto& each) {
+        constexpr double kExact = 9007199254740992.0;
+        if (isInteger(each.name) && std::abs(each.value) <= kExact)
+            return ParameterValue(std::int64_t{std::llround(each.value)});
+        return ParameterValue(each.value);
+    });
+    take(asked.strs, shown.strs,
+         [](const auto& each) { return ParameterValue(std::string(each.value)); });
     return batch;
+}
+
+std::vector<std::string> bringWithinBounds(executor::ParameterBatch& batch,
+                                           const ParameterSet& set) {
+    std::vector<std::string> lines;
+    const auto clamped = [&](const ParameterDeclaration& declaration, auto& value) {
+        using Number = std::decay_t<decltype(value)>;
+        const auto number = static_cast<double>(value);
+        const double low = declaration.minimum.value_or(number);
+        const double high = declaration.maximum.value_or(number);
+        if (!(number < low) && !(number > high)) return;  // one that is no number stays
+        const Number asked = value;
+        // The nearest integer within the bounds.
+        const double nearest = number < low ? low : high;
+        if constexpr (std::is_integral_v<Number>) {
+            value = static_cast<Number>(number < low ? std::ceil(nearest) : std::floor(nearest));
+        } else {
+            value = nearest;
+        }
+        lines.push_back(fmt::format("{} = {} is {} its {} {}: it is set to {}", declaration.name,
+                                    asked, number < low ? "below" : "above",
+                                    number < low ? "minimum" : "maximum", nearest, value));
+    };
+    for (auto& [name, value] : batch) {
+        const auto found = std::find_if(set.parameters.begin(), set.parameters.end(),
+                                        [name = &name](const ParameterSnapshot& each) {
+                                            return each.declaration.name == *name;
+                                        });
+        if (found == set.parameters.end()) continue;
+        if (auto* integer = std::get_if<std::int64_t>(&value)) {
+            if (found->declaration.type == "int") clamped(found->declaration, *integer);
+        } else if (auto* real = std::get_if<double>(&value)) {
+            if (found->declaration.type == "double") clamped(found->declaration, *real);
+        }
+    }
+    return lines;
 }
 
 }  // namespace rtcf::ros1

@@ -18,8 +18,8 @@ constexpr auto kSlice = std::chrono::milliseconds(20);
 }  // namespace
 
 ReconfigureServer::ReconfigureServer(Set set, executor::ParameterRequest request,
-                                     const std::atomic<bool>& ending)
-    : request_(std::move(request)), ending_(ending), set_(std::move(set)) {}
+                                     const RangePolicy& range, const std::atomic<bool>& ending)
+    : request_(std::move(request)), range_(range), ending_(ending), set_(std::move(set)) {}
 
 void ReconfigureServer::open(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue) {
     using dynamic_reconfigure::ReconfigureRequest;
@@ -97,24 +97,33 @@ ReconfigureServer::Set ReconfigureServer::set() const {
 }
 
 // The answer has the values that hold then: those that were asked for, or, of a change that was
-// refused, those of before.
+// refused, those of before. Who wants to be told has the call fail instead.
 bool ReconfigureServer::change(const dynamic_reconfigure::ReconfigureRequest& asked,
                                dynamic_reconfigure::ReconfigureResponse& answer) {
     const Set before = set();
     executor::ParameterBatch batch = batchOf(asked.config, *before);
+    const bool refuse = range_.refuse;
+    if (!refuse) {
+        for (const std::string& line : bringWithinBounds(batch, *before))
+            range_.warn(before->full_name, line);
+    }
+    bool refused = false;
     if (!batch.empty()) {
-        const auto done = std::make_shared<std::promise<void>>();
-        std::future<void> outcome = done->get_future();
+        const auto done = std::make_shared<std::promise<bool>>();
+        std::future<bool> outcome = done->get_future();
         request_(before->full_name, std::move(batch),
-                 [done](const std::string& /*refusal*/) { done->set_value(); });
+                 [done](const std::string& refusal) { done->set_value(!refusal.empty()); });
         const auto deadline = std::chrono::steady_clock::now() + kPatience;
         while (outcome.wait_for(kSlice) != std::future_status::ready) {
             // A hook that hangs: whether it will be changed nobody can say.
             if (ending_ || std::chrono::steady_clock::now() > deadline) return false;
         }
+        refused = outcome.get();
     }
-    answer.config = valuesOf(*set());
-    return true;
+    const std::lock_guard lock(mutex_);
+    answer.config = valuesOf(*set_);
+    if (refused && updates_) updates_.publish(answer.config);  // what others show holds no more
+    return !(refused && refuse);
 }
 
 }  // namespace rtcf::ros1

@@ -9,6 +9,7 @@
 #include <ros/service_server.h>
 
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -22,6 +23,12 @@ class NodeHandle;
 
 namespace rtcf::ros1 {
 
+/// What is done about values out of range. Owned by Reconfiguring.
+struct RangePolicy {
+    std::atomic<bool> refuse{false};  ///< fail the call; else the nearest value is taken
+    std::function<void(const std::string& component, const std::string& line)> warn;
+};
+
 /// Owned by Reconfiguring.
 class ReconfigureServer {
    public:
@@ -29,7 +36,8 @@ class ReconfigureServer {
 
     /// @param request by which a change is asked for
     /// @param ending  becomes true when nobody answers requests any more
-    ReconfigureServer(Set set, executor::ParameterRequest request, const std::atomic<bool>& ending);
+    ReconfigureServer(Set set, executor::ParameterRequest request, const RangePolicy& range,
+                      const std::atomic<bool>& ending);
 
     /// Opens and closes service and topics. Watch thread.
     void open(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue);
@@ -47,6 +55,7 @@ class ReconfigureServer {
                 dynamic_reconfigure::ReconfigureResponse& answer);
 
     const executor::ParameterRequest request_;
+    const RangePolicy& range_;
     const std::atomic<bool>& ending_;
     mutable std::mutex mutex_;  // all below
     Set set_;

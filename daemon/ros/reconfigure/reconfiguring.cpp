@@ -2,6 +2,7 @@
 
 #include <ros/node_handle.h>
 
+#include <algorithm>
 #include <chrono>
 
 #include "ros/reconfigure/reconfigure_server.hpp"
@@ -14,9 +15,17 @@ namespace {
 // For one call: the watch has more to look at than a thousand components' parameters.
 constexpr auto kTurn = std::chrono::milliseconds(300);
 
+bool sameChoices(const std::vector<Choice>& one, const std::vector<Choice>& other) {
+    return std::equal(
+        one.begin(), one.end(), other.begin(), other.end(),
+        [](const Choice& a, const Choice& b) { return a.name == b.name && a.value == b.value; });
+}
+
 }  // namespace
 
-Reconfiguring::Reconfiguring() {
+Reconfiguring::Reconfiguring(
+    std::function<void(const std::string& component, const std::string& line)> warn) {
+    range_.warn = std::move(warn);
     thread_ = quietThread("ros-parameters", [this] { run(); });
 }
 
@@ -39,7 +48,8 @@ void Reconfiguring::setSets(const Sets& sets) {
                 const ParameterDeclaration& other = set->parameters[i].declaration;
                 if (one.name != other.name || one.type != other.type ||
                     one.minimum != other.minimum || one.maximum != other.maximum ||
-                    one.default_value != other.default_value || one.doc != other.doc)
+                    one.default_value != other.default_value || one.doc != other.doc ||
+                    one.unit != other.unit || !sameChoices(one.choices, other.choices))
                     return false;
             }
             return true;
@@ -48,7 +58,8 @@ void Reconfiguring::setSets(const Sets& sets) {
             found->second->update(set);
             wanted.insert(*found);
         } else {
-            wanted[set->full_name] = std::make_shared<ReconfigureServer>(set, request_, stop_);
+            wanted[set->full_name] =
+                std::make_shared<ReconfigureServer>(set, request_, range_, stop_);
         }
     }
     wanted_ = std::move(wanted);

@@ -16,6 +16,7 @@
 
 #include "bridge/bridge.hpp"
 #include "ros/parameters/parameter_mirror.hpp"
+#include "ros/reconfigure/reconfigure_server.hpp"
 #include "ros/roscpp/master_client.hpp"
 
 namespace ros {
@@ -24,14 +25,14 @@ class NodeHandle;
 
 namespace rtcf::ros1 {
 
-class ReconfigureServer;
-
 /// Owned by the master watch. A thread of its own answers the services.
 class Reconfiguring {
    public:
     using Sets = std::vector<std::shared_ptr<const executor::ParameterSet>>;
 
-    Reconfiguring();
+    /// @param warn hears of values that were out of range; any thread
+    explicit Reconfiguring(
+        std::function<void(const std::string& component, const std::string& line)> warn);
     ~Reconfiguring();
     Reconfiguring(const Reconfiguring&) = delete;
     Reconfiguring& operator=(const Reconfiguring&) = delete;
@@ -41,6 +42,8 @@ class Reconfiguring {
         request_ = request;
         mirror_.serve(std::move(request));
     }
+    /// Whether a call with a value out of range fails. Any thread.
+    void refuseOutOfRange(bool refuse) noexcept { range_.refuse = refuse; }
     /// The parameters to offer from now on. Any thread; returns at once.
     void setSets(const Sets& sets);
     /// Nobody answers requests any more: those under way fail. Any thread.
@@ -64,6 +67,7 @@ class Reconfiguring {
     void run();
 
     executor::ParameterRequest request_;
+    RangePolicy range_;
     ros::CallbackQueue queue_;
     std::atomic<bool> stop_{false};
     mutable std::mutex mutex_;  // wanted_ and servers_
