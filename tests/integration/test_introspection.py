@@ -14,6 +14,7 @@ from ros_processes import Master
 from rtcf.v1 import runner_pb2
 from values import iteration
 
+LOOP = "rt_runner: loop"
 PEER = Path(__file__).with_name("introspection_peer.py")
 SERVICES = {
     "/rt_runner/activate_rt_loop",
@@ -129,7 +130,7 @@ def test_a_peer_of_rtcf_2021_loads_looks_and_unloads(
         "port_type": 1, "name_remapped": "/arm/total", "name_unresolved": "out1",
         "msg_type": "std_msgs/Float64", "connected_to_ROS": False,
     } in component["output_ports"]  # fmt: skip
-    assert len(component["input_ports"]) == 3
+    assert len(component["input_ports"]) == 4
     assert {
         "name": "/arm/total", "type": "std_msgs/Float64", "publishing_components": ["/arm/Sum"],
         "subscribing_components": [], "connected_to_ROS": False,
@@ -162,6 +163,31 @@ def test_diagnostics_tell_the_health_of_loop_and_components(
             "values lost on the way to topics", "log records lost",
             "cycle messages lost", "real time"} <= keys  # fmt: skip
     assert "state=faulted" in loop[-1]
+
+
+def test_diagnostics_call_a_loop_that_cannot_keep_its_rate_an_error(
+    client: rtcf.Client, master: Master
+) -> None:
+    # It sleeps for 100 µs or more in each cycle of 50 µs.
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=20000.0))
+    client.load(rtcf.component("rtcf_faults", "Sleeps", name="slow", parameters=["after:=0"]))
+    client.start()
+    statuses = [line.split("|") for line in _lines(_peer(master, "diagnostics", LOOP, "2"))]
+    loop = [each for each in statuses if each[0] == LOOP]
+    assert "Hz instead of 20000 Hz" in loop[-1][2]
+
+
+def test_what_is_missing_for_real_time_is_a_warning_once(
+    client: rtcf.Client, master: Master
+) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=10.0, lock_memory=False))
+    peer = _peer(master, "diagnostics", LOOP, "0")
+    assert _lines(peer)  # it listens, and the loop is stopped
+    client.start()
+    wait_for(lambda: iteration(client) > 30, "three seconds")
+    statuses = [line.split("|") for line in _lines(_peer(master, "diagnostics", LOOP, "0"))]
+    loop = [each for each in statuses if each[0] == LOOP][-1]
+    assert "not in real time: " in loop[2]
 
 
 def test_services_load_run_and_unload_as_rtcfctl_does(

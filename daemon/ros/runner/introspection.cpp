@@ -4,6 +4,12 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
+#include <utility>
+
+#include "ros/roscpp/quiet_thread.hpp"
+#include "runner/runner.hpp"
+#include "runner/runner_view.hpp"
 
 namespace rtcf::ros1 {
 
@@ -18,7 +24,16 @@ std::string hostName() {
 
 Introspection::Introspection(executor::RunnerView& runner, const executor::AskSupervisor& ask,
                              executor::Log& log)
-    : cycles_(runner), report_(runner, hostName()), services_(runner, ask, log) {}
+    : runner_(runner),
+      cycles_(runner),
+      services_(runner, ask, log),
+      report_(runner, hostName()),
+      health_(quietThread("ros-health", [this] { watchHealth(); })) {}
+
+Introspection::~Introspection() {
+    stop_ = true;
+    health_.join();
+}
 
 void Introspection::open(ros::NodeHandle& handle, const std::string& name_space) {
     if (open_ && name_space == name_space_) return;
@@ -26,7 +41,12 @@ void Introspection::open(ros::NodeHandle& handle, const std::string& name_space)
     open_ = true;
     name_space_ = name_space;
     cycles_.open(handle, name_space);
-    diagnostics_ = handle.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10);
+    ros::Publisher diagnostics =
+        handle.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10);
+    {
+        const std::lock_guard lock(mutex_);
+        diagnostics_ = diagnostics;
+    }
     services_.open(handle, name_space);
 }
 
@@ -34,17 +54,31 @@ void Introspection::close() {
     if (!open_) return;
     open_ = false;
     services_.close();
-    diagnostics_.shutdown();
+    ros::Publisher diagnostics;
+    {
+        const std::lock_guard lock(mutex_);
+        std::swap(diagnostics, diagnostics_);
+    }
+    diagnostics.shutdown();
     cycles_.close();
 }
 
-void Introspection::publishDiagnostics() {
-    if (!open_ || std::chrono::steady_clock::now() < due_) return;
-    // The watch comes by twice a second.
-    due_ = std::chrono::steady_clock::now() + std::chrono::milliseconds(900);
-    diagnostic_msgs::DiagnosticArray array = report_.take();
-    array.header.stamp = ros::Time::now();
-    diagnostics_.publish(array);
+void Introspection::watchHealth() {
+    using Clock = std::chrono::steady_clock;
+    constexpr auto kLook = std::chrono::milliseconds(20);
+    executor::RunnerState published = executor::RunnerState::Stopped;
+    Clock::time_point due = Clock::now();
+    for (; !stop_; std::this_thread::sleep_for(kLook)) {
+        const executor::RunnerState state = runner_.picture().state;
+        if (state == published && Clock::now() < due) continue;
+        const std::lock_guard lock(mutex_);
+        if (!diagnostics_) continue;
+        diagnostic_msgs::DiagnosticArray array = report_.take();
+        array.header.stamp = ros::Time::now();
+        diagnostics_.publish(array);
+        published = state;
+        due = Clock::now() + std::chrono::seconds(1);
+    }
 }
 
 }  // namespace rtcf::ros1

@@ -5,8 +5,10 @@
 
 #include <ros/publisher.h>
 
-#include <chrono>
+#include <atomic>
+#include <mutex>
 #include <string>
+#include <thread>
 
 #include "bridge/outside_call.hpp"
 #include "ros/runner/cycle_topic.hpp"
@@ -15,7 +17,9 @@
 
 namespace rtcf::ros1 {
 
-/// Owned by the ROS node; all but the constructor and the destructor by the watch thread.
+/// Owned by the ROS node; all but the constructor and the destructor by the watch thread. The
+/// health has a thread of its own: once a second, and at once when the loop's state changes, as the
+/// node may be about to go.
 class Introspection {
    public:
     /// @param log gets why services refused; outlives this
@@ -26,18 +30,23 @@ class Introspection {
     void open(ros::NodeHandle& handle, const std::string& name_space);
     void close();
     bool isOpen() const { return open_; }
-
-    /// Publishes the diagnostics when they are due: once a second.
-    void publishDiagnostics();
+    ~Introspection();
+    Introspection(const Introspection&) = delete;
+    Introspection& operator=(const Introspection&) = delete;
 
    private:
+    void watchHealth();
+
+    executor::RunnerView& runner_;
     CycleTopic cycles_;
-    DiagnosticReport report_;
     RunnerServices services_;
-    ros::Publisher diagnostics_;
-    std::chrono::steady_clock::time_point due_;
     std::string name_space_;
     bool open_ = false;
+    std::atomic<bool> stop_{false};
+    std::mutex mutex_;  // diagnostics_
+    ros::Publisher diagnostics_;
+    DiagnosticReport report_;  // the health's thread's
+    std::thread health_;
 };
 
 }  // namespace rtcf::ros1

@@ -12,6 +12,11 @@ namespace rtcf::ros1 {
 namespace {
 
 using diagnostic_msgs::DiagnosticStatus;
+
+constexpr std::int64_t kLongEnough = 500'000'000;  // ns, to tell a rate
+constexpr double kEnoughCycles = 5.0;
+constexpr double kSlow = 0.9;     // of the rate that is wanted: a warning,
+constexpr double kFailing = 0.5;  // an error
 using executor::RunnerState;
 
 const char* stateName(RunnerState state) {
@@ -48,6 +53,10 @@ void addMicroseconds(DiagnosticStatus& status, const std::string& what,
     add("mean", ns.mean);
     add("p99", ns.p99);
     add("p99.9", ns.p999);
+}
+
+std::string counted(std::uint64_t count, const char* one, const char* many) {
+    return fmt::format("{} {}", count, count == 1 ? one : many);
 }
 
 // The worse of two: an error hides a warning, not the other way round.
@@ -204,18 +213,38 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
     const std::uint64_t dropped = growth(taps + logs + cycles, dropped_);
     if (dropped != 0) {
         raise(status, DiagnosticStatus::WARN,
-              fmt::format("{}: {} records lost in full rings", status.message, dropped));
+              fmt::format("{}: {} lost in full rings", stateName(picture.state),
+                          counted(dropped, "record", "records")));
     }
     if (overruns != 0) {
         raise(status, DiagnosticStatus::WARN,
-              fmt::format("{}: {} overruns, {} cycles missed", stateName(picture.state), overruns,
-                          missed));
+              fmt::format("{}: {}, {} missed", stateName(picture.state),
+                          counted(overruns, "overrun", "overruns"),
+                          counted(missed, "cycle", "cycles")));
     }
     if (!picture.degraded.empty()) {
-        raise(status, DiagnosticStatus::WARN,
-              fmt::format("{}, not in real time: {}", stateName(picture.state),
-                          joined(picture.degraded)));
+        status.message += ", not in real time: " + joined(picture.degraded);
+        // Once: it is no news afterwards, and hides what is.
+        if (picture.degraded != degraded_) raise(status, DiagnosticStatus::WARN, status.message);
     }
+    degraded_ = picture.degraded;
+    const double wanted_hz = picture.settings.frequency_hz;
+    const double done_hz =
+        elapsed_ns > 0 ? static_cast<double>(done) * 1e9 / static_cast<double>(elapsed_ns) : 0.0;
+    // Over a report's time in which it ran all along; the pace of a simulation is the clock's.
+    const bool runs = loop.running();
+    if (runs && ran_ && !picture.simulated && elapsed_ns >= kLongEnough &&
+        wanted_hz * static_cast<double>(elapsed_ns) * 1e-9 >= kEnoughCycles) {
+        const double share = done_hz / wanted_hz;
+        const std::string text = fmt::format("{}: {:.1f} Hz instead of {:g} Hz",
+                                             stateName(picture.state), done_hz, wanted_hz);
+        if (share < kFailing) {
+            raise(status, DiagnosticStatus::ERROR, text);
+        } else if (share < kSlow) {
+            raise(status, DiagnosticStatus::WARN, text);
+        }
+    }
+    ran_ = runs;
     if (picture.state == RunnerState::Faulted || picture.state == RunnerState::Stuck) {
         raise(status, DiagnosticStatus::ERROR,
               fmt::format("{}: {}", stateName(picture.state), picture.status));
@@ -223,9 +252,7 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
     addValue(status, "state", stateName(picture.state));
     addValue(status, "frequency wanted (Hz)", picture.settings.frequency_hz);
     if (elapsed_ns > 0 && loop.running()) {
-        addValue(status, "frequency (Hz)",
-                 fmt::format("{:.1f}",
-                             static_cast<double>(done) * 1e9 / static_cast<double>(elapsed_ns)));
+        addValue(status, "frequency (Hz)", fmt::format("{:.1f}", done_hz));
     }
     addValue(status, "iteration", iteration);
     addValue(status, "components", graph->components.size());
@@ -255,7 +282,8 @@ DiagnosticStatus DiagnosticReport::componentStatus(const std::string& name,
     const executor::HistogramSnapshot duration = now.duration.snapshot();
     const std::uint64_t overruns =
         growth(now.overruns.load(std::memory_order_relaxed), last.overruns);
-    if (overruns != 0) raise(status, DiagnosticStatus::WARN, fmt::format("{} overruns", overruns));
+    if (overruns != 0)
+        raise(status, DiagnosticStatus::WARN, counted(overruns, "overrun", "overruns"));
     if (!fault.empty()) raise(status, DiagnosticStatus::ERROR, fault);
     addValue(status, "overruns", last.overruns);
     addMicroseconds(status, "update", summarize(difference(duration, last.duration), ns_per_tick));

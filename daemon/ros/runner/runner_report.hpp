@@ -11,6 +11,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "statistics/histogram.hpp"
 
@@ -60,6 +61,8 @@ class DiagnosticReport {
     std::uint64_t dropped_ = 0;
     std::uint64_t iteration_ = 0;
     std::int64_t time_ns_ = 0;
+    bool ran_ = false;                   // at the last report
+    std::vector<std::string> degraded_;  // as it was said last
     std::map<Figures, Counts> components_;
 };
 

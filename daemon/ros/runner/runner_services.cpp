@@ -166,12 +166,12 @@ void RunnerServices::openLikeRtcf2021(ros::NodeHandle& handle, const std::string
                         return true;
                     });
     using Unload = rtcf_msgs::UnloadOrocosComponent;
-    advertise<Unload>(
-        handle, at("unload_orocos_component"), changes_,
-        [this](Unload::Request& request, Unload::Response& response) {
-            changeAndLog(unloadCall(request.component_name.data, request.ns.data), response.success);
-            return true;
-        });
+    advertise<Unload>(handle, at("unload_orocos_component"), changes_,
+                      [this](Unload::Request& request, Unload::Response& response) {
+                          changeAndLog(unloadCall(request.component_name.data, request.ns.data),
+                                       response.success);
+                          return true;
+                      });
 }
 
 void RunnerServices::close() {

@@ -21,7 +21,7 @@ class NodeHandle;
 namespace rtcf::executor {
 class Log;
 class RunnerView;
-}
+}  // namespace rtcf::executor
 
 namespace rtcf::ros1 {
 
