@@ -43,7 +43,8 @@ def _print_size(message: Any) -> None:
 def _print_record(message: Any, node: str) -> None:
     if message._connection_header["callerid"] != node:
         return
-    record = {key: getattr(message, key) for key in ("level", "name", "msg", "file", "line")}
+    record = {key: getattr(message, key) for key in ("level", "name", "msg", "file", "line",
+                                                         "function", "topics")}  # fmt: skip
     record["stamp"] = message.header.stamp.to_sec()
     sys.stdout.write(json.dumps(record) + "\n")
 

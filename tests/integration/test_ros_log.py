@@ -46,7 +46,7 @@ def test_every_record_is_on_rosout_and_in_the_log_under_its_component(
 
     for text, level in (("by macro at 1", _INFO), ("by rtcf at 1", _INFO), ("in the cycle", _WARN)):
         found = record(text)
-        assert found["name"] == "ros.rtcf.arm.speaker"
+        assert found["name"] == "/arm/speaker"
         assert found["level"] == level
         assert str(found["file"]).endswith("tests/components/speaker.cpp")
         assert found["line"] != 0
@@ -57,7 +57,7 @@ def test_every_record_is_on_rosout_and_in_the_log_under_its_component(
     assert "for those who debug" not in daemon.log()
     # What the executor itself says is under the node's name, as for any node.
     client.stop()
-    assert all(each["name"] in ("ros.rtcf.arm.speaker", node) for each in listener.records())
+    assert all(each["name"] in ("/arm/speaker", node) for each in listener.records())
 
 
 def test_levels_are_set_as_rqt_logger_level_does(
@@ -79,7 +79,7 @@ def test_levels_are_set_as_rqt_logger_level_does(
     debug = wait_for(
         lambda: [each for each in listener.records() if each["msg"] == "each cycle"], "a record"
     )
-    assert {(each["name"], each["level"]) for each in debug} == {("ros.rtcf.speaker", _DEBUG)}
+    assert {(each["name"], each["level"]) for each in debug} == {("/speaker", _DEBUG)}
     wait_for(lambda: "each cycle" in daemon.log(), "the record in the log")
     assert levels()["ros.rtcf.speaker"] == "debug"
     assert levels()["ros.rtcf.other"] == "info"

@@ -78,7 +78,7 @@ def test_rqt_console_and_rqt_logger_level_work_together(
     loop: tuple[Daemon, rtcf.Client, str], master: Master
 ) -> None:
     _, client, node = loop
-    console = master.node("console", "ros.rtcf.s")
+    console = master.node("console", "/s")
     console.wait_until_connected()
     client.load(rtcf.component("rtcf_test_ros", "Speaker", name="s"))
     client.start()

@@ -5,6 +5,8 @@
 
 #include <utility>
 
+#include "runner/runner_view.hpp"
+
 namespace rtcf::ros1 {
 
 namespace {
@@ -41,14 +43,45 @@ void Rosout::publish(const executor::LogEntry& entry) {
     message.file = entry.file;
     message.function = entry.function;
     message.line = entry.line;
+    if (message.file.empty()) {  // what the executor itself says of a component or of the loop
+        message.file = "rtcf-executor";
+        message.function = "report";
+    }
     const std::lock_guard lock(mutex_);
     if (!publisher_) return;
     // Of a simulation only the present is known, which is hardly later than the call. Without a
     // node there is no time of ROS.
     message.header.stamp = ros::Time::isSimTime() ? ros::Time::now() : timeOf(entry);
     // What the node itself says is under the node's name, as for any node.
-    message.name = entry.component.empty() ? node_ : executor::LogLevels::loggerOf(entry.component);
+    message.name = entry.component.empty() ? node_ : entry.component;
+    message.topics = topicsOf(entry.component);
     publisher_.publish(message);
+}
+
+void Rosout::show(const executor::RunnerView* runner) {
+    const std::lock_guard lock(mutex_);
+    runner_ = runner;
+}
+
+// Made anew when the graph has changed.
+const std::vector<std::string>& Rosout::topicsOf(const std::string& component) {
+    static const std::vector<std::string> none;
+    if (runner_ == nullptr) return none;
+    if (const auto graph = runner_->snapshot(); graph != graph_) {
+        graph_ = graph;
+        topics_.clear();
+        const auto add = [this](const std::string& of, const std::string& topic) {
+            auto& topics = topics_[of];
+            if (topics.empty() || topics.back() != topic) topics.push_back(topic);
+        };
+        for (const auto& [topic, connection] : graph->connections) {
+            if (connection.published && connection.writer) add(connection.writer->component, topic);
+            if (!connection.subscribed) continue;
+            for (const auto& reader : connection.readers) add(reader.component, topic);
+        }
+    }
+    const auto found = topics_.find(component);
+    return found != topics_.end() ? found->second : none;
 }
 
 void Rosout::open(ros::NodeHandle& handle, const std::string& node) {
