@@ -195,7 +195,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("bag", type=Path, metavar="BAG", help="a bag with a loop's topic cycles or iteration_info")
+    parser.add_argument(
+        "bag", type=Path, metavar="BAG", help="a bag with a loop's topic cycles or iteration_info"
+    )
     parser.add_argument(
         "frequency", type=_frequency, metavar="FREQUENCY", help="nominal frequency of the loop, Hz"
     )

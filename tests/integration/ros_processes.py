@@ -130,6 +130,11 @@ class Node:
                 stdout=output,
             )
 
+    @property
+    def pid(self) -> int:
+        """Its process."""
+        return self._process.pid
+
     def wait_until_connected(self) -> None:
         """Return when it says that it has met its peer."""
         wait_for(lambda: "connected" in self._lines(), "the node's connection")

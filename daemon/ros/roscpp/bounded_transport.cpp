@@ -30,8 +30,8 @@ constexpr std::uint32_t kMostRead = 65 * kMega;
 constexpr std::uint32_t kMostReadOfServer = 8 * kMega;
 constexpr std::uint32_t kMostHeader = kMega;
 constexpr std::uint32_t kMostHeaderOfServer = 64 * 1024;
-constexpr std::size_t kMostWaiting = 4 * kMega;   // for one slow subscriber
-constexpr std::size_t kMostXmlRpc = 16 * kMega;   // a call, or the answer of a master
+constexpr std::size_t kMostWaiting = 4 * kMega;  // for one slow subscriber
+constexpr std::size_t kMostXmlRpc = 8 * kMega;   // a call, or the answer of a master
 constexpr std::uint32_t kSkippedAtOnce = 16 * 1024;
 
 // Which injector has a topic. By topic, as that is all that roscpp's links know.
@@ -78,8 +78,7 @@ namespace ros {
 
 void Connection::read(std::uint32_t size, const ReadFinishedFunc& callback) {
     if (dropped_ || sending_header_error_) return;
-    const std::uint32_t most =
-        is_server_ ? rtcf::ros1::kMostReadOfServer : rtcf::ros1::kMostRead;
+    const std::uint32_t most = is_server_ ? rtcf::ros1::kMostReadOfServer : rtcf::ros1::kMostRead;
     const auto buffer =
         size <= most ? rtcf::ros1::tryNetworkBytes(size) : boost::shared_array<std::uint8_t>();
     if (!buffer) {
@@ -119,9 +118,8 @@ void TransportPublisherLink::onMessageLength(const ConnectionPtr& connection,
     const auto read_length = [this] {
         connection_->read(
             4, [this](const ConnectionPtr& link, const boost::shared_array<std::uint8_t>& bytes,
-                      std::uint32_t count, bool read_all) {
-                onMessageLength(link, bytes, count, read_all);
-            });
+                      std::uint32_t count,
+                      bool read_all) { onMessageLength(link, bytes, count, read_all); });
     };
     // Reads on and forgets, a piece at a time.
     struct Skip {

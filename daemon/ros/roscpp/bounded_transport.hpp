@@ -6,7 +6,8 @@
 /// - `Connection::onHeaderLengthRead`: no more than a header has
 /// - `TransportPublisherLink::onMessageLength`: a message that its input does not take is passed
 ///   over without being kept
-/// - `TransportSubscriberLink::enqueueMessage`: what waits for a slow subscriber is bounded in bytes
+/// - `TransportSubscriberLink::enqueueMessage`: what waits for a slow subscriber is bounded in
+/// bytes
 /// - `XmlRpcSocket::nbRead`: a call or an answer is bounded
 #pragma once
 

@@ -1,4 +1,4 @@
-"""The ROS messages and services that RTCF 2021 has: its bags, scripts and peers go by these sums."""
+"""The messages and services that RTCF 2021 has: its bags, scripts and peers go by their sums."""
 
 from pathlib import Path
 

@@ -1,0 +1,148 @@
+"""What peers send, and do not take, stays out of the memory that is locked for the loop."""
+
+import os
+import signal
+import socket
+import struct
+import xmlrpc.client
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rosgraph
+import rtcf
+from daemon_process import Daemon, wait_for, with_ros
+from ros_processes import Master
+from rtcf.v1 import runner_pb2
+from values import port_value, state, wait_until_after
+
+MOST_LOCKED_KB = 64 * 1024
+
+
+@pytest.fixture
+def text(tmp_path: Path, master: Master) -> Iterator[rtcf.Client]:
+    """Give a loop with a string of 200 kB out and one in, both on ROS."""
+    daemon = Daemon(tmp_path, with_ros(master.uri, "/t/said|/t/heard"))
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=100.0))
+        client.load(
+            rtcf.component("rtcf_test_ros", "Text", name="text", ns="/t",
+                           parameters=["size:=200000"])
+        )  # fmt: skip
+        client.start()
+        wait_for(lambda: "/t/heard" in master.topics()[1], "the topics")
+        yield client
+    daemon.end()
+
+
+def _locked_kb(client: rtcf.Client) -> int:
+    status = Path(f"/proc/{state(client).pid}/status").read_text()
+    return int(next(line for line in status.splitlines() if line.startswith("VmLck")).split()[1])
+
+
+class _Subscriber:
+    """A peer that asks for a topic and then takes nothing."""
+
+    def __init__(self, host: str, port: int, topic: str) -> None:
+        self._socket = socket.create_connection((host, port), 30.0)
+        fields = {"callerid": "/idle", "topic": topic, "md5sum": "*", "type": "*"}
+        lines = [f"{name}={value}".encode() for name, value in fields.items()]
+        header = b"".join(struct.pack("<I", len(line)) + line for line in lines)
+        self._socket.sendall(struct.pack("<I", len(header)) + header)
+
+    def wait_until_accepted(self) -> None:
+        assert self._socket.recv(4)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def _address(client: rtcf.Client, master: Master, topic: str) -> tuple[str, int]:
+    uri = rosgraph.Master("/test", master.uri).lookupNode(state(client).ros.node)
+    node: Any = xmlrpc.client.ServerProxy(uri)
+    code, _, protocol = node.requestTopic("/idle", topic, [["TCPROS"]])
+    assert code == 1
+    return protocol[1], protocol[2]
+
+
+def test_a_message_that_is_too_large_is_counted_and_costs_nothing(
+    text: rtcf.Client, master: Master
+) -> None:
+    before = _locked_kb(text)
+    for count in (1, 2):
+        sender = master.node("text", "/t/heard", "100000000")
+        wait_for(lambda count=count: state(text).ros.too_large == count, "the count")
+        sender.end()
+    assert _locked_kb(text) <= min(before + 4096, MOST_LOCKED_KB)
+    # What fits comes through all the same.
+    sender = master.node("text", "/t/heard", "5000")
+    wait_for(lambda: port_value(text, "/t/text", "length") == 5000, "the message")
+    sender.end()
+
+
+def test_subscribers_that_take_nothing_cost_no_locked_memory(
+    text: rtcf.Client, master: Master
+) -> None:
+    before = _locked_kb(text)
+    host, port = _address(text, master, "/t/said")
+    peers = [_Subscriber(host, port, "/t/said") for _ in range(20)]
+    for peer in peers:
+        peer.wait_until_accepted()
+    # More than all queues may hold: 20 kB a cycle for each of them.
+    wait_until_after(text, state(text).iteration + 500)
+    assert _locked_kb(text) <= min(before + 8192, MOST_LOCKED_KB)
+    listener = master.node("sizes", "/t/said")
+    listener.wait_for_values(10)
+    listener.end()
+    for peer in peers:
+        peer.close()
+
+
+def test_a_thousand_peers_cost_little_locked_memory(text: rtcf.Client, master: Master) -> None:
+    host, port = _address(text, master, "/t/said")
+    peers = []
+    try:
+        for _ in range(900):  # the executor may have 1024 descriptors
+            peers.append(_Subscriber(host, port, "/t/said"))
+        for peer in peers:
+            peer.wait_until_accepted()
+        wait_until_after(text, state(text).iteration + 100)
+        assert _locked_kb(text) <= MOST_LOCKED_KB
+    finally:
+        for peer in peers:
+            peer.close()
+
+
+def test_a_peer_that_announces_a_huge_header_or_call_is_sent_away(
+    text: rtcf.Client, master: Master
+) -> None:
+    before = _locked_kb(text)
+    host, port = _address(text, master, "/t/said")
+    with socket.create_connection((host, port), 30.0) as peer:
+        peer.sendall(struct.pack("<I", 900_000_000))
+        assert peer.recv(1) == b""
+    uri = rosgraph.Master("/test", master.uri).lookupNode(state(text).ros.node)
+    host, port = uri.rstrip("/").rpartition("/")[2].split(":")
+    with socket.create_connection((host, int(port)), 30.0) as peer:
+        peer.sendall(b"POST /RPC2 HTTP/1.1\r\nContent-Length: 500000000\r\n\r\n")
+        piece = bytes(1024 * 1024)
+        with pytest.raises(OSError):
+            for _ in range(400):
+                peer.sendall(piece)
+    assert _locked_kb(text) <= min(before + 48 * 1024, MOST_LOCKED_KB + 48 * 1024)
+    assert state(text).state == runner_pb2.RUNNER_STATE_RUNNING
+
+
+def test_a_stopped_listener_loses_the_oldest_and_goes_on(text: rtcf.Client, master: Master) -> None:
+    listener = master.node("sizes", "/t/said")
+    listener.wait_for_values(5)
+    os.kill(listener.pid, signal.SIGSTOP)
+    wait_until_after(text, state(text).iteration + 300)
+    locked = _locked_kb(text)
+    os.kill(listener.pid, signal.SIGCONT)
+    seen = len(listener.values())
+    listener.wait_for_values(seen + 20)
+    assert locked <= MOST_LOCKED_KB
+    listener.end()
