@@ -106,6 +106,10 @@ std::string Publishing::problem() const {
     for (const auto& [topic, publisher] : publishers_) {
         if (!publisher->problem().empty()) return publisher->problem();
     }
+    for (const auto& [topic, publisher] : publishers_) {
+        if (publisher->lost() != 0)
+            return topic + ": messages were lost, as too much waits for slow subscribers";
+    }
     return {};
 }
 

@@ -2,6 +2,8 @@
 
 #include <ros/node_handle.h>
 
+#include <new>
+
 #include "ros/roscpp/raw_message.hpp"
 
 namespace rtcf::ros1 {
@@ -29,6 +31,19 @@ std::string TopicPublisher::problem() const {
     return problem_;
 }
 
+std::uint64_t TopicPublisher::lost() const {
+    const std::lock_guard lock(mutex_);
+    return lost_;
+}
+
+void TopicPublisher::send(const std::uint8_t* bytes, std::size_t size) {
+    try {
+        publisher_.publish(RawView{bytes, static_cast<std::uint32_t>(size)});
+    } catch (const std::bad_alloc&) {
+        ++lost_;
+    }
+}
+
 void TopicPublisher::open(ros::NodeHandle& handle) {
     ros::AdvertiseOptions options(topic_, queue_, md5_, type_, definition_);
     options.has_header = startsWithHeader(definition_);
@@ -43,8 +58,7 @@ void TopicPublisher::open(ros::NodeHandle& handle) {
     }
     const std::lock_guard lock(mutex_);
     publisher_ = publisher;
-    if (publisher_ && !kept_.empty())
-        publisher_.publish(RawView{kept_.data(), static_cast<std::uint32_t>(kept_.size())});
+    if (publisher_ && !kept_.empty()) send(kept_.data(), kept_.size());
     kept_.clear();
     if (!problem.empty()) problem_ = "cannot publish " + topic_ + " as " + type_ + ": " + problem;
 }
@@ -61,7 +75,7 @@ void TopicPublisher::close() {
 void TopicPublisher::publish(const std::uint8_t* bytes, std::uint32_t size) {
     const std::lock_guard lock(mutex_);
     if (publisher_) {
-        publisher_.publish(RawView{bytes, size});
+        send(bytes, size);
     } else if (latch_) {
         kept_.assign(bytes, bytes + size);
     }

@@ -31,6 +31,8 @@ class TopicPublisher {
     bool isOpen() const;
     /// Why it could not be opened, one line; empty if it could.
     std::string problem() const;
+    /// Messages lost as too much waited for slow subscribers, of all topics.
+    std::uint64_t lost() const;
 
     void open(ros::NodeHandle& handle);
     void close();
@@ -40,6 +42,8 @@ class TopicPublisher {
     void publish(const std::uint8_t* bytes, std::uint32_t size);
 
    private:
+    void send(const std::uint8_t* bytes, std::size_t size);
+
     std::string topic_;
     std::string type_;
     std::string md5_;
@@ -48,6 +52,7 @@ class TopicPublisher {
     bool latch_;
     mutable std::mutex mutex_;  // all below
     std::string problem_;
+    std::uint64_t lost_ = 0;
     std::vector<std::uint8_t> kept_;
     ros::Publisher publisher_;
 };
