@@ -172,6 +172,12 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
     to.add_argument("--lock-memory", action=switch, help="lock the executor's memory")
     add_quantity(to, "--heap-kb", "heap_kb", "heap touched at start")
     add_quantity(to, "--stack-kb", "stack_kb", "stack of the real-time thread")
+    to.add_argument(
+        "--refuse-out-of-range",
+        dest="ros_refuse_out_of_range",
+        action=switch,
+        help="fail a call of dynamic_reconfigure instead of taking the nearest value",
+    )
     to.add_argument("--ros", dest="ros_enabled", action=switch, help="have a ROS node")
     to.add_argument("--master-uri", dest="ros_master_uri", metavar="URI", help="the ROS master")
     to.add_argument(
@@ -236,12 +242,6 @@ def add_quantity(to: argparse.ArgumentParser, option: str, dest: str, text: str)
         type=value,
         metavar=unit.upper() or "N",
         help=f"{text} ({quantity.range()}, default {quantity.default:g})",
-    )
-    to.add_argument(
-        "--refuse-out-of-range",
-        dest="ros_refuse_out_of_range",
-        action=switch,
-        help="fail a call of dynamic_reconfigure instead of taking the nearest value",
     )
 
 
