@@ -14,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include "access/rights.hpp"
 #include "check/check.hpp"
 #include "faults/crash_handler.hpp"
 #include "faults/flight_recorder.hpp"
@@ -25,6 +26,7 @@
 #include "rtcf/version.hpp"
 #include "runner/runner.hpp"
 #include "server/describe.hpp"
+#include "server/direct_stop.hpp"
 #include "server/server.hpp"
 
 namespace {
@@ -35,6 +37,8 @@ using rtcf::LogLevel;
 struct Options {
     std::string runner;
     std::string socket;
+    std::string stop_socket;
+    std::string resume_mark;
     std::string describe;
     std::string package;
     std::vector<uid_t> trusted;
@@ -42,7 +46,7 @@ struct Options {
 };
 
 constexpr const char* kUsage =
-    "usage: rtcf-executor --runner NAME --socket PATH\n"
+    "usage: rtcf-executor --runner NAME --socket PATH [--stop-socket PATH] [--resume-mark FILE]\n"
     "       rtcf-executor --describe LIBRARY --package PACKAGE [--trust UID]...\n"
     "       rtcf-executor --check LIBRARY --package PACKAGE --type TYPE [--cycles N] [--param "
     "NAME:=VALUE]...\n"
@@ -56,6 +60,8 @@ int parse(int argc, char** argv, Options& options) {
     enum Option {
         kRunner = 1,
         kSocket,
+        kStopSocket,
+        kResumeMark,
         kDescribe,
         kPackage,
         kCheck,
@@ -68,6 +74,8 @@ int parse(int argc, char** argv, Options& options) {
     };
     const option known[] = {{"runner", required_argument, nullptr, kRunner},
                             {"socket", required_argument, nullptr, kSocket},
+                            {"stop-socket", required_argument, nullptr, kStopSocket},
+                            {"resume-mark", required_argument, nullptr, kResumeMark},
                             {"describe", required_argument, nullptr, kDescribe},
                             {"package", required_argument, nullptr, kPackage},
                             {"check", required_argument, nullptr, kCheck},
@@ -86,6 +94,12 @@ int parse(int argc, char** argv, Options& options) {
                 break;
             case kSocket:
                 options.socket = optarg;
+                break;
+            case kStopSocket:
+                options.stop_socket = optarg;
+                break;
+            case kResumeMark:
+                options.resume_mark = optarg;
                 break;
             case kDescribe:
                 options.describe = optarg;
@@ -171,6 +185,7 @@ int run(const Options& options) {
     prepareProcess();
     // Takes the signals first, so that every thread made from here on has them blocked.
     Server server(options.socket);
+    Access access;
     rtcf::ros1::Rosout rosout;
     Log log([&](LogEntry&& entry) {
         server.publish(entry);
@@ -204,7 +219,21 @@ int run(const Options& options) {
                               return server.ask(call, cancel);
                           }),
                       recorder);
-        server.serve(runner, log);
+        // After the runner, which it stops to the last.
+        DirectStop direct_stop(options.stop_socket, options.resume_mark, access);
+        direct_stop.serve({[&](const DirectStopReport& report) {
+                               runner.requestStop();
+                               server.publish(report);
+                               runner.post([&runner] {
+                                   try {
+                                       runner.stop([](const std::string&) {});
+                                   } catch (const std::exception&) {
+                                       // The loop has not ended yet; its end is noticed.
+                                   }
+                               });
+                           },
+                           [&] { return runner.loop().running(); }});
+        server.serve(runner, log, access, direct_stop);
     }
     log.end();
     server.deliver();

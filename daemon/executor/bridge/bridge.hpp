@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "access/rights.hpp"
 #include "bridge/hook_gate.hpp"
 #include "bridge/injector.hpp"
 #include "bridge/tap.hpp"
@@ -60,6 +61,7 @@ struct BridgeSettings {
     std::uint32_t decimation = 1;                ///< each n-th value of an output is published,
     std::string decimate = ".*";                 ///< if its name matches this expression
     std::uint32_t largest_message = 256 * 1024;  ///< of a type of variable size, bytes
+    Right peers = Right::Observe;                ///< what peers may do, who are strangers
     bool refuse_out_of_range = false;  ///< what peers ask for; else it is brought into the range
 };
 

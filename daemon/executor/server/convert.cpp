@@ -92,6 +92,37 @@ pb::ComponentSpec specTo(const ComponentDefinition& definition) {
     return spec;
 }
 
+Right rightFrom(pb::Right right) {
+    switch (right) {
+        case pb::RIGHT_OBSERVE:
+            return Right::Observe;
+        case pb::RIGHT_TUNE:
+            return Right::Tune;
+        case pb::RIGHT_OPERATE:
+            return Right::Operate;
+        case pb::RIGHT_ADMIN:
+            return Right::Admin;
+        default:
+            return Right::None;
+    }
+}
+
+pb::Right rightTo(Right right) {
+    switch (right) {
+        case Right::None:
+            break;
+        case Right::Observe:
+            return pb::RIGHT_OBSERVE;
+        case Right::Tune:
+            return pb::RIGHT_TUNE;
+        case Right::Operate:
+            return pb::RIGHT_OPERATE;
+        case Right::Admin:
+            return pb::RIGHT_ADMIN;
+    }
+    return pb::RIGHT_NONE;
+}
+
 OverrunPolicy overrunFrom(pb::OverrunPolicy policy) {
     if (policy == pb::OVERRUN_POLICY_CATCH_UP) return OverrunPolicy::CatchUp;
     if (policy == pb::OVERRUN_POLICY_RELATIVE) return OverrunPolicy::Relative;
@@ -228,6 +259,16 @@ v1::ServiceCall callTo(std::uint64_t number, const OutsideCall& call) {
     return message;
 }
 
+AccessRules rulesFrom(const v1::AccessRules& message) {
+    AccessRules rules;
+    rules.others = rightFrom(message.others());
+    for (const auto& entry : message.users()) rules.users[entry.id()] = rightFrom(entry.right());
+    for (const auto& entry : message.groups()) rules.groups[entry.id()] = rightFrom(entry.right());
+    if (message.has_door_group()) rules.door_group = message.door_group();
+    rules.door_open = message.door_open();
+    return rules;
+}
+
 RunnerSettings settingsFrom(const pb::RunnerSettings& message, RunnerSettings base) {
     if (message.has_frequency_hz()) base.frequency_hz = message.frequency_hz();
     RealtimeSettings& realtime = base.loop.realtime;
@@ -270,6 +311,8 @@ RunnerSettings settingsFrom(const pb::RunnerSettings& message, RunnerSettings ba
         base.bridge.largest_message =
             std::min(ros.largest_message_kb(), UINT32_MAX / 1024) * std::uint32_t{1024};
     }
+    if (ros.has_peers() && ros.peers() != pb::RIGHT_UNSPECIFIED)
+        base.bridge.peers = rightFrom(ros.peers());
     if (ros.has_refuse_out_of_range()) base.bridge.refuse_out_of_range = ros.refuse_out_of_range();
     if (ros.has_whitelist()) base.whitelist = ros.whitelist();
     if (ros.has_blacklist()) base.blacklist = ros.blacklist();
@@ -308,6 +351,7 @@ pb::RunnerSettings settingsTo(const RunnerSettings& settings) {
     ros.set_decimation(settings.bridge.decimation);
     ros.set_decimate(settings.bridge.decimate);
     ros.set_largest_message_kb(settings.bridge.largest_message / 1024);
+    ros.set_peers(rightTo(settings.bridge.peers));
     ros.set_refuse_out_of_range(settings.bridge.refuse_out_of_range);
     ros.set_whitelist(settings.whitelist);
     ros.set_blacklist(settings.blacklist);
@@ -427,6 +471,15 @@ v1::LogRecord logTo(const LogEntry& entry) {
     record.set_function(entry.function);
     record.set_realtime(entry.realtime);
     return record;
+}
+
+v1::DirectStop directStopTo(const DirectStopReport& report) {
+    v1::DirectStop message;
+    message.set_count(report.count);
+    message.set_uid(report.user);
+    message.set_pid(report.pid);
+    message.set_at_ns(report.at_ns);
+    return message;
 }
 
 v1::Event eventTo(const RunnerEvent& event) {

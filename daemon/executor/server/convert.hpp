@@ -3,6 +3,7 @@
 /// no further than this folder. Pure functions.
 #pragma once
 
+#include "access/rights.hpp"
 #include "bridge/outside_call.hpp"
 #include "graph/definition.hpp"
 #include "logging/log.hpp"
@@ -11,6 +12,7 @@
 #include "runner/runner.hpp"
 #include "runner/settings.hpp"
 #include "runner/snapshot.hpp"
+#include "server/direct_stop.hpp"
 
 namespace rtcf::executor {
 
@@ -25,6 +27,7 @@ RunnerSettings settingsFrom(const ::rtcf::v1::RunnerSettings& message, RunnerSet
 std::vector<std::pair<std::string, ParameterValue>> parametersFrom(
     const google::protobuf::RepeatedPtrField<::rtcf::v1::ParameterSetting>& settings);
 ReplayChunk replayFrom(const ::rtcf::v1::ReplayRequest& request);
+AccessRules rulesFrom(const v1::AccessRules& message);
 /// @}
 
 /// @name To the wire
@@ -33,6 +36,7 @@ v1::Error errorTo(RefusalKind kind, const std::string& message);
 ::rtcf::v1::ChangeResult outcomeTo(const ChangeOutcome& outcome);
 v1::LogRecord logTo(const LogEntry& entry);
 v1::ServiceCall callTo(std::uint64_t number, const OutsideCall& call);
+v1::DirectStop directStopTo(const DirectStopReport& report);
 v1::Event eventTo(const RunnerEvent& event);
 ::rtcf::v1::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t position,
                                       RunnerState state);

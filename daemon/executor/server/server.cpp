@@ -6,7 +6,6 @@
 #include <sys/resource.h>
 #include <sys/signalfd.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -18,6 +17,7 @@
 
 #include "rtcf/version.hpp"
 #include "server/convert.hpp"
+#include "server/listen.hpp"
 #include "statistics/thread_usage.hpp"
 
 namespace rtcf::executor {
@@ -28,7 +28,7 @@ namespace {
 
 // Of rtcfd and executor the newer asks for nothing that the older does not know:
 // see link.py of rtcfd. Hello, stop and exit stay as they are for good.
-constexpr std::uint32_t kProtocol = 2;
+constexpr std::uint32_t kProtocol = 3;
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kHookTimeout = 10 * kSecond;
 constexpr std::int64_t kProbeTimeout = kSecond / 2;
@@ -36,26 +36,10 @@ constexpr std::int64_t kProbeTimeout = kSecond / 2;
 constexpr std::chrono::seconds kAskTimeout{70};
 constexpr std::size_t kLargestOutbox = 10000;  // messages kept while no daemon is connected
 constexpr std::size_t kLargestConnections = 8;
+constexpr int kBacklog = 8;
 
 [[noreturn]] void fail(const std::string& what) {
     throw std::system_error(errno, std::generic_category(), what);
-}
-
-int listenOn(const std::string& path) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    if (path.size() >= sizeof address.sun_path) {
-        errno = ENAMETOOLONG;
-        fail("socket " + path);
-    }
-    std::copy(path.begin(), path.end(), address.sun_path);
-    const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (fd < 0) fail("socket");
-    ::unlink(path.c_str());  // of an executor that was killed
-    if (::bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0)
-        fail("socket " + path);
-    if (::listen(fd, 8) != 0) fail("socket " + path);
-    return fd;
 }
 
 int takeSignals() {
@@ -125,7 +109,7 @@ pb::RunnerState stateTo(RunnerState state) {
 
 Server::Server(const std::string& socket_path)
     : path_(socket_path),
-      listener_(listenOn(socket_path)),
+      listener_(listenOn(socket_path, kBacklog)),
       signals_(takeSignals()),
       wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
     if (wake_ < 0) fail("eventfd");
@@ -193,9 +177,17 @@ void Server::handOn(const v1::Response& call) {
     calls_.answer(number, {false, "no rtcfd is connected to this executor: is it running?"});
 }
 
-void Server::serve(Runner& runner, Log& log) {
+void Server::publish(const DirectStopReport& report) {
+    v1::Response response;
+    *response.mutable_direct_stop() = directStopTo(report);
+    post(0, std::move(response), false);
+}
+
+void Server::serve(Runner& runner, Log& log, Access& access, const DirectStop& direct_stop) {
     runner_ = &runner;
     log_ = &log;
+    access_ = &access;
+    direct_stop_ = &direct_stop;
     while (!exiting_) {
         std::vector<pollfd> polled{
             {listener_, POLLIN, 0}, {signals_, POLLIN, 0}, {wake_, POLLIN, 0}};
@@ -350,6 +342,8 @@ void Server::handle(Connection& connection, const v1::Request& request) {
         hello.set_runner(runner_->name());
         hello.set_pid(::getpid());
         hello.set_flight_recorder_fd(runner_->recorder().fd());
+        if (const DirectStopReport report = direct_stop_->last(); report.count != 0)
+            *hello.mutable_direct_stop() = directStopTo(report);
         connection.setGreeted();
         respond(id, response);
         return;
@@ -402,6 +396,10 @@ bool Server::answerQuery(std::uint64_t connection, const v1::Request& request) {
                           {request.service_answer().success(), request.service_answer().message()});
             response.mutable_done();
             break;
+        case v1::Request::kAccess:
+            access_->set(rulesFrom(request.access()));
+            response.mutable_done();
+            break;
         case v1::Request::kExit:
             response.mutable_done();
             exiting_ = true;
@@ -423,6 +421,7 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
                       fmt::format("runner {} is stuck in {}(): only stop and restart it",
                                   runner_->name(), where));
     }
+    requireStopsKnown(request);
     // Statistics are of one run of the loop, which has not begun yet.
     const bool begins = request.kind_case() == v1::Request::kStart ||
                         (request.kind_case() == v1::Request::kReplay && request.replay().begin()) ||
@@ -449,6 +448,7 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
         };
         try {
             require_wanted();
+            requireStopsKnown(request);
             const auto progress = [this, connection, id, &require_wanted](const std::string& line) {
                 require_wanted();
                 v1::Response step;
@@ -476,6 +476,19 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
         log_->drain();  // what the hooks said comes before the answer
         post(connection, std::move(response), true);
     });
+}
+
+// What was asked for before somebody stopped the loop past rtcfd does not run it again.
+void Server::requireStopsKnown(const v1::Request& request) const {
+    const bool runs = request.kind_case() == v1::Request::kStart ||
+                      request.kind_case() == v1::Request::kStep ||
+                      request.kind_case() == v1::Request::kReplay;
+    const DirectStopReport report = direct_stop_->last();
+    if (!runs || request.direct_stops() >= report.count) return;
+    throw Refusal(RefusalKind::FailedPrecondition,
+                  fmt::format("runner {} was stopped at its executor by user {} after this was "
+                              "asked for: ask again",
+                              runner_->name(), report.user));
 }
 
 // What rtcfd says about the folder that it found a library in.

@@ -17,6 +17,7 @@
 #include "logging/log.hpp"
 #include "runner/runner.hpp"
 #include "server/connection.hpp"
+#include "server/direct_stop.hpp"
 #include "server/outside_calls.hpp"
 #include "statistics/histogram.hpp"
 
@@ -34,6 +35,7 @@ class Server {
     /// @{
     void publish(const LogEntry& entry);
     void publish(const RunnerEvent& event);
+    void publish(const DirectStopReport& report);
     /// @}
 
     /// Hands what a peer outside asks for to the daemon and waits for its answer. Any other thread
@@ -41,7 +43,8 @@ class Server {
     OutsideAnswer ask(const OutsideCall& call, const std::atomic<bool>& cancel);
 
     /// Serves until an `exit` request or a signal. @param runner what to serve; outlives the call
-    void serve(Runner& runner, Log& log);
+    /// @param access gets the rules that rtcfd sends @param direct_stop what rtcfd is told of
+    void serve(Runner& runner, Log& log, Access& access, const DirectStop& direct_stop);
     /// Sends what has been posted. After serve(), for what was logged on the way out.
     void deliver();
 
@@ -77,6 +80,7 @@ class Server {
     void handle(Connection& connection, const v1::Request& request);
     bool answerQuery(std::uint64_t connection, const v1::Request& request);
     void submitChange(std::uint64_t connection, const v1::Request& request);
+    void requireStopsKnown(const v1::Request& request) const;
     void submitProbe(std::uint64_t connection, const v1::Request& request);
     void expire();
     bool orphaned();
@@ -97,6 +101,8 @@ class Server {
     std::int64_t alone_since_ns_ = 0;
     Runner* runner_ = nullptr;
     Log* log_ = nullptr;
+    Access* access_ = nullptr;
+    const DirectStop* direct_stop_ = nullptr;
     std::uint64_t next_id_ = 1;
     std::map<std::uint64_t, std::unique_ptr<Connection>> connections_;
     Baseline baseline_;

@@ -55,7 +55,7 @@ class ServerTest : public ::testing::Test {
    protected:
     ServerTest() {
         journal().clear();
-        thread_ = std::thread([this] { server_.serve(runner_, log_); });
+        thread_ = std::thread([this] { server_.serve(runner_, log_, access_, direct_stop_); });
     }
 
     ~ServerTest() override {
@@ -85,6 +85,8 @@ class ServerTest : public ::testing::Test {
     executor::Runner runner_{"rt_runner", log_,
                              [this](const executor::RunnerEvent& event) { server_.publish(event); },
                              nullptr, recorder_};
+    executor::Access access_;
+    executor::DirectStop direct_stop_{"", "", access_};
     std::thread thread_;
 };
 

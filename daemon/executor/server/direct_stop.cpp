@@ -1,0 +1,191 @@
+#include "server/direct_stop.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <pthread.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+#include "loop/cycle_counter.hpp"
+#include "server/listen.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::int64_t kAskTimeout = kSecond;         // from the connection to the line
+constexpr std::int64_t kAnswerTimeout = 2 * kSecond;  // from the line to the end of the loop
+constexpr int kLookMs = 2;                            // between looks at a loop that is to end
+constexpr std::size_t kMostClients = 32;              // with the right; others are never kept
+constexpr std::size_t kLongestLine = 64;
+constexpr mode_t kSocketMode = 0660;  // who has no right is told so; the folder keeps others out
+
+void answer(int fd, const std::string& text) {
+    const std::string line = text + "\n";
+    // A client that reads nothing is not waited for.
+    [[maybe_unused]] const ssize_t sent =
+        ::send(fd, line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+}
+
+std::vector<gid_t> groupsOf(int fd, gid_t primary) {
+    std::vector<gid_t> groups(256);
+    auto size = static_cast<socklen_t>(groups.size() * sizeof(gid_t));
+    if (::getsockopt(fd, SOL_SOCKET, SO_PEERGROUPS, groups.data(), &size) != 0) {
+        if (errno != ERANGE) return {primary};
+        groups.resize(size / sizeof(gid_t));
+        if (::getsockopt(fd, SOL_SOCKET, SO_PEERGROUPS, groups.data(), &size) != 0)
+            return {primary};
+    }
+    groups.resize(size / sizeof(gid_t));
+    groups.push_back(primary);
+    return groups;
+}
+
+}  // namespace
+
+DirectStop::DirectStop(const std::string& path, std::string mark, const Access& access)
+    : path_(path), mark_(std::move(mark)), access_(access) {
+    if (path_.empty()) return;
+    listener_ = listenOn(path_, 256);
+    ::chmod(path_.c_str(), kSocketMode);
+    wake_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    if (wake_ < 0) {
+        const int error = errno;
+        ::close(listener_);
+        throw std::system_error(error, std::generic_category(), "eventfd");
+    }
+}
+
+DirectStop::~DirectStop() {
+    close();
+    if (path_.empty()) return;
+    ::close(wake_);
+    ::close(listener_);
+    ::unlink(path_.c_str());
+}
+
+void DirectStop::serve(Stoppable what) {
+    if (path_.empty()) return;
+    what_ = std::move(what);
+    thread_ = std::thread([this] { threadMain(); });
+}
+
+void DirectStop::close() noexcept {
+    if (!thread_.joinable()) return;
+    ending_.store(true);
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const ssize_t count = ::write(wake_, &one, sizeof one);
+    thread_.join();
+}
+
+DirectStopReport DirectStop::last() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return last_;
+}
+
+void DirectStop::threadMain() {
+    pthread_setname_np(pthread_self(), "rtcf-stop");
+    while (!ending_.load()) {
+        const bool waits = std::any_of(clients_.begin(), clients_.end(),
+                                       [](const Client& client) { return client.asked; });
+        std::vector<pollfd> polled{{wake_, POLLIN, 0}, {listener_, POLLIN, 0}};
+        // Nobody is kept waiting by those who only connect.
+        if (clients_.size() >= kMostClients) polled[1].events = 0;
+        for (const Client& client : clients_)
+            polled.push_back({client.fd, static_cast<short>(client.asked ? 0 : POLLIN), 0});
+        ::poll(polled.data(), polled.size(), waits ? kLookMs : clients_.empty() ? -1 : 100);
+        for (std::size_t i = clients_.size(); i-- > 0;) {
+            if (attend(clients_[i], polled[i + 2].revents != 0)) continue;
+            ::close(clients_[i].fd);
+            clients_.erase(clients_.begin() + static_cast<std::ptrdiff_t>(i));
+        }
+        if ((polled[1].revents & POLLIN) != 0) accept();
+        if (unsynced_ && clients_.empty()) {
+            // After the answers: a busy disk is no reason to say "stopped" late.
+            unsynced_ = false;
+            const std::string folder = mark_.substr(0, mark_.rfind('/') + 1);
+            const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+            if (fd >= 0) {
+                ::fsync(fd);
+                ::close(fd);
+            }
+        }
+    }
+    for (const Client& client : clients_) {
+        if (client.asked) answer(client.fd, "stopped: the executor ends");
+        ::close(client.fd);
+    }
+    clients_.clear();
+}
+
+void DirectStop::accept() {
+    const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    if (fd < 0) return;
+    ucred peer{};
+    socklen_t size = sizeof peer;
+    if (::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
+        ::close(fd);
+        return;
+    }
+    // At once, and without a look at what it sends: that costs the others next to nothing.
+    if (const Right has = access_.of(peer.uid, groupsOf(fd, peer.gid)); has < Right::Operate) {
+        answer(fd, fmt::format("refused: stop takes the right to operate, and user {} has {}",
+                               peer.uid, has == Right::None ? "none" : wordOf(has)));
+        ::close(fd);
+        return;
+    }
+    clients_.push_back({fd, peer.uid, peer.pid, false, monotonicNow() + kAskTimeout, {}});
+}
+
+bool DirectStop::attend(Client& client, bool readable) {
+    if (client.asked) {
+        if (!what_.running()) {
+            answer(client.fd, "stopped");
+            return false;
+        }
+        if (monotonicNow() < client.until_ns) return true;
+        answer(client.fd,
+               "late: a component does not return from its update(): its loop ends when that does, "
+               "or its executor after stall_timeout");
+        return false;
+    }
+    if (!readable) return monotonicNow() < client.until_ns;
+    std::array<char, kLongestLine> buffer{};
+    const ssize_t count = ::recv(client.fd, buffer.data(), buffer.size(), 0);
+    if (count < 0) return errno == EAGAIN || errno == EINTR;
+    client.text.append(buffer.data(), static_cast<std::size_t>(count));
+    if (client.text.find('\n') == std::string::npos)
+        return count > 0 && client.text.size() <= kLongestLine;
+    if (client.text != "stop\n") {
+        answer(client.fd, "refused: what can be asked for here is `stop`");
+        return false;
+    }
+    stop(client);
+    client.asked = true;
+    client.until_ns = monotonicNow() + kAnswerTimeout;
+    return true;
+}
+
+void DirectStop::stop(const Client& client) {
+    DirectStopReport report;
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        last_ = {last_.count + 1, client.user, client.pid, monotonicNow()};
+        report = last_;
+    }
+    what_.stop(report);
+    // Whoever starts this loop again by itself looks for it. Removing works on a full disk too.
+    if (!mark_.empty() && ::unlink(mark_.c_str()) == 0) unsynced_ = true;
+}
+
+}  // namespace rtcf::executor
