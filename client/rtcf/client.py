@@ -1,13 +1,15 @@
 """The client of rtcfd: one method per call of `rtcf.v1.Control`."""
 
 import os
+import time
 from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
 from typing import Any
 
 import grpc
+from rtcf_shared.errors import RtcfError
 
-from rtcf import errors
+from rtcf import direct_stop, errors
 from rtcf.tenancy import Tenancy
 from rtcf.v1 import control_pb2, control_pb2_grpc, graph_pb2, runner_pb2
 
@@ -15,6 +17,9 @@ DEFAULT_SOCKET = "/run/rtcfd/control.sock"
 QUERY_TIMEOUT_S = 20.0
 # Above rtcfd's own limits, so that its better word arrives.
 CHANGE_TIMEOUT_S = 120.0
+_CROWDED_S = 15.0  # for a place in the queue at the door
+_RETRY_S = 0.05
+DEFAULT_RUNNER = "rt_runner"
 
 _OPTIONS = (
     ("grpc.max_receive_message_length", 64 * 1024 * 1024),
@@ -66,10 +71,12 @@ class Client:
         """End the connection."""
         self._channel.close()
 
-    def get_status(self, runner: str = "") -> control_pb2.GetStatusResponse:
+    def get_status(
+        self, runner: str = "", timeout_s: float = QUERY_TIMEOUT_S
+    ) -> control_pb2.GetStatusResponse:
         """Return the status of rtcfd and of all runners, or of the one named."""
         request = control_pb2.GetStatusRequest(runner=runner)
-        return self._ask(self._stub.GetStatus, request)  # type: ignore[no-any-return]
+        return self._ask(self._stub.GetStatus, request, timeout_s)  # type: ignore[no-any-return]
 
     def reload(self) -> list[str]:
         """Make rtcfd read its settings and graphs.d again; return a line for each change."""
@@ -109,8 +116,45 @@ class Client:
     def stop(
         self, runner: str = "", on_progress: OnProgress | None = None
     ) -> control_pb2.ChangeResult:
-        """End the loop at the next cycle boundary."""
-        return self._change(self._stub.Stop, control_pb2.StopRequest(runner=runner), on_progress)
+        """End the loop at the next cycle boundary.
+
+        Where rtcfd cannot be reached, has no place for another client, or does
+        not answer within a second, the loop's executor is asked itself; a note
+        of the result says so.
+        """
+
+        request = control_pb2.StopRequest(runner=runner)
+        return direct_stop.where_rtcfd_does_not(
+            lambda heard: self._change(self._stub.Stop, request, heard),
+            runner or DEFAULT_RUNNER,
+            self.socket,
+            on_progress,
+        )
+
+    def stop_all(self) -> list[direct_stop.Stopped]:
+        """End all loops at once, at their executors; then tell rtcfd, if it answers in a second.
+
+        Raises nothing: what came of each loop is in the result, by runner.
+        """
+        stopped = {each.runner: each for each in direct_stop.stop_all(self.socket)}
+        try:
+            runners = [
+                each.runner for each in self.get_status(timeout_s=direct_stop.PATIENCE_S).runners
+            ]
+        except RtcfError as error:
+            if not stopped:
+                stopped[""] = direct_stop.Stopped("", error)
+            runners = []
+        # A runner without an executor may be about to get one.
+        for runner in runners:
+            request = control_pb2.StopRequest(runner=runner)
+            try:
+                self._change(self._stub.Stop, request, None, timeout_s=direct_stop.TIMEOUT_S)
+            except RtcfError as error:
+                stopped.setdefault(runner, direct_stop.Stopped(runner, error))
+            else:
+                stopped[runner] = direct_stop.Stopped(runner)
+        return [stopped[runner] for runner in sorted(stopped)]
 
     def step(
         self, cycles: int, runner: str = "", on_progress: OnProgress | None = None
@@ -293,10 +337,21 @@ class Client:
         self._ask(self._stub.ResetStatistics, control_pb2.ResetStatisticsRequest(runner=runner))
 
     def _ask(self, method: Any, request: Any, timeout_s: float | None = QUERY_TIMEOUT_S) -> Any:
-        try:
-            return method(request, timeout=timeout_s)
-        except grpc.RpcError as error:
-            raise errors.from_grpc(error, self.socket) from None
+        until = time.monotonic() + _CROWDED_S
+        while True:
+            try:
+                return method(request, timeout=timeout_s)
+            except grpc.RpcError as error:
+                if not self._crowded(error, until):
+                    raise errors.from_grpc(error, self.socket) from None
+
+    def _crowded(self, error: Any, until: float) -> bool:
+        """Tell whether to try again, after a moment: others were before us in the queue at the
+        door, for which gRPC does not wait."""
+        if time.monotonic() > until or not errors.is_crowded(error, self.socket):
+            return False
+        time.sleep(_RETRY_S)
+        return True
 
     def _change(
         self,
@@ -305,13 +360,24 @@ class Client:
         on_progress: OnProgress | None,
         timeout_s: float | None = CHANGE_TIMEOUT_S,
     ) -> control_pb2.ChangeResult:
+        until = time.monotonic() + _CROWDED_S
+        while True:
+            try:
+                return self._change_once(method, request, on_progress, timeout_s)
+            except grpc.RpcError as error:
+                if not self._crowded(error, until):
+                    raise errors.from_grpc(error, self.socket) from None
+
+    @staticmethod
+    def _change_once(
+        method: Any, request: Any, on_progress: OnProgress | None, timeout_s: float | None
+    ) -> control_pb2.ChangeResult:
         result = control_pb2.ChangeResult()
-        try:
-            for response in method(request, timeout=timeout_s):
-                if response.WhichOneof("kind") == "result":
-                    result = response.result
-                elif on_progress is not None:
-                    on_progress(response.progress)
-        except grpc.RpcError as error:
-            raise errors.from_grpc(error, self.socket) from None
+        # A rtcfd that was stopped may come to it after somebody has ended the loop elsewhere.
+        asked = (("rtcf-asked-ns", str(time.monotonic_ns())),)
+        for response in method(request, timeout=timeout_s, metadata=asked):
+            if response.WhichOneof("kind") == "result":
+                result = response.result
+            elif on_progress is not None:
+                on_progress(response.progress)
         return result

@@ -1,5 +1,6 @@
 """What can go wrong for a client, and the one place where gRPC's errors become that."""
 
+import errno
 import os
 import socket as sockets
 import stat
@@ -46,6 +47,20 @@ def from_grpc(error: Any, socket: str) -> RtcfError:
             f"under [limits] in its settings ({text})"
         )
     return RtcfError(f"{text} ({code})")
+
+
+def is_crowded(error: Any, socket: str) -> bool:
+    """Tell whether a call did not get through as the queue at the door is full."""
+    if error.code().name != "UNAVAILABLE" or any(
+        key == _REFUSAL_KEY for key, _ in error.trailing_metadata() or ()
+    ):
+        return False
+    if "failed to connect" not in (error.details() or ""):
+        return False
+    # What gRPC makes of a full queue is an invalid argument. Somebody listens there, though.
+    with sockets.socket(sockets.AF_UNIX, sockets.SOCK_STREAM) as probe:
+        probe.setblocking(False)
+        return probe.connect_ex(socket) in (0, errno.EAGAIN)
 
 
 def _why_unreachable(socket: str, text: str) -> str:

@@ -17,6 +17,11 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     begin = verbs.add_parser("start", parents=[common], help="start the loop")
     begin.set_defaults(run=start)
     end = verbs.add_parser("stop", parents=[common], help="end the loop at the next cycle")
+    end.add_argument(
+        "--all",
+        action="store_true",
+        help="of all runners at once, whether rtcfd answers or not",
+    )
     end.set_defaults(run=stop)
     stepping = verbs.add_parser(
         "step", parents=[common], help="run cycles of a stopped loop on a simulated clock"
@@ -39,9 +44,25 @@ def start(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None
 
 
 def stop(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Stop the loop."""
+    """Stop the loop, or all."""
+    if args.all:
+        _stop_all(client, output)
+        return
     result = client.stop(args.runner, output.progress)
     output.changed("stopped", result)
+
+
+def _stop_all(client: rtcf.Client, output: Output) -> None:
+    found = client.stop_all()
+    failed = [each for each in found if each.error is not None]
+    if output.for_people:
+        for each in found:
+            if each.error is None:
+                print(f"{each.runner} stopped")
+    else:
+        output.data([{"runner": each.runner, "stopped": each.error is None} for each in found])
+    if failed:
+        raise rtcf.RtcfError("; ".join(str(each.error) for each in failed))
 
 
 def step(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:

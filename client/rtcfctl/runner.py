@@ -20,6 +20,7 @@ _CHOICES = {
     "on_crash": choices(runner_pb2.OnCrash.DESCRIPTOR),
     "sim_time": choices(runner_pb2.SimTime.DESCRIPTOR),
 }
+_RIGHTS = choices(runner_pb2.Right.DESCRIPTOR)
 # Options that are fields of RunnerSettings and of RosSettings.
 _FIELDS = ("frequency_hz", "cpu", "priority", "spin_us", "spin_auto", "max_overruns",
            "warmup_cycles", "stall_timeout_ms", "orphan_timeout_s", "lock_memory", "heap_kb",
@@ -107,6 +108,7 @@ def settings_of(args: argparse.Namespace) -> runner_pb2.RunnerSettings:
     ros = runner_pb2.RosSettings()
     for field in _ROS_FIELDS:
         _take(ros, field, getattr(args, f"ros_{field}"))
+    _take(ros, "peers", _RIGHTS.get(args.ros_peers))
     if ros.ListFields():
         settings.ros.CopyFrom(ros)
     return settings
@@ -242,6 +244,11 @@ def add_quantity(to: argparse.ArgumentParser, option: str, dest: str, text: str)
         type=value,
         metavar=unit.upper() or "N",
         help=f"{text} ({quantity.range()}, default {quantity.default:g})",
+    )
+    to.add_argument(
+        "--ros-peers",
+        choices=_RIGHTS,
+        help="what ROS peers may do: ROS knows no users",
     )
 
 

@@ -5,6 +5,8 @@ import os
 import sys
 import time
 
+from rtcfd.log_thread import LogThread
+
 _JOURNAL_PRIORITIES = (
     (logging.CRITICAL, 2),
     (logging.ERROR, 3),
@@ -108,6 +110,6 @@ def set_up(verbose: bool) -> None:
         handler = logging.StreamHandler(sys.stderr)
         handler.setFormatter(LineFormatter())
     root = logging.getLogger()
-    root.handlers[:] = [handler]
+    root.handlers[:] = [LogThread(handler)]
     root.setLevel(logging.DEBUG if verbose else logging.INFO)
     logging.getLogger("asyncio").setLevel(logging.WARNING)

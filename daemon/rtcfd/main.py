@@ -14,7 +14,7 @@ from rtcf.v1 import control_pb2, control_pb2_grpc
 
 from rtcfd import VERSION, journal
 from rtcfd.access.admission import Admission
-from rtcfd.access.clients import Clients
+from rtcfd.access.clients import Clients, Doors
 from rtcfd.access.endpoint import Endpoint
 from rtcfd.catalog.catalog import Catalog
 from rtcfd.catalog.describe import Describer
@@ -27,8 +27,8 @@ from rtcfd.executor.executor import left_overs
 from rtcfd.notify import Notify, machine_goes_down
 from rtcfd.operations.runner_core import Surroundings
 from rtcfd.reload import Reloads
+from rtcfd.runners import ros_services
 from rtcfd.runners.held_runners import await_holder
-from rtcfd.runners.ros_services import RosServices
 from rtcfd.runners.runners import Runners
 from rtcfd.service.control import Control
 from rtcfd.state import handover
@@ -41,6 +41,9 @@ log = logging.getLogger("rtcfd")
 REFUSED = 1
 _GRACE_S = 60.0  # for calls under way: the end of their executors ends them sooner
 _LAST_WORDS_S = 0.1  # for their answers
+# Of who may not stop loops: how large a message may be, and calls at a time by one connection.
+_OTHERS_MESSAGE_KB = 1024
+_OTHERS_STREAMS = 16
 _LAST_ANSWERS_S = 1.0  # likewise where all is well: before a restart
 
 
@@ -51,15 +54,23 @@ class Daemon:
         self._options = given
         self._read_options = read_options
         self._notify = Notify()
-        self._command = ExecutorCommand(given.executor, given.runtime_dir / "executors")
         self._store = Store(given.state_dir)
-        self._endpoint = Endpoint(given.socket)
-        self._private = given.runtime_dir / "executors" / "control"
-        self._clients = Clients(self._private, given.limits.clients)
-        admission = Admission(self._clients, given.access)
+        self._command = ExecutorCommand(
+            given.executor,
+            given.runtime_dir / "executors",
+            given.runtime_dir / "stop",
+            # Who can connect to us can do so too; it is the executor that looks at rights.
+            0o700 if given.foreground else 0o750,
+            self._store.mark,
+        )
+        self._endpoint = Endpoint(given.socket, private=given.foreground)
+        folder = self._command.folder
+        self._doors = Doors(folder / "control", folder / "control-others")
+        self._admission = admission = Admission(given.access)
+        self._clients = Clients(self._doors, given.limits, admission.level)
+        admission.clients = self._clients
         catalog = Catalog(given.folders, Describer(given.executor))
-        ros_services = RosServices(given.ros_services)
-        shared = Surroundings(
+        self._shared = shared = Surroundings(
             command=self._command,
             catalog=catalog,
             store=self._store,
@@ -67,6 +78,7 @@ class Daemon:
             on_change=self._tell,
             serve_ros=ros_services.serve,
             limits=given.limits,
+            name_of=self._clients.name_of,
         )
         self._runners = Runners(shared)
         self._reloads = Reloads(
@@ -78,14 +90,25 @@ class Daemon:
             self._clients,
             admission,
             self._store,
-            ros_services,
         )
-        self._server = grpc.aio.server(options=_server_options(given), interceptors=[admission])
+        # One for each door: what gRPC itself takes of a client cannot be told it by client.
+        self._servers = {
+            self._doors.trusted: grpc.aio.server(
+                options=_server_options(given.limits.message_kb), interceptors=[admission]
+            ),
+            self._doors.others: grpc.aio.server(
+                options=[
+                    *_server_options(min(given.limits.message_kb, _OTHERS_MESSAGE_KB)),
+                    ("grpc.max_concurrent_streams", _OTHERS_STREAMS),
+                ],
+                interceptors=[admission],
+            ),
+        }
         self._left_over: list[str] = []  # runners of executors that outlived another rtcfd
         self._leaving = False  # loops go on after our end
-        control_pb2_grpc.add_ControlServicer_to_server(  # type: ignore[no-untyped-call]
-            Control(self._runners, catalog, self._reloads), self._server
-        )
+        control = Control(self._runners, catalog, self._reloads)
+        for server in self._servers.values():
+            control_pb2_grpc.add_ControlServicer_to_server(control, server)  # type: ignore[no-untyped-call]
 
     async def run(self) -> None:
         """Serve until SIGTERM or SIGINT stops all loops, or SIGUSR1 leaves them to the next rtcfd;
@@ -111,12 +134,14 @@ class Daemon:
         self._options.settings.keep()
         listener = self._endpoint.listen()
         self._serve_privately()
+        self._shared.rules = await self._reloads.rules()
         self._left_over = left_overs(self._command.folder)
         states = self._store.load()
         if self._options.default_runner and DEFAULT_RUNNER not in [s.runner for s in states]:
             states.append(Desired(DEFAULT_RUNNER))
         self._runners.adopt(self._reloads.boot(states, self._left_over))
-        await self._server.start()
+        for server in self._servers.values():
+            await server.start()
         await self._clients.serve(listener)
         log.info("rtcfd %s serves %s", VERSION, self._endpoint.path)
         self._notify.starting()
@@ -142,10 +167,10 @@ class Daemon:
         """End loops and executors, then what serves clients."""
         log.info("stopping all loops")
         self._notify.stopping("stopping all loops")
-        serving = asyncio.create_task(self._server.stop(_GRACE_S))
+        serving = asyncio.create_task(self._end_servers(_GRACE_S))
         await self._runners.close(in_order=not await machine_goes_down())
         await asyncio.wait({serving}, timeout=_LAST_WORDS_S)
-        await self._server.stop(None)
+        await self._end_servers(None)
         self._clients.close()
 
     async def _let_go(self) -> None:
@@ -157,12 +182,12 @@ class Daemon:
         except Refusal as refusal:
             log.error("the next rtcfd will take the last good settings: %s", refusal)
         self._clients.close_door()
-        serving = asyncio.create_task(self._server.stop(_GRACE_S))
+        serving = asyncio.create_task(self._end_servers(_GRACE_S))
         await self._runners.leave()
         await asyncio.wait({serving}, timeout=_LAST_ANSWERS_S)
         # Holders see a connection that is lost, and come back.
         self._clients.close()
-        await self._server.stop(None)
+        await self._end_servers(None)
 
     async def _start(self) -> None:
         await self._runners.bring_up(self._left_over)
@@ -177,14 +202,16 @@ class Daemon:
 
     def _serve_privately(self) -> None:
         """Let gRPC listen where only we may connect: the folder is 0700."""
-        try:
-            bound = self._server.add_insecure_port(f"unix:{self._private}")
-        except RuntimeError:
-            bound = 0
-        if not bound:
-            raise FailedPrecondition(
-                f"cannot listen on {self._private}: is its folder ours to write?"
-            )
+        for door, server in self._servers.items():
+            try:
+                bound = server.add_insecure_port(f"unix:{door}")
+            except RuntimeError:
+                bound = 0
+            if not bound:
+                raise FailedPrecondition(f"cannot listen on {door}: is its folder ours to write?")
+
+    async def _end_servers(self, grace_s: float | None) -> None:
+        await asyncio.gather(*(server.stop(grace_s) for server in self._servers.values()))
 
     def _reload(self) -> None:
         self._runners.operations.in_background("the reload", self._reloads.reload())
@@ -198,8 +225,7 @@ class Daemon:
         if not self._leaving:
             handover.remove(self._command.folder)
         # What is not empty or not there stays as it is.
-        with contextlib.suppress(OSError):
-            self._command.folder.rmdir()
+        self._command.remove_folders()
         if self._options.own_runtime_dir:
             with contextlib.suppress(OSError):
                 self._options.runtime_dir.rmdir()
@@ -220,9 +246,9 @@ def _when_stdin_ends(do: Callable[[], None]) -> None:
     loop.add_reader(0, readable)
 
 
-def _server_options(given: options.Options) -> list[tuple[str, int]]:
+def _server_options(message_kb: int) -> list[tuple[str, int]]:
     return [
-        ("grpc.max_receive_message_length", given.limits.message_kb * 1024),
+        ("grpc.max_receive_message_length", message_kb * 1024),
         ("grpc.max_send_message_length", frames.MAX_FRAME),
     ]
 

@@ -9,16 +9,17 @@ from collections.abc import Callable, Iterable
 from dataclasses import fields
 from pathlib import Path
 
+from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, runner_pb2
 
 from rtcfd.access.admission import Admission
 from rtcfd.access.clients import Clients
 from rtcfd.catalog.catalog import Catalog
 from rtcfd.common import runner_settings
+from rtcfd.common.aside import Aside
 from rtcfd.common.refusals import Refusal
 from rtcfd.configuration.options import Options
 from rtcfd.operations.runner_core import Surroundings
-from rtcfd.runners.ros_services import RosServices
 from rtcfd.runners.runners import Runners
 from rtcfd.state import handover
 from rtcfd.state.boot_graphs import BootGraphs, Given, become
@@ -28,6 +29,8 @@ from rtcfd.state.store import Store
 
 log = logging.getLogger(__name__)
 
+_USERS_TIMEOUT_S = 5.0
+_FILES_TIMEOUT_S = 60.0
 # Read at the start only.
 _FIXED = ("socket", "runtime_dir", "state_dir", "graphs_dir", "executor")
 
@@ -45,7 +48,6 @@ class Reloads:
         clients: Clients,
         admission: Admission,
         store: Store,
-        ros_services: RosServices,
     ) -> None:
         self._given = given
         self._command_folder = shared.command.folder
@@ -56,7 +58,8 @@ class Reloads:
         self._clients = clients
         self._admission = admission
         self._store = store
-        self._ros_services = ros_services
+        self._users = Aside("user database")
+        self._aside = Aside("settings and graphs")
         self._left: Handover | None = None  # by the rtcfd before this one
         self._graphs = BootGraphs(given.graphs_dir, {})
         self._late: list[Given] = []  # for runners that are adopted first
@@ -94,6 +97,17 @@ class Reloads:
         for line in lines:
             log.info("changed while rtcfd was away: %s", line)
 
+    async def rules(self) -> wire.AccessRules:
+        """Return who may do what, for executors."""
+        access = self._admission.access
+        try:
+            return await self._users.run(
+                lambda: access.for_executors(self._given.socket), _USERS_TIMEOUT_S
+            )
+        except (Refusal, OSError) as problem:
+            log.error("executors take `stop` from root and us alone: %s", problem)
+            return wire.AccessRules()
+
     def notes(self) -> list[str]:
         """Return what is to be said about rtcfd itself."""
         lines = [self._given.settings.problem] if self._given.settings.problem else []
@@ -118,7 +132,7 @@ class Reloads:
         return await self._runners.operations.take_turn("a reload", self._reload, None)
 
     async def _reload(self) -> list[str]:
-        new = self._read_options()
+        new = await self._aside.run(self._read_options, _FILES_TIMEOUT_S)
         new.settings.keep()
         lines = [
             f"{name} changes with the next restart of rtcfd"
@@ -132,15 +146,15 @@ class Reloads:
                 lines.append(f"{_WORDS[part.name]} changed")
         self._catalog.folders = new.folders
         self._admission.access = new.access
-        self._ros_services.access = new.ros_services
-        self._clients.limit = new.limits.clients
-        taps, self._shared.limits = self._shared.limits.taps, new.limits
+        self._clients.limits = new.limits
+        self._shared.limits = new.limits
+        self._shared.rules = await self.rules()
         self._given = new
-        if new.limits.taps != taps:
-            for runner in self._runners.all():
-                await runner.follow_limits()
+        # Users and groups may be others than before, whatever the settings say.
+        for runner in self._runners.all():
+            await runner.follow_limits()
         lines += await self._follow_defaults(new.defaults)
-        graphs, self._graph_problems = self._graphs.read()
+        graphs, self._graph_problems = await self._aside.run(self._graphs.read, _FILES_TIMEOUT_S)
         lines += self._graph_problems
         lines += await self._apply([given for given in graphs if given.changed])
         self._leave_note()
@@ -178,7 +192,7 @@ class Reloads:
 
 
 _WORDS = {"folders": "component folders", "access": "access rights", "limits": "limits",
-          "defaults": "defaults of runners", "ros_services": "rights of ROS services"}  # fmt: skip
+          "defaults": "defaults of runners"}  # fmt: skip
 
 
 def _identity(file: Path) -> tuple[int, int] | None:

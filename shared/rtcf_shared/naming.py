@@ -1,11 +1,18 @@
 """Names in messages: those there are, and the one that was probably meant."""
 
 import difflib
+import itertools
 from collections.abc import Iterable
+
+_LONGEST = 255
+_MOST = 2000
 
 
 def suggestion(name: str, known: Iterable[str], most: int = 2) -> str:
     """Return '; did you mean "x"?' with at most so many, or nothing where no name is close."""
+    if len(name) > _LONGEST:
+        return ""  # what is compared costs by its length
+    known = itertools.islice(known, _MOST)
     close = difflib.get_close_matches(name, list(known), n=most, cutoff=0.6)
     if not close:
         return ""

@@ -271,14 +271,14 @@ def test_refusals_say_what_is_wrong(
 def test_ros_may_do_what_the_settings_allow(
     tmp_path: Path, master: Master, access: str, loads: bool, starts: bool
 ) -> None:
-    settings = f'[daemon]\nros_services = "{access}"\n' + with_ros(master.uri, "")
+    settings = with_ros(master.uri, "") + f'peers = "{access}"\n'
     daemon = Daemon(tmp_path, settings)
     daemon.start()
     try:
         _wait_for_services(master)
         load = _call(master, "load_component", "{package: rtcf_examples, type: Mimo}")
         assert load["success"] is loads
-        assert 'ros_services = "admin"' in str(load["message"])
+        assert "--ros-peers admin" in str(load["message"])
         start = _call(master, "activate_rt_loop")
         assert start["success"] is starts
         assert _call(master, "deactivate_rt_loop")["success"] is starts

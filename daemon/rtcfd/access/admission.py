@@ -6,18 +6,22 @@ Owned by the daemon.
 
 import contextlib
 import logging
+import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from typing import Any
 
 import grpc
 from google.protobuf.message import DecodeError
 
-from rtcfd.access.clients import Clients
+from rtcfd.access import calls, lengths
+from rtcfd.access.caller import ASKED_KEY, Caller, enter
+from rtcfd.access.calls import Level
+from rtcfd.access.clients import Client, Clients
 from rtcfd.access.peer import Peer
-from rtcfd.access.rights import Access, Level, needed
+from rtcfd.access.rights import Access, needed
 from rtcfd.common.budget import Budget
-from rtcfd.common.refusals import InvalidArgument, Refusal
-from rtcfd.common.status_codes import abort
+from rtcfd.common.refusals import InvalidArgument, Refusal, ResourceExhausted
+from rtcfd.common.status_codes import abort, bounded
 
 log = logging.getLogger("rtcfd.access")
 
@@ -26,22 +30,26 @@ _REFUSALS_PER_S = 20
 
 
 class _Malformed:
-    """What arrived was no message of the expected type."""
+    """What arrived was no message of the expected type, or was refused before it was read."""
 
-    def __init__(self, problem: str) -> None:
+    def __init__(self, problem: Refusal) -> None:
         self.problem = problem
 
 
 class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
     """Admits calls.  `access` may be changed at any time."""
 
-    def __init__(self, clients: Clients, access: Access) -> None:
+    def __init__(self, access: Access) -> None:
         self.access = access
-        self._clients = clients
+        self.clients: Clients | None = None  # set by who owns both
         self._budget = Budget(_REFUSALS_PER_S)
 
+    def level(self, peer: Peer) -> Level:
+        """Return what a peer may do."""
+        return self.access.level(peer)
+
     async def intercept_service(self, continuation: Any, details: Any) -> Any:
-        """Return the handler of a call, behind the check."""
+        """Return the handler of a call, behind the gate."""
         handler = await continuation(details)
         if handler is None:
             return None
@@ -54,42 +62,49 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
         make = getattr(grpc, f"{kind}_rpc_method_handler")
         return make(
             wrap(method, inner),
-            request_deserializer=_forgiving(handler.request_deserializer),
+            request_deserializer=_forgiving(method, handler.request_deserializer),
             response_serializer=handler.response_serializer,
         )
 
     def _unary(self, method: str, inner: Callable[..., Any]) -> Any:
         async def call(request: Any, context: Any) -> Any:
-            peer = await self._admit(method, request, context)
-            with self._noted(method, request, context, peer):
-                return await inner(request, context)
+            async with self._admitted(method, request, context) as peer:
+                with self._noted(method, request, context, peer):
+                    return await inner(request, context)
 
         return call
 
     def _stream(self, method: str, inner: Callable[..., Any]) -> Any:
         async def call(request: Any, context: Any) -> AsyncIterator[Any]:
-            peer = await self._admit(method, request, context)
-            if isinstance(request, AsyncIterator):
-                request = _formed(method, request)
-            with self._noted(method, request, context, peer):
-                async for response in inner(request, context):
-                    yield response
+            async with self._admitted(method, request, context) as peer:
+                if isinstance(request, AsyncIterator):
+                    request = _formed(method, request)
+                with self._noted(method, request, context, peer):
+                    async for response in inner(request, context):
+                        yield response
 
         return call
 
-    async def _admit(self, method: str, request: Any, context: Any) -> Peer:
-        """Return who calls; refuse who may not."""
-        peer = None
-        try:
-            peer = self._clients.peer(context.peer())
-            _require_formed(method, request)
-            self.access.check(peer, method)
-            return peer
-        except Refusal as refusal:
-            if peer is not None:
-                self._log(logging.WARNING, f"{method} by {peer}: refused: {refusal}", peer, request)
-            await abort(context, refusal)
-            raise
+    @contextlib.asynccontextmanager
+    async def _admitted(self, method: str, request: Any, context: Any) -> AsyncIterator[Peer]:
+        """Return who calls, for as long as that lasts; refuse who may not."""
+        assert self.clients is not None
+        with contextlib.ExitStack() as stack:
+            client: Client | None = None
+            try:
+                client = stack.enter_context(self.clients.calling(context.peer(), method))
+                await client.usage.turn(client.level)
+                assert client.peer is not None
+                self.access.check(client.peer, method)
+                _require_formed(method, request)
+                tuning = self.access.tuning(client.peer)
+                enter(Caller(client.peer, client.level, tuning, _asked_ns(context)))
+            except Refusal as refusal:
+                if client is not None and client.peer is not None:
+                    text = f"{method} by {client.peer}: refused: {bounded(refusal)}"
+                    self._log(logging.WARNING, text, client.peer, request)
+                await abort(context, refusal)
+            yield client.peer
 
     @contextlib.contextmanager
     def _noted(self, method: str, request: Any, context: Any, peer: Peer) -> Iterator[None]:
@@ -97,7 +112,7 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
         if needed(method) <= Level.OBSERVE:
             yield
             return
-        runner = getattr(request, "runner", "")
+        runner = _runner(request)
         what = f"{method} by {peer}"
         try:
             yield
@@ -112,12 +127,27 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
             return
         if lost := self._budget.take_lost():
             text += f" ({lost} more were refused since the last such line)"
-        log.log(level, "%s", text, extra={"runner": getattr(request, "runner", ""), "peer": peer})
+        log.log(level, "%s", text, extra={"runner": _runner(request), "peer": peer})
+
+
+def _asked_ns(context: Any) -> int:
+    """Return when the caller says that it asked: a rtcfd that was stopped comes to it later."""
+    now = time.monotonic_ns()
+    for key, value in context.invocation_metadata() or ():
+        if key == ASKED_KEY and isinstance(value, str) and value.isdigit() and len(value) < 20:
+            return min(int(value), now)
+    return now
+
+
+def _runner(request: Any) -> str:
+    return str(getattr(request, "runner", ""))[: lengths.LONGEST_NAME]
 
 
 def _require_formed(method: str, request: Any) -> None:
     if isinstance(request, _Malformed):
-        raise InvalidArgument(f"the request of {method} is malformed: {request.problem}")
+        raise request.problem
+    if hasattr(request, "DESCRIPTOR"):
+        lengths.check(request)
 
 
 async def _formed(method: str, requests: AsyncIterator[Any]) -> AsyncIterator[Any]:
@@ -126,13 +156,21 @@ async def _formed(method: str, requests: AsyncIterator[Any]) -> AsyncIterator[An
         yield request
 
 
-def _forgiving(deserialize: Callable[[bytes], Any]) -> Callable[[bytes], Any]:
-    """Make a deserializer that hands on what is malformed, instead of a traceback in the log."""
+def _forgiving(method: str, deserialize: Callable[[bytes], Any]) -> Callable[[bytes], Any]:
+    """Make a deserializer that hands on what is malformed, instead of a traceback in the log,
+    and does not begin with what is too large for the call."""
+    largest = calls.of(method).largest
 
     def forgiving(data: bytes) -> Any:
+        if len(data) > largest:
+            return _Malformed(
+                ResourceExhausted(
+                    f"a request of {len(data)} bytes is too large for {method}: at most {largest}"
+                )
+            )
         try:
             return deserialize(data)
         except DecodeError as error:
-            return _Malformed(str(error))
+            return _Malformed(InvalidArgument(f"the request of {method} is malformed: {error}"))
 
     return forgiving

@@ -9,15 +9,18 @@ from rtcfd.executor.command import MAX_SOCKET_PATH
 
 # The complement of 0660: owner and group may connect.
 _UMASK = 0o117
-_BACKLOG = 256
+_PRIVATE_UMASK = 0o177  # 0600
+_BACKLOG = 4096
 _FIRST_PASSED = 3  # sd_listen_fds(3)
 
 
 class Endpoint:
     """A listening unix socket, ours from listen() to remove()."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, private: bool = False) -> None:
+        """`private`: for our user alone."""
         self.path = path
+        self._umask = _PRIVATE_UMASK if private else _UMASK
         self._identity: tuple[int, int] | None = None  # device and inode; None: not ours to remove
 
     def listen(self) -> socket.socket:
@@ -35,7 +38,7 @@ class Endpoint:
         self._make_way()
         listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         # The socket's mode follows the umask at this call.
-        umask = os.umask(_UMASK)
+        umask = os.umask(self._umask)
         try:
             self.path.parent.mkdir(mode=0o755, parents=True, exist_ok=True)
             listener.bind(str(self.path))

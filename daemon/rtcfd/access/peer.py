@@ -1,65 +1,123 @@
-"""Who is at the other end of a connection, by the kernel's word."""
+"""Who is at the other end of a connection, by the kernel's word and the user database's names."""
 
-import errno
 import grp
 import os
 import pwd
 import socket
 import struct
-from collections.abc import Iterable
+import time
 from dataclasses import dataclass
+
+from rtcfd.common.aside import Aside
+from rtcfd.common.refusals import Refusal
 
 _CREDENTIALS = struct.Struct("3i")  # struct ucred, unix(7)
 _SO_PEERGROUPS = 59  # asm-generic/socket.h; unknown to Python's socket
-_LARGEST_OPTION = 1024  # bytes, of Python's getsockopt
+_LARGEST_OPTION = 1024  # bytes, of Python's getsockopt: 256 groups
+_KEPT_S = 60.0  # names that were looked up
+_MOST_KEPT = 4096
+_TIMEOUT_S = 5.0  # for the user database
+
+
+@dataclass(frozen=True)
+class Credentials:
+    """What the kernel says of a process that connected, with the rights it had then."""
+
+    pid: int
+    uid: int
+    gids: frozenset[int]
 
 
 @dataclass(frozen=True)
 class Peer:
-    """A process that connected, with the rights it had then."""
+    """A process that connected, with the names of its user and groups."""
 
     pid: int
     uid: int
-    groups: frozenset[int]
-
-    @property
-    def user(self) -> str:
-        """Return the user's name, or #uid where there is none."""
-        try:
-            return pwd.getpwuid(self.uid).pw_name
-        except KeyError:
-            return f"#{self.uid}"
-
-    def group_names(self) -> set[str]:
-        """Return the names of its groups."""
-        names = set()
-        for gid in self.groups:
-            try:
-                names.add(grp.getgrgid(gid).gr_name)
-            except KeyError:
-                names.add(f"#{gid}")
-        return names
+    user: str  # #uid where there is none
+    groups: frozenset[str]  # by name; #gid where there is none
+    known: bool = True  # False: the user database did not answer
 
     def __str__(self) -> str:
         return f"{self.user} (uid {self.uid}, pid {self.pid})"
 
 
-def of(connection: socket.socket) -> Peer:
-    """Return the peer of a connected unix socket; raises OSError."""
-    credentials = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
-    pid, uid, gid = _CREDENTIALS.unpack(credentials)
-    return Peer(pid, uid, frozenset({gid, *_groups(connection, uid, gid)}))
+def user_of(connection: socket.socket) -> int:
+    """Return the user of the peer of a connected unix socket; raises OSError.  Never blocks."""
+    found = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+    return int(_CREDENTIALS.unpack(found)[1])
 
 
-def _groups(connection: socket.socket, uid: int, gid: int) -> Iterable[int]:
+def credentials(connection: socket.socket) -> Credentials:
+    """Return those of the peer of a connected unix socket; raises OSError.  Never blocks."""
+    found = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+    pid, uid, gid = _CREDENTIALS.unpack(found)
     try:
         listed = connection.getsockopt(socket.SOL_SOCKET, _SO_PEERGROUPS, _LARGEST_OPTION)
-        return struct.unpack(f"{len(listed) // 4}I", listed)
-    except OSError as error:
-        if error.errno != errno.ERANGE:
-            raise
-    # Of more than 256 groups, those in the user database.
+    except OSError:
+        # Of more than 256 groups the first counts: rights come from few.
+        listed = b""
+    return Credentials(pid, uid, frozenset({gid, *struct.unpack(f"{len(listed) // 4}I", listed)}))
+
+
+class Directory:
+    """Names of users and groups, looked up aside and kept for a while.
+
+    Owned by Clients.
+    """
+
+    def __init__(self) -> None:
+        self._aside = Aside("user database")
+        self._kept: dict[tuple[int, frozenset[int]], tuple[float, str, frozenset[str]]] = {}
+        # A hanging database must not keep out who may always come in.
+        self._sure = {0: "root", os.geteuid(): user_name(os.geteuid())}
+
+    def sure(self, uid: int) -> bool:
+        """Tell whether this is root or our own user."""
+        return uid in self._sure
+
+    def known(self, found: Credentials) -> Peer | None:
+        """Return a peer whose names are at hand."""
+        if found.uid in self._sure:
+            return Peer(found.pid, found.uid, self._sure[found.uid], frozenset())
+        until, user, groups = self._kept.get((found.uid, found.gids), (0.0, "", frozenset()))
+        return Peer(found.pid, found.uid, user, groups) if until > time.monotonic() else None
+
+    async def peer(self, found: Credentials) -> Peer:
+        """Return a peer with its names; one that is not `known` if they cannot be found out."""
+        try:
+            user, groups = await self._aside.run(lambda: _names(found), _TIMEOUT_S)
+        except (Refusal, OSError):
+            return Peer(found.pid, found.uid, f"#{found.uid}", frozenset(), known=False)
+        if len(self._kept) >= _MOST_KEPT:
+            self._kept.clear()
+        self._kept[found.uid, found.gids] = (time.monotonic() + _KEPT_S, user, groups)
+        return Peer(found.pid, found.uid, user, groups)
+
+    async def name_of(self, uid: int) -> str:
+        """Return a user's name for people, or #uid if that takes too long."""
+        try:
+            if uid in self._sure:
+                return self._sure[uid]
+            return await self._aside.run(lambda: user_name(uid), _TIMEOUT_S)
+        except (Refusal, OSError):
+            return f"#{uid}"
+
+
+def user_name(uid: int) -> str:
+    """Return a user's name, or #uid where there is none.  May block."""
     try:
-        return os.getgrouplist(pwd.getpwuid(uid).pw_name, gid)
+        return pwd.getpwuid(uid).pw_name
     except KeyError:
-        return ()
+        return f"#{uid}"
+
+
+def _group_name(gid: int) -> str:
+    try:
+        return grp.getgrgid(gid).gr_name
+    except KeyError:
+        return f"#{gid}"
+
+
+def _names(found: Credentials) -> tuple[str, frozenset[str]]:
+    return user_name(found.uid), frozenset(_group_name(gid) for gid in found.gids)

@@ -1,55 +1,33 @@
-"""What a client may do: observe, operate, or everything, by its user and groups.
+"""What a client may do, by its user and groups.
 
 Owned by the daemon; asked by admission.py before each call.
 """
 
-import enum
+import grp
+import logging
 import os
+import pwd
+import stat
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
+from rtcf.executor.v1 import executor_pb2 as wire
+
+from rtcfd.access import calls
+from rtcfd.access.calls import WORDS, Level
 from rtcfd.access.peer import Peer
+from rtcfd.access.tuning import Rule, Tuning, bound
 from rtcfd.common.refusals import PermissionDenied
 
+__all__ = ["WORDS", "Access", "Level", "needed", "rules"]
 
-class Level(enum.IntEnum):
-    """Rights, each with those before it."""
-
-    NONE = 0
-    OBSERVE = 1  # see everything, change nothing
-    OPERATE = 2  # run what is there: loops, parameters, loop breaks
-    ADMIN = 3  # decide what is there: load code, make runners, settings
-
-    @property
-    def word(self) -> str:
-        """Return it as the settings write it."""
-        return self.name.lower()
-
-
-WORDS = {level.word: level for level in Level}
-
-# Calls that change what runs, but not what there is to run.
-_OPERATE = frozenset(
-    {
-        "Start",
-        "Stop",
-        "Step",
-        "Replay",
-        "SetBreaks",
-        "SetParameters",
-        "Release",
-        "ResetStatistics",
-        "RestartRunner",
-    }
-)
-_OBSERVING = ("Get", "List", "Watch")
+log = logging.getLogger(__name__)
 
 
 def needed(method: str) -> Level:
-    """Return what a method of rtcf.v1.Control takes; one that is not known here: admin."""
-    if method.startswith(_OBSERVING):
-        return Level.OBSERVE
-    return Level.OPERATE if method in _OPERATE else Level.ADMIN
+    """Return what a method of rtcf.v1.Control takes."""
+    return calls.of(method).right
 
 
 @dataclass(frozen=True)
@@ -59,15 +37,23 @@ class Access:
     default: Level = Level.ADMIN  # of whoever may connect and is not named
     users: Mapping[str, Level] = field(default_factory=dict)
     groups: Mapping[str, Level] = field(default_factory=dict)
+    parameters: tuple[Rule, ...] = ()
+
+    def tuning(self, peer: Peer) -> Tuning | None:
+        """Return which parameters a peer may set; None: all, if it may set any."""
+        rules = tuple(rule for rule in self.parameters if rule.of(peer))
+        return Tuning(peer.user, rules) if bound(self.level(peer), rules) else None
 
     def level(self, peer: Peer) -> Level:
         """Return what a peer may do."""
         # Root can become anybody, and our own user owns the executors.
         if peer.uid in (0, os.geteuid()):
             return Level.ADMIN
+        if not peer.known and (self.users or self.groups):
+            return Level.NONE
         if peer.user in self.users:
             return self.users[peer.user]
-        ruled = [self.groups[name] for name in peer.group_names() & set(self.groups)]
+        ruled = [self.groups[name] for name in peer.groups & set(self.groups)]
         return max(ruled, default=self.default)
 
     def check(self, peer: Peer, method: str) -> None:
@@ -75,15 +61,49 @@ class Access:
         has, wants = self.level(peer), needed(method)
         if has >= wants:
             return
+        if wants == Level.TUNE and has == Level.OBSERVE and self.tuning(peer) is not None:
+            return  # which parameters is looked at where they are known
+        if not peer.known:
+            raise PermissionDenied(
+                f"{method} takes the right to {_deed(wants)}, and who user {peer.user} is cannot "
+                "be found out: the user database does not answer"
+            )
         raise PermissionDenied(
             f"{method} takes the right to {_deed(wants)}, and user {peer.user} has "
-            f"{f'only the right to {_deed(has)}' if has else 'none'}: an administrator grants it "
-            f'by {wants.word} = ["{peer.user}"] under [access] in rtcfd\'s settings '
-            "and `systemctl reload rtcfd`"
+            f"{'none' if has == Level.NONE else f'only the right to {_deed(has)}'}: an "
+            f'administrator grants it by {wants.word} = ["{peer.user}"] under [access] in '
+            "rtcfd's settings and `systemctl reload rtcfd`"
         )
 
+    def for_executors(self, door: Path) -> wire.AccessRules:
+        """Return the rules by numbers, with who can connect to the socket `door` at all.
 
-def rules(named: Mapping[Level, Collection[str]], default: Level) -> Access:
+        May block: asks the user database.  Names that it does not have are left out.
+        """
+        found = wire.AccessRules(others=self.default.right)
+        for name, level in self.users.items():
+            try:
+                found.users.add(id=pwd.getpwnam(name).pw_uid, right=level.right)
+            except KeyError:
+                log.warning("[access] names user %s, whom there is not", name)
+        for name, level in self.groups.items():
+            try:
+                found.groups.add(id=grp.getgrnam(name).gr_gid, right=level.right)
+            except KeyError:
+                log.warning("[access] names group %s, which there is not", name)
+        try:
+            there = door.stat()
+        except OSError:
+            return found
+        if there.st_mode & stat.S_IWGRP:
+            found.door_group = there.st_gid
+        found.door_open = bool(there.st_mode & stat.S_IWOTH)
+        return found
+
+
+def rules(
+    named: Mapping[Level, Collection[str]], default: Level, parameters: tuple[Rule, ...] = ()
+) -> Access:
     """Return the rules that a settings file gives; names that begin with @ are groups."""
     users: dict[str, Level] = {}
     groups: dict[str, Level] = {}
@@ -93,7 +113,7 @@ def rules(named: Mapping[Level, Collection[str]], default: Level) -> Access:
                 groups[name[1:]] = level
             else:
                 users[name] = level
-    return Access(default, users, groups)
+    return Access(default, users, groups, parameters)
 
 
 def _deed(level: Level) -> str:

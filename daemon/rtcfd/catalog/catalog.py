@@ -15,8 +15,11 @@ from rtcf_shared.folders import packages
 from rtcf_shared.naming import listing, suggestion
 
 from rtcfd.catalog.describe import Describer
+from rtcfd.common.aside import Aside
 from rtcfd.common.names import check_base_name
 from rtcfd.common.refusals import FailedPrecondition, NotFound
+
+_FOLDERS_TIMEOUT_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -73,14 +76,17 @@ class Catalog:
     def __init__(self, folders: Sequence[Folder], describer: Describer) -> None:
         self.folders = list(folders)
         self._describer = describer
+        # They may be on a server that does not answer.
+        self._aside = Aside("folders of components")
 
     async def find(self, package: str, type_name: str) -> Found:
         """Return the library that offers a type, or refuse and say why."""
         check_base_name("package", package)
         check_base_name("type", type_name)
-        libraries = self._packages().get(package)
+        known = await self._packages()
+        libraries = known.get(package)
         if libraries is None:
-            raise NotFound(self._no_package(package))
+            raise NotFound(self._no_package(package, known))
         contents = await self._contents(package, libraries)
         found = contents.types.get(type_name)
         if found is not None:
@@ -102,11 +108,11 @@ class Catalog:
 
     async def types(self, package: str = "") -> tuple[list[graph_pb2.ComponentType], list[str]]:
         """Return the types of one package or of all, by name, and what does not load."""
-        known = self._packages()
+        known = await self._packages()
         if package:
             check_base_name("package", package)
             if package not in known:
-                raise NotFound(self._no_package(package))
+                raise NotFound(self._no_package(package, known))
             known = {package: known[package]}
         names = sorted(known)
         every = await asyncio.gather(*(self._contents(name, known[name]) for name in names))
@@ -133,8 +139,9 @@ class Catalog:
                     contents.others.setdefault(offered.type, []).append(str(library))
         return contents
 
-    def _packages(self) -> dict[str, list[Path]]:
-        return packages([folder.path for folder in self.folders])
+    async def _packages(self) -> dict[str, list[Path]]:
+        folders = [folder.path for folder in self.folders]
+        return await self._aside.run(lambda: packages(folders), _FOLDERS_TIMEOUT_S)
 
     def _owner(self, library: Path) -> int | None:
         """Return whose libraries are trusted in the folder that holds a package's library."""
@@ -143,11 +150,11 @@ class Catalog:
                 return folder.owner()
         return None
 
-    def _no_package(self, package: str) -> str:
+    def _no_package(self, package: str, known: Iterable[str]) -> str:
         folders = ", ".join(str(folder.path) for folder in self.folders)
         return (
             f'no package "{package}" with component libraries in {folders}'
-            f"{suggestion(package, self._packages())}"
+            f"{suggestion(package, known)}"
         )
 
 

@@ -6,20 +6,37 @@ in rtcfd nor in a loop's process: a crash there is a refusal.
 
 import asyncio
 import os
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from google.protobuf.message import DecodeError
 from rtcf.executor.v1 import executor_pb2 as wire
 
+from rtcfd.common.aside import Aside
+from rtcfd.common.refusals import Refusal
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.process import describe_exit
 
 TIMEOUT_S = 10.0
+FAILURE_KEPT_S = 5.0
 _AT_ONCE = 2
 _MAX_STDERR_LINE = 300
 
 _Key = tuple[str, int | None, int, int, int]
+
+
+@dataclass
+class _Known:
+    """What is kept of one file as it is."""
+
+    description: wire.LibraryDescription
+    since: float = field(default_factory=time.monotonic)
+
+    def valid(self) -> bool:
+        """Tell whether it need not be looked at again: what does not load may do so later, when
+        what it links against is there."""
+        return not self.description.problem or time.monotonic() - self.since < FAILURE_KEPT_S
 
 
 @dataclass
@@ -29,7 +46,9 @@ class Describer:
     binary: Path
 
     def __post_init__(self) -> None:
-        self._known: dict[_Key, wire.LibraryDescription] = {}
+        self._known: dict[_Key, _Known] = {}
+        self._running: dict[_Key, asyncio.Task[wire.LibraryDescription]] = {}
+        self._aside = Aside("folders of components")
         self._slots = asyncio.Semaphore(_AT_ONCE)
 
     async def describe(
@@ -40,18 +59,26 @@ class Describer:
         `owner` is a user whose libraries are trusted besides root's and our own.
         """
         try:
-            found = library.stat()
+            found = await self._aside.run(library.stat, TIMEOUT_S)
         except OSError as error:
             return _problem(f"cannot read it: {error.strerror}")
+        except Refusal as refusal:
+            return _problem(str(refusal))
         key = (str(library), owner, found.st_ino, found.st_mtime_ns, found.st_size)
         known = self._known.get(key)
-        if known is not None:
-            return known
+        if known is not None and known.valid():
+            return known.description
+        # Whoever asks for the same meanwhile waits for the same answer; who leaves ends nothing.
+        running = self._running.get(key)
+        if running is None:
+            running = self._running[key] = asyncio.create_task(self._find(key, library, package))
+            running.add_done_callback(lambda _: self._running.pop(key, None))
+        return await asyncio.shield(running)
+
+    async def _find(self, key: _Key, library: Path, package: str) -> wire.LibraryDescription:
         async with self._slots:
-            description = await self._run(library, package, owner)
-        # What does not load may do so later, when what it links against is there.
-        if not description.problem:
-            self._known[key] = description
+            description = await self._run(library, package, key[1])
+        self._known[key] = _Known(description)
         return description
 
     async def _run(self, library: Path, package: str, owner: int | None) -> wire.LibraryDescription:

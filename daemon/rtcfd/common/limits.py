@@ -10,11 +10,17 @@ class Limits:
     """The [limits] of the settings."""
 
     clients: int = 256  # connections at a time
+    clients_per_user: int = 32  # of one user that may only look or tune
     runners: int = 32
     components: int = 5000  # of one runner
     taps: int = 1000  # outputs of one runner that are published; kept by its executor
     message_kb: int = 16384  # one request, KiB
     log_records_per_s: int = 2000  # of one runner, averaged over some seconds
+
+    @property
+    def reserve(self) -> int:
+        """Connections that are kept for those who may stop loops."""
+        return max(self.clients // 8, 1)
 
     def check_runners(self, number: int) -> None:
         """Refuse a number of runners."""
@@ -36,6 +42,7 @@ class Limits:
 # What the settings may say: least and most.
 RANGES = {
     "clients": (1, 4096),
+    "clients_per_user": (1, 4096),
     "runners": (1, 256),
     "components": (1, 100_000),
     "taps": (0, 100_000),

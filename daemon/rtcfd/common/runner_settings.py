@@ -30,7 +30,9 @@ _DEFAULT_MASTER = "http://localhost:11311"
 
 
 def defaults(
-    realtime: runner_pb2.Realtime, orphan_timeout_s: float = ORPHAN_TIMEOUT_S
+    realtime: runner_pb2.Realtime,
+    orphan_timeout_s: float = ORPHAN_TIMEOUT_S,
+    peers: "runner_pb2.Right" = runner_pb2.RIGHT_OBSERVE,
 ) -> runner_pb2.RunnerSettings:
     """Return complete settings; ROS_MASTER_URI of our environment is part of them."""
     result = runner_pb2.RunnerSettings(
@@ -52,6 +54,7 @@ def defaults(
             latch="",
             decimate=".*",
             refuse_out_of_range=False,
+            peers=peers,
         ),
     )
     tables: list[tuple[Any, Mapping[str, Quantity]]] = [
@@ -74,6 +77,8 @@ def merged(
     for field in ("realtime", "overrun", "on_boot", "on_crash", "sim_time"):
         if not getattr(effective, field):
             effective.ClearField(field)
+    if effective.HasField("ros") and not effective.ros.peers:
+        effective.ros.ClearField("peers")
     result = runner_pb2.RunnerSettings()
     result.CopyFrom(base)
     result.MergeFrom(effective)

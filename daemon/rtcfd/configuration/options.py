@@ -12,7 +12,7 @@ from rtcf.v1 import runner_pb2
 from rtcf_shared.folders import component_folders
 
 from rtcfd import VERSION
-from rtcfd.access.rights import Access, Level
+from rtcfd.access.rights import Access
 from rtcfd.catalog.catalog import Folder
 from rtcfd.common import runner_settings
 from rtcfd.common.limits import Limits
@@ -40,7 +40,6 @@ class Options:
     limits: Limits
     defaults: runner_pb2.RunnerSettings
     default_runner: bool
-    ros_services: Level
     end_with_stdin: bool
     foreground: bool
     verbose: bool
@@ -89,14 +88,12 @@ def parse(
                 runner_settings.PRIVATE_ORPHAN_TIMEOUT_S
                 if args.foreground
                 else runner_settings.ORPHAN_TIMEOUT_S,
+                # Privately, its ROS is as much its user's as its socket.
+                runner_pb2.RIGHT_ADMIN if args.foreground else runner_pb2.RIGHT_OBSERVE,
             ),
             file.runner,
         ),
         default_runner=args.default_runner,
-        # Privately, its ROS is as much its user's as its socket.
-        ros_services=file.ros_services
-        if file.ros_services is not None
-        else (Level.ADMIN if args.foreground else Level.OBSERVE),
         end_with_stdin=args.end_with_stdin,
         foreground=args.foreground,
         verbose=args.verbose,

@@ -1,8 +1,8 @@
 """The configuration file, /etc/rtcfd/rtcfd.toml: reading and checking.
 
-    [daemon]            socket, path, realtime, state_dir, runtime_dir, graphs_dir, executor,
-                        ros_services
+    [daemon]            socket, path, realtime, state_dir, runtime_dir, graphs_dir, executor
     [access]            default, and the users and @groups of each level
+    [[access.parameters]]  who may set what, how fast: who, runner, names, most_per_s
     [limits]            named as in common/limits.py
     [runner]            defaults of runners, named as in RunnerSettings
     [runner.ros]        likewise, named as in RosSettings
@@ -24,6 +24,7 @@ from rtcf_shared.naming import listing, suggestion
 
 from rtcfd.access import rights
 from rtcfd.access.rights import Access, Level
+from rtcfd.access.tuning import Rule
 from rtcfd.common import runner_settings
 from rtcfd.common.limits import RANGES, Limits
 from rtcfd.common.refusals import InvalidArgument, Refusal
@@ -48,7 +49,6 @@ class Config:
     executor: Path | None = None
     path: list[Path] = field(default_factory=list)
     realtime: str = ""
-    ros_services: Level | None = None
     runner: runner_pb2.RunnerSettings = field(default_factory=runner_pb2.RunnerSettings)
     access: Access = field(default_factory=Access)
     limits: Limits = field(default_factory=Limits)
@@ -88,7 +88,7 @@ def read(file: Path) -> Config:
 
 
 def _read_daemon(table: dict[str, Any], config: Config) -> None:
-    _check_keys("daemon.", table, (*_PATHS, "path", "realtime", "ros_services"))
+    _check_keys("daemon.", table, (*_PATHS, "path", "realtime"))
     for name in _PATHS:
         if name in table:
             setattr(config, name, _absolute_path(f"daemon.{name}", table[name]))
@@ -99,13 +99,11 @@ def _read_daemon(table: dict[str, Any], config: Config) -> None:
     if "realtime" in table:
         _enumerator("daemon.realtime", runner_pb2.Realtime.DESCRIPTOR, table["realtime"])
         config.realtime = table["realtime"]
-    if "ros_services" in table:
-        config.ros_services = _level("daemon.ros_services", table["ros_services"])
 
 
 def _read_access(table: dict[str, Any], config: Config) -> None:
-    lists = [level.word for level in Level if level]
-    _check_keys("access.", table, ("default", *lists))
+    lists = [level.word for level in Level if level > Level.NONE]
+    _check_keys("access.", table, ("default", "parameters", *lists))
     default = _level("access.default", table.get("default", config.access.default.word))
     named: dict[Level, list[str]] = {}
     seen: dict[str, str] = {}
@@ -121,7 +119,32 @@ def _read_access(table: dict[str, Any], config: Config) -> None:
                 raise _Wrong(key, f"{key}: {name} is in {seen[name]} already")
             seen[name] = key
         named[rights.WORDS[word]] = names
-    config.access = rights.rules(named, default)
+    rules = table.get("parameters", [])
+    if not isinstance(rules, list) or not all(isinstance(rule, dict) for rule in rules):
+        raise _Wrong("access.parameters", "access.parameters must be tables: [[access.parameters]]")
+    config.access = rights.rules(named, default, tuple(_parameter_rule(rule) for rule in rules))
+
+
+def _parameter_rule(table: dict[str, Any]) -> Rule:
+    """Return who may set what, how fast."""
+    key = "access.parameters"
+    _check_keys(f"{key}.", table, ("who", "runner", "names", "most_per_s"))
+    who, names, runner = table.get("who"), table.get("names", [".*"]), table.get("runner", ".*")
+    if not isinstance(who, list) or not all(
+        isinstance(name, str) and _PRINCIPAL.fullmatch(name) for name in who
+    ):
+        raise _Wrong(f"{key}.who", f"{key}: who must be a list of users and @groups, not {who!r}")
+    if not isinstance(names, list):
+        raise _Wrong(f"{key}.names", f"{key}: names must be a list of expressions, not {names!r}")
+    for pattern in (*names, runner):
+        try:
+            re.compile(pattern)
+        except (re.error, TypeError) as error:
+            raise _Wrong(f"{key}.names", f"{key}: {pattern!r} is no expression: {error}") from None
+    pace = table.get("most_per_s")
+    if pace is not None and (type(pace) not in (int, float) or not pace > 0):
+        raise _Wrong(f"{key}.most_per_s", f"{key}: most_per_s must be above 0, not {pace!r}")
+    return Rule(frozenset(who), runner, tuple(names), pace)
 
 
 def _read_limits(table: dict[str, Any], config: Config) -> None:

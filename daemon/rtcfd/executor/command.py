@@ -1,6 +1,8 @@
 """How an executor is called: its binary, its socket, its environment."""
 
+import contextlib
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,41 +19,67 @@ MAX_SOCKET_PATH = 107
 
 @dataclass(frozen=True)
 class ExecutorCommand:
-    """Where the executor binary is, and the folder of the executors' sockets."""
+    """Where the executor binary is, and the folders of the executors' sockets."""
 
     binary: Path
     folder: Path
+    # Of the sockets by which loops are stopped without rtcfd, and who may enter besides us.
+    stop_folder: Path | None = None
+    stop_mode: int = 0o700
+    mark: Callable[[str], Path | None] = lambda runner: None  # see Store.mark
 
     def prepare(self) -> None:
-        """Make the socket folder, which only our user may enter, and check the binary."""
+        """Make the socket folders, of which only our user may enter the first, and check the
+        binary."""
         if not os.access(self.binary, os.X_OK):
             raise FailedPrecondition(
                 f"no executor at {self.binary}: install it, or name one with --executor"
             )
-        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        found = self.folder.lstat()
-        if found.st_uid != os.geteuid():
-            raise FailedPrecondition(
-                f"{self.folder} belongs to user {found.st_uid}, not to {os.geteuid()}: "
-                "remove it, or choose another --runtime-dir"
-            )
-        self.folder.chmod(0o700)
+        _make(self.folder, 0o700)
+        if self.stop_folder is not None:
+            _make(self.stop_folder, self.stop_mode)
+
+    def remove_folders(self) -> None:
+        """Remove the socket folders, if nothing is left in them."""
+        for folder in (self.folder, self.stop_folder):
+            with contextlib.suppress(OSError):
+                if folder is not None:
+                    folder.rmdir()
 
     def socket(self, runner: str) -> Path:
         """Return the path of the socket that a runner's executor listens on."""
-        path = self.folder / f"{runner}.sock"
-        if len(os.fsencode(path)) > MAX_SOCKET_PATH:
-            raise FailedPrecondition(
-                f"{path} is longer than the {MAX_SOCKET_PATH} characters of a unix socket's path: "
-                "choose a shorter --runtime-dir"
-            )
-        return path
+        return _checked(self.folder / f"{runner}.sock")
 
     def arguments(self, runner: str) -> list[str]:
         """Return the command line."""
-        return [str(self.binary), "--runner", runner, "--socket", str(self.socket(runner))]
+        line = [str(self.binary), "--runner", runner, "--socket", str(self.socket(runner))]
+        if self.stop_folder is not None:
+            line += ["--stop-socket", str(_checked(self.stop_folder / runner))]
+        if mark := self.mark(runner):
+            line += ["--resume-mark", str(mark)]
+        return line
 
     @staticmethod
     def environment() -> dict[str, str]:
         """Return ours (ROS_MASTER_URI, ROS_IP, ROS_HOSTNAME …) without what is rtcfd's alone."""
         return {name: value for name, value in os.environ.items() if name not in _OWN_VARIABLES}
+
+
+def _make(folder: Path, mode: int) -> None:
+    folder.mkdir(mode=mode, parents=True, exist_ok=True)
+    found = folder.lstat()
+    if found.st_uid != os.geteuid():
+        raise FailedPrecondition(
+            f"{folder} belongs to user {found.st_uid}, not to {os.geteuid()}: "
+            "remove it, or choose another --runtime-dir"
+        )
+    folder.chmod(mode)
+
+
+def _checked(path: Path) -> Path:
+    if len(os.fsencode(path)) > MAX_SOCKET_PATH:
+        raise FailedPrecondition(
+            f"{path} is longer than the {MAX_SOCKET_PATH} characters of a unix socket's path: "
+            "choose a shorter --runtime-dir"
+        )
+    return path

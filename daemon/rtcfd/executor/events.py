@@ -55,6 +55,9 @@ class Audience(Protocol):
     def called(self, call: wire.ServiceCall) -> None:
         """Somebody calls a service of the executor's ROS node."""
 
+    def stopped_directly(self, stop: wire.DirectStop) -> None:
+        """Somebody has stopped the loop at its executor; told of again with each connection."""
+
     def parameters_changed(self, changed: wire.ParametersChanged) -> None:
         """A peer on ROS has changed parameters of a component."""
 
@@ -80,6 +83,8 @@ class Events:
             self._audience.called(response.service_call)
         elif kind == "parameters_changed":
             self._audience.parameters_changed(response.parameters_changed)
+        elif kind == "direct_stop":
+            self._audience.stopped_directly(response.direct_stop)
         elif kind == "error":
             log.error("%s", response.error.message, extra={"runner": self._runner})
 

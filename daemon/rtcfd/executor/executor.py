@@ -6,6 +6,7 @@ restarts: a new start is a new object.
 
 import asyncio
 import logging
+import os
 import signal
 import subprocess
 from collections.abc import Callable
@@ -19,7 +20,15 @@ from rtcfd.common.refusals import FailedPrecondition, Refusal, Unavailable
 from rtcfd.common.tasks import looked_at
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.flight_recorder import FlightRecorder, Note
-from rtcfd.executor.link import LIMITS_PROTOCOL, PROTOCOL, Link, OnAnswer, Progress, Unasked
+from rtcfd.executor.link import (
+    ACCESS_PROTOCOL,
+    LIMITS_PROTOCOL,
+    PROTOCOL,
+    Link,
+    OnAnswer,
+    Progress,
+    Unasked,
+)
 from rtcfd.executor.process import Child, End, Process
 
 log = logging.getLogger(__name__)
@@ -45,6 +54,7 @@ class Executor:
         self.version = ""  # of rtcf
         self.foreign = ""  # why nothing but stop and its end can be asked of it
         self._protocol = 0
+        self._runner = runner
         self._peer = f"executor of {runner} (pid {process.pid})"
         self._process = process
         self._socket = socket
@@ -161,6 +171,11 @@ class Executor:
         if self._protocol >= LIMITS_PROTOCOL and not self.foreign:
             await self.request(wire.Request(limits=wire.Limits(taps=limits.taps)), None)
 
+    async def grant(self, rules: wire.AccessRules) -> None:
+        """Tell it who may stop its loop past us, and whose ROS master it may follow."""
+        if self._protocol >= ACCESS_PROTOCOL and not self.foreign:
+            await self.request(wire.Request(access=rules))
+
     async def leave(self) -> None:
         """Let go of it without ending it: the next rtcfd finds it."""
         if self._watching is not None:
@@ -213,7 +228,17 @@ class Executor:
 
     async def _greet(self, link: Link, timeout_s: float) -> None:
         """Say hello, and open what the answer names."""
+        if not _belongs(link.peer_pid, self.pid):
+            raise Unavailable(
+                f"{self._socket} is served by process {link.peer_pid}, which is not the executor "
+                f"of {self._runner} (pid {self.pid}): end that"
+            )
         hello = await link.hello(timeout_s)
+        if hello.runner != self._runner:
+            raise Unavailable(
+                f'{self._socket} is served by the executor of runner "{hello.runner}", and is to '
+                f'be that of "{self._runner}": end it (pid {link.peer_pid})'
+            )
         self.version = hello.version or "?"
         self._protocol = hello.protocol
         if abs(hello.protocol - PROTOCOL) > 1:
@@ -227,6 +252,9 @@ class Executor:
             except (OSError, ValueError) as error:
                 log.warning("%s: no flight recorder: %s", self._peer, error)
         self._link = link
+        if hello.HasField("direct_stop"):
+            link.direct_stops = hello.direct_stop.count
+            self._on_unasked(wire.Response(direct_stop=hello.direct_stop))
 
     def _begin_to_watch(self) -> None:
         watching = asyncio.create_task(self._watch())
@@ -260,6 +288,14 @@ class Executor:
             self._recorder.close()
             self._recorder = None
         self.ended.set()
+
+
+def _belongs(pid: int, to: int) -> bool:
+    """Tell whether a process is the one that was started, or of the session that it began."""
+    try:
+        return pid == to or os.getsid(pid) == to
+    except OSError:
+        return False
 
 
 async def _end(process: Process, peer: str) -> None:

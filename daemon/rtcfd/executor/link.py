@@ -21,8 +21,9 @@ from rtcfd.executor import frames
 # The protocol that this rtcfd speaks.  A number is added for what a peer cannot do without
 # knowing of it, so that rtcfd and an executor of neighbouring numbers work together: the newer
 # asks the older for nothing that it does not know.  Hello, Stop and Exit stay as they are for good.
-PROTOCOL = 2
+PROTOCOL = 3
 LIMITS_PROTOCOL = 2  # from it on executors keep [limits]
+ACCESS_PROTOCOL = 3  # from it on they are stopped past rtcfd by who may, and tell
 _CREDENTIALS = struct.Struct("3i")  # struct ucred, unix(7)
 
 Progress = Callable[[str], None]
@@ -64,6 +65,7 @@ class Link:
         self._on_unasked = on_unasked
         self._next_id = 1
         self._pending: dict[int, _Pending] = {}
+        self.direct_stops = 0  # that we know of: what was asked before any is refused
         self.problem = ""  # why the peer was cut off; empty = it closed
         self.ended = asyncio.Event()
         credentials = writer.get_extra_info("socket").getsockopt(
@@ -108,6 +110,7 @@ class Link:
         if self.ended.is_set():
             raise refusals.Unavailable(self._lost())
         request.id = self._next_id
+        request.direct_stops = self.direct_stops
         self._next_id += 1
         pending = self._pending[request.id] = _Pending(on_progress, on_answer)
         try:
@@ -150,6 +153,8 @@ class Link:
 
     def _dispatch(self, response: wire.Response) -> None:
         if response.id == 0:
+            if response.WhichOneof("kind") == "direct_stop":
+                self.direct_stops = response.direct_stop.count
             self._on_unasked(response)
             return
         pending = self._pending.get(response.id)

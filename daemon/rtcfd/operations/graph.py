@@ -4,12 +4,15 @@ Functions on a RunnerCore; each is one transaction of its executor.
 """
 
 import asyncio
-from collections.abc import Awaitable, Callable
+import time
+from collections.abc import Awaitable, Callable, Iterable
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, graph_pb2
 from rtcf_shared.naming import listing, suggestion
 
+from rtcfd.access import caller
+from rtcfd.access.tuning import Tuning, require_pace
 from rtcfd.catalog.catalog import loads
 from rtcfd.common import runner_settings
 from rtcfd.common.names import absolute, check_graph, full_name
@@ -19,6 +22,7 @@ from rtcfd.operations.runner_core import RunnerCore
 from rtcfd.state.desired import replacement
 
 _MASTER_POLL_S = 0.5
+_LONGEST_WORD = 60  # of a value in the log
 
 
 async def load(
@@ -255,15 +259,63 @@ async def set_parameters(
     """Change parameters of one component."""
     name = absolute(request.component)
 
+    acting = caller.current()
+
     async def work() -> control_pb2.ChangeResult:
+        if acting is not None and acting.tuning is not None:
+            await _require_tuning(runner, name, request.parameters, acting.tuning)
         result = (await runner.ask(wire.Request(set_parameters=request), progress)).change
         runner.desired.set_parameters(name, request.parameters)
         return await _saved(runner, result)
 
     result = await runner.change(f"a change of parameters of {name}", work)
-    changed = ", ".join(setting.name for setting in request.parameters)
-    runner.log.info("%s: %s set", name, changed)
+    note_parameters(runner, name, request.parameters, caller.name())
     return result
+
+
+async def _require_tuning(
+    runner: RunnerCore,
+    component: str,
+    changes: Iterable[graph_pb2.ParameterSetting],
+    tuning: Tuning,
+) -> None:
+    """Refuse what somebody may not set, or not that fast."""
+    query = control_pb2.GetComponentRequest(component=component)
+    found = (await runner.ask(wire.Request(get_component=query))).component
+    values = {each.name: _plain(each.value) for each in found.parameters}
+    now = time.monotonic()
+    names = {each.name: f"{component}.{each.name}" for each in changes}
+    for each in changes:
+        name = names[each.name]
+        rule = tuning.rule(runner.name, name)
+        last = runner.tuned.get(name)
+        require_pace(rule, name, values.get(each.name), _plain(each.value), last, now)
+    for name in names.values():
+        runner.tuned[name] = now
+
+
+def _plain(value: graph_pb2.ParameterValue) -> object:
+    kind = value.WhichOneof("kind")
+    return None if kind is None else getattr(value, kind)
+
+
+def note_parameters(
+    runner: RunnerCore, component: str, changes: Iterable[graph_pb2.ParameterSetting], who: str
+) -> None:
+    """Log parameters that were changed, with who did it: always."""
+    words = ", ".join(f"{each.name} = {_word(each.value)}" for each in changes)
+    acting = caller.current()
+    runner.log.logger.info(
+        "%s: %s set by %s",
+        component,
+        words,
+        who,
+        extra={"runner": runner.name, "peer": None if acting is None else acting.peer},
+    )
+
+
+def _word(value: graph_pb2.ParameterValue) -> str:
+    return f"{_plain(value)}"[:_LONGEST_WORD]
 
 
 async def _saved(runner: RunnerCore, result: control_pb2.ChangeResult) -> control_pb2.ChangeResult:

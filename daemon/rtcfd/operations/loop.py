@@ -10,11 +10,19 @@ import asyncio
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2
 
+from rtcfd.access import caller
 from rtcfd.common.refusals import FailedPrecondition, Refusal
 from rtcfd.executor.link import Progress
 from rtcfd.operations.runner_core import RunnerCore
 
 STOP_TIMEOUT_S = 30.0
+
+
+def asked_now(runner: RunnerCore) -> int:
+    """Return the number of stops at which what is asked for by the call of now was asked for."""
+    if caller.asked_ns() <= runner.loop.stopped_at_ns:
+        return -1  # before somebody stopped the loop at its executor, as we did not answer
+    return runner.loop.stops
 
 
 def require_no_stop(runner: RunnerCore, asked: int) -> None:

@@ -5,16 +5,7 @@ events on one connection; each is noted when it arrives, in the order they were
 sent, so that the newest wins whoever waits for an answer.
 """
 
-from pathlib import Path
-
-from rtcfd.state.desired import Desired
-
-_BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
-
-
-def this_boot() -> str:
-    """Return what tells one boot of the machine from another."""
-    return _BOOT_ID.read_text(encoding="ascii").strip()
+from rtcfd.state.desired import Desired, this_boot
 
 
 class LoopState:
@@ -25,6 +16,7 @@ class LoopState:
         self.running = False  # as far as told
         self.fault = ""  # why it ended by itself
         self.held = ""  # why it is not started, if that was not asked for
+        self.stopped_at_ns = 0  # CLOCK_MONOTONIC, by somebody at its executor
         self.stops = 0  # how often it was to stop; what was asked before the last starts nothing
 
     @property

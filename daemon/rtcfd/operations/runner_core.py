@@ -35,6 +35,10 @@ _LAST_WORDS_S = 2.0  # from the loss of a link to the end of its executor
 Result = TypeVar("Result")
 
 
+async def _number(uid: int) -> str:
+    return f"#{uid}"
+
+
 @dataclass
 class Surroundings:
     """What all runners share; a reload of rtcfd changes it."""
@@ -47,6 +51,8 @@ class Surroundings:
     # Answers what ROS peers ask of a runner.
     serve_ros: Callable[["RunnerCore", wire.ServiceCall], Awaitable[wire.ServiceAnswer]]
     limits: Limits = field(default_factory=Limits)
+    rules: wire.AccessRules = field(default_factory=wire.AccessRules)  # for executors
+    name_of: Callable[[int], Awaitable[str]] = _number  # of a user, for people
 
 
 class RunnerCore(ABC):
@@ -61,6 +67,7 @@ class RunnerCore(ABC):
         self.shared = surroundings
         self.trouble = "its executor is not started"  # why there is none
         self.unsaved = ""  # why the desired state is not on disk
+        self.tuned: dict[str, float] = {}  # when parameters were set whose pace is bound
         self.closing = False
         self.leaving = False  # it ends for this rtcfd only
         self.code = LoadedCode()
@@ -193,9 +200,10 @@ class RunnerCore(ABC):
                 await self._settled.wait()
 
     async def limit(self) -> None:
-        """Tell the executor what its graph may have."""
+        """Tell the executor what its graph may have, and who may do what at it."""
         if self._executor is not None:
             await self._executor.limit(self.limits)
+            await self._executor.grant(self.shared.rules)
 
     async def query(self, request: wire.Request) -> wire.Response:
         """Ask the executor what changes nothing in the graph."""
@@ -287,9 +295,9 @@ class RunnerCore(ABC):
             async with self._saving:
                 if self._forgotten:
                     return []
-                text = self.shared.store.text(self.desired)
+                text, running = self.shared.store.text(self.desired), self.desired.running
                 # Not here: fsync may take long.
-                await asyncio.to_thread(self.shared.store.save, self.name, text)
+                await asyncio.to_thread(self.shared.store.save, self.name, text, running)
         except OSError as error:
             self.unsaved = f"not saved: {error.strerror}"
             self.log.error("its state is %s", self.unsaved)

@@ -8,16 +8,17 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2
 
 from rtcfd.executor.link import Progress
-from rtcfd.operations.loop import require_no_stop, start_in_turn
+from rtcfd.operations.loop import asked_now, require_no_stop, start_in_turn
 from rtcfd.operations.runner_core import RunnerCore
 from rtcfd.recovery.bring_up import bring_up
 
 
 async def start(runner: RunnerCore, progress: Progress) -> control_pb2.ChangeResult:
     """Start the loop."""
-    asked = runner.loop.stops
+    asked = asked_now(runner)
 
     async def work() -> control_pb2.ChangeResult:
+        require_no_stop(runner, asked)
         await _need_executor(runner, progress)
         result = await start_in_turn(runner, asked, progress)
         runner.log.info("loop started")
@@ -28,7 +29,7 @@ async def start(runner: RunnerCore, progress: Progress) -> control_pb2.ChangeRes
 
 async def step(runner: RunnerCore, cycles: int, progress: Progress) -> control_pb2.ChangeResult:
     """Run cycles of a stopped loop on a simulated clock; takes as long as they take."""
-    asked = runner.loop.stops
+    asked = asked_now(runner)
 
     async def work() -> control_pb2.ChangeResult:
         await _need_executor(runner, progress)
@@ -45,7 +46,7 @@ async def replay(
     runner: RunnerCore, request: control_pb2.ReplayRequest
 ) -> control_pb2.ReplayResponse:
     """Run a piece of a recording through the loop; takes as long as its cycles take."""
-    asked = runner.loop.stops
+    asked = asked_now(runner)
 
     async def work() -> control_pb2.ReplayResponse:
         if request.begin:

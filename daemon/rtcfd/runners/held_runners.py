@@ -11,6 +11,7 @@ import contextlib
 from rtcf.v1 import control_pb2, runner_pb2
 from rtcf_shared.naming import listing
 
+from rtcfd.access import caller
 from rtcfd.common import runner_settings
 from rtcfd.common.names import DEFAULT_RUNNER
 from rtcfd.common.refusals import (
@@ -82,6 +83,10 @@ class Hold:
     async def _take(self, name: str) -> Runner:
         request = self._request
         runner_settings.check(request.settings)
+        # Of a launch its ROS is as much its user's as its components.
+        holder = caller.current()
+        if holder is not None and not request.settings.ros.HasField("peers"):
+            request.settings.ros.peers = holder.level.right
         terms = HoldTerms(request.token, request.holder or "a client", runner_pb2.RunnerSettings())
         try:
             runner = self._runners.get(name)

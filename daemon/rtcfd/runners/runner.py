@@ -12,10 +12,11 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 
 from rtcfd.common import runner_settings
-from rtcfd.common.refusals import Refusal
+from rtcfd.common.refusals import NotFound, Refusal
 from rtcfd.executor.events import Events
 from rtcfd.executor.executor import Executor
 from rtcfd.executor.process import End
+from rtcfd.operations.graph import note_parameters
 from rtcfd.operations.runner_core import RunnerCore, Surroundings
 from rtcfd.recovery.bring_up import bring_up, recover, resumes
 from rtcfd.recovery.verdict import Crashes, judge
@@ -37,6 +38,7 @@ class Runner(RunnerCore):
         self.leases = Leases(self, self.alarm)
         self.hold_outbox: Outbox | None = None  # of the holder, if it is there
         self._crashes = Crashes()
+        self._changed_by_ros: dict[str, set[str]] = {}  # parameters, by component; not noted yet
         self._events = Events(self.name, self, lambda: self.limits)
 
     # -- life ---------------------------------------------------------------
@@ -221,29 +223,57 @@ class Runner(RunnerCore):
         with contextlib.suppress(Refusal):
             await self.alive().request(wire.Request(service_answer=answer))
 
-    def parameters_changed(self, changed: wire.ParametersChanged) -> None:
-        """A peer on ROS has changed parameters of a component."""
-        names = ", ".join(changed.parameters)
-        self.log.info("%s: %s set by dynamic_reconfigure", changed.component, names)
-        self.operations.in_background(
-            "noting parameters changed by ROS", self._follow_parameters(changed)
+    def stopped_directly(self, stop: wire.DirectStop) -> None:
+        """Somebody has stopped the loop at its executor, while we did not answer or as well."""
+        if stop.at_ns <= self.loop.stopped_at_ns:
+            return  # told of again, by a new connection
+        self.loop.stopped_at_ns = stop.at_ns
+        self.loop.stop()
+        self.loop.told(False)
+        self.operations.withdraw("the loop was stopped at its executor", only_cycles=True)
+        self.tell()
+        self.operations.in_background("noting a stop", self._note_direct_stop(stop))
+
+    async def _note_direct_stop(self, stop: wire.DirectStop) -> None:
+        await self.save()
+        who = await self.shared.name_of(stop.uid)
+        self.log.warning(
+            "loop stopped at its executor by %s (uid %d, pid %d)", who, stop.uid, stop.pid
         )
 
-    async def _follow_parameters(self, changed: wire.ParametersChanged) -> None:
+    def parameters_changed(self, changed: wire.ParametersChanged) -> None:
+        """A peer on ROS has changed parameters of a component."""
+        follows = bool(self._changed_by_ros)
+        self._changed_by_ros.setdefault(changed.component, set()).update(changed.parameters)
+        if not follows:
+            self.operations.in_background(
+                "noting parameters changed by ROS", self._follow_parameters()
+            )
+
+    async def _follow_parameters(self) -> None:
+        """Note all that has changed until our turn, and save once."""
+
         async def work() -> None:
-            # Not what was told: more may have happened since.
-            request = control_pb2.GetComponentRequest(component=changed.component)
-            response = await self.ask(wire.Request(get_component=request))
-            settings = [
-                graph_pb2.ParameterSetting(name=each.name, value=each.value)
-                for each in response.component.parameters
-                if each.name in changed.parameters
-            ]
-            self.desired.set_parameters(changed.component, settings)
+            changes, self._changed_by_ros = self._changed_by_ros, {}
+            for component, names in changes.items():
+                # Not what was told: more may have happened since.
+                request = control_pb2.GetComponentRequest(component=component)
+                with contextlib.suppress(NotFound):  # gone since, and its parameters with it
+                    response = await self.ask(wire.Request(get_component=request))
+                    settings = [
+                        graph_pb2.ParameterSetting(name=each.name, value=each.value)
+                        for each in response.component.parameters
+                        if each.name in names
+                    ]
+                    self.desired.set_parameters(component, settings)
+                    note_parameters(self, component, settings, "a ROS peer, dynamic_reconfigure")
             await self.save()
 
-        with contextlib.suppress(Refusal):  # gone since, and its parameters with it
+        try:
             await self.change("a change of parameters by ROS", work)
+        except Refusal as refusal:
+            self._changed_by_ros = {}
+            self.log.warning("parameters changed by ROS are not noted: %s", refusal)
 
     # -- queries ------------------------------------------------------------
 

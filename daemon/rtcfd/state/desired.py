@@ -5,12 +5,20 @@ Owned by its Runner; store.py keeps it on disk.
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 from google.protobuf import json_format
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 
 from rtcfd.common import names, runner_settings
 from rtcfd.common.names import absolute
+
+_BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
+
+
+def this_boot() -> str:
+    """Return what tells one boot of the machine from another."""
+    return _BOOT_ID.read_text(encoding="ascii").strip()
 
 
 @dataclass(frozen=True)

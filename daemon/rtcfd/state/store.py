@@ -18,12 +18,13 @@ from rtcf.v1 import graph_pb2, runner_pb2
 
 from rtcfd.common.names import check_base_name, full_name
 from rtcfd.common.refusals import Refusal
-from rtcfd.state.desired import Desired, HoldTerms, LeaseTerms
+from rtcfd.state.desired import Desired, HoldTerms, LeaseTerms, this_boot
 
 log = logging.getLogger(__name__)
 
 VERSION = 2
 _SUFFIX = ".json"
+_MARK = ".running"
 
 _Document = dict[str, Any]
 
@@ -57,6 +58,14 @@ class Store:
         if self._folder is not None:
             self._folder.mkdir(mode=0o750, parents=True, exist_ok=True)
 
+    def mark(self, runner: str) -> Path | None:
+        """Return the file without which a loop is not resumed, whatever the state says.
+
+        It is there while a loop is to run.  Removing it works on a full disk,
+        and the executor does so when somebody stops its loop without rtcfd.
+        """
+        return None if self._folder is None else self._folder / f"{runner}{_MARK}"
+
     def load(self) -> list[Desired]:
         """Return all states, by runner."""
         if self._folder is None:
@@ -66,7 +75,12 @@ class Store:
             try:
                 text = file.read_bytes()
                 document, version = _upgraded(text)
-                states.append(_parse(file.stem, document))
+                desired = _parse(file.stem, document)
+                mark = self.mark(desired.runner)
+                if desired.running and mark is not None and not mark.exists():
+                    # Stopped, and there was nobody or no room to write it down.
+                    desired.running, desired.ended_boot = False, this_boot()
+                states.append(desired)
                 if version != VERSION:
                     self._keep_beside(file, text, version)
             except OSError as error:
@@ -105,10 +119,17 @@ class Store:
             "}\n"
         ).encode()
 
-    def save(self, runner: str, text: bytes) -> None:
-        """Replace a runner's file, durably; raises OSError.  May run on any thread."""
-        if self._folder is None:
+    def save(self, runner: str, text: bytes, running: bool) -> None:
+        """Replace a runner's file, durably; raises OSError.  May run on any thread.
+
+        `running`: what the text says of the loop.  That it is not to run is
+        saved whatever becomes of the rest.
+        """
+        mark = self.mark(runner)
+        if self._folder is None or mark is None:
             return
+        if not running:
+            mark.unlink(missing_ok=True)
         file = self._folder / f"{runner}{_SUFFIX}"
         temporary = self._folder / f".{runner}{_SUFFIX}.new"
         try:
@@ -120,6 +141,8 @@ class Store:
         except OSError:
             temporary.unlink(missing_ok=True)
             raise
+        if running:
+            mark.touch(mode=0o640)
         self._sync_folder(self._folder)
 
     def remove(self, runner: str) -> None:
@@ -127,6 +150,7 @@ class Store:
         if self._folder is None:
             return
         (self._folder / f"{runner}{_SUFFIX}").unlink(missing_ok=True)
+        (self._folder / f"{runner}{_MARK}").unlink(missing_ok=True)
         self._sync_folder(self._folder)
 
     @staticmethod

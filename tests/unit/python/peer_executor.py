@@ -33,7 +33,7 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 from rtcfd import VERSION
 from rtcfd.executor import frames
-from rtcfd.executor.link import LIMITS_PROTOCOL, PROTOCOL
+from rtcfd.executor.link import ACCESS_PROTOCOL, LIMITS_PROTOCOL, PROTOCOL
 
 POLL_S = 0.005
 CHATTER = 100  # records at once
@@ -139,6 +139,11 @@ class Peer:
     async def limits(self, _: wire.Limits, __: int) -> wire.Response:
         if self.protocol < LIMITS_PROTOCOL:
             os._exit(9)  # whoever does not know of them must not be asked
+        return wire.Response(done=wire.Done())
+
+    async def access(self, _: wire.AccessRules, __: int) -> wire.Response:
+        if self.protocol < ACCESS_PROTOCOL:
+            os._exit(9)
         return wire.Response(done=wire.Done())
 
     async def configure(self, change: runner_pb2.RunnerSettings, _: int) -> wire.Response:
@@ -359,7 +364,14 @@ async def run(runner: str, socket: str) -> None:
 
 def main() -> int:
     parser = argparse.ArgumentParser()
-    for option in ("--runner", "--socket", "--package", "--trust"):
+    for option in (
+        "--runner",
+        "--socket",
+        "--stop-socket",
+        "--resume-mark",
+        "--package",
+        "--trust",
+    ):
         parser.add_argument(option)
     parser.add_argument("--describe", type=Path)
     args = parser.parse_args()

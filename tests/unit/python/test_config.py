@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from rtcf.v1 import runner_pb2
-from rtcfd.access.rights import Access, Level
+from rtcfd.access.rights import Access
 from rtcfd.common import runner_settings
 from rtcfd.common.limits import Limits
 from rtcfd.common.refusals import Refusal
@@ -37,22 +37,21 @@ def test_a_file_is_read(tmp_path: Path) -> None:
         socket = "/run/x.sock"
         path = ["/opt/a/lib/rtcf"]
         realtime = "preferred"
-        ros_services = "operate"
         [runner]
         frequency_hz = 2000
         overrun = "catch_up"
         [runner.ros]
         whitelist = "/a.*"
+        peers = "tune"
         """,
     )
     found = settings_file.read(file)
     assert (found.socket, found.realtime) == (Path("/run/x.sock"), "preferred")
-    assert found.ros_services is Level.OPERATE
     assert found.path == [Path("/opt/a/lib/rtcf")]
     assert found.runner == runner_pb2.RunnerSettings(
         frequency_hz=2000.0,
         overrun=runner_pb2.OVERRUN_POLICY_CATCH_UP,
-        ros=runner_pb2.RosSettings(whitelist="/a.*"),
+        ros=runner_pb2.RosSettings(whitelist="/a.*", peers=runner_pb2.RIGHT_TUNE),
     )
 
 
@@ -66,8 +65,8 @@ def test_a_file_is_read(tmp_path: Path) -> None:
         ('[daemon]\nsocket = "x"', "daemon.socket must be an absolute path"),
         ('[daemon]\nrealtime = "no"', "daemon.realtime must be one of required, preferred"),
         (
-            '[daemon]\nros_services = "all"',
-            "daemon.ros_services must be one of none, observe, operate, admin, not 'all'",
+            '[runner.ros]\npeers = "all"',
+            "runner.ros.peers must be one of none, observe, tune, operate, admin, not 'all'",
         ),
         ("daemon = 1", "daemon must be a table"),
         ("[runner]\npriority = true", "runner.priority must be an integer"),
@@ -78,7 +77,7 @@ def test_a_file_is_read(tmp_path: Path) -> None:
         ("[runner]\n!", "line 2"),
         ("[runner]\npriority = 5\n\nspin_us = -1", "rtcfd.toml:4: runner.spin_us is out of"),
         ("[daemon]\n[runner.ros]\nmaster_uri = 'x'", ':3: ROS master URI "x" is not valid'),
-        ("[access]\ndefault = 'root'", "access.default must be one of none, observe, operate"),
+        ("[access]\ndefault = 'root'", "access.default must be one of none, observe, tune"),
         ("[access]\nobserve = 'alice'", "access.observe must be a list of users and @groups"),
         ("[access]\nobserve = ['a b']", "'a b' is no user's name, nor @ and a group's"),
         ("[access]\nobserve=['a']\nadmin=['a']", ":3: access.admin: a is in access.observe"),

@@ -26,9 +26,16 @@ def test_serves_the_default_runner_stopped(client: rtcf.Client) -> None:
     assert is_alive(status.runners[0].pid)
 
 
-def test_socket_is_for_owner_and_group(daemon: DaemonUnderTest) -> None:
-    assert stat.S_IMODE(daemon.socket.stat().st_mode) == 0o660
-    assert stat.S_IMODE(Path(f"{daemon.socket}.d/executors").stat().st_mode) == 0o700
+def test_the_socket_is_for_owner_and_group_a_private_one_for_its_owner(
+    stopped_daemon: DaemonUnderTest,
+) -> None:
+    stopped_daemon.start()
+    assert stat.S_IMODE(stopped_daemon.socket.stat().st_mode) == 0o600
+    assert stopped_daemon.end() == 0
+    stopped_daemon.start_service()
+    assert stat.S_IMODE(stopped_daemon.socket.stat().st_mode) == 0o660
+    assert stat.S_IMODE((stopped_daemon.folder / "run" / "executors").stat().st_mode) == 0o700
+    assert stat.S_IMODE((stopped_daemon.folder / "run" / "stop").stat().st_mode) == 0o750
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])

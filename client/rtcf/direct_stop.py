@@ -1,0 +1,169 @@
+"""Stopping loops at their executors, without rtcfd: it may be dead, hung, or full of clients.
+
+Each executor has a socket for that in the folder `stop` beside rtcfd's own. It takes one line from
+whoever has the right `operate`: `echo stop | nc -U /run/rtcfd/stop/rt_runner` does the same.
+"""
+
+import contextlib
+import os
+import socket as sockets
+import struct
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from rtcf_shared.errors import RtcfError
+
+from rtcf.errors import DaemonUnreachableError, RefusedError
+from rtcf.v1 import control_pb2
+
+PATIENCE_S = 1.0  # with rtcfd, until a loop's executor is asked instead
+TIMEOUT_S = 5.0  # above the executor's own for a component that does not return
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """What came of stopping one loop; `error` is None if it has ended."""
+
+    runner: str
+    error: RtcfError | None = None
+
+
+def folders(socket: str) -> list[Path]:
+    """Return where the executors of the rtcfd that serves `socket` may have theirs."""
+    path = Path(socket)
+    return [path.with_name(path.name + ".d") / "stop", path.parent / "stop"]
+
+
+def stop(runner: str, socket: str) -> None:
+    """Stop one loop; return when it has ended.
+
+    Raises RefusedError, also if a component does not return from its cycle,
+    and DaemonUnreachableError if there is no executor of that name, or the
+    caller may not reach it.
+    """
+    problem: OSError | None = None
+    for folder in folders(socket):
+        try:
+            _ask(folder / runner, runner)
+            return
+        except (FileNotFoundError, NotADirectoryError, ConnectionRefusedError) as error:
+            problem = problem or error
+        except OSError as error:
+            problem = error
+    why = f": {problem.strerror or problem}" if isinstance(problem, PermissionError) else ""
+    raise DaemonUnreachableError(
+        f"no executor of runner {runner} can be stopped at {folders(socket)[-1]}{why}"
+    )
+
+
+def where_rtcfd_does_not(
+    ask: Callable[[Callable[[str], None]], control_pb2.ChangeResult],
+    runner: str,
+    socket: str,
+    on_progress: Callable[[str], None] | None,
+) -> control_pb2.ChangeResult:
+    """Ask rtcfd to stop a loop, by `ask`, and its executor if that does not answer in time."""
+    answered = threading.Event()
+    asked: Future[control_pb2.ChangeResult] = Future()
+
+    def heard(line: str) -> None:
+        answered.set()
+        if on_progress is not None:
+            on_progress(line)
+
+    def work() -> None:
+        try:
+            asked.set_result(ask(heard))
+        except Exception as error:
+            asked.set_exception(error)
+        answered.set()
+
+    threading.Thread(target=work, daemon=True).start()
+    problem = f"rtcfd does not answer within {PATIENCE_S:g} s"
+    if answered.wait(PATIENCE_S):
+        try:
+            return asked.result()
+        except RtcfError as error:
+            if not _is_rtcfds_trouble(error):
+                raise
+            problem = str(error)
+    try:
+        stop(runner, socket)
+    except DaemonUnreachableError:
+        return asked.result()  # what rtcfd says in the end
+    return control_pb2.ChangeResult(notes=[f"the loop was stopped at its executor, as {problem}"])
+
+
+def _is_rtcfds_trouble(error: RtcfError) -> bool:
+    """Tell whether the loop's executor may do what rtcfd could not."""
+    if isinstance(error, RefusedError):
+        return error.code in ("RESOURCE_EXHAUSTED", "UNAVAILABLE")
+    return True
+
+
+def stop_all(socket: str) -> list[Stopped]:
+    """Stop all loops at once; return what came of each, by runner.
+
+    Raises DaemonUnreachableError if their folder cannot be read.
+    """
+    runners: set[str] = set()
+    for folder in folders(socket):
+        try:
+            runners |= {each.name for each in folder.iterdir()}
+        except (FileNotFoundError, NotADirectoryError):
+            continue
+        except OSError as error:
+            raise DaemonUnreachableError(f"cannot look for loops: {error}") from None
+    names = sorted(runners)
+    if not names:
+        return []
+    with ThreadPoolExecutor(max_workers=len(names)) as pool:
+        return list(pool.map(lambda name: _stopped(name, socket), names))
+
+
+def _stopped(runner: str, socket: str) -> Stopped:
+    try:
+        stop(runner, socket)
+    except RtcfError as error:
+        # One that has ended since has no loop any more.
+        gone = isinstance(error, DaemonUnreachableError) and not any(
+            os.path.exists(folder / runner) for folder in folders(socket)
+        )
+        return Stopped(runner, None if gone else error)
+    return Stopped(runner)
+
+
+def _ask(path: Path, runner: str) -> None:
+    """Say `stop` and take the answer; raises OSError or RefusedError."""
+    with sockets.socket(sockets.AF_UNIX, sockets.SOCK_STREAM) as connection:
+        # Not settimeout(): one that blocks in the kernel has its turn in a queue that is full.
+        limit = struct.pack("ll", int(TIMEOUT_S), 0)
+        for option in (sockets.SO_SNDTIMEO, sockets.SO_RCVTIMEO):
+            connection.setsockopt(sockets.SOL_SOCKET, option, limit)
+        connection.connect(str(path))
+        # Whoever may not is told so, and hung up on, before anything is read.
+        with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+            connection.sendall(b"stop\n")
+        answer = b""
+        try:
+            while not answer.endswith(b"\n") and (more := connection.recv(4096)):
+                answer += more
+        except BlockingIOError:
+            pass
+        except ConnectionResetError:
+            pass
+    word, _, reason = answer.decode(errors="replace").strip().partition(": ")
+    if word == "stopped":
+        return
+    if word == "refused":
+        raise RefusedError(f"runner {runner}: {reason}", "PERMISSION_DENIED")
+    if word == "late":
+        raise RefusedError(f"runner {runner} is asked to stop, and {reason}", "UNAVAILABLE")
+    raise RefusedError(
+        f"the executor of runner {runner} does not answer within {TIMEOUT_S:g} s: "
+        "is it stopped by a debugger?",
+        "UNAVAILABLE",
+    )

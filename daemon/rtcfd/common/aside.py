@@ -1,0 +1,63 @@
+"""What may block, done beside the event loop: the user database, folders that may be remote, files.
+
+In daemon threads: one that hangs for ever holds up neither the event loop nor
+the end of rtcfd.  Each kind of work has its own, so that a hanging one takes no
+other's place.
+"""
+
+import asyncio
+import contextlib
+import threading
+from collections.abc import Callable
+from typing import TypeVar
+
+from rtcfd.common.refusals import Unavailable
+
+Result = TypeVar("Result")
+
+
+class Aside:
+    """At most so many threads for one kind of work; `what` names it in refusals."""
+
+    def __init__(self, what: str, threads: int = 2) -> None:
+        self._what = what
+        self._places = asyncio.Semaphore(threads)
+
+    async def run(self, work: Callable[[], Result], timeout_s: float) -> Result:
+        """Return what `work` returns, or raise what it raises; Unavailable after `timeout_s`.
+
+        Work that is given up on keeps its thread until it returns.
+        """
+        loop = asyncio.get_running_loop()
+        done: asyncio.Future[Result] = loop.create_future()
+
+        def finish(result: Result | None, error: BaseException | None) -> None:
+            self._places.release()
+            if done.done():
+                return
+            if error is None:
+                done.set_result(result)  # type: ignore[arg-type]
+            else:
+                done.set_exception(error)
+
+        def thread() -> None:
+            result, problem = None, None
+            try:
+                result = work()
+            except BaseException as error:
+                problem = error
+            # Closed: rtcfd has ended meanwhile.
+            with contextlib.suppress(RuntimeError):
+                loop.call_soon_threadsafe(finish, result, problem)
+
+        try:
+            async with asyncio.timeout(timeout_s):
+                await self._places.acquire()
+                try:
+                    threading.Thread(target=thread, name=f"rtcfd-{self._what}", daemon=True).start()
+                except BaseException:
+                    self._places.release()
+                    raise
+                return await done
+        except TimeoutError:
+            raise Unavailable(f"the {self._what} does not answer within {timeout_s:g} s") from None

@@ -1,0 +1,61 @@
+"""Log records handed to a thread: a journal that hangs holds up no event loop, and no watchdog.
+
+Owned by the root logger.
+"""
+
+import copy
+import logging
+import queue
+import threading
+import time
+
+_MOST_WAITING = 20_000  # records; a hanging journal does not fill the memory
+_LAST_WORDS_S = 2.0  # at the end of rtcfd
+
+
+class LogThread(logging.Handler):
+    """Passes records on to another handler, in a thread; what finds no room is counted."""
+
+    def __init__(self, handler: logging.Handler, most: int = _MOST_WAITING) -> None:
+        super().__init__()
+        self._handler = handler
+        self._queue: queue.Queue[logging.LogRecord] = queue.Queue(most)
+        self._lost = 0
+        threading.Thread(target=self._work, name="rtcfd-log", daemon=True).start()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Queue one record."""
+        # What it was made of may change before it is written.
+        kept = copy.copy(record)
+        kept.msg, kept.args = record.getMessage(), None
+        try:
+            self._queue.put_nowait(kept)
+        except queue.Full:
+            self._lost += 1
+
+    def flush(self) -> None:
+        """Wait a while until all is written."""
+        deadline = time.monotonic() + _LAST_WORDS_S
+        while self._queue.unfinished_tasks and time.monotonic() < deadline:
+            time.sleep(0.005)
+
+    def close(self) -> None:
+        """At the end of the process."""
+        self.flush()
+        super().close()
+
+    def _work(self) -> None:
+        while True:
+            record = self._queue.get()
+            try:
+                self._handler.handle(record)
+                if self._lost and self._queue.empty():
+                    lost, self._lost = self._lost, 0
+                    self._handler.handle(_report(lost))
+            finally:
+                self._queue.task_done()
+
+
+def _report(lost: int) -> logging.LogRecord:
+    text = f"{lost} log records were lost: they were not taken as fast as they came"
+    return logging.LogRecord("rtcfd", logging.WARNING, "", 0, text, None, None)

@@ -1,0 +1,254 @@
+"""Stopping loops at their executors: rtcfd is stopped, dead or full, or the disk is full."""
+
+import os
+import resource
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import rtcf
+from daemon_process import BUILD_TREE, NO_ROS, Daemon, wait_for
+from rtcf.v1 import runner_pb2
+from values import iteration
+
+RESUME = "[runner]\non_boot = 'resume'\norphan_timeout_s = 60.0\n" + NO_ROS
+STRANGER = 54321  # a uid that no user has
+ASK = (
+    "import socket, sys\n"
+    "peer = socket.socket(socket.AF_UNIX)\n"
+    "peer.settimeout(30)\n"
+    "peer.connect(sys.argv[1])\n"
+    "try:\n"
+    "    peer.sendall(b'stop\\n')\n"
+    "except OSError:\n"
+    "    pass\n"
+    "print(peer.recv(4096).decode(), end='')\n"
+)
+
+
+@pytest.fixture
+def settings() -> str:
+    return RESUME
+
+
+def runs(client: rtcf.Client) -> bool:
+    """Tell whether the loop runs."""
+    state: int = client.get_status("rt_runner").runners[0].state
+    return state == runner_pb2.RUNNER_STATE_RUNNING
+
+
+def begin(client: rtcf.Client) -> None:
+    """Start a loop and see cycles."""
+    if not client.get_order():
+        client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
+    client.start()
+    wait_for(lambda: iteration(client) > 10, "cycles")
+
+
+@contextmanager
+def frozen(daemon: Daemon) -> Iterator[None]:
+    """Stop rtcfd as a debugger does."""
+    os.kill(daemon.pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(daemon.pid, signal.SIGCONT)
+
+
+def mark(daemon: Daemon) -> Path:
+    """Return the file by which the loop would be resumed."""
+    return daemon.folder / "state" / "rt_runner.running"
+
+
+def test_a_frozen_daemon_holds_up_no_stop_and_is_right_when_it_lives_again(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    begin(client)
+    assert mark(daemon).exists()
+    with frozen(daemon):
+        done = daemon.ctl("stop")
+        assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
+        assert "at its executor, as rtcfd does not answer within 1 s" in done.stderr
+        # Disk says so, whatever becomes of rtcfd now.
+        assert not mark(daemon).exists()
+    assert not runs(client)
+    wait_for(lambda: "loop stopped at its executor by " in daemon.log(), "the log")
+    wait_for(
+        lambda: '"running": false' in (daemon.folder / "state" / "rt_runner.json").read_text(),
+        "the state on disk",
+    )
+    begin(client)
+
+
+def test_a_start_that_was_asked_before_the_stop_starts_nothing(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    begin(client)
+    with (
+        frozen(daemon),
+        subprocess.Popen(
+            [BUILD_TREE / "bin" / "rtcfctl", "start"],
+            env=daemon.environment(),
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as early,
+    ):
+        # It is connected, and waits for its answer.
+        wait_for(lambda: _connections(daemon) > 1, "the early start")
+        assert daemon.ctl("stop").returncode == 0
+        os.kill(daemon.pid, signal.SIGCONT)
+        complaint = early.communicate(timeout=60)[1]
+    assert (early.returncode, "ask again" in complaint) == (1, True), complaint
+    assert not runs(client)
+
+
+def _connections(daemon: Daemon) -> int:
+    lines = Path("/proc/net/unix").read_text().splitlines()
+    return sum(line.endswith(str(daemon.socket)) for line in lines) - 1
+
+
+def test_a_dead_daemon_holds_up_no_stop_and_the_next_one_resumes_nothing(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    begin(client)
+    executor = client.get_status("rt_runner").runners[0].pid
+    daemon.end(signal.SIGKILL)
+    done = daemon.ctl("stop", "--all")
+    assert (done.returncode, done.stdout) == (0, "rt_runner stopped\n"), done.stderr
+    # Also without the executor, which knows of the stop.
+    os.kill(executor, signal.SIGKILL)
+    daemon.start()
+    with rtcf.Client(daemon.socket) as again:
+        wait_for(lambda: again.get_status("rt_runner").runners[0].pid, "an executor")
+        assert not runs(again)
+        assert again.get_order() == ["/steady"]
+
+
+def test_the_next_daemon_takes_over_that_the_loop_was_stopped(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    begin(client)
+    executor = client.get_status("rt_runner").runners[0].pid
+    daemon.end(signal.SIGKILL)
+    assert daemon.ctl("stop").returncode == 0
+    daemon.start()
+    with rtcf.Client(daemon.socket) as again:
+        assert again.get_status("rt_runner").runners[0].pid == executor
+        assert not runs(again)
+        begin(again)
+    assert "by root" in daemon.log() or os.geteuid()
+
+
+def test_clients_that_fill_all_slots_hold_up_no_stop(tmp_path: Path) -> None:
+    daemon = Daemon(tmp_path, "[limits]\nclients = 4\n" + NO_ROS)
+    daemon.start()
+    others: list[socket.socket] = []
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            begin(client)
+        for _ in range(600):
+            other = socket.socket(socket.AF_UNIX)
+            other.setblocking(False)
+            try:
+                other.connect(str(daemon.socket))
+            except BlockingIOError:
+                other.close()
+                break
+            others.append(other)
+        done = daemon.ctl("stop")
+        assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
+    finally:
+        for other in others:
+            other.close()
+    with rtcf.Client(daemon.socket) as client:
+        wait_for(lambda: _answers(client), "an answer")
+        assert not runs(client)
+    daemon.end()
+
+
+def _answers(client: rtcf.Client) -> bool:
+    try:
+        client.get_status()
+    except rtcf.RtcfError:
+        return False
+    return True
+
+
+def test_a_full_disk_holds_up_no_stop_and_the_loop_stays_stopped(tmp_path: Path) -> None:
+    # No file can grow: what a full disk does to whoever writes.
+    folder = tmp_path / "d"
+    folder.mkdir()
+    daemon = Daemon(folder, RESUME)
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        begin(client)
+        resource.prlimit(daemon.pid, resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
+        result = client.stop()
+        assert any("not saved" in note for note in result.notes), result
+        assert not runs(client)
+    assert '"running": true' in (folder / "state" / "rt_runner.json").read_text()
+    daemon.end(signal.SIGKILL)
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        assert not runs(client)
+    daemon.end()
+
+
+@pytest.fixture
+def open_folder() -> Iterator[Path]:
+    """Give a folder that others can enter, as pytest's cannot be."""
+    with tempfile.TemporaryDirectory() as name:
+        Path(name).chmod(0o755)
+        yield Path(name)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="takes on another user")
+def test_who_may_not_operate_stops_nothing_past_the_daemon(open_folder: Path) -> None:
+    daemon = Daemon(open_folder, f"[access]\ndefault = 'observe'\n{NO_ROS}")
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            begin(client)
+            path = Path(f"{daemon.socket}.d/stop/rt_runner")
+            for folder in (path.parent, path.parent.parent):
+                folder.chmod(0o755)
+            path.chmod(0o666)
+            done = subprocess.run(
+                ["setpriv", f"--reuid={STRANGER}", "--clear-groups", "--",
+                 "/usr/bin/python3", "-c", ASK, str(path)],
+                capture_output=True, text=True, timeout=60, check=False,
+            )  # fmt: skip
+            assert done.stdout == (
+                f"refused: stop takes the right to operate, and user {STRANGER} has none\n"
+            ), done.stderr
+            assert runs(client)
+            # What is no request, or no end of one, does nothing and holds up nobody.
+            for nonsense in (b"start\n", b"stop", b"\0" * 4096):
+                with socket.socket(socket.AF_UNIX) as peer:
+                    peer.connect(str(path))
+                    peer.sendall(nonsense)
+            assert runs(client)
+            asked = subprocess.run(
+                [sys.executable, "-c", ASK, str(path)], capture_output=True, text=True, check=True
+            )
+            assert asked.stdout == "stopped\n"
+            wait_for(lambda: not runs(client), "the end of the loop")
+    finally:
+        daemon.end()
+
+
+def test_all_loops_stop_at_one_word(daemon: Daemon, client: rtcf.Client) -> None:
+    client.add_runner("second")
+    for runner in ("rt_runner", "second"):
+        client.load(rtcf.component("rtcf_test", "Counter"), runner)
+        client.start(runner)
+    done = daemon.ctl("stop", "--all")
+    assert (done.returncode, done.stdout) == (0, "rt_runner stopped\nsecond stopped\n")
+    states = {each.runner: each.state for each in client.get_status().runners}
+    assert set(states.values()) == {runner_pb2.RUNNER_STATE_STOPPED}
