@@ -34,6 +34,12 @@ const char* hookName(Hook hook) noexcept {
             return "cleanup";
         case Hook::Prepare:
             return "prepare";
+        case Hook::Safe:
+            return "safe";
+        case Hook::TakeOver:
+            return "takeOver";
+        case Hook::Wait:
+            return "wait";
         case Hook::None:
             break;
     }
@@ -83,6 +89,14 @@ std::uint32_t FlightRecorder::addSlot(const std::string& name) {
 void FlightRecorder::removeSlot(std::uint32_t slot) noexcept {
     page_->names[slot][0] = '\0';
     free_.push_back(slot);
+}
+
+std::string FlightRecorder::realtimeActivity() const {
+    const std::uint32_t slot = runningSlot();
+    if (slot == 0) return {};
+    const auto hook = static_cast<Hook>(page_->realtime_hook.load(std::memory_order_relaxed));
+    return fmt::format("{}.{}", static_cast<const char*>(page_->names[slot]),
+                       hook == Hook::None ? "update" : hookName(hook));
 }
 
 void FlightRecorder::noteCrash(int signal, ThreadRole thread, CrashReason reason,

@@ -17,7 +17,7 @@ namespace rtcf::executor {
 /// Which thread, in the recorder's numbers.
 enum class ThreadRole : std::uint32_t { None = 0, Realtime = 1, Graph = 2, Other = 3 };
 
-/// Which hook the graph thread is in, in the recorder's numbers.
+/// Which hook a thread is in, in the recorder's numbers.
 enum class Hook : std::uint32_t {
     None = 0,
     Constructor = 1,
@@ -25,7 +25,11 @@ enum class Hook : std::uint32_t {
     Start = 3,
     Stop = 4,
     Cleanup = 5,
-    Prepare = 6
+    Prepare = 6,
+    // In the real-time thread, whose hook is update() otherwise.
+    Safe = 7,
+    TakeOver = 8,
+    Wait = 9
 };
 
 const char* hookName(Hook hook) noexcept;
@@ -35,7 +39,7 @@ enum class CrashReason : std::uint32_t { Signal = 0, Stall = 1 };
 
 class FlightRecorder {
    public:
-    static constexpr std::uint32_t kSlots = 4096;  ///< one per component; slot 0 means none
+    static constexpr std::uint32_t kSlots = 10241;  ///< one per component; slot 0 means none
 
     /// @throws std::system_error if there is no memory for it
     FlightRecorder();
@@ -75,6 +79,9 @@ class FlightRecorder {
         return page_->realtime_slot.load(std::memory_order_relaxed);
     }
 
+    /// What the real-time thread is in, e.g. "/H1.update"; empty = no component. Not real-time.
+    std::string realtimeActivity() const;
+
    private:
     struct Page {
         std::uint32_t magic;
@@ -89,7 +96,8 @@ class FlightRecorder {
         std::atomic<std::uint64_t> crash_address;
         std::atomic<std::uint32_t> running;
         std::uint32_t slots;
-        std::uint64_t reserved;
+        std::atomic<std::uint32_t> realtime_hook;
+        std::uint32_t reserved;
         char names[kSlots][128];  // NOLINT(modernize-avoid-c-arrays): a layout in memory
     };
     static_assert(offsetof(Page, crash_address) == 40 && offsetof(Page, names) == 64,
@@ -110,6 +118,15 @@ class FlightRecorder::RealtimeNotes {
     }
     void enterComponent(std::uint32_t slot) const noexcept RTCF_NONBLOCKING {
         page_->realtime_slot.store(slot, std::memory_order_relaxed);
+    }
+    /// What is neither update() nor in the cycle proper: the slot's hook until leaveHook().
+    void enterHook(std::uint32_t slot, Hook hook) const noexcept RTCF_NONBLOCKING {
+        page_->realtime_hook.store(static_cast<std::uint32_t>(hook), std::memory_order_relaxed);
+        enterComponent(slot);
+    }
+    void leaveHook() const noexcept RTCF_NONBLOCKING {
+        enterComponent(0);
+        page_->realtime_hook.store(0, std::memory_order_relaxed);
     }
     void leaveComponents() const noexcept RTCF_NONBLOCKING { enterComponent(0); }
 

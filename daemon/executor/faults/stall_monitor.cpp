@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <utility>
 
 #include "faults/crash_handler.hpp"
 #include "loop/cycle_counter.hpp"
@@ -17,17 +18,19 @@ namespace {
 constexpr std::int64_t kMicrosecond = 1000;
 constexpr std::int64_t kMargin = 500'000'000;  // the monitor comes first where it gets a CPU
 constexpr auto kPoll = std::chrono::milliseconds(20);
+constexpr std::int64_t kPollNs = 20'000'000;
 
 // For SIGXCPU, which comes once a second from the limit on.
 std::atomic<const Loop*> watched_loop{nullptr};
-std::atomic<std::uint64_t> iteration_at_last_signal{0};
+std::atomic<std::uint64_t> progress_at_last_signal{0};
 
 void handleCpuLimit(int /*signal*/) {
     const Loop* loop = watched_loop.load();
     if (loop == nullptr) return;
-    const std::uint64_t now = loop->figures().iteration.load(std::memory_order_relaxed);
-    // A loop that overruns all the time never sleeps either, but gets on.
-    if (iteration_at_last_signal.exchange(now) == now) dieStalled();
+    // A loop that overruns all the time, or polls a silent device, never sleeps either, but gets
+    // on.
+    const std::uint64_t now = loop->progress();
+    if (progress_at_last_signal.exchange(now) == now && loop->inComponent()) dieStalled();
 }
 
 }  // namespace
@@ -60,19 +63,23 @@ void StallMonitor::setTimeout(std::int64_t timeout_ns) {
 void StallMonitor::threadMain() {
     pthread_setname_np(pthread_self(), "rtcf-monitor");
     std::uint64_t last = 0;
-    std::int64_t since = monotonicNow();
+    std::int64_t polled = monotonicNow();
+    std::int64_t stalled = 0;
     while (!ending_.load()) {
         std::this_thread::sleep_for(kPoll);
-        const std::uint64_t iteration = loop_.figures().iteration.load(std::memory_order_relaxed);
+        const std::uint64_t progress = loop_.progress();
         const std::int64_t now = monotonicNow();
-        // Between cycles a loop may wait for long: only a cycle that does not end is a stall.
-        if (!loop_.inCycle() || iteration != last) {
-            last = iteration;
-            since = now;
+        // Counted in own polls: when a debugger or SIGSTOP holds the process, it holds this thread
+        // as well, and that time is not the component's.
+        stalled += std::min(now - std::exchange(polled, now), 2 * kPollNs);
+        // Between cycles a loop may wait for long: only a hook that does not return is a stall.
+        if (!loop_.inComponent() || progress != last) {
+            last = progress;
+            stalled = 0;
             continue;
         }
         const std::int64_t timeout = timeout_ns_.load();
-        if (timeout != 0 && now - since > timeout) dieStalled();
+        if (timeout != 0 && stalled > timeout) dieStalled();
     }
 }
 

@@ -10,12 +10,15 @@ import struct
 from dataclasses import dataclass
 from enum import IntEnum
 
-_HEADER = struct.Struct("<IIQIIIIIIQIIQ")
+_HEADER = struct.Struct("<IIQIIIIIIQIIII")
 _MAGIC = 0x46435452
 _VERSION = 1
 _NAMES = 64
 _NAME_BYTES = 128
-_HOOKS = ("", "constructor", "configure", "start", "stop", "cleanup")
+_HOOKS = (
+    "", "constructor", "configure", "start", "stop", "cleanup", "prepare",
+    "safe", "takeOver", "wait",
+)  # fmt: skip
 
 
 class Thread(IntEnum):
@@ -40,6 +43,11 @@ class Note:
     thread: int = Thread.NONE  # that crashed
     stalled: bool = False  # the crash was made because a cycle did not end
     address: int = 0  # of the fault
+    cycle_hook: str = "update"  # the real-time thread's in the component `updating`
+
+
+def _hook(number: int) -> str:
+    return _HOOKS[number] if number < len(_HOOKS) else f"hook {number}"
 
 
 class FlightRecorder:
@@ -60,17 +68,18 @@ class FlightRecorder:
     def read(self) -> Note:
         """Return what it says now."""
         (_, _, iteration, updating, hooking, hook, signal, thread, reason, address, running,
-         slots, _) = _HEADER.unpack_from(self._memory)  # fmt: skip
+         slots, cycle_hook, _) = _HEADER.unpack_from(self._memory)  # fmt: skip
         return Note(
             iteration=iteration,
             running=bool(running),
             updating=self._name(updating, slots),
             hooking=self._name(hooking, slots),
-            hook=_HOOKS[hook] if hook < len(_HOOKS) else f"hook {hook}",
+            hook=_hook(hook),
             signal=signal,
             thread=thread,
             stalled=reason == 1,
             address=address,
+            cycle_hook=_hook(cycle_hook) or "update",
         )
 
     def close(self) -> None:

@@ -43,7 +43,7 @@ def judge(end: End, note: Note | None) -> Verdict:
     """Return the verdict on a death that nobody asked for."""
     if note is None:
         return Verdict(str(end), "(there is no flight recorder)")
-    update = f"{note.updating}.update" if note.updating else ""
+    update = f"{note.updating}.{note.cycle_hook}" if note.updating else ""
     hook = f"{note.hooking}.{note.hook}" if note.hooking else ""
     cycle = f"in cycle {note.iteration}"
     how = str(end)

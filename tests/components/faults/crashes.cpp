@@ -1,5 +1,8 @@
 // Components that end their process, each in another way.
+#include <time.h>
+
 #include <array>
+#include <cstdint>
 #include <cstdlib>
 #include <stdexcept>
 
@@ -66,6 +69,49 @@ class ThrowsThroughNoexcept final : public Faulty {
     void fault() noexcept override { raise(); }
 };
 
+[[noreturn]] void hang() {
+    while (zero == 0) {
+    }
+    std::abort();
+}
+
+class HangsInSafe final : public rtcf::Component {
+    void update() override {}
+    void safe() noexcept override { hang(); }
+};
+
+class HangsInTakeOver final : public rtcf::Component {
+    void update() override {}
+    void takeOver(const rtcf::Component& /*previous*/) noexcept override { hang(); }
+};
+
+class HangsInWait final : public rtcf::Source {
+    void update() override { ++updates_; }
+    bool wait(std::int64_t /*deadline_ns*/) noexcept override {
+        if (updates_ > kCycles) hang();
+        return true;
+    }
+    static constexpr int kCycles = 20;
+    int updates_ = 0;
+};
+
+// Never sleeps, as drivers that poll do not.
+class PollsSilence final : public rtcf::Source {
+    void update() override {}
+    bool wait(std::int64_t deadline_ns) noexcept override {
+        timespec now{};
+        do {
+            clock_gettime(CLOCK_MONOTONIC, &now);
+        } while (std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec < deadline_ns);
+        return false;
+    }
+};
+
+class CrashesInSafe final : public rtcf::Component {
+    void update() override {}
+    void safe() noexcept override { std::abort(); }
+};
+
 class CrashingConfigure final : public rtcf::Component {
     bool configure() override {
         volatile int* volatile nowhere = nullptr;
@@ -93,5 +139,10 @@ RTCF_COMPONENT(CallsAbort, "Calls abort()")
 RTCF_COMPONENT(CallsExit, "Calls exit(3)")
 RTCF_COMPONENT(NeverReturns, "Does not return from update()")
 RTCF_COMPONENT(ThrowsThroughNoexcept, "Throws where nothing may be thrown")
+RTCF_COMPONENT(HangsInSafe, "Does not return from safe()")
+RTCF_COMPONENT(HangsInTakeOver, "Does not return from takeOver()")
+RTCF_COMPONENT(HangsInWait, "Does not return from wait()")
+RTCF_COMPONENT(PollsSilence, "Polls a device that is never ready")
+RTCF_COMPONENT(CrashesInSafe, "Aborts in safe()")
 RTCF_COMPONENT(CrashingConfigure, "Crashes in configure()")
 RTCF_COMPONENT(CrashingStop, "Crashes in stop()")

@@ -32,6 +32,15 @@ class Sleeps final : public Faulty {
     void fault() override { std::this_thread::sleep_for(std::chrono::microseconds(100)); }
 };
 
+// Not so long that it would be a fault.
+class Lingers final : public Faulty {
+    void fault() override {
+        const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(150);
+        while (std::chrono::steady_clock::now() < until) {
+        }
+    }
+};
+
 class NotFinite final : public Faulty {
     void fault() override { value_.write(std::numeric_limits<double>::quiet_NaN()); }
     rtcf::Output<double> value_{this, "value", "", rtcf::Finite()};
@@ -54,6 +63,7 @@ RTCF_COMPONENT(Throws, "Throws an exception")
 RTCF_COMPONENT(Allocates, "Allocates 10 MB in each update")
 RTCF_COMPONENT(Hoards, "Takes 1 MB more in each update, until there is no memory left")
 RTCF_COMPONENT(Sleeps, "Sleeps in each update")
+RTCF_COMPONENT(Lingers, "Takes 150 ms in each update")
 RTCF_COMPONENT(NotFinite, "Writes NaN to an output that is declared finite")
 RTCF_COMPONENT(WritesNan, "Writes NaN to an output that is not declared finite")
 RTCF_COMPONENT(NotFiniteStops, "Writes infinity to an output that stops the loop then")

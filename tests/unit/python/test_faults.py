@@ -208,6 +208,8 @@ def test_a_flight_recorder_is_read_through_proc_and_after_its_end() -> None:
     assert recorder.read() == Note(
         4711, True, "/arm/H1", "/x", "configure", signal.SIGSEGV, 1, False, 0xDEAD
     )
+    writer.put(56, 7)
+    assert recorder.read().cycle_hook == "safe"
     writer.update(99)
     assert recorder.read().updating == ""
     recorder.close()
@@ -227,6 +229,12 @@ def test_what_is_no_flight_recorder_is_refused() -> None:
         (End(-11), Note(updating="/a", signal=11, thread=3), "belongs to no component", ""),
         (End(-6), Note(updating="/a", signal=6, thread=1), "/a.update was running", "/a"),
         (End(-6), Note(signal=6, thread=1), "in its loop", ""),
+        (
+            End(-6),
+            Note(updating="/a", signal=6, thread=1, stalled=True, cycle_hook="safe"),
+            "made no progress while /a.safe was running",
+            "/a",
+        ),
         (
             End(-8),
             Note(updating="/a", hooking="/b", hook="start", signal=8, thread=2),
