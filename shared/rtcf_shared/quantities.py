@@ -31,7 +31,7 @@ _COUNT = 2**31 - 1  # XML-RPC has no larger integers
 
 # Named as in RunnerSettings.
 RUNNER = {
-    "frequency_hz": Quantity(0.1, 20000.0, 1000.0, "Hz"),
+    "frequency_hz": Quantity(0.1, 50000.0, 1000.0, "Hz"),
     "priority": Quantity(1, 98, 80),  # 99 is the kernel's own watchdog and migration threads'
     "spin_us": Quantity(0, 1_000_000, 0, "µs"),  # and at most half a period
     "max_overruns": Quantity(0, _COUNT, 0),

@@ -41,7 +41,7 @@ usage: rosrun rtcf rt_runner [__name:=NAME] [_PARAMETER:=VALUE]...
 Holds a real-time loop for the life of a launch; rt_launcher loads components into it.
 
 private parameters:
-  frequency                cycles per second, 0.1 to 20000 (default: 1000)
+  frequency                cycles per second, 0.1 to 50000 (default: 1000)
   mode                     wait_for_components, no_wait or wait_for_trigger
   num_components_expected  for wait_for_components: start when so many are loaded
   ros_mapping_whitelist    regular expression: connections that become ROS topics

@@ -43,7 +43,7 @@ void requireCpu(int cpu) {
 
 void validate(RunnerSettings& settings) {
     constexpr double kLowestHz = 0.1;
-    constexpr double kHighestHz = 20000.0;
+    constexpr double kHighestHz = 50000.0;
     constexpr std::size_t kKilo = 1024;
     requireRange("frequency", settings.frequency_hz, kLowestHz, kHighestHz, "Hz");
     settings.loop.period_ns = std::llround(1e9 / settings.frequency_hz);

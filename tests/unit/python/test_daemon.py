@@ -152,11 +152,11 @@ def test_a_runner_that_is_there_is_refused(client: rtcf.Client) -> None:
     assert refused.value.code == "ALREADY_EXISTS"
 
 
-@pytest.mark.parametrize("frequency", [0.0, -1.0, 20001.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("frequency", [0.0, -1.0, 50001.0, float("nan"), float("inf")])
 def test_bad_frequency_is_refused_and_nothing_changed(
     client: rtcf.Client, frequency: float
 ) -> None:
-    with pytest.raises(rtcf.RefusedError, match=r"0\.1 to 20000 Hz"):
+    with pytest.raises(rtcf.RefusedError, match=r"0\.1 to 50000 Hz"):
         client.set_runner(runner_pb2.RunnerSettings(frequency_hz=frequency))
     assert client.get_status().runners[0].settings.frequency_hz == 1000.0
 

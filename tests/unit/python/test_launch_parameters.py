@@ -97,7 +97,7 @@ def test_what_rtcf_2021_took_is_taken() -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"frequency": 0}, "~frequency of 0 is out of range: 0.1 to 20000"),
+        ({"frequency": 0}, "~frequency of 0 is out of range: 0.1 to 50000"),
         ({"frequency": float("nan")}, "~frequency of nan is out of range"),
         ({"frequency": True}, "~frequency must be a number, not True"),
         ({"mode": "wait"}, "~mode must be one of wait_for_components, no_wait, wait_for_trigger"),
