@@ -41,36 +41,52 @@ std::vector<Node> paperGraph() {
 
 BenchGraph::BenchGraph(const std::vector<Node>& nodes, const std::string& library,
                        const std::string& mapped)
-    : log_([](executor::LogEntry&&) {}), loop_(log_, recorder_) {
+    : log_([](executor::LogEntry&&) {}),
+      loop_(log_, recorder_),
+      code_(libraries_.open(library)),
+      mapped_(mapped) {
     executor::Graph graph;
-    const std::shared_ptr<const executor::Library> code = libraries_.open(library);
     for (const Node& node : nodes) {
-        executor::ComponentDefinition definition;
-        definition.name = node.name;
-        definition.package = "rtcf_examples";
-        definition.type = "Mimo";
-        definition.first = node.first;
+        executor::Remaps remaps;
         // A port without a connection gets a name of its own.
         for (const char* port : {"in1", "in2", "in3", "in4", "out1", "out2"}) {
-            definition.remaps.emplace_back(port, fmt::format("/{}/{}", node.name, port));
+            remaps.emplace_back(port, fmt::format("/{}/{}", node.name, port));
         }
         for (const auto& [port, connection] : node.remaps) {
-            for (auto& [from, to] : definition.remaps) {
+            for (auto& [from, to] : remaps) {
                 if (from == port) to = connection;
             }
         }
-        auto instance = std::make_shared<executor::Instance>(std::move(definition), code, "bench",
-                                                             loop_.clock(), log_, recorder_);
-        instance->configure();
-        instance->start();
-        graph.add({instance, {}});
-        instances_.push_back(std::move(instance));
+        graph.add({make("Mimo", node.name, std::move(remaps), node.first), {}});
     }
+    adopt(graph);
+}
+
+std::shared_ptr<executor::Instance> BenchGraph::make(const std::string& type,
+                                                     const std::string& name,
+                                                     executor::Remaps remaps, bool first) {
+    executor::ComponentDefinition definition;
+    definition.name = name;
+    definition.package = "rtcf_examples";
+    definition.type = type;
+    definition.remaps = std::move(remaps);
+    definition.first = first;
+    auto instance = std::make_shared<executor::Instance>(std::move(definition), code_, "bench",
+                                                         loop_.clock(), log_, recorder_);
+    instance->configure();
+    instance->start();
+    return instance;
+}
+
+void BenchGraph::adopt(const executor::Graph& graph) {
     executor::Wiring wiring =
-        executor::wire(graph, {executor::NamePattern("bench", mapped), {}}, {});
+        executor::wire(graph, {executor::NamePattern("bench", mapped_), {}}, {});
     executor::Adoption adoption;
-    plan_ = executor::buildPlan(graph, std::move(wiring), *empty_, kFrequencyHz, adoption);
+    auto plan = executor::buildPlan(graph, std::move(wiring), *plan_, kFrequencyHz, adoption);
     loop_.adopt(adoption, kAdoptionTimeoutNs);
+    plan->noteKept(adoption, *plan_);
+    std::swap(plan_, plan);
+    order_.clear();
     for (const executor::Step& step : plan_->schedule.steps) order_.push_back(step.component);
 }
 

@@ -45,6 +45,11 @@ class BenchGraph {
     executor::Plan& plan() noexcept { return *plan_; }
     /// A new value for each mapped input, as from a topic.
     void deliver();
+    /// A component beside the graph. @param remaps of its ports
+    std::shared_ptr<executor::Instance> make(const std::string& type, const std::string& name,
+                                             executor::Remaps remaps = {}, bool first = false);
+    /// Makes `graph` what the loop executes.
+    void adopt(const executor::Graph& graph);
     /// The components in order of execution.
     const std::vector<Component*>& order() const noexcept { return order_; }
 
@@ -53,9 +58,9 @@ class BenchGraph {
     executor::FlightRecorder recorder_;
     executor::Loop loop_;
     executor::LibraryStore libraries_;
-    std::vector<std::shared_ptr<executor::Instance>> instances_;
-    std::unique_ptr<executor::Plan> empty_ = std::make_unique<executor::Plan>();
-    std::unique_ptr<executor::Plan> plan_;
+    std::shared_ptr<const executor::Library> code_;
+    const std::string mapped_;
+    std::unique_ptr<executor::Plan> plan_ = std::make_unique<executor::Plan>();
     std::vector<Component*> order_;
 };
 

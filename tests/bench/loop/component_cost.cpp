@@ -93,7 +93,8 @@ int main(int argc, char** argv) try {
     std::vector<std::unique_ptr<BenchGraph>> graphs;
     for (const std::size_t length : kLengths) {
         graphs.push_back(std::make_unique<BenchGraph>(rtcf::bench::chain(length), argv[1]));
-        graphs.back()->loop().beginStepping({});
+        rtcf::executor::Loop& loop = graphs.back()->loop();
+        loop.beginStepping({}, loop.stops());
     }
     constexpr std::size_t kCount = std::size(kLengths);
     std::vector<double> reads;

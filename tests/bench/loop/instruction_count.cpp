@@ -33,7 +33,7 @@ int runCounted(const std::string& library, const std::string& which, std::uint64
                             which == "mapped" ? kTopics : "");
     executor::LoopSettings settings;
     settings.warmup_cycles = kWarmUp;
-    graph.loop().beginStepping(settings);
+    graph.loop().beginStepping(settings, graph.loop().stops());
     graph.loop().step(kWarmUp);
     ptrace(PTRACE_TRACEME, 0, nullptr, nullptr);
     raise(SIGSTOP);

@@ -44,7 +44,7 @@ int run(char** argv) {
     };
     say(executor::lockMemory(settings.realtime));
     say(executor::checkScheduling(settings.realtime));
-    say(graph.loop().start(settings));
+    say(graph.loop().start(settings, graph.loop().stops()));
     for (std::uint64_t taken = 0; taken < cycles;) {
         const timespec pause{0, 20'000'000};
         nanosleep(&pause, nullptr);
