@@ -75,6 +75,14 @@ def _print(found: runner_pb2.RunnerStatistics, output: Output) -> None:
         f"{found.involuntary_switches} involuntary context switches",
         "bold red" if found.major_faults else "",
     )
+    causes = (
+        (found.late_wake_ups, "began late: the machine woke the loop late"),
+        (found.exchange_overruns, "were late by changes or values that were taken over"),
+        (found.catching_up, "were late by the overrun before (catch_up)"),
+    )
+    for count, cause in causes:
+        if count:
+            output.line(f"{count} of {found.overruns} overruns {cause}", "yellow")
     for count, what in ((found.log_dropped, "log records"), (found.tap_dropped, "mapped values")):
         if count:
             output.line(f"{count} {what} lost in full rings", "yellow")

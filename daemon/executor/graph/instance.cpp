@@ -81,7 +81,7 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
     context_.runner = runner;
     context_.clock = &clock;
     context_.period_ns = clock.period_ns * definition_.every;
-    context_.elapsed_ns = context_.period_ns;
+    context_.recorder_slot = slot_;
     context_.device = &figures_->device;
     context_.log = &log;
     log_.levels().attach(context_.full_name, context_.log_level);
@@ -209,6 +209,7 @@ void Instance::configure() {
 
 void Instance::freezePorts() {
     component_->freeze();
+    if (definition_.optional) component_->stageOutputs();
     const auto mapped = [this](const std::string& port) {
         return mappedName(port, definition_.ns, context_.full_name, definition_.remaps);
     };

@@ -1,6 +1,7 @@
 #include "graph/plan.hpp"
 
 #include <algorithm>
+#include <set>
 
 #include "graph/footprint.hpp"
 
@@ -38,6 +39,15 @@ class Builder {
         for (const auto& [name, connection] : plan_.wiring.connections)
             addConnection(name, connection);
         addSteps();
+        addLeaving();
+        // What arrives knows its inputs when it takes over; what leaves has said its last before
+        // others turn to new writers.
+        adoption_.rewires_of_new = static_cast<std::size_t>(
+            std::stable_partition(adoption_.rewires.begin(), adoption_.rewires.end(),
+                                  [this](const Rewire& rewire) {
+                                      return previous_.bindings.count(rewire.input) == 0;
+                                  }) -
+            adoption_.rewires.begin());
         plan_.schedule.footprint = footprint(plan_);
         adoption_.schedule = &plan_.schedule;
     }
@@ -171,8 +181,26 @@ class Builder {
                  instance.slot(), definition.every, instance.phase(), definition.optional});
             if (Source* source = instance.source(); source != nullptr)
                 plan_.schedule.source = source;
-            if (definition.every != 1 || !instance.component().finiteOutputs().empty())
-                plan_.schedule.plain = false;
+        }
+        plan_.schedule.findStretches();
+    }
+
+    void addLeaving() {
+        std::set<const Instance*> staying;
+        for (const GraphNode& node : plan_.graph.nodes()) staying.insert(node.instance.get());
+        for (const std::size_t index : previous_.wiring.order) {
+            const Instance& instance = *previous_.graph.nodes()[index].instance;
+            if (staying.count(&instance) != 0) continue;
+            Leaving leaving{&instance.component(), instance.figures().get(), {}, {}};
+            for (const OutputBase* output : instance.component().outputs()) {
+                const SlotHeader* const slot = output->slot().get();
+                if (const auto found = previous_.latches.find(slot);
+                    found != previous_.latches.end())
+                    leaving.latches.push_back({&output->type(), found->second.get(), slot});
+                for (const auto& [topic, tap] : previous_.taps)
+                    if (tap->source() == slot) leaving.taps.push_back(tap.get());
+            }
+            adoption_.leaving.push_back(std::move(leaving));
         }
     }
 

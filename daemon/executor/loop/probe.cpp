@@ -1,38 +1,54 @@
 #include "loop/probe.hpp"
 
+#include <algorithm>
 #include <memory>
 
 namespace rtcf::executor {
 
 std::size_t Probe::add(const InputBase& input) {
     items_.push_back(
-        {&input, nullptr, &input.type(), {}, 0, 0, false, std::vector<std::uint8_t>(kLargest)});
+        {&input, nullptr, &input.type(), {}, 0, 0, 0, false, std::vector<std::uint8_t>(kLargest)});
     return items_.size() - 1;
 }
 
 std::size_t Probe::add(const OutputBase& output) {
-    items_.push_back(
-        {nullptr, &output, &output.type(), {}, 0, 0, false, std::vector<std::uint8_t>(kLargest)});
+    items_.push_back({nullptr,
+                      &output,
+                      &output.type(),
+                      {},
+                      0,
+                      0,
+                      0,
+                      false,
+                      std::vector<std::uint8_t>(kLargest)});
     return items_.size() - 1;
 }
 
-void Probe::take(const LoopClock& clock) noexcept {
-    now_ns_ = clock.time_ns;
-    for (Item& item : items_) {
-        const SlotHeader& slot =
-            item.input != nullptr ? item.input->newest() : *item.output->slot();
-        item.header = slot;
-        if (item.input != nullptr) item.seen = item.input->seen();
-        if (slot.sequence == 0) continue;
-        item.length = item.type->length(slot);
-        item.copied = item.length <= item.bytes.size();
-        if (item.copied) item.type->serialize(slot, item.bytes.data(), item.length);
+bool Probe::takeSome(const LoopClock& clock) noexcept {
+    // A byte takes about a nanosecond: a thousandth of the period.
+    constexpr std::int64_t kLeast = 512;
+    std::int64_t left = std::max(kLeast, clock.period_ns / 1000);
+    for (; taken_ < items_.size() && left > 0; ++taken_) {
+        take(items_[taken_], clock);
+        left -= static_cast<std::int64_t>(sizeof(SlotHeader) + items_[taken_].length);
     }
+    return taken_ == items_.size();
+}
+
+void Probe::take(Item& item, const LoopClock& clock) noexcept {
+    const SlotHeader& slot = item.input != nullptr ? item.input->newest() : *item.output->slot();
+    item.now_ns = clock.time_ns;
+    item.header = slot;
+    if (item.input != nullptr) item.seen = item.input->seen();
+    if (slot.sequence == 0) return;
+    item.length = item.type->length(slot);
+    item.copied = item.length <= item.bytes.size();
+    if (item.copied) item.type->serialize(slot, item.bytes.data(), item.length);
 }
 
 Probe::Value Probe::value(std::size_t index) const {
     const Item& item = items_[index];
-    Value value{item.header.sequence, item.seen, now_ns_ - item.header.time_ns, {}};
+    Value value{item.header.sequence, item.seen, item.now_ns - item.header.time_ns, {}};
     if (item.copied) {
         const std::shared_ptr<SlotHeader> slot = item.type->make_slot(nullptr);
         if (item.type->deserialize(*slot, item.bytes.data(), item.length))

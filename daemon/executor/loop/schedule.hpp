@@ -10,6 +10,7 @@
 
 #include "bridge/injector.hpp"
 #include "bridge/tap.hpp"
+#include "loop/faults.hpp"
 #include "rtcf/component.hpp"
 #include "statistics/histogram.hpp"
 
@@ -21,6 +22,7 @@ struct ComponentFigures {
     std::atomic<std::uint64_t> overruns{
         0};  ///< cycles that passed the next deadline during its update
     DeviceFigures device;
+    ComponentFaults faults;
 };
 
 /// One component's turn.
@@ -35,6 +37,13 @@ struct Step {
     /// When its last update() ended. Noted here by whoever runs the cycle, as this memory is at
     /// hand then.
     mutable std::int64_t ended_ticks = 0;
+};
+
+/// Steps that follow each other and are of one kind.
+struct Stretch {
+    const Step* begin;
+    const Step* end;
+    bool plain;  ///< they run every cycle, and their outputs are seen as they are written
 };
 
 /// A copy of an output's value, made before any component runs, for inputs that
@@ -58,14 +67,27 @@ struct Feed {
 
 /// The immutable list of a cycle's work. What it points to lives in the Plan that it is part of.
 struct Schedule {
-    std::uint64_t generation = 0;
+    std::uint64_t generation = 0;  ///< transactions adopted; the graph thread's
     std::vector<Feed> feeds;
     std::vector<Latch> latches;
     std::vector<Step> steps;
     std::vector<Tap*> taps;
     Source* source = nullptr;  ///< paces the loop instead of the clock
-    bool plain = true;         ///< all components run every cycle and no output is checked
+    std::vector<Stretch> stretches;
+    bool selective = false;              ///< some steps are not plain
     std::vector<const void*> footprint;  ///< cache lines to fetch before a cycle
+
+    /// Once all steps are there.
+    void findStretches() {
+        for (const Step& step : steps) {
+            const bool plain =
+                step.every == 1 && !step.optional && step.component->stagedOutputs().empty();
+            selective = selective || !plain;
+            if (stretches.empty() || stretches.back().plain != plain)
+                stretches.push_back({&step, &step, plain});
+            ++stretches.back().end;
+        }
+    }
 };
 
 /// An input that reads from another place. Either `source` or `injector` is
@@ -99,26 +121,26 @@ struct HandOver {
     const Component* previous;
 };
 
+/// A component whose last cycle has come while the loop runs.
+struct Leaving {
+    Component* component;
+    ComponentFigures* figures;
+    std::vector<Latch> latches;  ///< of its outputs, by which others see the previous cycle
+    std::vector<Tap*> taps;      ///< of its outputs
+};
+
 /// Everything that changes at one cycle boundary. Owned by the graph thread,
-/// which waits until it is applied.
+/// which waits until Cycle::apply() has made the change.
 struct Adoption {
     const Schedule* schedule = nullptr;  ///< the next one; null = stays
     std::vector<Latch> new_latches;      ///< to be filled before inputs read them
     std::vector<Rewire> rewires;
+    std::size_t rewires_of_new = 0;  ///< the first so many are of inputs that never had a writer
     std::vector<Audience> audiences;
     std::vector<HandOver> hand_overs;
+    std::vector<Leaving> leaving;
     std::vector<StagedValue*> values;  ///< parameters, and what derives from them
     std::int64_t period_ns = 0;        ///< the loop's new period; 0 = stays
-
-    /// Makes the change. By whoever runs the cycle; real-time safe.
-    void apply() noexcept {
-        for (const Latch& latch : new_latches) latch.copy();
-        for (Rewire& rewire : rewires) rewire.apply();
-        for (const Audience& audience : audiences) audience.output->setConnected(audience.present);
-        for (StagedValue* value : values) value->commit();
-        for (const HandOver& hand_over : hand_overs)
-            hand_over.successor->takeOver(*hand_over.previous);
-    }
 };
 
 }  // namespace rtcf::executor

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "loop/floating_point.hpp"
 #include "plugins/linked_files.hpp"
 #include "plugins/trusted_file.hpp"
 #include "refusal.hpp"
@@ -67,6 +68,8 @@ void* openCopy(const std::string& path, int file) {
     // sanitizers find the symbols by this name, and it keeps the name unique.
     const int copy = privateCopy(path, file);
     const std::string copy_path = fmt::format("/proc/{}/fd/{}", ::getpid(), copy);
+    // Linked with -ffast-math it would change how all others compute from here on.
+    const FloatingPointKeeper floating_point;
     void* handle = ::dlopen(copy_path.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (handle == nullptr) {
         std::string why = ::dlerror();

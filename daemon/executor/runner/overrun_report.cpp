@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 namespace rtcf::executor {
 
 namespace {
@@ -25,31 +27,40 @@ std::string OverrunReport::take(const Loop& loop, const Graph& graph, bool last)
     if (missed != told_missed_) line += fmt::format(", {} missed", cycles(missed - told_missed_));
     if (told_at_ns_ != 0)
         line += fmt::format(" in {:.0f} s", static_cast<double>(now - told_at_ns_) / 1e9);
-    if (const std::string name = latestComponent(graph); !name.empty())
-        line += ", most of them in " + name;
+    line += mostFrequentCause(figures, graph);
     told_at_ns_ = now;
     told_overruns_ = overruns;
     told_missed_ = missed;
     return line;
 }
 
-// The component that was running most often since the last line, when a cycle should have ended.
-std::string OverrunReport::latestComponent(const Graph& graph) {
+// What made most of them since the last line: a component that was running when a cycle should have
+// ended, or what no component is to blame for.
+std::string OverrunReport::mostFrequentCause(const LoopFigures& figures, const Graph& graph) {
     std::map<std::shared_ptr<const ComponentFigures>, std::uint64_t> present;
-    std::string name;
+    std::string text;
     std::uint64_t most = 0;
+    const auto consider = [&](std::uint64_t count, const std::string& cause) {
+        if (count <= most) return;
+        most = count;
+        text = cause;
+    };
     for (const GraphNode& node : graph.nodes()) {
-        const std::shared_ptr<const ComponentFigures> figures = node.instance->figures();
-        const std::uint64_t count = figures->overruns.load(std::memory_order_relaxed);
-        const auto told = told_of_.find(figures);
-        const std::uint64_t since = count - (told == told_of_.end() ? 0 : told->second);
-        present.emplace(figures, count);
-        if (since <= most) continue;
-        most = since;
-        name = node.instance->fullName();
+        const std::shared_ptr<const ComponentFigures> counted = node.instance->figures();
+        const std::uint64_t count = counted->overruns.load(std::memory_order_relaxed);
+        const auto told = told_of_.find(counted);
+        present.emplace(counted, count);
+        consider(count - (told == told_of_.end() ? 0 : told->second),
+                 ", most of them in " + node.instance->fullName());
     }
     told_of_ = std::move(present);
-    return name;
+    const std::uint64_t late = figures.late_wake_ups.value();
+    const std::uint64_t exchanges = figures.exchange_overruns.value();
+    consider(late - std::exchange(told_late_, late),
+             ", most of them as the machine woke the loop late");
+    consider(exchanges - std::exchange(told_exchanges_, exchanges),
+             ", most of them while changes or values were taken over");
+    return text;
 }
 
 }  // namespace rtcf::executor

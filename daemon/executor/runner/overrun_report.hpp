@@ -20,11 +20,13 @@ class OverrunReport {
     std::string take(const Loop& loop, const Graph& graph, bool last);
 
    private:
-    std::string latestComponent(const Graph& graph);
+    std::string mostFrequentCause(const LoopFigures& figures, const Graph& graph);
 
     std::int64_t told_at_ns_ = 0;
     std::uint64_t told_overruns_ = 0;
     std::uint64_t told_missed_ = 0;
+    std::uint64_t told_late_ = 0;
+    std::uint64_t told_exchanges_ = 0;
     std::map<std::shared_ptr<const ComponentFigures>, std::uint64_t> told_of_;
 };
 

@@ -93,4 +93,9 @@ std::size_t Replay::takeOutputs(std::vector<RecordedMessage>& outputs) {
     return bytes;
 }
 
+void Replay::discardOutputs() {
+    std::vector<RecordedMessage> outputs;
+    takeOutputs(outputs);
+}
+
 }  // namespace rtcf::executor

@@ -65,6 +65,9 @@ class Replay {
     /// Runs cycles; fewer if the loop ends.
     ReplayOutcome run(const ReplayChunk& chunk);
 
+    /// Forgets what was written since.
+    void discardOutputs();
+
    private:
     void inject(const RecordedMessage& message);
     std::size_t takeOutputs(std::vector<RecordedMessage>& outputs);

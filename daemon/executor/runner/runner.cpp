@@ -28,7 +28,10 @@ Runner::Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr
                FlightRecorder& recorder)
     : name_(std::move(name)),
       log_(log),
-      events_(std::move(events)),
+      events_([this, events = std::move(events)](RunnerEvent event) {
+          event.state = numberedState();
+          events(std::move(event));
+      }),
       recorder_(recorder),
       loop_(log, recorder),
       stall_monitor_(loop_),
@@ -63,7 +66,7 @@ Runner::~Runner() {
 void Runner::post(std::function<void()> job) {
     {
         const std::lock_guard<std::mutex> lock(jobs_mutex_);
-        jobs_.push_back(std::move(job));
+        jobs_.push_back({std::move(job), loop_.stops()});
     }
     jobs_changed_.notify_all();
 }
@@ -74,13 +77,14 @@ void Runner::threadMain() {
     std::unique_lock<std::mutex> lock(jobs_mutex_);
     while (!ending_) {  // what still waits then is not begun any more
         jobs_changed_.wait_for(lock, kTick, [this] { return ending_ || !jobs_.empty(); });
-        std::function<void()> job;
+        Job job{};
         if (!jobs_.empty()) {
             job = std::move(jobs_.front());
             jobs_.pop_front();
         }
         lock.unlock();
-        if (job) job();
+        job_stops_ = job.stops;
+        if (job.work) job.work();
         note({});
         tick();
         lock.lock();
@@ -128,9 +132,22 @@ void Runner::loopEnded() {
     publish({loop_.fault().component_name.data()});
 }
 
+void Runner::setState(RunnerState state) noexcept {
+    state_ = state;
+    numbered_state_.store({state, numbered_state_.load().number + 1});
+}
+
+// A stop is final: no work that was posted before it begins cycles.
+void Runner::requireNoStop() const {
+    if (loop_.stops() == job_stops_) return;
+    throw Refusal(
+        RefusalKind::FailedPrecondition,
+        fmt::format("the loop of {} is not started: a stop was asked for after the start", name_));
+}
+
 void Runner::noteLoopFault() {
     const LoopFault& fault = loop_.fault();
-    state_ = fault.kind == LoopFault::Kind::None ? RunnerState::Stopped : RunnerState::Faulted;
+    setState(fault.kind == LoopFault::Kind::None ? RunnerState::Stopped : RunnerState::Faulted);
     if (state_ == RunnerState::Faulted) {
         RunnerEvent event{RunnerEvent::Kind::LoopEnded, {}, {}, fault.iteration};
         if (fault.kind == LoopFault::Kind::Overruns) {
@@ -161,24 +178,26 @@ const GraphNode* Runner::nodeOf(const Component* component) const noexcept {
     return nullptr;
 }
 
-// Components that failed while the loop went on: said once each, until the next start.
+// Components that failed while the loop went on: each kind said once, until the next start.
 void Runner::noteComponentFaults() {
-    ComponentFault fault;
-    while (loop_.popFault(fault)) {
-        const GraphNode* node = nodeOf(fault.component);
-        if (node == nullptr || !node->instance->faultText().empty()) continue;
-        const std::string& name = node->instance->fullName();
-        const std::string what =
-            fault.kind == LoopFault::Kind::NotFinite
-                ? fmt::format("output {} is not finite: readers keep its last value",
-                              fault.text.data())
-                : fmt::format("update() threw: {}; taken out, the loop goes on", fault.text.data());
-        node->instance->setFault(fmt::format("iteration {}: {}", fault.iteration, what));
+    const std::uint64_t count = loop_.figures().faults.value();
+    if (std::exchange(told_faults_, count) == count) return;
+    for (const GraphNode& node : plan_->graph.nodes()) noteFaultsOf(*node.instance);
+}
+
+void Runner::noteFaultsOf(Instance& instance) {
+    ComponentFaults& faults = instance.figures()->faults;
+    const auto say = [&](const ComponentFault* fault, const char* text) {
+        if (fault == nullptr) return;
+        const std::string what = fmt::vformat(text, fmt::make_format_args(fault->text.data()));
+        instance.setFault(fmt::format("iteration {}: {}", fault->iteration, what));
         events_({RunnerEvent::Kind::ComponentFailed,
-                 fmt::format("{}: iteration {}: {}", name, fault.iteration, what), name,
-                 fault.iteration});
-        publish({name});
-    }
+                 fmt::format("{}: iteration {}: {}", instance.fullName(), fault->iteration, what),
+                 instance.fullName(), fault->iteration});
+        publish({instance.fullName()});
+    };
+    say(faults.not_finite.take(), "output {} is not finite: readers keep its last value");
+    say(faults.taken_out.take(), "update() threw: {}; taken out, the loop goes on");
 }
 
 void Runner::noteOverruns(bool last) {
@@ -282,7 +301,7 @@ ChangeOutcome Runner::start(const Progress& progress) {
         stopAll();
         throw;
     }
-    state_ = RunnerState::Running;
+    setState(RunnerState::Running);
     status_.clear();
     publish();
     for (const std::string& problem : degraded_) {
@@ -301,6 +320,7 @@ bool Runner::wantsSimulation(const Progress& progress) {
     progress("asking the ROS master for /use_sim_time");
     const auto until = std::chrono::steady_clock::now() + kBridgePatience;
     while (std::chrono::steady_clock::now() < until && !ending_) {
+        requireNoStop();
         const BridgeStatus status = bridge_->status();
         if (status.simulated_time) return *status.simulated_time;
         if (!status.connected && !status.problem.empty()) return false;  // there is none
@@ -343,7 +363,7 @@ void Runner::noteClockJumps() {
 
 RealtimeProblems Runner::lockAndStart() {
     lacks_realtime_ = false;
-    if (simulated_) return loop_.start(loopSettings());
+    if (simulated_) return loop_.start(loopSettings(), job_stops_);
     RealtimeProblems problems = lockMemory(settings_.loop.realtime);
     for (RealtimeProblem& problem : checkScheduling(settings_.loop.realtime))
         problems.push_back(std::move(problem));
@@ -357,7 +377,7 @@ RealtimeProblems Runner::lockAndStart() {
                                   problem.text, name_));
     }
     tuned_spin_ns_ = -1;
-    for (RealtimeProblem& problem : loop_.start(loopSettings()))
+    for (RealtimeProblem& problem : loop_.start(loopSettings(), job_stops_))
         problems.push_back(std::move(problem));
     return problems;
 }
@@ -372,14 +392,12 @@ LoopSettings Runner::loopSettings() const {
 ChangeOutcome Runner::stop(const Progress& progress) {
     if (loop_.joinable()) {
         progress("stopping the loop");
-        loop_.requestStop();
+        if (!loop_.stopRequested())
+            loop_.requestStop();  // it must not void a start that came since
         if (!loop_.join(adoptionTimeout())) {
-            throw Refusal(
-                RefusalKind::Unavailable,
-                fmt::format(
-                    "the loop of {} does not reach the end of its cycle: a component does not "
-                    "return from update()",
-                    name_));
+            throw Refusal(RefusalKind::Unavailable,
+                          fmt::format("the loop of {} does not reach the end of its cycle: {}",
+                                      name_, whatDoesNotReturn()));
         }
         loopEnded();
     } else if (state_ == RunnerState::Stepping) {
@@ -403,8 +421,8 @@ ChangeOutcome Runner::step(std::uint64_t cycles, const Progress& progress) {
     requireNoLoop();
     if (state_ != RunnerState::Stepping) {
         startAll(progress);
-        loop_.beginStepping(settings_.loop);
-        state_ = RunnerState::Stepping;
+        beginStepping();
+        setState(RunnerState::Stepping);
         status_.clear();
         publish();
     }
@@ -447,6 +465,16 @@ ReplayOutcome Runner::replay(const ReplayChunk& chunk, const Progress& progress)
     return outcome;
 }
 
+// Of components that have started.
+void Runner::beginStepping(std::int64_t stamp_ns) {
+    try {
+        loop_.beginStepping(settings_.loop, job_stops_, stamp_ns);
+    } catch (const Refusal&) {
+        stopAll();
+        throw;
+    }
+}
+
 ReplayOutcome Runner::beginReplay(const ReplayChunk& chunk, const Progress& progress) {
     requireNoLoop();
     if (state_ == RunnerState::Stepping) endStepping();
@@ -455,12 +483,12 @@ ReplayOutcome Runner::beginReplay(const ReplayChunk& chunk, const Progress& prog
     if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>());
     try {
         startAll(progress);
+        beginStepping(chunk.start_ns);
     } catch (const Refusal&) {
         if (bridge_) bridge_->setTable(bridgeTable());
         throw;
     }
-    loop_.beginStepping(settings_.loop, chunk.start_ns);
-    state_ = RunnerState::Stepping;
+    setState(RunnerState::Stepping);
     status_.clear();
     replay_ = std::make_unique<Replay>(plan_->bridgeTable(), loop_, chunk.start_ns);
     publish();
@@ -498,11 +526,12 @@ void Runner::renewComponents(const Progress& progress) {
 }
 
 void Runner::endStepping() {
+    loop_.endStepping();
     if (replay_) {
+        replay_->discardOutputs();  // ROS sees nothing of them
         replay_.reset();
         if (bridge_) bridge_->setTable(bridgeTable());
     }
-    loop_.endStepping();
     noteLoopFault();
     stopAll();
     publish({loop_.fault().component_name.data()});
@@ -514,11 +543,13 @@ void Runner::startAll(const Progress& progress) {
         for (const std::size_t index : plan_->wiring.order) {
             Instance& instance = *plan_->graph.nodes()[index].instance;
             progress("starting " + instance.fullName());
+            requireNoStop();
             note(instance.fullName() + ".start");
             started.push_back(&instance);
             instance.setFault({});
             instance.start();
         }
+        requireNoStop();
     } catch (const Refusal&) {
         for (auto instance = started.rbegin(); instance != started.rend(); ++instance)
             (*instance)->stop();
@@ -555,14 +586,30 @@ std::shared_ptr<Instance> Runner::makeInstance(ComponentDefinition definition,
     return instance;
 }
 
+void Runner::requireNoReplay() const {
+    if (!replay_) return;
+    throw Refusal(RefusalKind::FailedPrecondition,
+                  fmt::format("a replay of {0} is under way: wait for its end, or stop it: "
+                              "rtcfctl -r {0} stop",
+                              name_));
+}
+
+std::string Runner::whatDoesNotReturn() const {
+    const std::string activity = recorder_.realtimeActivity();
+    return (activity.empty() ? "a component" : activity + "()") + " does not return";
+}
+
+void Runner::adoptAtBoundary(Adoption& adoption) {
+    note({});
+    if (loop_.adopt(adoption, adoptionTimeout())) return;
+    throw Refusal(RefusalKind::Unavailable,
+                  fmt::format("the loop of {} reaches no cycle boundary: {}; nothing has changed",
+                              name_, whatDoesNotReturn()));
+}
+
 void Runner::adopt(Change change, const Progress& progress) {
     noticeEnd();
-    if (replay_) {
-        throw Refusal(RefusalKind::FailedPrecondition,
-                      fmt::format("a replay of {0} is under way: wait for its end, or stop it: "
-                                  "rtcfctl -r {0} stop",
-                                  name_));
-    }
+    requireNoReplay();
     const Graph graph = change.graph;
     Wiring wiring = wire(graph, filter(), change.loading);
     checkTaps(wiring);
@@ -579,15 +626,8 @@ void Runner::adopt(Change change, const Progress& progress) {
             instance->start();
         }
     }
-    note({});
     progress("adopting the change");
-    if (!loop_.adopt(adoption, adoptionTimeout())) {
-        throw Refusal(RefusalKind::Unavailable,
-                      fmt::format("the loop of {} reaches no cycle boundary: a component does not "
-                                  "return from update(); "
-                                  "nothing has changed",
-                                  name_));
-    }
+    adoptAtBoundary(adoption);
     plan->noteKept(adoption, *plan_);
     std::swap(plan_, plan);
     if (simulated_) {
@@ -600,6 +640,7 @@ void Runner::adopt(Change change, const Progress& progress) {
     }
     // Out of the loop since its last boundary: what left may take its time.
     for (const auto& instance : change.leaving) {
+        noteFaultsOf(*instance);
         note(instance->fullName() + ".stop");
         instance->stop();
         note(instance->fullName() + ".cleanup");
@@ -778,16 +819,22 @@ ChangeOutcome Runner::setParameters(
     const std::string& name, const std::vector<std::pair<std::string, ParameterValue>>& batch) {
     Instance& instance = *plan_->graph.get(name).instance;
     const std::vector<ParameterValue> previous = instance.parameterValues();
-    Change change;
-    change.graph = plan_->graph;
-    change.changed = {name};
-    change.values = instance.stageParameters(batch);
+    noticeEnd();
+    requireNoReplay();
+    // Values alone: the schedule stays as it is.
+    Adoption adoption;
+    adoption.values = instance.stageParameters(batch);
     try {
-        adopt(std::move(change), [](const std::string&) {});
+        adoptAtBoundary(adoption);
     } catch (const Refusal&) {
         instance.restoreParameterValues(previous);
         throw;
     }
+    instance.releaseStaged();
+    ++plan_->schedule.generation;  // which the cycle does not look at
+    publish({name});
+    if (bridge_) bridge_->setTable(bridgeTable());
+    noticeEnd();
     return outcome(name);
 }
 
@@ -824,13 +871,10 @@ void Runner::publish(const std::set<std::string>& changed) {
 }
 
 void Runner::publishPicture() {
-    RunnerPicture next{state_,
-                       settings_,
-                       degraded_,
-                       status_,
-                       bridge_ ? bridge_->status() : BridgeStatus{},
-                       simulated_,
-                       size_watch_.total()};
+    RunnerPicture next{state_,     numbered_state_.load().number,
+                       settings_,  degraded_,
+                       status_,    bridge_ ? bridge_->status() : BridgeStatus{},
+                       simulated_, size_watch_.total()};
     if (settings_.spin_auto && tuned_spin_ns_ >= 0) next.settings.loop.spin_ns = tuned_spin_ns_;
     const std::lock_guard<std::mutex> lock(published_mutex_);
     picture_ = std::move(next);

@@ -38,6 +38,12 @@ namespace rtcf::executor {
 
 enum class RunnerState { Stopped, Running, Faulted, Stuck, Stepping };
 
+/// A state, and how many there have been: of two, the one with the higher number is newer.
+struct NumberedState {
+    RunnerState state = RunnerState::Stopped;
+    std::uint32_t number = 0;
+};
+
 /// What came of a change.
 struct ChangeOutcome {
     std::uint64_t generation = 0;
@@ -66,11 +72,13 @@ struct RunnerEvent {
     std::string component;
     std::uint64_t iteration = 0;
     std::vector<std::string> parameters = {};  ///< that were changed, other than by a request
+    NumberedState state = {};                  ///< when it happened
 };
 
 /// Counters and state for a status query; any thread.
 struct RunnerPicture {
     RunnerState state = RunnerState::Stopped;
+    std::uint32_t state_number = 0;  ///< see NumberedState
     RunnerSettings settings;
     std::vector<std::string> degraded;
     std::string status;
@@ -99,7 +107,8 @@ class Runner final : private RunnerView {
     /// Queues work for the graph thread, which calls the functions below. Any thread.
     void post(std::function<void()> job);
     /// Ends the loop at the next boundary without waiting for the graph thread; the stop hooks
-    /// follow when it is free. Any thread.
+    /// follow when it is free. Work that was posted before cannot start the loop any more. Any
+    /// thread.
     void requestStop() noexcept { loop_.requestStop(); }
 
     /// @name By jobs, on the graph thread. All throw Refusal and have then changed nothing.
@@ -141,6 +150,7 @@ class Runner final : private RunnerView {
     const std::string& name() const noexcept override { return name_; }
     std::shared_ptr<const GraphSnapshot> snapshot() const override;
     RunnerPicture picture() const override;
+    NumberedState numberedState() const noexcept { return numbered_state_.load(); }
     const Loop& loop() const noexcept override { return loop_; }
     const FlightRecorder& recorder() const noexcept { return recorder_; }
     /// Name of the hook that the graph thread is in, and since when; empty = none.
@@ -162,13 +172,25 @@ class Runner final : private RunnerView {
     std::uint64_t logRecordsDropped() const override { return log_.dropped(); }
     bool popCycle(CycleRecord& record) override { return loop_.popRecord(record); }
 
+    struct Job {
+        std::function<void()> work;
+        std::uint64_t stops;  // that had been requested when it was posted
+    };
+
     void threadMain();
     void tick();
+    void setState(RunnerState state) noexcept;
+    void requireNoStop() const;
     void noticeEnd();
     void requireNoLoop();
+    void requireNoReplay() const;
+    std::string whatDoesNotReturn() const;
+    /// Hands it to the loop. @throws Refusal if that does not take it
+    void adoptAtBoundary(Adoption& adoption);
     void loopEnded();
     void noteLoopFault();
     void noteComponentFaults();
+    void noteFaultsOf(Instance& instance);
     void noteOverruns(bool last);
     void noteSizes();
     /// A change of parameters that the bridge asks for.
@@ -177,6 +199,7 @@ class Runner final : private RunnerView {
     std::shared_ptr<const BridgeTable> bridgeTable() const;
     void tuneSpin();
     const GraphNode* nodeOf(const Component* component) const noexcept;
+    void beginStepping(std::int64_t stamp_ns = 0);
     void endStepping();
     ReplayOutcome beginReplay(const ReplayChunk& chunk, const Progress& progress);
     void renewComponents(const Progress& progress);
@@ -221,10 +244,12 @@ class Runner final : private RunnerView {
     std::unique_ptr<Plan> plan_ = std::make_unique<Plan>();
     std::size_t most_taps_ = SIZE_MAX;
     RunnerState state_ = RunnerState::Stopped;
+    std::uint64_t job_stops_ = 0;  // Job::stops of the present one
     std::vector<std::string> degraded_;
     std::string status_;
     bool lacks_realtime_ = false;  // the loop runs without something essential
     OverrunReport overrun_report_;
+    std::uint64_t told_faults_ = 0;    // LoopFigures::faults at the last look
     std::int64_t tuned_spin_ns_ = -1;  // by tuneSpin(); -1 = not yet
     std::unique_ptr<Replay> replay_;   // while one is under way
     std::shared_ptr<SimulatedClock> clock_ = std::make_shared<SimulatedClock>();
@@ -234,6 +259,7 @@ class Runner final : private RunnerView {
     std::int64_t sizes_due_ns_ = 0;
 
     // Published for queries.
+    std::atomic<NumberedState> numbered_state_{};
     mutable std::mutex published_mutex_;
     std::shared_ptr<const GraphSnapshot> snapshot_ = std::make_shared<GraphSnapshot>();
     RunnerPicture picture_;
@@ -243,7 +269,7 @@ class Runner final : private RunnerView {
     // Jobs.
     std::mutex jobs_mutex_;
     std::condition_variable jobs_changed_;
-    std::deque<std::function<void()>> jobs_;
+    std::deque<Job> jobs_;
     std::atomic<bool> ending_{false};
     std::thread thread_;
 };

@@ -105,6 +105,12 @@ pb::RunnerState stateTo(RunnerState state) {
     return pb::RUNNER_STATE_STOPPED;
 }
 
+// The state that a message was made in.
+void setState(v1::Response& response, const NumberedState& state) {
+    response.set_state(stateTo(state.state));
+    response.set_state_number(state.number);
+}
+
 }  // namespace
 
 Server::Server(const std::string& socket_path)
@@ -153,6 +159,7 @@ void Server::publish(const RunnerEvent& event) {
     } else {
         *response.mutable_event() = eventTo(event);
     }
+    setState(response, event.state);
     post(0, std::move(response), false);
 }
 
@@ -389,6 +396,7 @@ bool Server::answerQuery(std::uint64_t connection, const v1::Request& request) {
             response.mutable_done();
             break;
         case v1::Request::kGetStatus:
+            setState(response, runner_->numberedState());
             *response.mutable_status() = status();
             break;
         case v1::Request::kServiceAnswer:
@@ -473,6 +481,7 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
         } catch (const std::exception& error) {
             response = errorResponse(id, RefusalKind::FailedPrecondition, error.what());
         }
+        setState(response, runner_->numberedState());
         log_->drain();  // what the hooks said comes before the answer
         post(connection, std::move(response), true);
     });
@@ -644,6 +653,10 @@ pb::RunnerStatistics Server::statistics() const {
     message.set_overruns(loop.figures().overruns.load(std::memory_order_relaxed) -
                          baseline_.overruns);
     message.set_missed(loop.figures().missed.load(std::memory_order_relaxed) - baseline_.missed);
+    message.set_late_wake_ups(loop.figures().late_wake_ups.value() - baseline_.late_wake_ups);
+    message.set_exchange_overruns(loop.figures().exchange_overruns.value() -
+                                  baseline_.exchange_overruns);
+    message.set_catching_up(loop.figures().catching_up.value() - baseline_.catching_up);
     for (const auto& component : graph->components) {
         pb::ComponentStatistics& statistics = *message.add_components();
         statistics.set_component(component->full_name);
@@ -692,6 +705,9 @@ void Server::resetStatistics() {
     baseline_.adoption = loop.figures().adoption.snapshot();
     baseline_.overruns = loop.figures().overruns.load(std::memory_order_relaxed);
     baseline_.missed = loop.figures().missed.load(std::memory_order_relaxed);
+    baseline_.late_wake_ups = loop.figures().late_wake_ups.value();
+    baseline_.exchange_overruns = loop.figures().exchange_overruns.value();
+    baseline_.catching_up = loop.figures().catching_up.value();
 }
 
 }  // namespace rtcf::executor

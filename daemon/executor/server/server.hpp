@@ -68,6 +68,9 @@ class Server {
         HistogramSnapshot adoption;
         std::uint64_t overruns = 0;
         std::uint64_t missed = 0;
+        std::uint64_t late_wake_ups = 0;
+        std::uint64_t exchange_overruns = 0;
+        std::uint64_t catching_up = 0;
     };
 
     static Baseline::Component figuresOf(const ComponentFigures& figures);

@@ -22,6 +22,9 @@ class Counter {
 #endif
     }
 
+    /// While nobody adds.
+    void reset() noexcept { value_.store(0, std::memory_order_relaxed); }
+
     /// Any thread; real-time safe.
     std::uint64_t value() const noexcept RTCF_NONBLOCKING {
         return value_.load(std::memory_order_relaxed);

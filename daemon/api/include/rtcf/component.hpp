@@ -42,10 +42,11 @@ struct ComponentContext {
     std::string runner;                ///< name of the runner
     const LoopClock* clock = nullptr;  ///< the loop's clock
     std::int64_t period_ns = 0;        ///< of this component, ns
-    std::int64_t elapsed_ns = 0;       ///< whole periods since its last update, ns
+    std::int64_t elapsed_ns = 0;       ///< if it does not run every cycle: as the clock's, its own
     std::int64_t updated_ns =
         -1;                 ///< loop time in whole periods at its last update, ns; -1 = not yet
     bool disabled = false;  ///< taken out after a fault; written by the loop
+    std::uint32_t recorder_slot = 0;                          ///< in the flight recorder
     DeviceFigures* device = nullptr;                          ///< never null once attached
     LogSink* log = nullptr;                                   ///< never null once attached
     NodeGate* gate = nullptr;                                 ///< to the ROS node; null without one
@@ -73,8 +74,11 @@ class Component {
     virtual bool configure() { return true; }  ///< Acquire what is needed. Not real-time.
     virtual bool start() { return true; }      ///< The loop is about to run. Not real-time.
     virtual void update() = 0;                 ///< One cycle. Real-time.
-    /// Once, in schedule order, when the loop ends for any reason but a crash:
-    /// write safe commands here. Real-time.
+    /// Once, when the loop ends for any reason but a crash, after an update() of this component
+    /// that threw, and when it is unloaded or replaced while the loop runs: write safe commands
+    /// here. It is a cycle like others, in schedule order: inputs are to be read, and what is
+    /// written reaches the components after this one and ROS. It may come after any part of an
+    /// update(). Real-time.
     virtual void safe() noexcept {}
     virtual void stop() {}     ///< The loop has ended. Not real-time.
     virtual void cleanup() {}  ///< Undo configure(). Not real-time.
@@ -103,7 +107,9 @@ class Component {
     /// This component's nominal period, ns.
     std::int64_t period() const noexcept RTCF_NONBLOCKING { return context_->period_ns; }
     /// Time since this component's last update in whole periods, ns; never below period().
-    std::int64_t elapsed() const noexcept RTCF_NONBLOCKING { return context_->elapsed_ns; }
+    std::int64_t elapsed() const noexcept RTCF_NONBLOCKING {
+        return std::max<std::int64_t>(context_->clock->elapsed_ns, context_->elapsed_ns);
+    }
     /// This component's nominal frequency, Hz.
     double frequency() const noexcept RTCF_NONBLOCKING {
         return 1e9 / static_cast<double>(context_->period_ns);
@@ -131,8 +137,13 @@ class Component {
     const std::vector<OutputBase*>& outputs() const noexcept { return rest_->outputs; }
     const std::vector<ParameterBase*>& parameters() const noexcept { return rest_->parameters; }
     const std::vector<DerivedBase*>& derived() const noexcept { return rest_->derived; }
-    /// Outputs whose values are checked before anybody reads them.
-    const std::vector<OutputBase*>& finiteOutputs() const noexcept { return rest_->finite_outputs; }
+    /// Outputs whose values nobody reads before the executor has let them pass.
+    const std::vector<OutputBase*>& stagedOutputs() const noexcept { return rest_->staged_outputs; }
+    /// Makes all outputs such, before anybody reads them.
+    void stageOutputs() {
+        for (OutputBase* output : rest_->outputs) output->stage();
+        rest_->staged_outputs = rest_->outputs;
+    }
     ComponentContext& context() const noexcept { return *context_; }
     const std::string& failure() const noexcept { return rest_->failure; }
     const LoopClock& clock() const noexcept RTCF_NONBLOCKING { return *context_->clock; }
@@ -144,7 +155,7 @@ class Component {
     void declare(InputBase* input) { declareIn(rest_->inputs, input, input->name(), "port"); }
     void declare(OutputBase* output) { declareIn(rest_->outputs, output, output->name(), "port"); }
     void declare(DerivedBase* derived) { rest_->derived.push_back(derived); }
-    void declareFinite(OutputBase* output) { rest_->finite_outputs.push_back(output); }
+    void declareFinite(OutputBase* output) { rest_->staged_outputs.push_back(output); }
     void declare(ParameterBase* parameter) {
         declareIn(rest_->parameters, parameter, parameter->declaration().name, "parameter");
     }
@@ -177,7 +188,7 @@ class Component {
         std::vector<OutputBase*> outputs;
         std::vector<ParameterBase*> parameters;
         std::vector<DerivedBase*> derived;
-        std::vector<OutputBase*> finite_outputs;
+        std::vector<OutputBase*> staged_outputs;
         std::string failure;
     };
     std::unique_ptr<Rest> rest_ = std::make_unique<Rest>();
@@ -238,9 +249,9 @@ inline OutputBase::OutputBase(Component* owner, std::string name, std::string un
     raw_ = rest_->slot.get();
     owner->declare(this);
     if (finite == nullptr) return;
+    rest_->checked = true;
     rest_->policy = finite->policy;
-    rest_->staged = type.make_slot(nullptr);
-    raw_ = rest_->staged.get();
+    stage();
     owner->declareFinite(this);
 }
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "rtcf/any_type.hpp"
 #include "rtcf/arithmetic_type.hpp"
@@ -34,6 +35,8 @@ struct PortIdentity {
     std::string unit;
     const TypeInfo& type;
     bool connected = false;  ///< an input's: something feeds it; an output's: something reads it
+    bool kept_is_new =
+        false;  ///< an input's: its component has not read what an earlier writer left
 };
 
 /// What the executor handles of any input.
@@ -55,8 +58,9 @@ class InputBase {
 
     /// @name For the executor, at a cycle boundary
     /// @{
-    /// Reads from `source` on. A new writer's value counts once it writes; until then the present
-    /// value stays as old data. `continued`: the same writer's values by another slot.
+    /// Reads from `source` on. A new writer's value counts once it writes; until then the last
+    /// value stays, as new data if it has not been read. `continued`: the same writer's values by
+    /// another slot.
     void rewire(const SlotHeader* source, bool continued) noexcept RTCF_NONBLOCKING {
         if (continued) {
             // A value kept of an earlier writer stays, as before.
@@ -64,6 +68,10 @@ class InputBase {
         } else if (current_->sequence == 0 && seen_ == 0) {
             current_ = source;
         } else {
+            if (source_->sequence != seen_) {
+                current_ = source_;
+                identity_->kept_is_new = true;
+            }
             seen_ = source->sequence;
         }
         source_ = source;
@@ -94,6 +102,8 @@ class InputBase {
             current_ = source_;
             return DataStatus::New;
         }
+        if (current_ != source_ && std::exchange(identity_->kept_is_new, false))
+            return DataStatus::New;
         return current_->sequence != 0 ? DataStatus::Old : DataStatus::None;
     }
 
@@ -158,17 +168,28 @@ class OutputBase {
     /// The clock that stamps what is written; for the executor.
     void setClock(const LoopClock& clock) noexcept { clock_ = &clock; }
 
-    /// @name Of an output declared Finite; for the executor, after update(); real-time safe
+    /// @name Of an output that is staged, as one declared Finite is; for the executor
     /// @{
-    /// Lets readers see what was written, if it is finite. @return false if it is not
-    bool commitFinite() noexcept RTCF_NONBLOCKING {
+    /// From here on readers see nothing before commit(). Before there are any; not real-time safe.
+    void stage() {
+        if (rest_->staged != nullptr) return;
+        rest_->staged = type().make_slot(rest_->slot.get());
+        *rest_->staged = *rest_->slot;
+        rest_->examined = rest_->staged->sequence;
+        raw_ = rest_->staged.get();
+    }
+    /// Lets readers see what was written; if it is declared Finite, only a finite value. After
+    /// update(); real-time safe. @return false if it is not
+    bool commit() noexcept RTCF_NONBLOCKING {
         Rest& rest = *rest_;
         if (rest.staged->sequence == rest.examined) return true;
         rest.examined = rest.staged->sequence;
-        if (!type().finite(*rest.staged)) return false;
+        if (rest.checked && !type().finite(*rest.staged)) return false;
         type().copy(*rest.slot, *rest.staged);
         return true;
     }
+    /// What was written since the last commit() is never seen. Real-time safe.
+    void discard() noexcept RTCF_NONBLOCKING { rest_->examined = rest_->staged->sequence; }
     OnNonFinite nonFinitePolicy() const noexcept RTCF_NONBLOCKING { return rest_->policy; }
     /// @}
 
@@ -186,7 +207,8 @@ class OutputBase {
     struct Rest {
         PortIdentity identity;
         std::shared_ptr<SlotHeader> slot;
-        std::shared_ptr<SlotHeader> staged;  // of an output declared Finite
+        std::shared_ptr<SlotHeader> staged;  // null = readers see at once what is written
+        bool checked = false;                // declared Finite
         std::uint64_t examined = 0;          // the staged one's sequence at the last check
         OnNonFinite policy = OnNonFinite::Hold;
     };

@@ -46,7 +46,8 @@ struct LoopClock {
     Shared<std::uint64_t> iteration = 0;  ///< cycles since the loop started, from 0
     Shared<std::int64_t> time_ns = 0;     ///< monotonic loop time, ns; simulated under sim time
     Shared<std::int64_t> stamp_ns = 0;    ///< ROS time for message headers, ns since 1970
-    Shared<std::int64_t> period_ns = 1'000'000;  ///< nominal period of the loop, ns
+    Shared<std::int64_t> period_ns = 1'000'000;   ///< nominal period of the loop, ns
+    Shared<std::int64_t> elapsed_ns = 1'000'000;  ///< whole periods since the last cycle, ns
 };
 
 }  // namespace rtcf

@@ -52,7 +52,28 @@ class Watch final : public rtcf::Component {
     static constexpr double kMillisecond = 1e6;
 };
 
+// Takes 6 ms to take over.
+class SlowSuccessor final : public rtcf::Component {
+    void update() override {}
+    void takeOver(const rtcf::Component& /*previous*/) noexcept override {
+        const std::int64_t until = now() + 6'000'000;
+        while (now() < until) {
+        }
+    }
+};
+
+// A number below those that are normal, if it is not flushed to zero.
+class Subnormal final : public rtcf::Component {
+    rtcf::Output<double> out{this, "out"};
+    void update() override {
+        const volatile double smallest = 3e-308;
+        out.write(smallest / 16.0);
+    }
+};
+
 }  // namespace
 
+RTCF_COMPONENT(SlowSuccessor, "Takes long to take over")
+RTCF_COMPONENT(Subnormal, "Writes a subnormal number")
 RTCF_COMPONENT(Device, "Paces the loop")
 RTCF_COMPONENT(Watch, "Tells what it is told of time")

@@ -1,8 +1,11 @@
 // What a loop does when a cycle takes too long. No times are asserted here, only
 // what the counters must say of a cycle that took 6 ms of 1 ms.
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 
 #include "support/runner_fixture.hpp"
 
@@ -64,6 +67,39 @@ TEST_F(LoopTiming, OverrunIsCountedForTheComponentThatWasRunning) {
     load(definition("Ticker", "A"));
     overrun(OverrunPolicy::Skip);
     EXPECT_GE(runner().snapshot()->get("/S").figures->overruns.load(), 1U);
+}
+
+TEST_F(LoopTiming, WhatAChangeTakesIsNoComponentsOverrun) {
+    load(definition("Ticker", "A"));
+    ComponentDefinition relay = definition("Relay", "B");
+    relay.remaps = {{"out", "B_out"}};
+    load(relay);
+    start();
+    ASSERT_TRUE(runs());
+    replace("/B", definition("SlowSuccessor", "B"));
+    ASSERT_TRUE(runs());
+    EXPECT_GE(runner().loop().figures().exchange_overruns.value(), 1U);
+}
+
+// The process is held for a while between two cycles, as by a hypervisor.
+TEST_F(LoopTiming, LateWakeUpIsACauseOfItsOwn) {
+    load(definition("Ticker", "A"));
+    start();
+    ASSERT_TRUE(runs());
+    const auto late = [this] { return runner().loop().figures().late_wake_ups.value(); };
+    EXPECT_TRUE(eventually([&] {
+        const pid_t self = getpid();
+        const pid_t helper = fork();
+        if (helper == 0) {
+            kill(self, SIGSTOP);
+            usleep(10'000);
+            kill(self, SIGCONT);
+            _exit(0);
+        }
+        waitpid(helper, nullptr, 0);
+        return runs(2) && late() > 0;
+    }));
+    EXPECT_LE(late() + runner().snapshot()->get("/A").figures->overruns.load(), overruns());
 }
 
 // Also where the machine gives no real time: then a loop is not to blame for being late.

@@ -1,6 +1,9 @@
 // A component that waits for its device and so paces the loop.
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <thread>
+
 #include "support/runner_fixture.hpp"
 
 namespace rtcf::test {
@@ -36,6 +39,30 @@ TEST_F(SourceTest, PacesTheLoop) {
     }
     EXPECT_EQ(iteration(), 50U) << "one cycle for each time that it is ready";
     EXPECT_EQ(runner().loop().figures().overruns.load(), 0U);
+}
+
+TEST_F(SourceTest, MissedBeatsAreCountedAndTold) {
+    ComponentDefinition watch = definition("Watch", "W");
+    watch.remaps = {{"in", "D_out"}};
+    load(watch);
+    startSilent();
+    ASSERT_TRUE(tick());
+    EXPECT_EQ(value("/W", "since"), 1.0);
+    EXPECT_EQ(runner().loop().figures().missed.load(), 0U);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    ASSERT_TRUE(tick());
+    const double periods = value("/W", "since");
+    EXPECT_GE(periods, 19.0) << "elapsed() is whole periods since the last update";
+    EXPECT_EQ(runner().loop().figures().missed.load(), static_cast<std::uint64_t>(periods) - 1);
+}
+
+TEST_F(SourceTest, LatencyIsHowFarABeatIsOff) {
+    startSilent();
+    for (int i = 0; i < 60; ++i) ASSERT_TRUE(tick());
+    const auto latency = runner().loop().figures().latency.snapshot();
+    EXPECT_EQ(latency.count, 50U);
+    EXPECT_GT(latency.maximum, 0);
+    EXPECT_LE(latency.maximum, 500'000) << "half a period: more is another beat";
 }
 
 TEST_F(SourceTest, ChangesAreAdoptedWhileItIsSilent) {

@@ -176,6 +176,69 @@ TEST_F(Lifecycle, LoopEndsWhileAnArrivingComponentStarts) {
     EXPECT_EQ(journal().count("/B update"), 0U);
 }
 
+TEST_F(Lifecycle, StopWhileStartHooksRunIsFinal) {
+    load(definition("Recorder", "A"));
+    const ComponentDefinition slow = blocker("B", "start");
+    load(slow);
+    journal().gate_open = false;
+    auto starting = begin([this] { return runner().start([](const std::string&) {}); });
+    ASSERT_TRUE(eventually([this] { return journal().count("/B start") == 1; }));
+    runner().requestStop();
+    journal().gate_open = true;
+    const std::string text = refusal([&] { starting.get(); });
+    EXPECT_NE(text.find("a stop was asked for after the start"), std::string::npos) << text;
+    EXPECT_EQ(state(), RunnerState::Stopped);
+    EXPECT_EQ(journal().count("/A update"), 0U);
+    EXPECT_EQ(journal().count("/A stop"), 1U);
+    EXPECT_EQ(journal().count("/B stop"), 1U);
+    start();
+    EXPECT_TRUE(runs()) << "what is asked for after it starts again";
+}
+
+TEST_F(Lifecycle, StopVoidsStartsAndStepsThatWait) {
+    load(definition("Recorder", "A"));
+    journal().gate_open = false;
+    const ComponentDefinition slow = blocker("B", "configure");
+    auto loading = beginLoad(slow);
+    auto starting = begin([this] { return runner().start([](const std::string&) {}); });
+    auto stepping = begin([this] { return runner().step(5, [](const std::string&) {}); });
+    runner().requestStop();
+    auto stopping = begin([this] { return runner().stop([](const std::string&) {}); });
+    auto last = begin([this] { return runner().start([](const std::string&) {}); });
+    journal().gate_open = true;
+    loading.get();
+    EXPECT_NE(refusal([&] { starting.get(); }), "");
+    EXPECT_NE(refusal([&] { stepping.get(); }), "");
+    stopping.get();
+    EXPECT_EQ(journal().count("/A safe"), 0U) << "nothing had run";
+    last.get();
+    EXPECT_TRUE(runs());
+}
+
+TEST_F(Lifecycle, StatesAreNumbered) {
+    load(definition("Recorder", "A"));
+    const auto number = [this] { return runner().numberedState().number; };
+    EXPECT_EQ(number(), 0U);
+    start();
+    EXPECT_EQ(number(), 1U);
+    EXPECT_EQ(runner().numberedState().state, RunnerState::Running);
+    setParameters("/A", {{"gain", 2.0}});
+    EXPECT_EQ(number(), 1U);
+    stop();
+    EXPECT_EQ(number(), 2U);
+    unload("/A");
+    ComponentDefinition failing = definition("Recorder", "B");
+    failing.parameters = {{"throws_at", std::int64_t{1}}};
+    load(failing);
+    step(1);
+    EXPECT_EQ(number(), 3U);
+    step(1);
+    EXPECT_EQ(number(), 4U);
+    ASSERT_EQ(events().back().kind, RunnerEvent::Kind::LoopEnded);
+    EXPECT_EQ(events().back().state.number, 4U) << "an event tells which state it is about";
+    EXPECT_EQ(events().back().state.state, RunnerState::Faulted);
+}
+
 TEST_F(Lifecycle, WhatHooksLogComesWithTheComponentsName) {
     load(definition("Chatter", "A"));
     start();

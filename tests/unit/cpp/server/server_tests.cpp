@@ -197,6 +197,45 @@ TEST_F(ServerTest, ChangeIsAnsweredWithProgressAndOutcome) {
               (std::vector<std::string>{"loading /A", "configuring /A", "adopting the change"}));
 }
 
+TEST_F(ServerTest, AnswersAndEventsTellTheNumberOfTheState) {
+    ExecutorClient client(socket_);
+    client.hello();
+    const Response begun = client.ask(start());
+    EXPECT_EQ(begun.state(), rtcf::v1::RUNNER_STATE_RUNNING);
+    Request stop;
+    stop.mutable_stop();
+    const Response stopped = client.ask(stop);
+    EXPECT_EQ(stopped.state(), rtcf::v1::RUNNER_STATE_STOPPED);
+    EXPECT_GT(stopped.state_number(), begun.state_number());
+    const Response status = client.ask(getStatus());
+    EXPECT_EQ(status.state_number(), stopped.state_number());
+    EXPECT_EQ(status.state(), stopped.state());
+}
+
+// What reaches the socket before a stop cannot start the loop after it.
+TEST_F(ServerTest, StopVoidsAStartWhoseHooksRun) {
+    ExecutorClient client(socket_);
+    client.hello();
+    Request slow = load("Blocker", "B");
+    rtcf::v1::ParameterSetting& blocks =
+        *slow.mutable_load()->mutable_component()->add_parameters();
+    blocks.set_name("blocks");
+    blocks.mutable_value()->set_string_value("start");
+    ASSERT_TRUE(client.ask(slow).has_change());
+    journal().gate_open = false;
+    const std::uint64_t starting = client.send(start());
+    ASSERT_TRUE(eventually([] { return journal().count("/B start") == 1; }));
+    Request stop;
+    stop.mutable_stop();
+    const std::uint64_t stopping = client.send(stop);
+    (void)client.ask(getStatus());  // it has been read
+    journal().gate_open = true;
+    EXPECT_TRUE(client.answerTo(starting).has_error());
+    EXPECT_TRUE(client.answerTo(stopping).has_change());
+    EXPECT_EQ(client.ask(getStatus()).status().state(), rtcf::v1::RUNNER_STATE_STOPPED);
+    EXPECT_EQ(journal().count("/B update"), 0U);
+}
+
 TEST_F(ServerTest, RefusalCarriesItsCodeAndText) {
     ExecutorClient client(socket_);
     client.hello();
@@ -262,7 +301,8 @@ TEST_F(ServerTest, ChangeThatWasGivenUpDoesNotHappenLater) {
         << "only stop and restart are taken now";
     journal().gate_open = true;
     ASSERT_TRUE(eventually([] { return journal().count("/B cleanup") == 1; }));
-    ASSERT_TRUE(client.ask(load("Recorder", "E")).has_change());
+    ASSERT_TRUE(eventually([&] { return client.ask(load("Recorder", "E")).has_change(); }))
+        << "once the hook has returned";
     Request list;
     list.mutable_list_components();
     const Response response = client.ask(list);

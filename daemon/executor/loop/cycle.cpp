@@ -1,0 +1,286 @@
+#include "loop/cycle.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <exception>
+
+namespace rtcf::executor {
+
+namespace {
+
+constexpr std::int64_t kAbandoned = -1;  // no time: the cycle has ended before its end
+
+// What the flight recorder knows of a hook in the cycle, as long as it runs.
+class HookNote {
+   public:
+    HookNote(const FlightRecorder::RealtimeNotes& notes, const Component& component, Hook hook)
+        : notes_(notes) {
+        notes_.enterHook(component.context().recorder_slot, hook);
+    }
+    ~HookNote() { notes_.leaveHook(); }
+    HookNote(const HookNote&) = delete;
+    HookNote& operator=(const HookNote&) = delete;
+
+   private:
+    const FlightRecorder::RealtimeNotes& notes_;
+};
+
+}  // namespace
+
+Cycle::Cycle(FlightRecorder& recorder)
+    : schedule_(&empty_), notes_(recorder.realtimeNotes()), counter_(CycleCounter::calibrate()) {}
+
+void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles) {
+    clock_.iteration = 0;
+    clock_.time_ns = 0;
+    clock_.stamp_ns = 0;
+    clock_.period_ns = period_ns;
+    clock_.elapsed_ns = period_ns;
+    total_elapsed_ns_ = 0;
+    warmup_cycles_ = warmup_cycles;
+    for (const Step& step : schedule_->steps) {
+        step.context->period_ns = period_ns * step.every;
+        step.context->updated_ns = -1;
+        step.context->disabled = false;
+        step.figures->faults.clear();
+    }
+    noteSchedule();
+    figures_.iteration.store(0, std::memory_order_relaxed);
+    exchanged_at_ = UINT64_MAX;
+    fault_ = {};
+    active_ = true;
+}
+
+void Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NONBLOCKING {
+    const std::int64_t begin = readCycleCounter();
+    const bool worked = boundary_.waiting();
+    if (worked) boundary_.perform(*this);
+    const Schedule& schedule = *schedule_;
+    clock_.time_ns = time_ns;
+    clock_.stamp_ns = time_ns + stamp_offset_ns_.load(std::memory_order_relaxed);
+    const std::uint64_t iteration = clock_.iteration;
+    std::int64_t before = begin;
+    if (exchanges_) {
+        feed();
+        for (const Latch& latch : schedule.latches) latch.copy();
+    }
+    if (exchanges_ || worked) {
+        before = readCycleCounter();  // that was the work of no component
+        exchanged_ticks_ = before - begin;
+        exchanged_at_ = iteration;
+    }
+    notes_.setIteration(iteration);
+    if (schedule.selective) total_elapsed_ns_ += clock_.elapsed_ns;
+    if (iteration >= warmup_cycles_) {
+        for (const Stretch& stretch : schedule.stretches) {
+            before = stretch.plain ? update<true>(stretch.begin, stretch.end, before)
+                                   : updateSelected(stretch.begin, stretch.end, before);
+            if (before == kAbandoned) break;
+        }
+    } else {
+        before = updateSelected(schedule.steps.data(),
+                                schedule.steps.data() + schedule.steps.size(), before);
+    }
+    notes_.leaveComponents();
+    if (exchanges_ && before != kAbandoned) {
+        for (Tap* tap : schedule.taps) tap->push();
+    }
+    const std::int64_t duration = readCycleCounter() - begin;
+    if (iteration >= warmup_cycles_) {
+        figures_.duration.add(duration);
+        figures_.latency.add(latency_ns);
+    }
+    if (CycleRecord* record = records_.claim()) {
+        *record = {iteration, clock_.stamp_ns, latency_ns, counter_.toNs(duration)};
+        records_.commit();
+    }
+    clock_.iteration = iteration + 1;
+    figures_.iteration.store(iteration + 1, std::memory_order_relaxed);
+}
+
+// The one frame that catches: a component may throw, the loop may not. `Plain` leaves out what
+// most components do not have, so that it costs them nothing.
+// @param before ticks when they begin @return ticks when the last has ended, or kAbandoned
+template <bool Plain>
+[[gnu::always_inline]] inline std::int64_t Cycle::update(const Step* next, const Step* end,
+                                                         std::int64_t before) noexcept {
+    const FlightRecorder::RealtimeNotes notes = notes_;
+    while (true) {
+        bool goes_on = false;
+        try {
+            for (; next != end; ++next) {
+                if (!Plain && !due(*next)) continue;
+                notes.enterComponent(next->slot);
+                next->component->update();
+                if (!Plain) commit(*next->component, *next->figures);
+                const std::int64_t after = readCycleCounter();
+                const std::int64_t duration = after - before;
+                before = after;
+                next->ended_ticks = after;
+                if (Plain || clock_.iteration >= warmup_cycles_)
+                    next->figures->duration.add(duration);
+            }
+            return before;
+        } catch (const std::exception& error) {
+            goes_on = threw(*next, error.what());
+        } catch (...) {
+            goes_on = threw(*next, "an exception of unknown type");
+        }
+        if (Plain || !goes_on) return kAbandoned;
+        before = readCycleCounter();
+        next->ended_ticks = before;
+        ++next;
+    }
+}
+
+// Steps that are not plain; a function of its own, as it needs registers that the others do not.
+[[gnu::noinline]] std::int64_t Cycle::updateSelected(const Step* next, const Step* end,
+                                                     std::int64_t before) noexcept {
+    return update<false>(next, end, before);
+}
+
+// Whether a component runs in this cycle; then its clock is set.
+bool Cycle::due(const Step& step) const noexcept RTCF_NONBLOCKING {
+    ComponentContext& context = *step.context;
+    if (context.disabled) return false;
+    if (step.every == 1) return true;
+    if (clock_.iteration % step.every != step.phase) return false;
+    context.elapsed_ns = context.updated_ns >= 0
+                             ? total_elapsed_ns_ - context.updated_ns
+                             : std::max<std::int64_t>(clock_.elapsed_ns, context.period_ns);
+    context.updated_ns = total_elapsed_ns_;
+    return true;
+}
+
+// Lets readers see what a component has written to outputs that are kept from them until then.
+void Cycle::commit(Component& component, ComponentFigures& figures) noexcept RTCF_NONBLOCKING {
+    for (OutputBase* output : component.stagedOutputs()) {
+        if (output->commit()) continue;
+        if (output->nonFinitePolicy() == OnNonFinite::Stop && !last_ && !faulted()) {
+            endLoop(LoopFault::Kind::NotFinite, &component, output->name().c_str());
+            continue;
+        }
+        figures.faults.not_finite.note(clock_.iteration, output->name().c_str());
+        figures.faults.count.add(1);
+        figures_.faults.add(1);
+    }
+}
+
+// @return whether the cycle goes on with the next component
+bool Cycle::threw(const Step& step, const char* text) noexcept {
+    step.context->disabled = true;
+    // Nobody sees what it has half written.
+    for (OutputBase* output : step.component->stagedOutputs()) output->discard();
+    if (!step.optional) {
+        endLoop(LoopFault::Kind::Exception, step.component, text);
+        return false;
+    }
+    step.figures->faults.taken_out.note(clock_.iteration, text);
+    step.figures->faults.count.add(1);
+    figures_.faults.add(1);
+    makeSafe(*step.component, *step.figures);
+    return true;
+}
+
+void Cycle::endLoop(LoopFault::Kind kind, const Component* component, const char* text) noexcept {
+    fault_.kind = kind;
+    fault_.component = component;
+    if (component != nullptr) {
+        std::strncpy(fault_.component_name.data(), component->fullName().c_str(),
+                     fault_.component_name.size() - 1);
+    }
+    fault_.iteration = clock_.iteration;
+    std::strncpy(fault_.text.data(), text, fault_.text.size() - 1);
+}
+
+void Cycle::makeSafe(Component& component, ComponentFigures& figures) noexcept {
+    {
+        const HookNote note(notes_, component, Hook::Safe);
+        component.safe();
+    }
+    commit(component, figures);
+}
+
+// In schedule order, so that a driver's safe() reads what the controller's has written.
+void Cycle::makeSafe(std::int64_t time_ns) noexcept {
+    if (!active_) return;
+    last_ = true;
+    clock_.time_ns = time_ns;
+    clock_.stamp_ns = time_ns + stamp_offset_ns_.load(std::memory_order_relaxed);
+    notes_.setIteration(clock_.iteration);
+    feed();
+    for (const Latch& latch : schedule_->latches) latch.copy();
+    for (const Step& step : schedule_->steps) {
+        // What was taken out has made safe then.
+        if (step.optional && step.context->disabled) continue;
+        makeSafe(*step.component, *step.figures);
+    }
+    for (Tap* tap : schedule_->taps) tap->push();
+    last_ = false;
+    active_ = false;
+}
+
+void Cycle::apply(Adoption& adoption) noexcept {
+    const std::int64_t begin = readCycleCounter();
+    for (const Latch& latch : adoption.new_latches) latch.copy();
+    const auto new_inputs =
+        adoption.rewires.begin() + static_cast<std::ptrdiff_t>(adoption.rewires_of_new);
+    std::for_each(adoption.rewires.begin(), new_inputs, [](Rewire& each) { each.apply(); });
+    for (const HandOver& hand_over : adoption.hand_overs) {
+        // Nobody knows what state an exception has left.
+        if (hand_over.previous->context().disabled) continue;
+        const HookNote note(notes_, *hand_over.successor, Hook::TakeOver);
+        hand_over.successor->takeOver(*hand_over.previous);
+    }
+    if (active_) {
+        for (const Leaving& leaving : adoption.leaving) {
+            // What threw has made safe then.
+            if (!leaving.component->context().disabled)
+                makeSafe(*leaving.component, *leaving.figures);
+            for (const Latch& latch : leaving.latches) latch.copy();
+            for (Tap* tap : leaving.taps) tap->push();
+        }
+    }
+    std::for_each(new_inputs, adoption.rewires.end(), [](Rewire& each) { each.apply(); });
+    for (const Audience& audience : adoption.audiences)
+        audience.output->setConnected(audience.present);
+    for (StagedValue* value : adoption.values) value->commit();
+    if (adoption.schedule != nullptr) {
+        schedule_ = adoption.schedule;
+        noteSchedule();
+    }
+    if (adoption.period_ns != 0) {
+        clock_.period_ns = adoption.period_ns;
+        clock_.elapsed_ns = adoption.period_ns;
+        for (const Step& step : schedule_->steps)
+            step.context->period_ns = adoption.period_ns * step.every;
+    }
+    figures_.adoption.add(readCycleCounter() - begin);
+}
+
+void Cycle::noteSchedule() noexcept RTCF_NONBLOCKING {
+    exchanges_ =
+        !schedule_->feeds.empty() || !schedule_->latches.empty() || !schedule_->taps.empty();
+}
+
+void Cycle::feed() noexcept RTCF_NONBLOCKING {
+    for (const Feed& feed : schedule_->feeds) {
+        if (!feed.injector->adopt(clock_)) continue;
+        for (InputBase* input : feed.readers) input->inject(feed.injector->front());
+    }
+}
+
+void Cycle::blame(std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept RTCF_NONBLOCKING {
+    const bool exchanged = exchanged_at_ + 1 == clock_.iteration;
+    if (!exchanged || begin_ticks + exchanged_ticks_ <= limit_ticks) {
+        for (const Step& step : schedule_->steps) {
+            if (step.ended_ticks < begin_ticks || step.ended_ticks <= limit_ticks)
+                continue;  // not now, or in time
+            bump(step.figures->overruns);
+            return;
+        }
+    }
+    figures_.exchange_overruns.add(1);
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,140 @@
+/// @file
+/// One cycle: all that happens between two waits, and the last one, in which
+/// components make safe instead of updating. The loop owns it; its thread
+/// runs it, or the graph thread while there is none. Who paces it is another
+/// matter, see loop.hpp.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "faults/flight_recorder.hpp"
+#include "loop/boundary.hpp"
+#include "loop/cycle_counter.hpp"
+#include "loop/faults.hpp"
+#include "loop/schedule.hpp"
+#include "spsc_ring.hpp"
+#include "statistics/histogram.hpp"
+
+namespace rtcf::executor {
+
+/// One executed cycle.
+struct CycleRecord {
+    std::uint64_t iteration;
+    std::int64_t stamp_ns;     ///< CLOCK_REALTIME of the deadline, or the simulated clock's time
+    std::int64_t latency_ns;   ///< wake-up after the deadline; may be negative
+    std::int64_t duration_ns;  ///< calculation
+};
+
+/// What the loop counts. Written by the real-time thread alone.
+struct LoopFigures {
+    Histogram duration;  ///< ticks
+    Histogram latency;   ///< ns
+    Histogram adoption;  ///< ticks; what a change took of the cycle that adopted it
+    Histogram wake_up;   ///< ns after the end of the sleep, which is `spin` before the deadline
+    std::atomic<std::uint64_t> iteration{0};  ///< cycles completed since the loop started
+    Counter faults;                           ///< of components, while the loop went on
+    std::atomic<std::uint64_t> overruns{0};
+    std::atomic<std::uint64_t> missed{0};
+    // Causes of overruns that no component is.
+    Counter late_wake_ups;      ///< the cycle took less than a period, but began late
+    Counter exchange_overruns;  ///< changes, values from outside and to it took too long
+    Counter catching_up;        ///< late by the overrun before, with OverrunPolicy::CatchUp
+};
+
+/// Adds to a number that only this thread writes. Real-time safe.
+inline void bump(std::atomic<std::uint64_t>& number, std::uint64_t by = 1) noexcept
+    RTCF_NONBLOCKING {
+    number.store(number.load(std::memory_order_relaxed) + by, std::memory_order_relaxed);
+}
+
+class Cycle {
+   public:
+    /// @param recorder what runs is noted there; outlives the cycle
+    explicit Cycle(FlightRecorder& recorder);
+    Cycle(const Cycle&) = delete;
+    Cycle& operator=(const Cycle&) = delete;
+
+    /// @name Graph thread
+    /// @{
+    /// Sets clock and counters for cycles from 0 on; while none runs.
+    void begin(std::int64_t period_ns, std::uint64_t warmup_cycles);
+    Boundary& boundary() noexcept { return boundary_; }
+    /// After the last cycle.
+    const LoopFault& fault() const noexcept { return fault_; }
+    /// @}
+
+    /// @name Whoever runs cycles; real-time safe as far as the components are
+    /// @{
+    const Schedule& schedule() const noexcept { return *schedule_; }
+    bool faulted() const noexcept { return fault_.kind != LoopFault::Kind::None; }
+    /// Does what waits for a boundary, between cycles.
+    void atBoundary() noexcept {
+        if (boundary_.waiting()) boundary_.perform(*this);
+    }
+    /// Makes a change.
+    void apply(Adoption& adoption) noexcept;
+    /// One cycle. @param time_ns of the loop @param latency_ns of its wake-up
+    void run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NONBLOCKING;
+    /// The last cycle: safe() in place of update(). Once until the next begin().
+    void makeSafe(std::int64_t time_ns) noexcept;
+    /// Takes the newest values from outside.
+    void feed() noexcept RTCF_NONBLOCKING;
+    /// What elapsed() says to components from the next cycle on, whole periods.
+    void setElapsed(std::int64_t elapsed_ns) noexcept RTCF_NONBLOCKING {
+        clock_.elapsed_ns = elapsed_ns;
+    }
+    /// Finds what was running when the cycle that began at `begin_ticks` should have ended, and
+    /// counts the overrun there.
+    void blame(std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept RTCF_NONBLOCKING;
+    void endLoop(LoopFault::Kind kind, const Component* component, const char* text) noexcept;
+    LoopFigures& figures() noexcept { return figures_; }
+    /// @}
+
+    /// @name Any thread
+    /// @{
+    const LoopFigures& figures() const noexcept { return figures_; }
+    const LoopClock& clock() const noexcept { return clock_; }
+    void setStampOffset(std::int64_t offset_ns) noexcept {
+        stamp_offset_ns_.store(offset_ns, std::memory_order_relaxed);
+    }
+    const CycleCounter& counter() const noexcept { return counter_; }
+    SpscRing<CycleRecord, 16384>& records() noexcept { return records_; }
+    const SpscRing<CycleRecord, 16384>& records() const noexcept { return records_; }
+    /// @}
+
+   private:
+    template <bool Plain>
+    std::int64_t update(const Step* next, const Step* end, std::int64_t before) noexcept;
+    std::int64_t updateSelected(const Step* next, const Step* end, std::int64_t before) noexcept;
+    bool due(const Step& step) const noexcept RTCF_NONBLOCKING;
+    void commit(Component& component, ComponentFigures& figures) noexcept RTCF_NONBLOCKING;
+    bool threw(const Step& step, const char* text) noexcept;
+    void makeSafe(Component& component, ComponentFigures& figures) noexcept;
+    void noteSchedule() noexcept RTCF_NONBLOCKING;
+
+    // What every cycle touches, in two cache lines: after a sleep, memory costs more than work.
+    // Owned by whoever runs cycles.
+    alignas(64) const Schedule* schedule_;
+    const FlightRecorder::RealtimeNotes notes_;
+    LoopClock clock_;
+    std::uint64_t warmup_cycles_ = 0;
+    bool exchanges_ = false;  // the schedule has feeds, latches or taps
+    bool active_ = false;     // between begin() and the last cycle
+    bool last_ = false;       // in the last cycle
+    // Shared.
+    std::atomic<std::int64_t> stamp_offset_ns_{0};  // CLOCK_REALTIME minus CLOCK_MONOTONIC
+    Boundary boundary_;
+
+    CycleCounter counter_;
+    // As above: of whoever runs cycles.
+    std::int64_t total_elapsed_ns_ = 0;        // loop time in whole periods
+    std::int64_t exchanged_ticks_ = 0;         // what the last exchange took,
+    std::uint64_t exchanged_at_ = UINT64_MAX;  // and its iteration
+    LoopFault fault_;
+    LoopFigures figures_;
+    SpscRing<CycleRecord, 16384> records_;
+    const Schedule empty_{};
+};
+
+}  // namespace rtcf::executor

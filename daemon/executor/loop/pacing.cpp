@@ -1,0 +1,189 @@
+// When the loop's cycles begin: by real time, by a device, by a simulated clock, or one after
+// another as steps.
+#include <time.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <optional>
+#include <utility>
+
+#include "logging/log.hpp"
+#include "loop/floating_point.hpp"
+#include "loop/loop.hpp"
+#include "loop/simulated_clock.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::uint64_t kBucketLeak = 1000;  // cycles on time that make good one overrun
+
+}  // namespace
+
+void Loop::beginStepping(const LoopSettings& settings, std::uint64_t stops_known,
+                         std::int64_t stamp_ns) {
+    reset(settings, stops_known);
+    cycle_.setStampOffset(stamp_ns);
+}
+
+std::uint64_t Loop::step(std::uint64_t cycles) noexcept {
+    std::uint64_t done = 0;
+    const FloatingPointDefaults floating_point;
+    // Components log as in any cycle; there is no other thread that runs one.
+    Log::setRealtimeThread(true);
+    for (; done < cycles && goesOn(); ++done) {
+        cycle_.run(nextStep(), 0);
+    }
+    Log::setRealtimeThread(false);
+    return done;
+}
+
+void Loop::endStepping() noexcept {
+    const FloatingPointDefaults floating_point;
+    cycle_.makeSafe(nextStep());
+}
+
+// Simulated time begins at 0 and goes on by a period each cycle.
+std::int64_t Loop::nextStep() const noexcept {
+    const LoopClock& clock = cycle_.clock();
+    const std::int64_t period = clock.period_ns;
+    return clock.iteration == 0 ? 0 : clock.time_ns + period;
+}
+
+// The component that paces the loop; null = the clock does.
+Source* Loop::source() const noexcept {
+    Source* const source = cycle_.schedule().source;
+    return source != nullptr && !source->context().disabled ? source : nullptr;
+}
+
+void Loop::followRealTime() noexcept {
+    std::int64_t deadline = monotonicNow() + cycle_.clock().period_ns;
+    std::int64_t end = 0;
+    while (goesOn()) {
+        Source* const device = source();
+        const bool behind = device == nullptr && end > deadline;
+        const WakeUp wake_up = device != nullptr ? waitForSource(*device) : waitForClock(deadline);
+        if (!wake_up.cycle) {
+            deadline = wake_up.wake_ns + cycle_.clock().period_ns;
+            continue;
+        }
+        const std::int64_t begin = readCycleCounter();
+        cycle_.run(device != nullptr ? wake_up.wake_ns : wake_up.deadline_ns,
+                   wake_up.wake_ns - wake_up.deadline_ns);
+        end = wake_up.wake_ns + cycle_.counter().toNs(readCycleCounter() - begin);
+        if (device != nullptr) {
+            // The next cycle begins when the device says so; what it then has missed is seen there.
+            deadline = wake_up.wake_ns + cycle_.clock().period_ns;
+            if (end >= deadline) noteOverrun(wake_up, begin, end, false);
+        } else {
+            if (end >= deadline + cycle_.clock().period_ns)
+                noteOverrun(wake_up, begin, end, behind);
+            deadline = nextDeadline(deadline, end);
+        }
+    }
+}
+
+// Components' time() goes on by a period each cycle, whatever the simulated clock does; stamps are
+// the clock's.
+void Loop::followClock() noexcept {
+    constexpr auto kPatience = std::chrono::milliseconds(10);
+    while (goesOn()) {
+        const std::optional<SimulatedCycle> due =
+            simulation_->next(cycle_.clock().period_ns, kPatience);
+        if (!due) {
+            cycle_.atBoundary();
+            continue;
+        }
+        for (const Feed& feed : cycle_.schedule().feeds) {
+            feed.injector->deliverUntil(due->arrived_ns);
+        }
+        const std::int64_t now = nextStep();
+        cycle_.setStampOffset(due->time_ns - now);
+        cycle_.run(now, 0);
+    }
+}
+
+// The device says when a cycle begins. Changes are taken over and a request to stop is seen
+// between its deadlines, which are never far away. A beat is expected a period after the last one:
+// what comes whole periods later has missed some.
+Loop::WakeUp Loop::waitForSource(Source& device) noexcept {
+    constexpr std::int64_t kPatience = 10'000'000;
+    const FlightRecorder::RealtimeNotes notes = recorder_.realtimeNotes();
+    notes.enterHook(device.context().recorder_slot, Hook::Wait);
+    const bool ready = device.wait(monotonicNow() + kPatience);
+    notes.leaveHook();
+    waits_.add(1);
+    const std::int64_t now = monotonicNow();
+    if (!ready) {
+        cycle_.atBoundary();
+        return {false, 0, now};
+    }
+    const std::int64_t period = cycle_.clock().period_ns;
+    const std::int64_t last = std::exchange(beat_ns_, now);
+    if (last == 0) return {true, now, now};
+    const std::int64_t periods = std::max<std::int64_t>(1, (now - last + period / 2) / period);
+    if (periods > 1) bump(cycle_.figures().missed, static_cast<std::uint64_t>(periods - 1));
+    cycle_.setElapsed(periods * period);
+    return {true, last + periods * period, now};
+}
+
+Loop::WakeUp Loop::waitForClock(std::int64_t deadline_ns) noexcept {
+    const std::int64_t spin = spin_ns_.load(std::memory_order_relaxed);
+    const timespec until{(deadline_ns - spin) / kSecond, (deadline_ns - spin) % kSecond};
+    // Absolute, so that a preemption before the call does not add up (clock_nanosleep(2)).
+    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
+    }
+    for (const void* line : cycle_.schedule().footprint) __builtin_prefetch(line);
+    std::int64_t now = monotonicNow();
+    cycle_.figures().wake_up.add(now - deadline_ns + spin);
+    while (now < deadline_ns) now = monotonicNow();
+    beat_ns_ = 0;  // no device says when
+    return {true, deadline_ns, now};
+}
+
+// Counts an overrun where it belongs. A cycle that took less than a period would have been in time,
+// had it begun so.
+void Loop::noteOverrun(const WakeUp& wake_up, std::int64_t begin_ticks, std::int64_t end_ns,
+                       bool behind) noexcept RTCF_NONBLOCKING {
+    LoopFigures& figures = cycle_.figures();
+    bump(figures.overruns);
+    const std::int64_t period = cycle_.clock().period_ns;
+    if (end_ns - wake_up.wake_ns >= period) {
+        cycle_.blame(begin_ticks, begin_ticks + cycle_.counter().toTicks(period));
+    } else if (behind) {
+        figures.catching_up.add(1);
+    } else {
+        figures.late_wake_ups.add(1);
+    }
+    const std::uint32_t limit = max_overruns_.load(std::memory_order_relaxed);
+    if (limit != 0 && ++bucket_ > limit && !cycle_.faulted())
+        cycle_.endLoop(LoopFault::Kind::Overruns, nullptr, "too many overruns");
+}
+
+std::int64_t Loop::nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) noexcept
+    RTCF_NONBLOCKING {
+    const std::int64_t period = cycle_.clock().period_ns;
+    const std::int64_t next = deadline_ns + period;
+    if (end_ns < next) {
+        cycle_.setElapsed(period);
+        if (bucket_ > 0 && ++cycles_on_time_ % kBucketLeak == 0) --bucket_;
+        return next;
+    }
+    switch (overrun_policy_.load(std::memory_order_relaxed)) {
+        case OverrunPolicy::CatchUp:
+            cycle_.setElapsed(period);
+            return next;
+        case OverrunPolicy::Relative:
+            cycle_.setElapsed((end_ns + period - deadline_ns) / period * period);
+            return end_ns + period;
+        case OverrunPolicy::Skip:
+            break;
+    }
+    const std::int64_t dropped = (end_ns - next) / period + 1;
+    bump(cycle_.figures().missed, static_cast<std::uint64_t>(dropped));
+    cycle_.setElapsed((dropped + 1) * period);
+    return next + dropped * period;
+}
+
+}  // namespace rtcf::executor

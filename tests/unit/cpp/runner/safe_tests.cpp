@@ -1,0 +1,257 @@
+// The last cycle: what safe() writes, who reads it, and when it is called. Think of a driver that
+// is left without its controller.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <optional>
+
+#include "rtcf/port.hpp"
+#include "support/runner_fixture.hpp"
+
+namespace rtcf::test {
+namespace {
+
+class Safe : public RunnerFixture {
+   protected:
+    static ComponentDefinition controller(const std::string& name,
+                                          const std::string& wired = "effort") {
+        ComponentDefinition result = definition("Controller", name);
+        for (const std::string port : {"effort", "other", "checked"})
+            result.remaps.emplace_back(port, port == wired ? "command" : name + "_" + port);
+        return result;
+    }
+
+    static ComponentDefinition driver(const std::string& name = "D") {
+        ComponentDefinition result = definition("Driver", name);
+        result.remaps = {{"command", "/command"}};
+        for (const char* port : {"applied", "lowest", "last_status", "zeros", "periods"})
+            result.remaps.emplace_back(port, name + "_" + port);
+        return result;
+    }
+
+    void mapEverything() {
+        configure([](RunnerSettings& settings) { settings.whitelist = ".*"; });
+    }
+
+    // The newest value that a tap has for the ROS node.
+    std::optional<double> published(const std::shared_ptr<executor::Tap>& tap) {
+        std::optional<double> last;
+        while (tap->pop([&](const std::uint8_t* bytes, std::uint32_t size) {
+            double value = 0.0;
+            if (size == sizeof value) std::memcpy(&value, bytes, size);
+            last = value;
+        })) {
+        }
+        return last;
+    }
+
+    double applied(const std::string& name = "/D") { return value(name, "applied"); }
+
+    static std::size_t position(const std::vector<std::string>& notes, const std::string& note) {
+        return static_cast<std::size_t>(std::find(notes.begin(), notes.end(), note) -
+                                        notes.begin());
+    }
+};
+
+TEST_F(Safe, WhatTheControllerWritesReachesTheDriverAndRos) {
+    mapEverything();
+    load(controller("C"));
+    load(driver());
+    start();
+    ASSERT_TRUE(runs());
+    EXPECT_EQ(applied(), 5.0);
+    stop();
+    EXPECT_EQ(applied(), 0.0) << "its safe() comes after the controller's, and reads";
+    EXPECT_EQ(value("/D", "zeros"), 1.0);
+    EXPECT_EQ(published(bridge().tap("/command")), 0.0);
+    EXPECT_EQ(published(bridge().tap("/D_applied")), 0.0);
+}
+
+TEST_F(Safe, CheckedOutputsAreCommitted) {
+    load(controller("C", "checked"));
+    load(driver());
+    start();
+    ASSERT_TRUE(runs());
+    stop();
+    EXPECT_EQ(applied(), 0.0);
+}
+
+TEST_F(Safe, WhatIsNotFiniteIsHeldBackAndTold) {
+    ComponentDefinition wild = controller("C", "checked");
+    wild.parameters = {{"wild", true}};
+    load(wild);
+    load(driver());
+    start();
+    ASSERT_TRUE(runs());
+    stop();
+    EXPECT_EQ(applied(), 5.0);
+    EXPECT_EQ(state(), RunnerState::Stopped);
+    EXPECT_TRUE(eventually([this] {
+        const auto all = events();
+        return std::any_of(all.begin(), all.end(), [](const RunnerEvent& event) {
+            return event.message.find("output checked is not finite") != std::string::npos;
+        });
+    }));
+}
+
+TEST_F(Safe, IsCalledOnTheCulpritToo) {
+    ComponentDefinition throwing = controller("C");
+    throwing.parameters = {{"throws_at", std::int64_t{15}}};
+    load(throwing);
+    load(driver());
+    start();
+    ASSERT_TRUE(eventually([this] { return state() == RunnerState::Faulted; }));
+    EXPECT_EQ(journal().count("/C safe"), 1U);
+    EXPECT_EQ(journal().count("/D safe"), 1U);
+    EXPECT_EQ(applied(), 0.0);
+}
+
+TEST_F(Safe, InputOfThePreviousCycleIsRightInTheLastOne) {
+    load(controller("C"));
+    ComponentDefinition early = driver();
+    early.first = true;
+    load(early);
+    ASSERT_EQ(order(), (std::vector<std::string>{"/D", "/C"}));
+    step(3);
+    stop();
+    // It comes before the controller: what it has is the command of the cycle before, as always.
+    EXPECT_EQ(applied(), 5.0);
+    EXPECT_EQ(value("/C", "effort"), 0.0);
+}
+
+TEST_F(Safe, UnloadFromARunningLoopLeavesTheDriverASafeCommand) {
+    mapEverything();
+    load(controller("C"));
+    load(driver());
+    start();
+    ASSERT_TRUE(runs());
+    const auto tap = bridge().tap("/command");
+    unload("/C");
+    ASSERT_TRUE(runs(3));
+    EXPECT_EQ(state(), RunnerState::Running);
+    EXPECT_EQ(applied(), 0.0);
+    EXPECT_EQ(value("/D", "zeros"), 1.0) << "as new data, once";
+    EXPECT_EQ(journal().count("/C safe"), 1U);
+    EXPECT_EQ(published(tap), 0.0);
+    stop();
+    EXPECT_EQ(journal().count("/C safe"), 1U);
+}
+
+TEST_F(Safe, UnloadLeavesASafeCommandInTheCycleBefore) {
+    load(controller("C"));
+    load(driver());
+    setBreak("/D", "command", true);  // it reads the value latched before the controller ran
+    start();
+    ASSERT_TRUE(runs());
+    unload("/C");
+    ASSERT_TRUE(runs(3));
+    EXPECT_EQ(applied(), 0.0);
+}
+
+TEST_F(Safe, ReplacedControllerHandsOverWithoutADip) {
+    load(controller("C"));
+    load(driver());
+    start();
+    ASSERT_TRUE(runs());
+    replace("/C", controller("C"));
+    ASSERT_TRUE(runs(3));
+    EXPECT_EQ(applied(), 5.0);
+    EXPECT_EQ(value("/D", "lowest"), 5.0) << "the successor writes in the same cycle";
+    const auto notes = journal().notes();
+    EXPECT_LT(position(notes, "/C takeOver"), position(notes, "/C safe"))
+        << "the successor sees the state before it is made safe";
+    EXPECT_EQ(journal().count("/C safe"), 1U);
+}
+
+TEST_F(Safe, ReplacedBySilenceLeavesASafeCommand) {
+    load(controller("C"));
+    load(driver());
+    start();
+    ASSERT_TRUE(runs());
+    ComponentDefinition silent = controller("C");
+    silent.parameters = {{"silent", true}};
+    replace("/C", silent);
+    ASSERT_TRUE(runs(3));
+    EXPECT_EQ(applied(), 0.0);
+    EXPECT_EQ(value("/D", "zeros"), 1.0);
+    EXPECT_EQ(value("/D", "last_status"), static_cast<double>(DataStatus::Old));
+}
+
+TEST_F(Safe, IsNotCalledAgainOnceTheLoopHasEnded) {
+    load(controller("C"));
+    start();
+    ASSERT_TRUE(runs());
+    stop();
+    unload("/C");
+    EXPECT_EQ(journal().count("/C safe"), 1U);
+}
+
+TEST_F(Safe, OptionalControllerThatThrowsMakesSafeInTheSameCycle) {
+    ComponentDefinition throwing = controller("C");
+    throwing.optional = true;
+    throwing.parameters = {{"throws_at", std::int64_t{15}}};
+    load(throwing);
+    load(driver());
+    step(15);
+    EXPECT_EQ(applied(), 5.0);
+    step(1);
+    EXPECT_EQ(state(), RunnerState::Stepping);
+    EXPECT_EQ(applied(), 0.0) << "the components after it run in that cycle";
+    EXPECT_EQ(value("/D", "periods"), 1.0);
+    step(5);
+    EXPECT_EQ(value("/D", "zeros"), 1.0);
+    stop();
+    EXPECT_EQ(journal().count("/C safe"), 1U) << "when it was taken out";
+    EXPECT_EQ(journal().count("/D safe"), 1U);
+}
+
+// What it had written before it threw is never seen: `other` by write(), `effort` in place.
+TEST_F(Safe, HalfOfWhatAThrowingOptionalComponentWritesIsNotSeen) {
+    for (const std::string port : {"effort", "other", "checked"}) {
+        ComponentDefinition throwing = controller("C_" + port, port);
+        throwing.optional = true;
+        throwing.parameters = {{"throws_at", std::int64_t{3}}};
+        load(throwing);
+        ComponentDefinition looking = definition("Watcher", "W_" + port);
+        looking.remaps = {{"in", "command"}, {"highest", "W_" + port + "_highest"}};
+        load(looking);
+        step(10);
+        EXPECT_EQ(value("/W_" + port, "highest"), 5.0) << port;
+        stop();
+        unload("/C_" + port);
+        unload("/W_" + port);
+    }
+}
+
+TEST_F(Safe, NothingIsTakenOverFromWhatThrew) {
+    ComponentDefinition throwing = controller("C");
+    throwing.optional = true;
+    throwing.parameters = {{"throws_at", std::int64_t{15}}};
+    load(throwing);
+    start();
+    ASSERT_TRUE(runs());
+    ComponentDefinition sound = controller("C");
+    sound.parameters = {{"throws_at", std::int64_t{-1}}};
+    replace("/C", sound);
+    EXPECT_EQ(journal().count("/C takeOver"), 0U);
+    replace("/C", sound);
+    EXPECT_EQ(journal().count("/C takeOver"), 1U);
+}
+
+// The component of docs/components.md, as it stands there.
+TEST_F(Safe, ExampleOfTheDocumentationCommandsZero) {
+    ComponentDefinition pi = definition("Pi", "pi");
+    pi.remaps = {{"effort", "command"}, {"setpoint", "C_effort"}, {"measured", "C_other"}};
+    load(controller("C", "checked_by_nobody"));
+    load(pi);
+    load(driver());
+    start();
+    ASSERT_TRUE(runs());
+    stop();
+    EXPECT_EQ(value("/pi", "effort"), 0.0);
+    EXPECT_EQ(applied(), 0.0);
+}
+
+}  // namespace
+}  // namespace rtcf::test
