@@ -159,7 +159,7 @@ OrderProblem orderProblem(const Graph& graph, const Wiring& wiring) {
 // Of whom would an input read? Where there is none, several may write, as several nodes may
 // publish.
 void requireOneWriter(const Graph& graph, const std::string& name, const ConnectionPlan& plan) {
-    if (plan.others.empty() || plan.readers.empty()) return;
+    if (!plan.writer || plan.others.empty() || plan.readers.empty()) return;
     const Writer& other = plan.others.front();
     const std::string& port = other.output->name();
     throw Refusal(

@@ -97,7 +97,8 @@ class Logger : public RTT::TaskContext, public RtcfExtension {
    public:
     explicit Logger(const std::string& name) : TaskContext(name) {
         RTT::Logger::In in("Logger");
-        RTT::log(RTT::Warning) << "constructed by " << 1 << std::endl;
+        RTT::log(RTT::Warning) << "constructed by " << 1
+                               << std::endl;  // NOLINT(performance-avoid-endl): as they do
         RT_INFO("constructed by 2");
         rtLogError("constructed by 3");
     }
