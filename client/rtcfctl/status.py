@@ -57,7 +57,7 @@ def print_runners(runners: list[runner_pb2.RunnerStatus], output: Output) -> Non
                 runner.runner,
                 (enumerator(runner, "state"), STYLES.get(runner.state, "")),
                 f"{runner.settings.frequency_hz:g}",
-                _cpu(runner.settings),
+                _cpu(runner),
                 runner.settings.priority,
                 runner.components,
                 runner.iteration,
@@ -107,5 +107,7 @@ def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
             output.line(f"{runner.runner}: {count} {what} lost in full rings", "yellow")
 
 
-def _cpu(settings: runner_pb2.RunnerSettings) -> str:
-    return "last" if settings.cpu < 0 else str(settings.cpu)
+def _cpu(runner: runner_pb2.RunnerStatus) -> str:
+    if runner.HasField("loop_cpu"):
+        return str(runner.loop_cpu)
+    return "free" if runner.settings.cpu < 0 else str(runner.settings.cpu)

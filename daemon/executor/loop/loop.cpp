@@ -76,16 +76,17 @@ RealtimeProblems Loop::start(const LoopSettings& settings, std::uint64_t stops_k
 
     running_.store(true, std::memory_order_release);
     joinable_.store(true, std::memory_order_release);
-    const RealtimeAttributes attributes(settings.realtime);
+    const RealtimeSettings realtime = placed(settings.realtime, problems);
+    const RealtimeAttributes attributes(realtime);
     if (const int error = pthread_create(&thread_, attributes.get(), &Loop::threadMain, this);
         error != 0) {
         running_.store(false, std::memory_order_release);
         joinable_.store(false, std::memory_order_release);
         idle_guard_.reset();
-        throw Refusal(
-            RefusalKind::FailedPrecondition,
-            fmt::format("no real-time thread: {} (CPU {}, priority {})", std::strerror(error),
-                        chooseCpu(settings.realtime), settings.realtime.priority));
+        leaveCpu();
+        throw Refusal(RefusalKind::FailedPrecondition,
+                      fmt::format("no real-time thread: {} (CPU {}, priority {})",
+                                  std::strerror(error), realtime.cpu, realtime.priority));
     }
     return problems;
 }
@@ -104,6 +105,7 @@ bool Loop::join(std::int64_t timeout_ns) {
     if (pthread_join(thread_, nullptr) != 0) return false;
     joinable_.store(false, std::memory_order_release);
     idle_guard_.reset();
+    leaveCpu();
     thread_id_.store(0, std::memory_order_relaxed);
     return true;
 }
@@ -150,7 +152,38 @@ RealtimeProblems Loop::retune(const LoopSettings& settings) {
     overrun_policy_.store(settings.overrun, std::memory_order_relaxed);
     max_overruns_.store(settings.max_overruns, std::memory_order_relaxed);
     if (!joinable() || simulation_ != nullptr) return {};
-    return applyToThread(thread_, settings.realtime);
+    RealtimeProblems problems;
+    const RealtimeSettings realtime = placed(settings.realtime, problems);
+    for (RealtimeProblem& problem : applyToThread(thread_, realtime))
+        problems.push_back(std::move(problem));
+    return problems;
+}
+
+// The settings with the CPU that the loop gets; other threads leave it.
+RealtimeSettings Loop::placed(RealtimeSettings settings, RealtimeProblems& problems) {
+    if (!settings.wanted) return settings;
+    const bool stays = cpu_claim_ != nullptr && (settings.cpu < 0 || settings.cpu == cpu());
+    if (!stays) {
+        cpu_claim_.reset();
+        cpu_claim_ = std::make_unique<CpuClaim>(settings.cpu);
+        cpu_.store(cpu_claim_->cpu(), std::memory_order_relaxed);
+        keepThreadsOff(cpu(), threadId());
+    }
+    if (!cpu_claim_->alone()) {
+        problems.push_back(
+            {fmt::format("CPU {} has another loop, each may delay the other: choose a CPU for one "
+                         "of them (rtcfctl runner set NAME --cpu N)",
+                         cpu()),
+             false});
+    }
+    settings.cpu = cpu();
+    return settings;
+}
+
+void Loop::leaveCpu() {
+    if (cpu_claim_ != nullptr) keepThreadsOff(-1, 0);  // they may use all of them again
+    cpu_claim_.reset();
+    cpu_.store(-1, std::memory_order_relaxed);
 }
 
 void Loop::refreshWallClock() noexcept {

@@ -13,6 +13,7 @@
 #include <memory>
 
 #include "faults/flight_recorder.hpp"
+#include "loop/cpu_claim.hpp"
 #include "loop/cycle.hpp"
 #include "loop/probe.hpp"
 #include "loop/realtime.hpp"
@@ -111,6 +112,8 @@ class Loop {
     std::uint64_t progress() const noexcept {
         return figures().iteration.load(std::memory_order_relaxed) + waits_.value();
     }
+    /// That it is pinned to; -1 = none.
+    int cpu() const noexcept { return cpu_.load(std::memory_order_relaxed); }
     int threadId() const noexcept { return thread_id_.load(std::memory_order_relaxed); }
     const LoopFigures& figures() const noexcept { return cycle_.figures(); }
     const CycleCounter& counter() const noexcept { return cycle_.counter(); }
@@ -130,6 +133,8 @@ class Loop {
     };
 
     void reset(const LoopSettings& settings, std::uint64_t stops_known);
+    RealtimeSettings placed(RealtimeSettings settings, RealtimeProblems& problems);
+    void leaveCpu();
     bool perform(BoundaryWork& work, std::int64_t timeout_ns);
     static void* threadMain(void* self);
     void run() noexcept;
@@ -150,6 +155,8 @@ class Loop {
     FlightRecorder& recorder_;
     pthread_t thread_{};
     std::unique_ptr<IdleStateGuard> idle_guard_;
+    std::unique_ptr<CpuClaim> cpu_claim_;  // while it runs in real time
+    std::atomic<int> cpu_{-1};
     std::shared_ptr<SimulatedClock> simulation_;  // that the thread follows; null = real time
     std::size_t stack_bytes_ = 0;
 

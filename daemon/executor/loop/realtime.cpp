@@ -16,6 +16,7 @@
 #include <fstream>
 #include <memory>
 
+#include "loop/cpu_claim.hpp"
 #include "loop/unlocked_memory.hpp"
 
 namespace rtcf::executor {
@@ -89,6 +90,7 @@ void prepareProcess() {
     pthread_attr_setstacksize(&attributes, kThreadStack);
     pthread_setattr_default_np(&attributes);
     pthread_attr_destroy(&attributes);
+    (void)processCpus();  // as long as all threads may use them
 }
 
 RealtimeProblems lockMemory(const RealtimeSettings& settings) {
@@ -109,18 +111,6 @@ RealtimeProblems lockMemory(const RealtimeSettings& settings) {
     }
     prefaultHeap(settings.heap_bytes);
     return problems;
-}
-
-int chooseCpu(const RealtimeSettings& settings) {
-    if (settings.cpu >= 0) return settings.cpu;
-    cpu_set_t allowed;
-    CPU_ZERO(&allowed);
-    sched_getaffinity(0, sizeof allowed, &allowed);
-    int last = 0;
-    for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
-        if (CPU_ISSET(cpu, &allowed)) last = cpu;
-    }
-    return last;
 }
 
 RealtimeProblems checkScheduling(const RealtimeSettings& settings) {
@@ -150,7 +140,7 @@ RealtimeAttributes::RealtimeAttributes(const RealtimeSettings& settings) {
     }
     cpu_set_t cpus;
     CPU_ZERO(&cpus);
-    CPU_SET(chooseCpu(settings), &cpus);
+    CPU_SET(settings.cpu, &cpus);
     pthread_attr_setaffinity_np(&attributes_, sizeof cpus, &cpus);
 }
 
@@ -163,10 +153,10 @@ RealtimeProblems applyToThread(pthread_t thread, const RealtimeSettings& setting
     }
     cpu_set_t cpus;
     CPU_ZERO(&cpus);
-    CPU_SET(chooseCpu(settings), &cpus);
+    CPU_SET(settings.cpu, &cpus);
     if (const int error = pthread_setaffinity_np(thread, sizeof cpus, &cpus); error != 0) {
         problems.push_back(
-            {fmt::format("not on CPU {}: {}", chooseCpu(settings), systemError(error)), true});
+            {fmt::format("not on CPU {}: {}", settings.cpu, systemError(error)), true});
     }
     return problems;
 }

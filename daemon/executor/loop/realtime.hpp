@@ -22,7 +22,7 @@ using RealtimeProblems = std::vector<RealtimeProblem>;
 
 /// What a loop wants of the machine.
 struct RealtimeSettings {
-    int cpu = -1;            ///< -1 = the last one this process may use
+    int cpu = -1;            ///< -1 = the last one that has no other loop; see CpuClaim
     unsigned priority = 80;  ///< SCHED_FIFO, 1 to 98
     bool wanted = true;      ///< false: an ordinary thread, for a simulated clock
     bool lock_memory = true;
@@ -42,10 +42,8 @@ RealtimeProblems lockMemory(const RealtimeSettings& settings);
 /// real time.
 RealtimeProblems checkScheduling(const RealtimeSettings& settings);
 
-/// The CPU that the settings mean.
-int chooseCpu(const RealtimeSettings& settings);
-
-/// Attributes of a real-time thread's pthread; without SCHED_FIFO where that is not allowed.
+/// Attributes of a real-time thread's pthread; without SCHED_FIFO where that is not allowed. The
+/// settings name a CPU.
 class RealtimeAttributes {
    public:
     explicit RealtimeAttributes(const RealtimeSettings& settings);
@@ -58,7 +56,7 @@ class RealtimeAttributes {
     pthread_attr_t attributes_{};
 };
 
-/// Changes policy and CPU of a running thread.
+/// Changes policy and CPU of a running thread. The settings name a CPU.
 RealtimeProblems applyToThread(pthread_t thread, const RealtimeSettings& settings);
 
 /// Touches `bytes` of the calling thread's stack, so that the cycle takes no page fault there.

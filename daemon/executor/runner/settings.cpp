@@ -1,12 +1,13 @@
 #include "runner/settings.hpp"
 
 #include <fmt/format.h>
-#include <sched.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "graph/name_pattern.hpp"
 #include "graph/names.hpp"
+#include "loop/cpu_claim.hpp"
 #include "refusal.hpp"
 
 namespace rtcf::executor {
@@ -27,16 +28,11 @@ void requireRange(const char* name, T value, T lowest, T highest, const char* un
 
 void requireCpu(int cpu) {
     if (cpu == -1) return;
-    cpu_set_t allowed;
-    CPU_ZERO(&allowed);
-    sched_getaffinity(0, sizeof allowed, &allowed);
-    if (cpu >= 0 && cpu < CPU_SETSIZE && CPU_ISSET(cpu, &allowed)) return;
-    std::string names;
-    for (int i = 0; i < CPU_SETSIZE; ++i) {
-        if (CPU_ISSET(i, &allowed)) names += (names.empty() ? "" : ", ") + std::to_string(i);
-    }
-    refuse(fmt::format("cpu {} is none that this daemon may use: {}, or -1 for the last of them",
-                       cpu, names));
+    const std::vector<int>& allowed = processCpus();
+    if (std::find(allowed.begin(), allowed.end(), cpu) != allowed.end()) return;
+    refuse(fmt::format(
+        "cpu {} is none that this daemon may use: {}, or -1 for the last that has no other loop",
+        cpu, fmt::join(allowed, ", ")));
 }
 
 }  // namespace
