@@ -13,6 +13,7 @@
 #include <filesystem>
 
 #include "loop/floating_point.hpp"
+#include "plugins/elf_file.hpp"
 #include "plugins/linked_files.hpp"
 #include "plugins/trusted_file.hpp"
 #include "refusal.hpp"
@@ -63,48 +64,91 @@ int privateCopy(const std::string& path, int source) {
     return copy.release();
 }
 
-void* openCopy(const std::string& path, int file) {
+// A copy that the loader has, until it is said to be kept.
+class OpenCopy {
+   public:
+    OpenCopy(const std::string& path, int file)
+        : copy_(privateCopy(path, file)),
+          name_(fmt::format("/proc/{}/fd/{}", ::getpid(), copy_.get())),
+          handle_(open(name_)) {
+        if (handle_ == nullptr) refuseUnloadable(path, ::dlerror());
+    }
+    ~OpenCopy() {
+        if (handle_ == nullptr) return;
+        ::dlclose(handle_);
+        // What the loader keeps all the same must go on having the name to itself.
+        if (void* still = ::dlopen(name_.c_str(), RTLD_NOW | RTLD_NOLOAD); still != nullptr) {
+            ::dlclose(still);
+            (void)copy_.release();
+        }
+    }
+    OpenCopy(const OpenCopy&) = delete;
+    OpenCopy& operator=(const OpenCopy&) = delete;
+
+    void* handle() const noexcept { return handle_; }
     // The descriptor stays open for the life of the process: debuggers and
     // sanitizers find the symbols by this name, and it keeps the name unique.
-    const int copy = privateCopy(path, file);
-    const std::string copy_path = fmt::format("/proc/{}/fd/{}", ::getpid(), copy);
-    // Linked with -ffast-math it would change how all others compute from here on.
-    const FloatingPointKeeper floating_point;
-    void* handle = ::dlopen(copy_path.c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (handle == nullptr) {
-        std::string why = ::dlerror();
-        ::close(copy);
+    void keep() noexcept {
+        handle_ = nullptr;
+        (void)copy_.release();
+    }
+
+   private:
+    static void* open(const std::string& name) {
+        // Linked with -ffast-math it would change how all others compute from here on.
+        const FloatingPointKeeper floating_point;
+        return ::dlopen(name.c_str(), RTLD_NOW | RTLD_LOCAL);
+    }
+
+    [[noreturn]] void refuseUnloadable(const std::string& path, std::string why) const {
+        const std::string& copy_path = name_;
         for (std::size_t at = why.find(copy_path); at != std::string::npos;
              at = why.find(copy_path)) {
             why.replace(at, copy_path.size(), std::filesystem::path(path).filename());
         }
         refuse(path, "does not load: " + why + "; build it again, with what it needs linked in");
     }
-    return handle;
+
+    FileDescriptor copy_;
+    std::string name_;
+    void* handle_;
+};
+
+// The real-time thread would allocate them, in the middle of a cycle.
+void requireNoLazyThreadLocals(const std::string& path, int file) {
+    if (!ElfFile(file).lazy_thread_locals) return;
+    refuse(
+        path,
+        "has thread_local variables, which are allocated in the cycle that first uses them: make "
+        "them members of the component, or build with -ftls-model=initial-exec, which has their "
+        "memory at hand from the start");
 }
 
 }  // namespace
 
 Library::Library(const std::string& path, int file) : path_(path) {
-    void* handle = openCopy(path, file);
+    OpenCopy copy(path, file);
     using EntryPoint = const PluginDescriptor* (*)();
-    const auto entry = reinterpret_cast<EntryPoint>(::dlsym(handle, RTCF_ENTRY_POINT_NAME));
+    const auto entry = reinterpret_cast<EntryPoint>(::dlsym(copy.handle(), RTCF_ENTRY_POINT_NAME));
     if (entry == nullptr) {
         refuse(path, "has no components: it exports no " RTCF_ENTRY_POINT_NAME
                      "; register them with RTCF_COMPONENT and build with rtcf_add_components()");
     }
     const PluginDescriptor* descriptor = entry();
-    if (descriptor->abi_version != RTCF_ABI_VERSION) {
+    const std::uint32_t ours = AbiProbe::fingerprint(RTCF_ABI_VERSION);
+    if (descriptor->abi_version != ours) {
         refuse(
             path,
             fmt::format("was built for component ABI {}, this executor has {}: build it again with "
-                        "librtcf-dev {}",
-                        descriptor->abi_version, RTCF_ABI_VERSION, RTCF_VERSION));
+                        "librtcf-dev {}, and without options that change layouts, as "
+                        "-D_GLIBCXX_DEBUG does",
+                        descriptor->abi_version, ours, RTCF_VERSION));
     }
     for (const ComponentRecord* record = descriptor->components; record != nullptr;
          record = record->next) {
         types_.push_back(record);
     }
+    copy.keep();
     std::sort(types_.begin(), types_.end(),
               [](const auto* a, const auto* b) { return std::strcmp(a->type, b->type) < 0; });
 }
@@ -125,19 +169,26 @@ std::shared_ptr<const Library> LibraryStore::open(const std::string& path) {
         fmt::format("{} {} {} {}.{:09} {}", path, status.st_dev, status.st_ino,
                     status.st_mtim.tv_sec, status.st_mtim.tv_nsec, status.st_size);
     for (const Entry& entry : entries_) {
-        if (entry.identity == identity) return entry.library;
+        if (entry.identity != identity) continue;
+        requireTrustedFinds(path);
+        return entry.library;
     }
     requireTrustedLinks(path, file.get(), owners_);
-    auto library = std::make_shared<const Library>(path, file.get());
-    // What the loader found in other places than were judged.
+    requireNoLazyThreadLocals(path, file.get());
+    entries_.push_back({identity, std::make_shared<const Library>(path, file.get())});
+    requireTrustedFinds(path);
+    return entries_.back().library;
+}
+
+// What the loader found in other places than were judged. It stays loaded: its library is asked
+// about it whenever it is wanted again, and not loaded another time.
+void LibraryStore::requireTrustedFinds(const std::string& path) {
     for (const std::string& linked : loadedFiles()) {
         if (linked_.count(linked) != 0) continue;
         const FileDescriptor trusted(openTrusted(
             linked, owners_, fmt::format("library {}, which links against {}", path, linked)));
         linked_.insert(linked);
     }
-    entries_.push_back({identity, std::move(library)});
-    return entries_.back().library;
 }
 
 }  // namespace rtcf::executor

@@ -45,6 +45,8 @@ class LibraryStore {
     std::shared_ptr<const Library> open(const std::string& path);
 
    private:
+    void requireTrustedFinds(const std::string& path);
+
     struct Entry {
         std::string identity;  // path, inode, time and size
         std::shared_ptr<const Library> library;
