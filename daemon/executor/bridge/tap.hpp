@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -42,7 +43,8 @@ class Tap {
     void push() noexcept RTCF_NONBLOCKING;
 
     /// Gives the oldest message's bytes to `use(const std::uint8_t*, std::uint32_t)` and removes
-    /// it. Consumer only; the bytes are valid during the call. @return false if the ring is empty
+    /// it. The bytes are valid during the call. Not by the producer; of two who come at once, one
+    /// finds nothing. @return false if the ring is empty
     template <typename Use>
     bool pop(Use&& use);
 
@@ -72,12 +74,16 @@ class Tap {
     std::size_t mask_ = 0;              // the ring's size minus 1
     std::atomic<std::size_t> head_{0};  // bytes ever written, by the producer
     std::atomic<std::size_t> tail_{0};  // bytes ever read, by the consumer
+    std::mutex consumer_;               // held in pop()
     std::atomic<std::uint64_t> dropped_{0};
     std::atomic<std::uint64_t> too_large_{0};
 };
 
 template <typename Use>
 bool Tap::pop(Use&& use) {
+    // A topic that is closed and opened again has a new reader before the old one has gone.
+    const std::unique_lock<std::mutex> reading(consumer_, std::try_to_lock);
+    if (!reading.owns_lock()) return false;
     std::size_t tail = tail_.load(std::memory_order_relaxed);
     const std::size_t head = head_.load(std::memory_order_acquire);
     if (tail == head) return false;

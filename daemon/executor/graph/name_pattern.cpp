@@ -4,6 +4,7 @@
 
 #include <cstring>
 
+#include "graph/names.hpp"
 #include "refusal.hpp"
 
 namespace rtcf::executor {
@@ -22,6 +23,11 @@ bool repeatsNothing(const std::string& expression) {
     }
     return false;
 }
+
+// Time and stack that a match takes grow with the name's length times the expression's, and no
+// more: libstdc++'s other way recurses once for each character, and takes for ever on some.
+constexpr auto kSyntax =
+    std::regex::ECMAScript | std::regex::optimize | std::regex_constants::__polynomial;
 
 const char* reason(std::regex_constants::error_type code, const std::string& expression = {}) {
     using namespace std::regex_constants;
@@ -42,8 +48,9 @@ const char* reason(std::regex_constants::error_type code, const std::string& exp
 
 NamePattern::NamePattern(const std::string& what, const std::string& expression) {
     if (expression.empty()) return;
+    requireLength(what.c_str(), expression, kLongestPattern);
     try {
-        regex_.emplace(expression, std::regex::ECMAScript | std::regex::optimize);
+        regex_.emplace(expression, kSyntax);
     } catch (const std::regex_error& error) {
         throw Refusal(RefusalKind::InvalidArgument,
                       fmt::format("{}: bad regular expression '{}': {}", what, expression,

@@ -1,5 +1,7 @@
 #include "graph/names.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 
@@ -26,6 +28,14 @@ std::string cleaned(const std::string& name) {
 
 }  // namespace
 
+void requireLength(const char* what, const std::string& text, std::size_t longest) {
+    if (text.size() <= longest) return;
+    constexpr std::size_t kShown = 40;
+    throw Refusal(RefusalKind::InvalidArgument,
+                  fmt::format("{} '{}…' has {} characters: at most {} are allowed", what,
+                              text.substr(0, kShown), text.size(), longest));
+}
+
 bool isBaseName(const std::string& name) {
     return !name.empty() && isLetter(name[0]) &&
            std::all_of(name.begin(), name.end(), isWordCharacter);
@@ -39,6 +49,7 @@ bool isGraphName(const std::string& name) {
 
 std::string canonicalNamespace(const std::string& ns) {
     if (ns.empty()) return "/";
+    requireLength("namespace", ns);
     const std::string absolute = cleaned(ns[0] == '/' ? ns : "/" + ns);
     if (!isGraphName(absolute)) {
         throw Refusal(
@@ -71,6 +82,7 @@ std::string mappedName(const std::string& port, const std::string& ns, const std
 }
 
 std::string fullNameOf(const std::string& given) {
+    requireLength("component name", given);
     if (!isGraphName(given) || given[0] == '~') {
         throw Refusal(RefusalKind::InvalidArgument, "'" + given + "' is not a component's name");
     }

@@ -3,6 +3,7 @@
 /// components and their ports use them. Pure functions, not real-time.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +12,12 @@ namespace rtcf::executor {
 
 /// Remaps in order of declaration, from and to as written.
 using Remaps = std::vector<std::pair<std::string, std::string>>;
+
+constexpr std::size_t kLongestName = 255;      ///< characters; with namespace, as in ROS
+constexpr std::size_t kLongestPattern = 1000;  ///< characters of a regular expression
+
+/// Refuses what is too long. @param what it is, for a person
+void requireLength(const char* what, const std::string& text, std::size_t longest = kLongestName);
 
 /// True for a letter followed by letters, digits and underscores.
 bool isBaseName(const std::string& name);

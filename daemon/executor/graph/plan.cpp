@@ -13,11 +13,15 @@ namespace {
 // has to share the machine with everything else.
 constexpr double kTapSeconds = 0.5;
 constexpr std::size_t kVariableTapValues = 2;  // of the largest
+// Of larger types it holds fewer, at least two: rings are locked memory.
+constexpr std::size_t kLargestTap = 8 * 1024 * 1024;
 
 std::size_t tapCapacity(const TypeInfo& type, double frequency_hz, std::size_t largest) {
     if (!type.fixed_size) return kVariableTapValues * (largest + 16);
     const std::size_t record = 16 + type.length(*type.make_slot(nullptr));
-    return record * static_cast<std::size_t>(std::clamp(frequency_hz * kTapSeconds, 64.0, 16384.0));
+    const auto values =
+        static_cast<std::size_t>(std::clamp(frequency_hz * kTapSeconds, 64.0, 16384.0));
+    return std::min(record * values, kLargestTap);
 }
 
 class Builder {

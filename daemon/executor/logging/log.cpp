@@ -55,7 +55,8 @@ void Log::write(LogLevel level, const std::string& component, std::string messag
 }
 
 std::uint64_t Log::iterationNow() const noexcept {
-    return iteration_ != nullptr ? iteration_->load(std::memory_order_relaxed) : 0;
+    const std::atomic<std::uint64_t>* iteration = iteration_.load(std::memory_order_acquire);
+    return iteration != nullptr ? iteration->load(std::memory_order_relaxed) : 0;
 }
 
 void Log::post(LogEntry entry) {

@@ -77,7 +77,7 @@ class Log final : public LogSink {
     /// @param iteration the loop's counter, read at each claim of any thread
     static void setRealtimeThread(bool realtime) noexcept;
     void setIteration(const std::atomic<std::uint64_t>* iteration) noexcept {
-        iteration_ = iteration;
+        iteration_.store(iteration, std::memory_order_release);
     }
 
    private:
@@ -101,7 +101,7 @@ class Log final : public LogSink {
     std::mutex posted_mutex_;  // posted_
     std::deque<LogEntry> posted_;
     std::atomic<std::uint64_t> posted_dropped_{0};
-    const std::atomic<std::uint64_t>* iteration_ = nullptr;
+    std::atomic<const std::atomic<std::uint64_t>*> iteration_{nullptr};
 };
 
 }  // namespace rtcf::executor

@@ -49,6 +49,22 @@ TEST(Tap, PassesEachWrittenValueOnce) {
     EXPECT_FALSE(tap.pop([](const std::uint8_t*, std::uint32_t) {}));
 }
 
+// A topic that is closed and opened again: the old reader has not gone yet.
+TEST(Tap, OfTwoReadersAtOnceOneFindsNothing) {
+    const auto slot = std::make_shared<Slot<double>>();
+    Tap tap("/x", typeInfo<double>(), slot, 1024);
+    for (const double value : {1.0, 2.0}) {
+        write(slot, value);
+        tap.push();
+    }
+    EXPECT_TRUE(tap.pop([&](const std::uint8_t*, std::uint32_t) {
+        std::thread other(
+            [&] { EXPECT_FALSE(tap.pop([](const std::uint8_t*, std::uint32_t) {})); });
+        other.join();
+    }));
+    EXPECT_EQ(takeAll(tap), std::vector<double>{2.0});
+}
+
 TEST(Tap, TakesTheFirstValueAndThenEachNth) {
     const auto slot = std::make_shared<Slot<double>>();
     Tap tap("/x", typeInfo<double>(), slot, 1024);

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+#include <thread>
+
+#include "graph/names.hpp"
 #include "refusal.hpp"
 
 namespace rtcf::test {
@@ -48,6 +52,36 @@ TEST(NamePattern, BadExpressionIsRefusedWithTheReason) {
     }
     EXPECT_NE(refusal("*R3").find("nothing before it"), std::string::npos);
     EXPECT_NE(refusal("(a").find("not closed"), std::string::npos);
+}
+
+// libstdc++ would recurse once for each character, or try all ways there are: it has a small stack
+// and a loop that waits.
+TEST(NamePattern, LongNamesAndHardExpressionsTakeLittleTimeAndStack) {
+    const std::string name(executor::kLongestName, 'a');
+    std::string hard;
+    for (int i = 0; i < 200; ++i) hard += "a?";
+    std::string nested = std::string(330, '(') + "a";
+    for (int i = 0; i < 330; ++i) nested += ")*";
+    std::thread small([&] {
+        EXPECT_TRUE(NamePattern("whitelist", nested).matches(name));
+        EXPECT_TRUE(NamePattern("whitelist", ".*|(.*a)*").matches(name));
+        EXPECT_FALSE(NamePattern("whitelist", hard).matches(name));
+    });
+    small.join();
+}
+
+TEST(NamePattern, TooLongExpressionIsRefused) {
+    const std::string longest(executor::kLongestPattern, 'a');
+    EXPECT_TRUE(NamePattern("whitelist", longest).matches(longest));
+    try {
+        const NamePattern pattern("whitelist", longest + "a");
+        ADD_FAILURE() << "it was taken";
+    } catch (const Refusal& refused) {
+        EXPECT_NE(std::string(refused.what()).find("whitelist"), std::string::npos);
+        EXPECT_NE(std::string(refused.what()).find("1001 characters: at most 1000"),
+                  std::string::npos)
+            << refused.what();
+    }
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+
 #include "refusal.hpp"
 
 namespace rtcf::test {
@@ -56,6 +58,23 @@ TEST(Names, ComponentsAreTakenInTheRoot) {
     EXPECT_EQ(fullNameOf("arm/H1"), "/arm/H1");
     EXPECT_EQ(fullNameOf("/arm//H1/"), "/arm/H1");
     for (const char* name : {"", "~H1", "H 1"}) EXPECT_THROW(fullNameOf(name), Refusal) << name;
+}
+
+TEST(Names, ThatAreTooLongAreRefusedWithTheirLength) {
+    const std::string longest(kLongestName, 'a');
+    EXPECT_EQ(fullNameOf("/" + longest.substr(1)).size(), kLongestName);
+    for (const auto& refuse : {std::function<void()>([&] { fullNameOf(longest + "a"); }),
+                               std::function<void()>([&] { canonicalNamespace(longest + "a"); })}) {
+        try {
+            refuse();
+            ADD_FAILURE() << "it was taken";
+        } catch (const Refusal& refused) {
+            EXPECT_NE(std::string(refused.what()).find("256 characters: at most 255"),
+                      std::string::npos)
+                << refused.what();
+            EXPECT_LT(std::string(refused.what()).size(), 150U);
+        }
+    }
 }
 
 TEST(MappedName, WithoutRemapIsResolved) {
