@@ -278,6 +278,13 @@ class Client:
         )
         return self._change(self._stub.SetParameters, request, on_progress)
 
+    def reset_state(
+        self, component: str, runner: str = "", on_progress: OnProgress | None = None
+    ) -> control_pb2.ChangeResult:
+        """Take a component's declared state back to its initial values, at one cycle boundary."""
+        request = control_pb2.ResetStateRequest(runner=runner, component=component)
+        return self._change(self._stub.ResetState, request, on_progress)
+
     def hold_runner(self, opening: control_pb2.OpenHold) -> Tenancy:
         """Take a runner for as long as the tenancy lasts; its messages are HoldRunnerResponse."""
         return Tenancy(self._stub.HoldRunner, control_pb2.HoldRunnerRequest, opening, self.socket)

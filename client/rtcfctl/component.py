@@ -146,6 +146,8 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         print_ports(list(found.ports), output)
     if found.parameters:
         print_parameters(list(found.parameters), output)
+    if found.states:
+        print_states(list(found.states), output)
 
 
 def print_ports(ports: list[graph_pb2.PortInfo], output: Output) -> None:
@@ -185,6 +187,17 @@ def print_parameters(parameters: list[graph_pb2.ParameterInfo], output: Output) 
                 each.doc,
             )
             for each in parameters
+        ),
+    )
+
+
+def print_states(states: list[graph_pb2.StateInfo], output: Output) -> None:
+    """Print declared state with values."""
+    output.table(
+        ("state", "type", "value", "unit", "initial", "meaning"),
+        (
+            (each.name, each.type, each.value or "-", each.unit, each.initial, each.doc)
+            for each in states
         ),
     )
 

@@ -26,8 +26,8 @@ class Wave final : public rtcf::Component {
                                  rtcf::Choice("square", Shape::Square)};
     rtcf::Parameter<bool> silent{this, "silent", false, rtcf::Doc("writes 0")};
 
-    double phase_ = 0.0;  // of the wave, from 0 to 1
-    bool above_ = false;
+    rtcf::State<double> phase_{this, "phase", 0.0, rtcf::Doc("of the wave, from 0 to 1")};
+    rtcf::State<bool> above_{this, "above", false, rtcf::Doc("the wave was above 0")};
 
     bool configure() override {
         RTCF_INFO(this, "configured: amplitude {}, rate {} Hz", amplitude.value(), rate.value());
@@ -45,7 +45,7 @@ class Wave final : public rtcf::Component {
         const double unit = shape == Shape::Sine ? sine : std::copysign(1.0, sine);
         wave.value().data = silent ? 0.0 : amplitude * unit;
         wave.publish();
-        RTCF_DEBUG(this, "wave at phase {}", phase_);
+        RTCF_DEBUG(this, "wave at phase {}", phase_.value());
         if (const bool above = sine > 0.0; above != above_) {
             above_ = above;
             RTCF_INFO_THROTTLE(this, 1.0, "{} through zero in cycle {}", above ? "up" : "down",

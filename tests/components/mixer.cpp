@@ -21,7 +21,7 @@ class Mixer final : public rtcf::Component {
                                            rtcf::Doc("configure or start, which then refuses")};
     // What prepare() made of the parameters: it must change in the same cycle as they do.
     rtcf::Derived<std::int64_t> product{this};
-    std::int32_t updates_ = 0;
+    rtcf::State<std::int32_t> updates_{this, "updates", 0};
 
     bool prepare(const rtcf::Values& proposed) override {
         if (proposed[offset] == kUnlucky) return fail("{} is an unlucky offset", kUnlucky);
@@ -45,10 +45,6 @@ class Mixer final : public rtcf::Component {
         out.write(mixed);
         half.write(mixed / 2.0);
         updates.write(++updates_);
-    }
-
-    void takeOver(const rtcf::Component& previous) noexcept override {
-        if (const auto* mixer = dynamic_cast<const Mixer*>(&previous)) updates_ = mixer->updates_;
     }
 
     static constexpr std::int32_t kUnlucky = 13;

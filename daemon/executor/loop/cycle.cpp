@@ -222,15 +222,18 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
 
 void Cycle::apply(Adoption& adoption) noexcept {
     const std::int64_t begin = readCycleCounter();
+    for (const StateCopy& state : adoption.copies) state.copy();
     for (const Latch& latch : adoption.new_latches) latch.copy();
     const auto new_inputs =
         adoption.rewires.begin() + static_cast<std::ptrdiff_t>(adoption.rewires_of_new);
     std::for_each(adoption.rewires.begin(), new_inputs, [](Rewire& each) { each.apply(); });
-    for (const HandOver& hand_over : adoption.hand_overs) {
+    for (HandOver& hand_over : adoption.hand_overs) {
         // Nobody knows what state an exception has left.
-        if (hand_over.previous->context().disabled) continue;
+        hand_over.skipped = hand_over.previous->context().disabled;
+        if (hand_over.skipped) continue;
+        for (const StateCopy& state : hand_over.states) state.copy();
         const HookNote note(notes_, *hand_over.successor, Hook::TakeOver);
-        hand_over.successor->takeOver(*hand_over.previous);
+        hand_over.successor->takeOver(Predecessor(*hand_over.previous));
     }
     if (active_) {
         for (const Leaving& leaving : adoption.leaving) {

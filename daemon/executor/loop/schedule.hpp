@@ -10,6 +10,7 @@
 
 #include "bridge/injector.hpp"
 #include "bridge/tap.hpp"
+#include "graph/state_copy.hpp"
 #include "loop/faults.hpp"
 #include "rtcf/component.hpp"
 #include "statistics/histogram.hpp"
@@ -119,6 +120,9 @@ struct Audience {
 struct HandOver {
     Component* successor;
     const Component* previous;
+    std::vector<StateCopy> states;
+    /// Filled at the boundary: what was taken out after a fault hands over nothing.
+    bool skipped = false;
 };
 
 /// A component whose last cycle has come while the loop runs.
@@ -138,6 +142,7 @@ struct Adoption {
     std::size_t rewires_of_new = 0;  ///< the first so many are of inputs that never had a writer
     std::vector<Audience> audiences;
     std::vector<HandOver> hand_overs;
+    std::vector<StateCopy> copies;  ///< of state, e.g. to be looked at
     std::vector<Leaving> leaving;
     std::vector<StagedValue*> values;  ///< parameters, and what derives from them
     std::int64_t period_ns = 0;        ///< the loop's new period; 0 = stays

@@ -32,6 +32,10 @@ std::shared_ptr<const ComponentSnapshot> picture(const GraphNode& node) {
     for (std::size_t i = 0; i < parameters.size(); ++i) {
         result->parameters.push_back({parameters[i]->declaration(), instance.parameterValues()[i]});
     }
+    for (const StateDeclaration& state : instance.component().states()) {
+        result->states.push_back(
+            {state.name, state.type, state.unit, state.doc, state.print(state.initial.data())});
+    }
     result->fault = instance.faultText();
     return result;
 }

@@ -26,6 +26,14 @@ struct PortSnapshot {
 
 /// One component. What its pointers point to is never unloaded (types) or is
 /// shared (figures), so a snapshot may outlive the component.
+struct StateSnapshot {
+    std::string name;
+    std::string type;
+    std::string unit;
+    std::string doc;
+    std::string initial;
+};
+
 struct ComponentSnapshot : ParameterSet {
     const Instance* instance;  ///< for comparison only
     std::shared_ptr<const ComponentFigures> figures;
@@ -33,6 +41,7 @@ struct ComponentSnapshot : ParameterSet {
     std::string library;
     std::string doc;
     std::vector<PortSnapshot> ports;
+    std::vector<StateSnapshot> states;
     std::string fault;
 };
 

@@ -63,6 +63,7 @@ CALLS = {
     "Step": Call(Level.OPERATE),
     "Replay": Call(Level.OPERATE, _ANY),
     "SetBreaks": Call(Level.OPERATE, _LISTS),
+    "ResetState": Call(Level.OPERATE),
     "Release": Call(Level.OPERATE, _LISTS),
     "ResetStatistics": Call(Level.OPERATE),
     "RestartRunner": Call(Level.OPERATE),

@@ -318,6 +318,20 @@ def _word(value: graph_pb2.ParameterValue) -> str:
     return f"{_plain(value)}"[:_LONGEST_WORD]
 
 
+async def reset_state(
+    runner: RunnerCore, request: control_pb2.ResetStateRequest, progress: Progress
+) -> control_pb2.ChangeResult:
+    """Take the state of one component back to its initial values."""
+    name = absolute(request.component)
+
+    async def work() -> control_pb2.ChangeResult:
+        return (await runner.ask(wire.Request(reset_state=request), progress)).change
+
+    result = await runner.change(f"a reset of {name}", work)
+    runner.log.info("%s: state reset", name)
+    return result
+
+
 async def _saved(runner: RunnerCore, result: control_pb2.ChangeResult) -> control_pb2.ChangeResult:
     result.notes.extend(await runner.save())
     return result

@@ -267,6 +267,12 @@ class Control(control_pb2_grpc.ControlServicer):
         runner = self._runners.get(request.runner)
         return lambda progress: graph.set_parameters(runner, request, progress)
 
+    @_changing
+    def ResetState(self, request: control_pb2.ResetStateRequest) -> Any:
+        """Take a component's state back to its initial values."""
+        runner = self._runners.get(request.runner)
+        return lambda progress: graph.reset_state(runner, request, progress)
+
     @_holding
     def HoldRunner(self, request: control_pb2.OpenHold) -> Any:
         """A runner, for as long as the call lasts."""

@@ -25,6 +25,7 @@
 #include "rtcf/realtime.hpp"
 #include "rtcf/registration.hpp"
 #include "rtcf/slot.hpp"
+#include "rtcf/state.hpp"
 
 namespace rtcf {
 
@@ -47,11 +48,12 @@ struct ComponentContext {
         -1;                 ///< loop time in whole periods at its last update, ns; -1 = not yet
     bool disabled = false;  ///< taken out after a fault; written by the loop
     std::uint32_t recorder_slot = 0;                          ///< in the flight recorder
-    DeviceFigures* device = nullptr;                          ///< never null once attached
-    LogSink* log = nullptr;                                   ///< never null once attached
+    DeviceFigures* device = nullptr;                          ///< null outside an executor
+    LogSink* log = nullptr;                                   ///< null: nothing is logged
     NodeGate* gate = nullptr;                                 ///< to the ROS node; null without one
     std::vector<std::pair<std::string, std::string>> remaps;  ///< resolved names, from and to
     std::atomic<LogLevel> log_level{LogLevel::Info};          ///< calls below it are not logged
+    LogMemory said;                                           ///< of _ONCE and _THROTTLE
 };
 
 /// Base class of all components.
@@ -82,8 +84,10 @@ class Component {
     virtual void safe() noexcept {}
     virtual void stop() {}     ///< The loop has ended. Not real-time.
     virtual void cleanup() {}  ///< Undo configure(). Not real-time.
-    /// At the cycle boundary in which this component takes the place of `previous`. Real-time.
-    virtual void takeOver(const Component& previous) noexcept { (void)previous; }
+    /// At the cycle boundary in which this component takes the place of another, before its first
+    /// update(). State of the same name and type is there already: here is for what changed its
+    /// name, type or meaning. Real-time.
+    virtual void takeOver(const Predecessor& previous) noexcept { (void)previous; }
     /// @}
 
     /// @name Identity; valid from configure() on
@@ -110,6 +114,8 @@ class Component {
     std::int64_t elapsed() const noexcept RTCF_NONBLOCKING {
         return std::max<std::int64_t>(context_->clock->elapsed_ns, context_->elapsed_ns);
     }
+    /// elapsed() in seconds: what an integral or a derivative is taken over.
+    double dt() const noexcept RTCF_NONBLOCKING { return 1e-9 * static_cast<double>(elapsed()); }
     /// This component's nominal frequency, Hz.
     double frequency() const noexcept RTCF_NONBLOCKING {
         return 1e9 / static_cast<double>(context_->period_ns);
@@ -123,6 +129,7 @@ class Component {
                level >= context_->log_level.load(std::memory_order_relaxed);
     }
     LogSink& logSink() const noexcept RTCF_NONBLOCKING { return *context_->log; }
+    LogMemory& logMemory() const noexcept RTCF_NONBLOCKING { return context_->said; }
     /// @}
 
     /// @name For the executor
@@ -137,6 +144,7 @@ class Component {
     const std::vector<OutputBase*>& outputs() const noexcept { return rest_->outputs; }
     const std::vector<ParameterBase*>& parameters() const noexcept { return rest_->parameters; }
     const std::vector<DerivedBase*>& derived() const noexcept { return rest_->derived; }
+    const std::vector<StateDeclaration>& states() const noexcept { return rest_->states; }
     /// Outputs whose values nobody reads before the executor has let them pass.
     const std::vector<OutputBase*>& stagedOutputs() const noexcept { return rest_->staged_outputs; }
     /// Makes all outputs such, before anybody reads them.
@@ -154,6 +162,7 @@ class Component {
     /// @{
     void declare(InputBase* input) { declareIn(rest_->inputs, input, input->name(), "port"); }
     void declare(OutputBase* output) { declareIn(rest_->outputs, output, output->name(), "port"); }
+    void declare(StateDeclaration state);
     void declare(DerivedBase* derived) { rest_->derived.push_back(derived); }
     void declareFinite(OutputBase* output) { rest_->staged_outputs.push_back(output); }
     void declare(ParameterBase* parameter) {
@@ -170,8 +179,10 @@ class Component {
     }
 
    private:
+    friend struct AbiProbe;
     template <typename T>
     void declareIn(std::vector<T*>& members, T* member, const std::string& name, const char* what);
+    void requireDeclarable(const std::string& name, const char* what) const;
     static ComponentContext& detached() {
         static const LoopClock clock{};
         static ComponentContext context;
@@ -188,15 +199,14 @@ class Component {
         std::vector<OutputBase*> outputs;
         std::vector<ParameterBase*> parameters;
         std::vector<DerivedBase*> derived;
+        std::vector<StateDeclaration> states;
         std::vector<OutputBase*> staged_outputs;
         std::string failure;
     };
     std::unique_ptr<Rest> rest_ = std::make_unique<Rest>();
 };
 
-template <typename T>
-void Component::declareIn(std::vector<T*>& members, T* member, const std::string& name,
-                          const char* what) {
+inline void Component::requireDeclarable(const std::string& name, const char* what) const {
     const auto legal = [](char c) {
         return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
     };
@@ -207,6 +217,51 @@ void Component::declareIn(std::vector<T*>& members, T* member, const std::string
     }
     if (rest_->frozen)
         throw std::logic_error(fmt::format("{} '{}' declared after configure()", what, name));
+}
+
+inline void Component::declare(StateDeclaration state) {
+    requireDeclarable(state.name, "state");
+    std::size_t size = state.size;
+    for (const StateDeclaration& other : rest_->states) {
+        if (other.name == state.name)
+            throw std::logic_error(fmt::format("state '{}' is declared twice", state.name));
+        size += other.size;
+    }
+    if (size > kLargestState) {
+        throw std::logic_error(
+            fmt::format("state '{}': {} bytes of state are more than the {} "
+                        "that a component may have",
+                        state.name, size, kLargestState));
+    }
+    rest_->states.push_back(std::move(state));
+}
+
+template <typename T>
+void State<T>::declareIn(Component* owner, StateDeclaration declaration) {
+    owner->declare(std::move(declaration));
+}
+
+inline const StateDeclaration* Predecessor::findState(std::string_view name) const noexcept {
+    for (const StateDeclaration& state : component_.states()) {
+        if (state.name == name) return &state;
+    }
+    return nullptr;
+}
+
+template <typename T>
+const T* Predecessor::output(std::string_view name) const noexcept {
+    for (const OutputBase* output : component_.outputs()) {
+        if (output->name() != name) continue;
+        const bool there = output->slot()->sequence != 0 && sameType(output->type(), typeInfo<T>());
+        return there ? &static_cast<const Slot<T>*>(output->slot().get())->value : nullptr;
+    }
+    return nullptr;
+}
+
+template <typename T>
+void Component::declareIn(std::vector<T*>& members, T* member, const std::string& name,
+                          const char* what) {
+    requireDeclarable(name, what);
     const auto taken = [&](const auto& list) {
         return std::any_of(list.begin(), list.end(), [&](const auto* other) {
             if constexpr (std::is_same_v<T, ParameterBase>) {
@@ -259,13 +314,9 @@ inline DerivedBase::DerivedBase(Component* owner) { owner->declare(this); }
 
 inline ParameterBase::ParameterBase(Component* owner, ParameterDeclaration declaration)
     : declaration_(std::move(declaration)) {
-    // NaN and infinity are no values to set, but some use them as default: "no limit".
     ParameterValue initial = declaration_.default_value;
-    const double* number = std::get_if<double>(&initial);
-    if (number == nullptr || std::isfinite(*number)) {
-        if (const std::string why = check(initial); !why.empty())
-            throw std::logic_error("default value: " + why);
-    }
+    if (const std::string why = check(initial); !why.empty())
+        throw std::logic_error("default value: " + why);
     owner->declare(this);
 }
 
@@ -283,7 +334,11 @@ inline std::string ParameterBase::check(ParameterValue& value) const {
     }
     double number = 0.0;
     if (const auto* real = std::get_if<double>(&value)) {
-        if (!std::isfinite(*real)) return fmt::format("parameter {} must be finite", name);
+        if (!std::isfinite(*real)) {
+            // No values to set, but for who takes back what it was declared with.
+            return sameValue(value, initial) ? std::string()
+                                             : fmt::format("parameter {} must be finite", name);
+        }
         number = *real;
     } else if (const auto* integer = std::get_if<std::int64_t>(&value)) {
         number = static_cast<double>(*integer);
@@ -319,4 +374,5 @@ class Source : public Component {
 
 }  // namespace rtcf
 
+#include "rtcf/abi.hpp"
 #include "rtcf/device_io.hpp"

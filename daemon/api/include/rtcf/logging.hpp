@@ -69,6 +69,30 @@ class LogSink {
     ~LogSink() = default;
 };
 
+/// What _ONCE and _THROTTLE remember for one component: when each of its calls may speak again.
+class LogMemory {
+   public:
+    /// The time from which a call may pass. Real-time safe; any thread. @return null if so many
+    /// other calls are known that there is no room for this one
+    std::atomic<std::int64_t>* of(const LogSite& site) noexcept RTCF_NONBLOCKING {
+        const std::size_t begin = reinterpret_cast<std::uintptr_t>(&site) / sizeof(LogSite);
+        for (std::size_t i = 0; i < entries_.size(); ++i) {
+            Entry& entry = entries_[(begin + i) % entries_.size()];
+            const LogSite* known = entry.site.load(std::memory_order_acquire);
+            if (known == nullptr && entry.site.compare_exchange_strong(known, &site)) known = &site;
+            if (known == &site) return &entry.next_ns;
+        }
+        return nullptr;
+    }
+
+   private:
+    struct Entry {
+        std::atomic<const LogSite*> site{nullptr};
+        std::atomic<std::int64_t> next_ns{std::numeric_limits<std::int64_t>::min()};
+    };
+    std::array<Entry, 32> entries_;
+};
+
 namespace detail {
 
 /// A text argument, cut to what a record can hold.
@@ -154,6 +178,12 @@ inline bool logThrottle(std::atomic<std::int64_t>& next_ns, std::int64_t now_ns,
            next_ns.compare_exchange_strong(due, now_ns + period_ns, std::memory_order_relaxed);
 }
 
+/// Lets a call pass once. Real-time safe.
+inline bool logOnce(std::atomic<std::int64_t>& next_ns) noexcept {
+    constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
+    return next_ns.exchange(kNever, std::memory_order_relaxed) != kNever;
+}
+
 }  // namespace detail
 
 }  // namespace rtcf
@@ -163,9 +193,9 @@ inline bool logThrottle(std::atomic<std::int64_t>& next_ns, std::int64_t now_ns,
 #define RTCF_LOG_IF_(self, log_level, condition, text, ...)                                    \
     do {                                                                                       \
         const ::rtcf::Component& rtcf_log_self = *(self);                                      \
+        static constexpr ::rtcf::LogSite rtcf_log_site{log_level, __FILE__, __LINE__,          \
+                                                       RTCF_LOG_FUNCTION_, text};              \
         if (rtcf_log_self.logs(log_level) && (condition)) {                                    \
-            static constexpr ::rtcf::LogSite rtcf_log_site{log_level, __FILE__, __LINE__,      \
-                                                           RTCF_LOG_FUNCTION_, text};          \
             if (false) ::rtcf::detail::logCheck(FMT_STRING(text), ##__VA_ARGS__);              \
             ::rtcf::detail::logCall(rtcf_log_self.logSink(), rtcf_log_self.fullName().c_str(), \
                                     rtcf_log_site, ##__VA_ARGS__);                             \
@@ -174,23 +204,26 @@ inline bool logThrottle(std::atomic<std::int64_t>& next_ns, std::int64_t now_ns,
 #define RTCF_LOG_FUNCTION_ static_cast<const char*>(__builtin_FUNCTION())
 #define RTCF_LOG_(self, log_level, text, ...) \
     RTCF_LOG_IF_(self, log_level, true, text, ##__VA_ARGS__)
-#define RTCF_LOG_ONCE_(self, log_level, text, ...)                                         \
-    do {                                                                                   \
-        static std::atomic<bool> rtcf_log_done{false};                                     \
-        RTCF_LOG_IF_(self, log_level, !rtcf_log_done.exchange(true), text, ##__VA_ARGS__); \
-    } while (false)
-#define RTCF_LOG_THROTTLE_(self, log_level, period_s, text, ...)                                  \
-    do {                                                                                          \
-        static std::atomic<std::int64_t> rtcf_log_next{std::numeric_limits<std::int64_t>::min()}; \
-        RTCF_LOG_IF_(self, log_level,                                                             \
-                     ::rtcf::detail::logThrottle(rtcf_log_next, (self)->time(),                   \
-                                                 static_cast<std::int64_t>((period_s) * 1e9)),    \
-                     text, ##__VA_ARGS__);                                                        \
-    } while (false)
+// Of a component that has more such calls than are remembered, the others are one with those of
+// its class.
+#define RTCF_LOG_NEXT_                                                                          \
+    ([](::rtcf::LogMemory& memory, const ::rtcf::LogSite& site) -> std::atomic<std::int64_t>& { \
+        static std::atomic<std::int64_t> shared{std::numeric_limits<std::int64_t>::min()};      \
+        std::atomic<std::int64_t>* own = memory.of(site);                                       \
+        return own != nullptr ? *own : shared;                                                  \
+    }(rtcf_log_self.logMemory(), rtcf_log_site))
+#define RTCF_LOG_ONCE_(self, log_level, text, ...) \
+    RTCF_LOG_IF_(self, log_level, ::rtcf::detail::logOnce(RTCF_LOG_NEXT_), text, ##__VA_ARGS__)
+#define RTCF_LOG_THROTTLE_(self, log_level, period_s, text, ...)                           \
+    RTCF_LOG_IF_(self, log_level,                                                          \
+                 ::rtcf::detail::logThrottle(RTCF_LOG_NEXT_, rtcf_log_self.time(),         \
+                                             static_cast<std::int64_t>((period_s) * 1e9)), \
+                 text, ##__VA_ARGS__)
 /// @}
 
 /// @name Logging, usable in every hook; real-time safe
-/// `self` is the component, usually `this`; throttled by loop time.
+/// `self` is the component, usually `this`; throttled by loop time. _ONCE and _THROTTLE count for
+/// each component of its own.
 /// @{
 #define RTCF_DEBUG(self, ...) RTCF_LOG_(self, ::rtcf::LogLevel::Debug, __VA_ARGS__)
 #define RTCF_INFO(self, ...) RTCF_LOG_(self, ::rtcf::LogLevel::Info, __VA_ARGS__)

@@ -35,6 +35,7 @@ inline std::string joinLines(const std::string& lines) {
 template <typename T>
 struct PortType<T, std::enable_if_t<ros::message_traits::IsMessage<T>::value>> {
     static constexpr bool kFixedSize = ros::message_traits::IsFixedSize<T>::value;
+    static constexpr bool kPlain = true;
     static const char* name() { return ros::message_traits::datatype<T>(); }
     static const char* md5() { return ros::message_traits::md5sum<T>(); }
     static const char* rosType() { return name(); }

@@ -52,6 +52,13 @@ struct Choice {
 };
 /// @}
 
+/// True for two NaN too, which do not equal each other.
+inline bool sameValue(const ParameterValue& a, const ParameterValue& b) noexcept {
+    const auto* x = std::get_if<double>(&a);
+    const auto* y = std::get_if<double>(&b);
+    return a == b || (x != nullptr && y != nullptr && std::isnan(*x) && std::isnan(*y));
+}
+
 /// How a parameter was declared.
 struct ParameterDeclaration {
     std::string name;
@@ -89,7 +96,8 @@ class ParameterBase : public StagedValue {
 
     /// Checks type, bounds and enumerators. @return empty if the value can be
     /// staged, else what is wrong with it. Converts int to double where a
-    /// double is declared. Not real-time safe.
+    /// double is declared. NaN and infinity are for defaults alone, as "no limit".
+    /// Not real-time safe.
     std::string check(ParameterValue& value) const;
 
     virtual void stage(const ParameterValue& checked) = 0;  ///< A successor. Not real-time safe.

@@ -108,6 +108,7 @@ class InputBase {
     }
 
    private:
+    friend struct AbiProbe;
     const SlotHeader* source_;   // where the writer writes
     const SlotHeader* current_;  // where the component's value is
     std::uint64_t seen_ = 0;     // the source's sequence at the last read
@@ -201,6 +202,7 @@ class OutputBase {
         raw_->time_ns = clock_->time_ns;
     }
 
+    friend struct AbiProbe;
     SlotHeader* raw_;  // what is written: the slot's object, or the staged one's
 
    private:

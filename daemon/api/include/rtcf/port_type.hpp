@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include "rtcf/finite.hpp"
 #include "rtcf/slot.hpp"
@@ -17,7 +18,8 @@ namespace rtcf {
 /// Type-erased description of a port's type. All functions take slots of this
 /// very type.
 struct TypeInfo {
-    /// @name Identity: two ports can be connected if all four are equal.
+    /// @name Identity: two ports can be connected if all four are equal, or both are plain and of
+    /// one message, size and alignment.
     /// @{
     const char* name;  ///< e.g. "std_msgs/Float64", "double"
     const char* md5;   ///< of the ROS definition; of the mapped message for other types
@@ -32,6 +34,8 @@ struct TypeInfo {
     const char* ros_definition;
     /// @}
 
+    /// The value lies in memory as the message of `ros_type` does: `double` and std_msgs/Float64.
+    bool plain;
     bool fixed_size;  ///< every value has the same serialised length, and copying never allocates
 
     /// A new slot, with a copy of the sample's value if there is one. Not real-time safe.
@@ -57,7 +61,7 @@ bool sameType(const TypeInfo& a, const TypeInfo& b) noexcept;
 /// How a type becomes a port's type; specialised in message_type.hpp,
 /// arithmetic_type.hpp and eigen_type.hpp. A specialisation has
 ///  - `static const char* name()`, `md5()`, `rosType()`, `rosMd5()`, `rosDefinition()`
-///  - `static constexpr bool kFixedSize`
+///  - `static constexpr bool kFixedSize`, and `kPlain` if the type is (TypeInfo::plain)
 ///  - `static std::uint32_t length(const T&)`
 ///  - `static void serialize(const T&, std::uint8_t*, std::uint32_t)`
 ///  - `static void deserialize(T&, const std::uint8_t*, std::uint32_t)`, which throws on bad bytes
@@ -105,6 +109,12 @@ bool finiteSlot(const SlotHeader& slot) {
     return isFinite(static_cast<const Slot<T>&>(slot).value);
 }
 
+template <typename T, typename = void>
+struct IsPlain : std::false_type {};
+template <typename T>
+struct IsPlain<T, std::void_t<decltype(PortType<T>::kPlain)>>
+    : std::bool_constant<PortType<T>::kPlain> {};
+
 template <typename T>
 std::string printSlot(const SlotHeader& slot) {
     return PortType<T>::print(static_cast<const Slot<T>&>(slot).value);
@@ -122,6 +132,7 @@ const TypeInfo& typeInfo() {
                                PortType<T>::rosType(),
                                PortType<T>::rosMd5(),
                                PortType<T>::rosDefinition(),
+                               detail::IsPlain<T>::value,
                                PortType<T>::kFixedSize,
                                &detail::makeSlot<T>,
                                &detail::copySlot<T>,
@@ -135,8 +146,11 @@ const TypeInfo& typeInfo() {
 
 inline bool sameType(const TypeInfo& a, const TypeInfo& b) noexcept {
     // Libraries have TypeInfo objects of their own, so identity is by content.
-    return &a == &b || (a.size == b.size && a.alignment == b.alignment &&
-                        std::string_view(a.name) == b.name && std::string_view(a.md5) == b.md5);
+    if (&a == &b) return true;
+    if (a.size != b.size || a.alignment != b.alignment) return false;
+    if (std::string_view(a.name) == b.name) return std::string_view(a.md5) == b.md5;
+    return a.plain && b.plain && std::string_view(a.ros_type) == b.ros_type &&
+           std::string_view(a.ros_md5) == b.ros_md5;
 }
 
 }  // namespace rtcf

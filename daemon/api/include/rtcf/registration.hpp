@@ -25,7 +25,7 @@ struct ComponentRecord {
 
 /// What a library's entry point gives. Its first two members never change.
 struct PluginDescriptor {
-    std::uint32_t abi_version;  ///< RTCF_ABI_VERSION of the headers it was built with
+    std::uint32_t abi_version;  ///< AbiProbe::fingerprint() of the headers it was built with
     std::uint32_t size;         ///< of this struct
     const char* version;        ///< release of the headers it was built with
     const ComponentRecord* components;
@@ -66,15 +66,6 @@ T* construct(ComponentContext* context, const Arguments&... arguments) {
 }  // namespace detail
 
 }  // namespace rtcf
-
-// Weak, as every source file with a component has one; they are all the same.
-extern "C" __attribute__((weak, visibility("default"))) const rtcf::PluginDescriptor*
-RTCF_ENTRY_POINT() {
-    static rtcf::PluginDescriptor descriptor{RTCF_ABI_VERSION, sizeof(rtcf::PluginDescriptor),
-                                             RTCF_VERSION, nullptr};
-    descriptor.components = rtcf::detail::component_records;
-    return &descriptor;
-}
 
 /// Registers a component class, in the global namespace or by its qualified
 /// name with RTCF_COMPONENT_NAMED.

@@ -46,7 +46,7 @@ class Controller final : public rtcf::Component {
         other.write(0.0);
         checked.write(wild ? std::numeric_limits<double>::quiet_NaN() : 0.0);
     }
-    void takeOver(const rtcf::Component& /*previous*/) noexcept override {
+    void takeOver(const rtcf::Predecessor& /*previous*/) noexcept override {
         note(*this, "takeOver");
     }
 };

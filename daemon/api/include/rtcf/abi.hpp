@@ -1,0 +1,109 @@
+/// @file
+/// The binary interface between components and the executor as one number: made of the sizes,
+/// places and order of all that both sides touch, so that nobody has to remember to raise it. A
+/// component that was built with other headers, or with compiler options that change a layout
+/// (as -D_GLIBCXX_DEBUG does), has another number and is refused. Included by component.hpp.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <initializer_list>
+
+#include "rtcf/registration.hpp"
+#include "rtcf/version.hpp"
+
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Winvalid-offsetof"
+
+namespace rtcf {
+
+struct AbiProbe {
+    /// @param meaning raised by hand where what is meant changes, but no layout
+    static std::uint32_t fingerprint(std::uint32_t meaning) noexcept {
+        std::uint64_t hash = detail::stateHash(meaning, detail::stateHash("rtcf"));
+        const auto add = [&hash](std::initializer_list<std::size_t> numbers) {
+            for (const std::size_t number : numbers) hash = detail::stateHash(number, hash);
+        };
+        add({sizeof(Component), alignof(Component), offsetof(Component, context_),
+             offsetof(Component, rest_), sizeof(Source), sizeof(Component::Rest)});
+        using Rest = Component::Rest;
+        add({offsetof(Rest, frozen), offsetof(Rest, inputs), offsetof(Rest, outputs),
+             offsetof(Rest, parameters), offsetof(Rest, derived), offsetof(Rest, states),
+             offsetof(Rest, staged_outputs), offsetof(Rest, failure)});
+        using Context = ComponentContext;
+        add({sizeof(Context), offsetof(Context, full_name), offsetof(Context, name),
+             offsetof(Context, ns), offsetof(Context, runner), offsetof(Context, clock),
+             offsetof(Context, period_ns), offsetof(Context, elapsed_ns),
+             offsetof(Context, updated_ns), offsetof(Context, disabled),
+             offsetof(Context, recorder_slot), offsetof(Context, device), offsetof(Context, log),
+             offsetof(Context, gate), offsetof(Context, remaps), offsetof(Context, log_level),
+             offsetof(Context, said), sizeof(LogMemory)});
+        add({sizeof(LoopClock), offsetof(LoopClock, iteration), offsetof(LoopClock, time_ns),
+             offsetof(LoopClock, stamp_ns), offsetof(LoopClock, period_ns),
+             offsetof(LoopClock, elapsed_ns)});
+        add({sizeof(DeviceFigures), offsetof(DeviceFigures, calls),
+             offsetof(DeviceFigures, time_ns)});
+        add({sizeof(InputBase), offsetof(InputBase, source_), offsetof(InputBase, current_),
+             offsetof(InputBase, seen_), offsetof(InputBase, identity_)});
+        add({sizeof(OutputBase), offsetof(OutputBase, raw_), offsetof(OutputBase, clock_),
+             offsetof(OutputBase, rest_), sizeof(OutputBase::Rest),
+             offsetof(OutputBase::Rest, identity), offsetof(OutputBase::Rest, slot),
+             offsetof(OutputBase::Rest, staged), offsetof(OutputBase::Rest, checked),
+             offsetof(OutputBase::Rest, examined), offsetof(OutputBase::Rest, policy)});
+        add({sizeof(PortIdentity), offsetof(PortIdentity, owner), offsetof(PortIdentity, name),
+             offsetof(PortIdentity, unit), offsetof(PortIdentity, type),
+             offsetof(PortIdentity, connected), offsetof(PortIdentity, kept_is_new)});
+        add({sizeof(SlotHeader), offsetof(SlotHeader, sequence), offsetof(SlotHeader, time_ns),
+             offsetof(Slot<double>, value)});
+        add({sizeof(TypeInfo), offsetof(TypeInfo, name), offsetof(TypeInfo, size),
+             offsetof(TypeInfo, ros_type), offsetof(TypeInfo, fixed_size),
+             offsetof(TypeInfo, plain), offsetof(TypeInfo, make_slot), offsetof(TypeInfo, copy),
+             offsetof(TypeInfo, length), offsetof(TypeInfo, serialize),
+             offsetof(TypeInfo, deserialize), offsetof(TypeInfo, print),
+             offsetof(TypeInfo, finite)});
+        using Declaration = ParameterDeclaration;
+        add({sizeof(ParameterBase), sizeof(ParameterValue), sizeof(Declaration),
+             offsetof(Declaration, name), offsetof(Declaration, type),
+             offsetof(Declaration, default_value), offsetof(Declaration, minimum),
+             offsetof(Declaration, maximum), offsetof(Declaration, unit),
+             offsetof(Declaration, doc), offsetof(Declaration, choices), sizeof(Choice),
+             sizeof(DerivedBase), sizeof(StagedValue)});
+        add({sizeof(StateDeclaration), offsetof(StateDeclaration, name),
+             offsetof(StateDeclaration, type), offsetof(StateDeclaration, identity),
+             offsetof(StateDeclaration, size), offsetof(StateDeclaration, value),
+             offsetof(StateDeclaration, initial), offsetof(StateDeclaration, print)});
+        add({sizeof(LogRecord), offsetof(LogRecord, site), offsetof(LogRecord, component),
+             offsetof(LogRecord, time_ns), offsetof(LogRecord, iteration),
+             offsetof(LogRecord, realtime), offsetof(LogRecord, render),
+             offsetof(LogRecord, payload), sizeof(LogSite), offsetof(LogSite, format)});
+        add({placeOf(&Component::prepare), placeOf(&Component::configure),
+             placeOf(&Component::start), placeOf(&Component::update), placeOf(&Component::safe),
+             placeOf(&Component::stop), placeOf(&Component::cleanup), placeOf(&Component::takeOver),
+             placeOf(&Source::wait), placeOf(&StagedValue::commit), placeOf(&StagedValue::release),
+             placeOf(&ParameterBase::stage), placeOf(&LogSink::claim), placeOf(&LogSink::commit)});
+        return static_cast<std::uint32_t>(hash ^ (hash >> 32));
+    }
+
+   private:
+    // A virtual function's pointer to member holds its place in the table of such functions.
+    template <typename Function>
+    static std::size_t placeOf(Function function) noexcept {
+        std::size_t place = 0;
+        std::memcpy(&place, &function, sizeof place);
+        return place;
+    }
+};
+
+}  // namespace rtcf
+
+#pragma GCC diagnostic pop
+
+// Weak, as every source file with a component has one; they are all the same.
+extern "C" __attribute__((weak, visibility("default"))) const rtcf::PluginDescriptor*
+RTCF_ENTRY_POINT() {
+    static rtcf::PluginDescriptor descriptor{rtcf::AbiProbe::fingerprint(RTCF_ABI_VERSION),
+                                             sizeof(rtcf::PluginDescriptor), RTCF_VERSION, nullptr};
+    descriptor.components = rtcf::detail::component_records;
+    return &descriptor;
+}

@@ -1,0 +1,241 @@
+/// @file
+/// A component alone in a test, without daemon, executor or ROS master: its ports and its clock by
+/// hand. The test program is built from the component's own source file.
+///
+///     TEST(Pi, StaysWithinItsLimit) {
+///         rtcf::test::Bench pi("Pi", {{"kp", 100.0}, {"limit", 2.0}});
+///         pi.write("setpoint", 1.0);
+///         pi.write("measured", 0.0);
+///         pi.cycle();
+///         EXPECT_EQ(*pi.read<double>("effort"), 2.0);
+///     }
+///
+/// Not real-time; everything is called by one thread. A wrong name or type is a
+/// std::invalid_argument, a hook that refuses a std::runtime_error with its words.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "rtcf/component.hpp"
+
+namespace rtcf::test {
+
+class Bench {
+   public:
+    using Parameters = std::vector<std::pair<std::string, ParameterValue>>;
+
+    /// Makes a component, sets its parameters and configures it. @param type as registered
+    /// @param period_ns of the loop, ns
+    explicit Bench(const std::string& type, const Parameters& parameters = {},
+                   std::int64_t period_ns = 1'000'000)
+        : log_(lines_) {
+        clock_.period_ns = period_ns;
+        clock_.elapsed_ns = period_ns;
+        context_.full_name = "/" + type;
+        context_.name = type;
+        context_.runner = "test";
+        context_.clock = &clock_;
+        context_.period_ns = period_ns;
+        context_.device = &device_;
+        context_.log = &log_;
+        context_.log_level = LogLevel::Debug;
+        component_.reset(find(type).create(type.c_str(), &context_));
+        component_->attach(context_);
+        set(parameters);
+        require(component_->configure(), "configure");
+        component_->freeze();
+    }
+    ~Bench() {
+        if (started_) component_->stop();
+        component_->cleanup();
+    }
+    Bench(const Bench&) = delete;
+    Bench& operator=(const Bench&) = delete;
+
+    /// Sets parameters as a batch, as `rtcfctl set` does.
+    void set(const Parameters& batch) {
+        for (const auto& [name, given] : batch) {
+            ParameterBase& parameter = named(component_->parameters(), name, "parameter");
+            ParameterValue value = given;
+            if (const std::string why = parameter.check(value); !why.empty()) {
+                release();
+                throw std::invalid_argument(why);
+            }
+            parameter.stage(value);
+        }
+        const bool prepared = component_->prepare(Values{});
+        if (!prepared) release();
+        require(prepared, "prepare");
+        for (ParameterBase* parameter : component_->parameters()) {
+            if (parameter->staged()) parameter->commit();
+        }
+        for (DerivedBase* derived : component_->derived()) {
+            if (derived->staged()) derived->commit();
+        }
+        release();
+    }
+
+    /// Gives an input a new value.
+    template <typename T>
+    void write(const std::string& name, const T& value) {
+        InputBase& input = named(component_->inputs(), name, "input");
+        requireType(input.type(), typeInfo<T>(), name);
+        std::shared_ptr<SlotHeader>& slot = slotOf(input);
+        static_cast<Slot<T>&>(*slot).value = value;
+        ++slot->sequence;
+        slot->time_ns = clock_.time_ns;
+    }
+
+    /// Runs cycles, the first after start().
+    void cycle(std::uint64_t cycles = 1) {
+        if (!started_) require(component_->start(), "start");
+        for (started_ = true; cycles > 0; --cycles) {
+            component_->update();
+            for (OutputBase* output : component_->stagedOutputs()) {
+                if (!output->commit()) ++non_finite_;
+            }
+            clock_.iteration = clock_.iteration + 1;
+            clock_.time_ns = clock_.time_ns + clock_.period_ns;
+            clock_.stamp_ns = clock_.stamp_ns + clock_.period_ns;
+        }
+    }
+    /// As at the end of a loop.
+    void safe() {
+        component_->safe();
+        for (OutputBase* output : component_->stagedOutputs()) {
+            if (!output->commit()) ++non_finite_;
+        }
+    }
+
+    /// What an output wrote last. @return null if it has not written yet
+    template <typename T>
+    const T* read(const std::string& name) const {
+        const OutputBase& output = named(component_->outputs(), name, "output");
+        requireType(output.type(), typeInfo<T>(), name);
+        return output.slot()->sequence == 0
+                   ? nullptr
+                   : &static_cast<const Slot<T>*>(output.slot().get())->value;
+    }
+    /// How often an output has been written, non-finite values of Finite outputs not counted.
+    std::uint64_t writes(const std::string& name) const {
+        return named(component_->outputs(), name, "output").slot()->sequence;
+    }
+    /// Values that were not finite on outputs declared Finite.
+    std::uint64_t nonFinite() const noexcept { return non_finite_; }
+
+    /// A declared state, to look at and to set.
+    template <typename T>
+    T& state(const std::string& name) {
+        for (const StateDeclaration& state : component_->states()) {
+            if (state.name != name) continue;
+            if (state.identity == StateType<T>::identity() && state.size == sizeof(T))
+                return *static_cast<T*>(state.value);
+            throw std::invalid_argument("state " + name + " is a " + state.type);
+        }
+        throw std::invalid_argument("no state " + name);
+    }
+    /// Takes declared state over from another one, by name and type, as `rtcfctl replace` does.
+    void takeOver(const Bench& previous) {
+        for (const StateDeclaration& state : component_->states()) {
+            for (const StateDeclaration& before : previous.component_->states()) {
+                if (before.name == state.name && before.identity == state.identity &&
+                    before.size == state.size)
+                    std::memcpy(state.value, before.value, state.size);
+            }
+        }
+        component_->takeOver(Predecessor(*previous.component_));
+    }
+
+    /// The loop's clock; time and stamp may be set between cycles.
+    LoopClock& clock() noexcept { return clock_; }
+    /// Device scopes (RTCF_DEVICE_IO) so far.
+    std::uint64_t deviceCalls() const noexcept { return device_.calls; }
+    /// What it has logged, all levels.
+    const std::vector<std::string>& log() const noexcept { return lines_; }
+    Component& component() noexcept { return *component_; }
+
+   private:
+    class Lines final : public LogSink {
+       public:
+        explicit Lines(std::vector<std::string>& lines) : lines_(lines) {}
+        LogRecord* claim() noexcept override { return &record_; }
+        void commit(LogRecord* record) noexcept override {
+            std::string text;
+            record->render(*record, text);
+            lines_.push_back(std::move(text));
+        }
+
+       private:
+        std::vector<std::string>& lines_;
+        LogRecord record_{};
+    };
+
+    static const ComponentRecord& find(const std::string& type) {
+        std::string known;
+        for (const ComponentRecord* each = rtcf::detail::component_records; each != nullptr;
+             each = each->next) {
+            if (type == each->type) return *each;
+            known += (known.empty() ? "" : ", ") + std::string(each->type);
+        }
+        throw std::invalid_argument(
+            "no component type " + type + " in this program; it has " +
+            (known.empty() ? "none: build it from the component's source" : known));
+    }
+
+    static std::string nameOf(const ParameterBase& parameter) {
+        return parameter.declaration().name;
+    }
+    template <typename Port>
+    static std::string nameOf(const Port& port) {
+        return port.name();
+    }
+    template <typename T>
+    static T& named(const std::vector<T*>& members, const std::string& name, const char* what) {
+        std::string known;
+        for (T* member : members) {
+            if (nameOf(*member) == name) return *member;
+            known += (known.empty() ? "" : ", ") + nameOf(*member);
+        }
+        throw std::invalid_argument("no " + std::string(what) + " " + name + "; it has " +
+                                    (known.empty() ? "none" : known));
+    }
+    static void requireType(const TypeInfo& is, const TypeInfo& asked, const std::string& name) {
+        if (!sameType(is, asked))
+            throw std::invalid_argument("port " + name + " carries " + is.name + ", not " +
+                                        asked.name);
+    }
+    void require(bool passed, const char* hook) const {
+        if (passed) return;
+        throw std::runtime_error(std::string(hook) + " failed: " + component_->failure());
+    }
+    void release() {
+        for (ParameterBase* parameter : component_->parameters()) parameter->release();
+        for (DerivedBase* derived : component_->derived()) derived->release();
+    }
+    std::shared_ptr<SlotHeader>& slotOf(InputBase& input) {
+        for (auto& [known, slot] : slots_) {
+            if (known == &input) return slot;
+        }
+        slots_.emplace_back(&input, input.type().make_slot(nullptr));
+        input.rewire(slots_.back().second.get(), false);
+        return slots_.back().second;
+    }
+
+    LoopClock clock_;
+    ComponentContext context_;
+    DeviceFigures device_;
+    std::vector<std::string> lines_;
+    Lines log_;
+    std::vector<std::pair<InputBase*, std::shared_ptr<SlotHeader>>> slots_;
+    std::uint64_t non_finite_ = 0;
+    bool started_ = false;
+    std::unique_ptr<Component> component_;
+};
+
+}  // namespace rtcf::test

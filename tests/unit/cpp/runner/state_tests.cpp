@@ -1,0 +1,129 @@
+// Declared state: kept over a replacement, shown, reset.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "support/runner_fixture.hpp"
+
+namespace rtcf::test {
+namespace {
+
+class DeclaredState : public RunnerFixture {
+   protected:
+    static std::string version(int number) {
+        return RTCF_UNIT_COMPONENTS "/stateful_" + std::to_string(number) + ".so";
+    }
+    static ComponentDefinition stateful() { return definition("Stateful", "A"); }
+    void loadVersion(int number) {
+        onGraphThread(
+            [&] { return runner().load(stateful(), version(number), [](const std::string&) {}); });
+    }
+    std::vector<std::string> replaceBy(int number) {
+        return onGraphThread([&] {
+                   return runner().replace("/A", stateful(), version(number), false,
+                                           [](const std::string&) {});
+               })
+            .notes;
+    }
+    std::string state(const std::string& name) {
+        const auto snapshot = runner().snapshot();
+        const auto& declared = snapshot->get("/A").states;
+        const auto values = onGraphThread([&] { return runner().states("/A"); });
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            if (declared[i].name == name) return values[i];
+        }
+        return "none";
+    }
+    static bool has(const std::vector<std::string>& notes, const std::string& note) {
+        return std::find(notes.begin(), notes.end(), note) != notes.end();
+    }
+};
+
+TEST_F(DeclaredState, GoesOverToARebuiltComponentInARunningLoop) {
+    loadVersion(1);
+    start();
+    ASSERT_TRUE(runs());
+    const auto notes = replaceBy(2);
+    ASSERT_TRUE(runs());
+    stop();
+    EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration()))
+        << "one update in every cycle, counted in one count";
+    EXPECT_EQ(value("/A", "skipped"), 0.0);
+    EXPECT_EQ(state("new_name"), "7.5") << "handed over by takeOver()";
+    EXPECT_NE(state("fresh"), "0.25") << "the output's last value, by takeOver()";
+    EXPECT_EQ(state("gain"), "2") << "of another type than before";
+    for (const char* note : {"state fresh of /A is new: it begins at 0.25",
+                             "state gain of /A begins at 2: it was float and is double",
+                             "state old_name of /A is no more", "state dropped of /A is no more"})
+        EXPECT_TRUE(has(notes, note)) << note;
+    EXPECT_EQ(notes.size(), 5U) << "and that new_name is new";
+}
+
+TEST_F(DeclaredState, GoesOverUnchangedWithoutNotes) {
+    loadVersion(1);
+    step(10);
+    EXPECT_TRUE(replaceBy(1).empty());
+    step(5);
+    EXPECT_EQ(value("/A", "out"), 15.0);
+    EXPECT_EQ(state("delay"), "{now: 14, before: 13}");
+}
+
+TEST_F(DeclaredState, WithoutAnyBeforeTheAnswerSaysSo) {
+    load(definition("Camera", "B"));
+    const auto notes = onGraphThread([&] {
+                           return runner().replace("/B", definition("Recorder", "B"),
+                                                   RTCF_UNIT_COMPONENTS "/rtcf_unit_test.so", false,
+                                                   [](const std::string&) {});
+                       }).notes;
+    EXPECT_EQ(notes, std::vector<std::string>{
+                         "/B begins at its initial state: what it replaces declares none"});
+}
+
+TEST_F(DeclaredState, IsShownWithItsDeclaration) {
+    loadVersion(1);
+    step(3);
+    const auto snapshot = runner().snapshot();
+    const auto& states = snapshot->get("/A").states;
+    ASSERT_EQ(states.size(), 5U);
+    EXPECT_EQ(states[3].name, "count");
+    EXPECT_EQ(states[3].type, "uint64");
+    EXPECT_EQ(states[3].doc, "updates so far");
+    EXPECT_EQ(states[3].initial, "0");
+    EXPECT_EQ(states[4].type, "{now: double, before: double}");
+    EXPECT_EQ(states[4].unit, "cycles");
+    EXPECT_EQ(state("count"), "3");
+    EXPECT_EQ(state("dropped"), "1");
+}
+
+TEST_F(DeclaredState, IsResetAtABoundaryOfARunningLoop) {
+    loadVersion(1);
+    start();
+    ASSERT_TRUE(runs());
+    onGraphThread([&] { return runner().reset("/A"); });
+    ASSERT_TRUE(runs());
+    stop();
+    EXPECT_LT(value("/A", "out"), static_cast<double>(iteration()));
+    EXPECT_GT(value("/A", "out"), 0.0);
+}
+
+TEST_F(DeclaredState, ThatIsNotThereCannotBeReset) {
+    load(definition("Camera", "B"));
+    EXPECT_EQ(refusal([&] { onGraphThread([&] { return runner().reset("/B"); }); }),
+              "/B declares no state (rtcf::State) that could be reset");
+    EXPECT_NE(refusal([&] { onGraphThread([&] { return runner().reset("/C"); }); }), "");
+}
+
+// A graph file that names a rebuilt library replaces too.
+TEST_F(DeclaredState, GoesOverInAnApplyToo) {
+    loadVersion(1);
+    step(10);
+    const auto outcome = onGraphThread([&] {
+        return runner().apply({{stateful(), version(2)}}, false, [](const std::string&) {});
+    });
+    EXPECT_TRUE(has(outcome.notes, "state dropped of /A is no more"));
+    step(1);
+    EXPECT_EQ(value("/A", "out"), 11.0);
+}
+
+}  // namespace
+}  // namespace rtcf::test
