@@ -58,7 +58,7 @@ std::vector<std::pair<std::string, ParameterValue>> otherParameters(
         }
         ParameterValue checked = value;
         const bool bad = !declared[i]->check(checked).empty();
-        if (!bad && checked == present.parameterValues()[i]) continue;
+        if (!bad && sameValue(checked, present.parameterValues()[i])) continue;
         detail += fmt::format("{}{} {} -> {}", detail.empty() ? "" : ", ", name,
                               text(present.parameterValues()[i]), text(value));
         others.emplace_back(name, value);

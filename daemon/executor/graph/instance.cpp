@@ -73,49 +73,38 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
       log_(log),
       recorder_(recorder),
       gate_(gate),
-      slot_(recorder.addSlot(definition_.fullName())) {
-    phase_ = definition_.phase;
+      slot_(recorder, definition_.fullName()),
+      drained_(log),
+      phase_(definition_.phase) {
     context_.full_name = definition_.fullName();
     context_.name = definition_.name;
     context_.ns = definition_.ns;
     context_.runner = runner;
     context_.clock = &clock;
     context_.period_ns = clock.period_ns * definition_.every;
-    context_.recorder_slot = slot_;
+    context_.recorder_slot = slot();
     context_.device = &figures_->device;
     context_.log = &log;
-    log_.levels().attach(context_.full_name, context_.log_level);
+    level_.emplace(log.levels(), context_);
     context_.gate = gate;
     for (const auto& [from, to] : definition_.remaps) {
         context_.remaps.emplace_back(resolveName(from, context_.ns, context_.full_name),
                                      resolveName(to, context_.ns, context_.full_name));
     }
-    try {
-        callHook(Hook::Constructor, [this] {
-            component_.reset(record_->create(definition_.name.c_str(), &context_));
-            return true;
-        });
-        component_->attach(context_);
-        for (const ParameterBase* parameter : component_->parameters()) {
-            parameter_values_.push_back(parameter->declaration().default_value);
-        }
-        setFirstParameters();
-    } catch (const Refusal&) {
-        component_.reset();
-        log_.levels().detach(context_.log_level);
-        log_.drain();  // pending records refer to its name
-        recorder_.removeSlot(slot_);
-        throw;
+    callHook(Hook::Constructor, [this] {
+        component_.reset(record_->create(definition_.name.c_str(), &context_));
+        return true;
+    });
+    component_->attach(context_);
+    for (const ParameterBase* parameter : component_->parameters()) {
+        parameter_values_.push_back(parameter->declaration().default_value);
     }
+    setFirstParameters();
 }
 
 Instance::~Instance() {
     stop();
     cleanup();
-    component_.reset();
-    log_.levels().detach(context_.log_level);
-    log_.drain();  // pending records refer to its name
-    recorder_.removeSlot(slot_);
 }
 
 void Instance::setFirstParameters() {
@@ -134,7 +123,7 @@ void Instance::setFirstParameters() {
                 ? fmt::format("{}/{} has none", definition_.package, definition_.type)
                 : (*found)->check(value);
         if (why.empty()) {
-            if (value != (*found)->declaration().default_value)
+            if (!sameValue(value, (*found)->declaration().default_value))
                 kept_parameters_.emplace_back(name, std::move(value));
         } else if (chosen) {
             lost_parameters_.push_back(
@@ -150,7 +139,7 @@ void Instance::setFirstParameters() {
 
 // A failing hook's own words, or its exception's, in one line.
 void Instance::callHook(Hook hook, const std::function<bool()>& call) {
-    HookNote note(recorder_, slot_, hook, gate_, context_.full_name);
+    HookNote note(recorder_, slot(), hook, gate_, context_.full_name);
     RefusalKind kind = RefusalKind::FailedPrecondition;
     std::string why;
     try {
@@ -179,7 +168,7 @@ void Instance::callHook(Hook hook, const std::function<bool()>& call) {
 }
 
 void Instance::callLastHook(Hook hook, const std::function<void()>& call) noexcept {
-    HookNote note(recorder_, slot_, hook, gate_, context_.full_name);
+    HookNote note(recorder_, slot(), hook, gate_, context_.full_name);
     std::string why;
     try {
         call();
@@ -200,7 +189,7 @@ void Instance::configure() {
     configured_ = true;
     try {
         callHook(Hook::Configure, [this] { return component_->configure(); });
-    } catch (const Refusal&) {
+    } catch (...) {
         cleanup();
         throw;
     }
@@ -211,7 +200,9 @@ void Instance::freezePorts() {
     component_->freeze();
     if (definition_.optional) component_->stageOutputs();
     const auto mapped = [this](const std::string& port) {
-        return mappedName(port, definition_.ns, context_.full_name, definition_.remaps);
+        std::string name = mappedName(port, definition_.ns, context_.full_name, definition_.remaps);
+        requireLength("mapped name", name);
+        return name;
     };
     for (const InputBase* input : component_->inputs())
         input_names_.push_back(mapped(input->name()));
@@ -302,7 +293,7 @@ std::vector<StagedValue*> Instance::stageParameters(
     for (const auto& [index, value] : checked) declared[index]->stage(value);
     try {
         callHook(Hook::Prepare, [this] { return component_->prepare(Values{}); });
-    } catch (const Refusal&) {
+    } catch (...) {
         releaseStaged();
         throw;
     }

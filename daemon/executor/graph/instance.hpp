@@ -61,7 +61,7 @@ class Instance {
     /// Remaps that name no port of it; after configure().
     std::vector<std::string> uselessRemaps() const;
     /// Its place in the flight recorder.
-    std::uint32_t slot() const noexcept { return slot_; }
+    std::uint32_t slot() const noexcept { return slot_.number; }
     /// The cycle of its every() in which it runs; chosen once, so that a change of others does not
     /// move it.
     std::uint32_t phase() const noexcept { return phase_.value_or(0); }
@@ -107,17 +107,56 @@ class Instance {
     Log& log_;
     FlightRecorder& recorder_;
     HookGate* gate_;
-    std::uint32_t slot_;
-    std::optional<std::uint32_t> phase_;
+
+    // What stands around the component as long as there is one. It goes in the order against this
+    // one, also when the constructor refuses: first the component, then its level, then what it
+    // has said, whose records refer to its name.
+    struct Slot {
+        Slot(FlightRecorder& in, const std::string& name)
+            : recorder(in), number(in.addSlot(name)) {}
+        ~Slot() { recorder.removeSlot(number); }
+        Slot(const Slot&) = delete;
+        Slot& operator=(const Slot&) = delete;
+        FlightRecorder& recorder;
+        const std::uint32_t number;
+    };
+    struct Drained {
+        explicit Drained(Log& drained) : log(drained) {}
+        ~Drained() {
+            try {
+                log.drain();
+            } catch (...) {  // NOLINT(bugprone-empty-catch)
+                // There is no memory for their texts: they are lost.
+            }
+        }
+        Drained(const Drained&) = delete;
+        Drained& operator=(const Drained&) = delete;
+        Log& log;
+    };
+    struct Level {
+        Level(LogLevels& of, ComponentContext& component) : levels(of), level(component.log_level) {
+            levels.attach(component.full_name, level);
+        }
+        ~Level() { levels.detach(level); }
+        Level(const Level&) = delete;
+        Level& operator=(const Level&) = delete;
+        LogLevels& levels;
+        std::atomic<LogLevel>& level;
+    };
+    const Slot slot_;
     ComponentContext context_;
+    std::shared_ptr<ComponentFigures> figures_ = std::make_shared<ComponentFigures>();
+    const Drained drained_;
+    std::optional<const Level> level_;
     std::unique_ptr<Component> component_;
+
+    std::optional<std::uint32_t> phase_;
     std::vector<ParameterValue> parameter_values_;
     std::vector<std::pair<std::string, ParameterValue>> kept_parameters_;
     std::vector<std::string> lost_parameters_;
     std::vector<std::string> input_names_;
     std::vector<std::string> output_names_;
     std::vector<std::shared_ptr<SlotHeader>> samples_;
-    std::shared_ptr<ComponentFigures> figures_ = std::make_shared<ComponentFigures>();
     bool configured_ = false;
     bool started_ = false;
     std::string fault_;

@@ -139,6 +139,11 @@ class Runner final : private RunnerView {
                             bool broken);
     ChangeOutcome setParameters(const std::string& name,
                                 const std::vector<std::pair<std::string, ParameterValue>>& batch);
+    /// Takes a component's declared state back to its initial values, at one boundary.
+    ChangeOutcome reset(const std::string& name);
+    /// Values of a component's declared state, as text. Empty if the loop reaches no boundary in
+    /// time.
+    std::vector<std::string> states(const std::string& name);
     /// Values of a component's ports, inputs first. Empty if the loop reaches no boundary in time.
     std::vector<Probe::Value> probe(const std::string& name);
     /// Settings to start from.
@@ -166,6 +171,8 @@ class Runner final : private RunnerView {
         std::vector<std::shared_ptr<Instance>> leaving;
         std::vector<StagedValue*> values;
         std::vector<HandOver> hand_overs;
+        std::vector<StateCopy> copies;
+        std::vector<std::string> notes;  // of what is handed over
         std::int64_t period_ns = 0;
     };
 
@@ -178,6 +185,8 @@ class Runner final : private RunnerView {
     };
 
     void threadMain();
+    void guarded(const char* what, const std::function<void()>& work) noexcept;
+    void tell(const RunnerEvent& event) noexcept;
     void tick();
     void setState(RunnerState state) noexcept;
     void requireNoStop() const;
@@ -210,7 +219,12 @@ class Runner final : private RunnerView {
     void addDifference(Change& change, const Difference& difference, const Progress& progress,
                        bool look);
     /// Wires, starts, adopts; then stops and cleans up what left.
-    void adopt(Change change, const Progress& progress);
+    /// @return notes on what was handed over @throws Refusal and others; nothing has changed then
+    std::vector<std::string> adopt(Change change, const Progress& progress);
+    /// Has a component take another's place, with its state.
+    static void handOver(Change& change, const Instance& previous, const Instance& successor);
+    /// Of a change that the loop has: makes it known.
+    void adopted(const Change& change);
     void startAll(const Progress& progress);
     void stopAll() noexcept;
     ChangeOutcome outcome(std::string component = {}) const;

@@ -49,6 +49,11 @@ bool Connection::receive(std::vector<v1::Request>& requests) {
 bool Connection::send(const v1::Response& response) {
     const std::string body = response.SerializeAsString();
     if (out_.size() - written_ > kLargestBacklog) return false;
+    // What a slow peer has taken goes, as it may never take all.
+    if (written_ > out_.size() / 2) {
+        out_.erase(0, written_);
+        written_ = 0;
+    }
     for (std::size_t i = 0; i < kHeader; ++i)
         out_ += static_cast<char>((body.size() >> (8 * i)) & 0xff);
     out_ += body;

@@ -179,6 +179,9 @@ pb::OverrunPolicy overrunTo(OverrunPolicy policy) {
 ComponentDefinition definitionFrom(const pb::ComponentSpec& spec) {
     ComponentDefinition definition;
     definition.name = spec.name().empty() ? spec.type() : spec.name();
+    requireLength("component name", definition.name);
+    requireLength("package", spec.package());
+    requireLength("type", spec.type());
     if (!isBaseName(definition.name)) {
         throw Refusal(RefusalKind::InvalidArgument,
                       fmt::format("'{}' is not a legal component name: a letter, then letters, "
@@ -187,10 +190,12 @@ ComponentDefinition definitionFrom(const pb::ComponentSpec& spec) {
                                   definition.name));
     }
     definition.ns = canonicalNamespace(spec.ns());
+    requireLength("component name", definition.fullName());
     definition.package = spec.package();
     definition.type = spec.type();
     for (const auto& remap : spec.remaps()) {
         for (const std::string& name : {remap.from(), remap.to()}) {
+            requireLength("remap", name);
             if (isGraphName(name)) continue;
             throw Refusal(RefusalKind::InvalidArgument,
                           fmt::format("remap {}:={}: '{}' is not a legal ROS name", remap.from(),
@@ -201,6 +206,7 @@ ComponentDefinition definitionFrom(const pb::ComponentSpec& spec) {
     definition.parameters = parametersFrom(spec.parameters());
     definition.first = spec.first();
     definition.ignore = spec.ignore();
+    for (const std::string& port : spec.breaks()) requireLength("port", port);
     definition.breaks.insert(spec.breaks().begin(), spec.breaks().end());
     definition.every = std::max(1U, spec.every());
     definition.optional = spec.optional();
@@ -362,6 +368,7 @@ std::vector<std::pair<std::string, ParameterValue>> parametersFrom(
     const google::protobuf::RepeatedPtrField<pb::ParameterSetting>& settings) {
     std::vector<std::pair<std::string, ParameterValue>> parameters;
     for (const auto& setting : settings) {
+        requireLength("parameter", setting.name());
         parameters.emplace_back(setting.name(), valueFrom(setting.value(), setting.name()));
     }
     return parameters;
@@ -542,7 +549,20 @@ pb::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t positio
     for (const ParameterSnapshot& parameter : component.parameters) {
         *info.add_parameters() = parameterTo(parameter.declaration, parameter.value);
     }
+    for (const StateSnapshot& declared : component.states) {
+        pb::StateInfo& message = *info.add_states();
+        message.set_name(declared.name);
+        message.set_type(declared.type);
+        message.set_unit(declared.unit);
+        message.set_doc(declared.doc);
+        message.set_initial(declared.initial);
+    }
     return info;
+}
+
+void addStates(pb::ComponentInfo& info, const std::vector<std::string>& values) {
+    for (std::size_t i = 0; i < values.size(); ++i)
+        info.mutable_states(static_cast<int>(i))->set_value(values[i]);
 }
 
 void addValues(pb::ComponentInfo& info, const std::vector<Probe::Value>& values) {
@@ -597,6 +617,14 @@ pb::ComponentType typeTo(const std::string& package, const std::string& library,
     for (const ParameterBase* parameter : component.parameters()) {
         *type.add_parameters() =
             parameterTo(parameter->declaration(), parameter->declaration().default_value);
+    }
+    for (const StateDeclaration& state : component.states()) {
+        pb::StateInfo& message = *type.add_states();
+        message.set_name(state.name);
+        message.set_type(state.type);
+        message.set_unit(state.unit);
+        message.set_doc(state.doc);
+        message.set_initial(state.print(state.initial.data()));
     }
     return type;
 }

@@ -42,6 +42,8 @@ v1::Event eventTo(const RunnerEvent& event);
                                       RunnerState state);
 /// Adds what probe() found, inputs first.
 void addValues(::rtcf::v1::ComponentInfo& info, const std::vector<Probe::Value>& values);
+/// Adds what Runner::states() found.
+void addStates(::rtcf::v1::ComponentInfo& info, const std::vector<std::string>& values);
 v1::ListConnectionsResult connectionsTo(const GraphSnapshot& snapshot);
 /// Of a component that is not loaded: its ports have no mapped names.
 ::rtcf::v1::ComponentType typeTo(const std::string& package, const std::string& library,

@@ -480,6 +480,8 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
             response = errorResponse(id, refusal.kind(), refusal.what());
         } catch (const std::exception& error) {
             response = errorResponse(id, RefusalKind::FailedPrecondition, error.what());
+        } catch (...) {
+            response = errorResponse(id, RefusalKind::FailedPrecondition, "an unknown exception");
         }
         setState(response, runner_->numberedState());
         log_->drain();  // what the hooks said comes before the answer
@@ -555,6 +557,8 @@ ChangeOutcome Server::change(const v1::Request& request, const Runner::Progress&
             }
             return runner_->setBreaks(ports, request.set_breaks().broken());
         }
+        case v1::Request::kResetState:
+            return runner_->reset(fullNameOf(request.reset_state().component()));
         case v1::Request::kSetParameters:
             return runner_->setParameters(fullNameOf(request.set_parameters().component()),
                                           parametersFrom(request.set_parameters().parameters()));
@@ -586,7 +590,8 @@ void Server::submitProbe(std::uint64_t connection, const v1::Request& request) {
     runner_->post([this, connection, name, response]() mutable {
         try {
             addValues(*response.mutable_component(), runner_->probe(name));
-        } catch (const Refusal&) {
+            addStates(*response.mutable_component(), runner_->states(name));
+        } catch (const std::exception&) {
             // Unloaded since: the picture of a moment ago is still an answer.
         }
         post(connection, std::move(response), true);
@@ -609,6 +614,7 @@ pb::RunnerStatus Server::status() const {
     *status.mutable_settings() = settingsTo(picture.settings);
     status.set_pid(::getpid());
     status.set_realtime_tid(loop.threadId());
+    if (loop.cpu() >= 0) status.set_loop_cpu(loop.cpu());
     status.set_iteration(loop.figures().iteration.load(std::memory_order_relaxed));
     status.set_overruns(loop.figures().overruns.load(std::memory_order_relaxed));
     status.set_missed(loop.figures().missed.load(std::memory_order_relaxed));

@@ -39,8 +39,8 @@ double adoptionOf(BenchGraph& graph, const std::function<void()>& change) {
 }
 
 double median(std::vector<double> values) {
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                     values.end());
+    std::nth_element(values.begin(),
+                     values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
     return values[values.size() / 2];
 }
 
@@ -64,10 +64,11 @@ int main(int argc, char** argv) try {
         std::map<std::string, std::vector<double>> found;
         for (std::size_t round = 0; round < rounds; ++round) {
             rtcf::executor::Adoption values;
-            values.values = wave->stageParameters({{"amplitude", 1.0 + static_cast<double>(round)}});
+            values.values =
+                wave->stageParameters({{"amplitude", 1.0 + static_cast<double>(round)}});
             flushCaches();
-            found["set"].push_back(adoptionOf(
-                graph, [&] { graph.loop().adopt(values, 1'000'000'000); }));
+            found["set"].push_back(
+                adoptionOf(graph, [&] { graph.loop().adopt(values, 1'000'000'000); }));
             wave->releaseStaged();
             const rtcf::executor::Graph small = graph.plan().graph;
             rtcf::executor::Graph grown = small;
@@ -78,8 +79,7 @@ int main(int argc, char** argv) try {
         std::vector<std::string> figures;
         for (const auto& [change, values] : found)
             figures.push_back(fmt::format("\"{}_ns\": {:.0f}", change, median(values)));
-        rows.push_back(
-            fmt::format("{{\"components\": {}, {}}}", length, fmt::join(figures, ", ")));
+        rows.push_back(fmt::format("{{\"components\": {}, {}}}", length, fmt::join(figures, ", ")));
     }
     fmt::print("{{\"rounds\": {}, \"graphs\": [{}]}}\n", rounds, fmt::join(rows, ", "));
     return 0;

@@ -51,10 +51,13 @@ class Journal {
         }
         used_.store(0);
         gate_open.store(true);
+        copies_throw.store(false);
     }
 
     /// Hooks of Blocker wait until it is open.
     std::atomic<bool> gate_open{true};
+    /// Values of Touchy's ports cannot be copied.
+    std::atomic<bool> copies_throw{false};
 
    private:
     struct Entry {

@@ -2,6 +2,7 @@
 #include <std_msgs/Float64.h>
 
 #include <chrono>
+#include <limits>
 #include <rtcf/component.hpp>
 #include <stdexcept>
 #include <string>
@@ -12,9 +13,6 @@
 namespace {
 
 class Recorder : public rtcf::Component {
-   public:
-    double count() const { return count_; }
-
    protected:
     rtcf::Input<std_msgs::Float64> in{this, "in"};
     rtcf::Output<std_msgs::Float64> out{this, "out"};
@@ -24,6 +22,13 @@ class Recorder : public rtcf::Component {
                                             rtcf::Doc("update, from 0, that throws")};
     rtcf::Parameter<double> gain{this, "gain", 1.0, rtcf::Min(0.0), rtcf::Max(10.0)};
 
+    rtcf::Parameter<double> limit{this, "limit", std::numeric_limits<double>::infinity()};
+
+    bool prepare(const rtcf::Values& proposed) override {
+        if (proposed[refuses] != "prepare") return true;
+        RTCF_WARN(this, "refuses to prepare");
+        return fail("told to refuse prepare");
+    }
     bool configure() override { return hook("configure"); }
     bool start() override { return hook("start"); }
     void stop() override { hook("stop"); }
@@ -41,10 +46,7 @@ class Recorder : public rtcf::Component {
 
     void safe() noexcept override { note("safe"); }
 
-    void takeOver(const rtcf::Component& previous) noexcept override {
-        note("takeOver");
-        if (const auto* same = dynamic_cast<const Recorder*>(&previous)) count_ = same->count();
-    }
+    void takeOver(const rtcf::Predecessor&) noexcept override { note("takeOver"); }
 
     void note(const char* what) const noexcept {
         if (rtcf_unit_test_journal != nullptr) rtcf_unit_test_journal()->note(fullName(), what);
@@ -57,7 +59,7 @@ class Recorder : public rtcf::Component {
     }
 
    private:
-    double count_ = 0.0;
+    rtcf::State<double> count_{this, "count", 0.0, rtcf::Doc("updates so far")};
 };
 
 // Its hook of the parameter's name waits until the test opens the journal's gate.

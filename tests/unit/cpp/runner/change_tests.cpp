@@ -272,5 +272,35 @@ TEST_F(Change, InputIsSubscribedOnlyWithoutAWriter) {
     EXPECT_TRUE(runs());
 }
 
+// One number in two clothes: a connection between them costs nothing, and no component in between.
+TEST_F(Change, OutputOfADoubleFeedsAFloat64) {
+    ComponentDefinition writer = definition("Stateful", "A");
+    writer.remaps = {{"out", "x"}};
+    onGraphThread([&] {
+        return runner().load(writer, RTCF_UNIT_COMPONENTS "/stateful_1.so",
+                             [](const std::string&) {});
+    });
+    ComponentDefinition reader = definition("Recorder", "B");
+    reader.remaps = {{"in", "x"}};
+    load(reader);
+    step(4);
+    EXPECT_EQ(value("/B", "in"), 4.0);
+}
+
+// 16 values of it, not the 500 of half a second: rings are locked memory.
+TEST_F(Change, RingOfALargeTypeIsBoundedInBytes) {
+    configure([](RunnerSettings& settings) {
+        settings.whitelist = ".*";
+        settings.frequency_hz = 2000.0;
+    });
+    load(definition("Camera", "B"));
+    step(40);
+    const auto tap = bridge().tap("/picture");
+    ASSERT_NE(tap, nullptr);
+    EXPECT_GE(tap->dropped(), 20U);
+    EXPECT_TRUE(
+        tap->pop([](const std::uint8_t*, std::uint32_t size) { EXPECT_EQ(size, 1024U * 1024U); }));
+}
+
 }  // namespace
 }  // namespace rtcf::test

@@ -175,7 +175,7 @@ TEST_F(Fault, NoFaultIsLostInAFloodOfOthers) {
 
 TEST_F(Fault, LongExceptionTextIsCut) {
     // The text of Recorder is short; the culprit's name makes the message long.
-    const std::string name = "B" + std::string(300, 'b');
+    const std::string name = "B" + std::string(230, 'b');
     load(recorder(name, 3));
     start();
     ASSERT_TRUE(waitForFault());

@@ -244,6 +244,34 @@ TEST_F(ServerTest, RefusalCarriesItsCodeAndText) {
     EXPECT_EQ(response.error().message(), "no component /X in this runner; loaded: none");
 }
 
+// 2000 characters in an expression or a name once were more than the graph thread's stack holds.
+TEST_F(ServerTest, NamesAndExpressionsThatAreTooLongAreRefusedShortly) {
+    ExecutorClient client(socket_);
+    client.hello();
+    const std::string long_name(2000, 'a');
+    Request remapped = load("Recorder", "B");
+    auto& remap = *remapped.mutable_load()->mutable_component()->add_remaps();
+    remap.set_from("in");
+    remap.set_to(long_name);
+    Request ignoring = load("Recorder", "B");
+    ignoring.mutable_load()->mutable_component()->set_ignore(long_name);
+    Request whitelist;
+    whitelist.mutable_configure()->mutable_ros()->set_whitelist(long_name);
+    // Two names that are long enough together.
+    Request mapped = load("Recorder", "B");
+    mapped.mutable_load()->mutable_component()->set_ns(long_name.substr(0, 252));
+    for (const Request& request :
+         {load("Recorder", long_name), remapped, ignoring, whitelist, mapped}) {
+        const Response response = client.ask(request);
+        ASSERT_TRUE(response.has_error()) << request.ShortDebugString().substr(0, 200);
+        EXPECT_EQ(response.error().code(), executor::v1::Error::CODE_INVALID_ARGUMENT);
+        EXPECT_NE(response.error().message().find(" characters: at most "), std::string::npos)
+            << response.error().message();
+        EXPECT_LT(response.error().message().size(), 300U);
+    }
+    EXPECT_TRUE(client.ask(load("Recorder", "B")).has_change());
+}
+
 TEST_F(ServerTest, QueriesAreAnsweredWhileAHookBlocks) {
     ExecutorClient client(socket_);
     client.hello();

@@ -18,6 +18,8 @@ class BridgeRecord {
     std::shared_ptr<executor::Tap> tap(const std::string& topic) const;
     std::shared_ptr<executor::Injector> injector(const std::string& topic) const;
     void set(std::shared_ptr<const executor::BridgeTable> table);
+    /// By which the test asks for a change of parameters, as ROS does.
+    executor::ParameterRequest request;
 
    private:
     mutable std::mutex mutex_;
@@ -27,6 +29,9 @@ class BridgeRecord {
 class BridgeKeeper final : public executor::Bridge {
    public:
     explicit BridgeKeeper(std::shared_ptr<BridgeRecord> record) : record_(std::move(record)) {}
+    void serveParameters(executor::ParameterRequest request) override {
+        record_->request = std::move(request);
+    }
     void configure(const executor::BridgeSettings&) override {}
     void setTable(std::shared_ptr<const executor::BridgeTable> table) override {
         record_->set(std::move(table));

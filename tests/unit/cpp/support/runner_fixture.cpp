@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <new>
 
 namespace rtcf::test {
 
@@ -30,6 +31,7 @@ RunnerFixture::RunnerFixture()
     runner_ = std::make_unique<Runner>(
         "rt_runner", log_,
         [this](const RunnerEvent& event) {
+            if (events_are_lost_) throw std::bad_alloc();
             const std::lock_guard<std::mutex> lock(mutex_);
             events_.push_back(event);
         },
@@ -151,6 +153,10 @@ std::vector<RunnerEvent> RunnerFixture::events() const {
 
 std::vector<LogEntry> RunnerFixture::logged() {
     log_.drain();
+    return handedOn();
+}
+
+std::vector<LogEntry> RunnerFixture::handedOn() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return logged_;
 }

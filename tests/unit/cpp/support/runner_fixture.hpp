@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <functional>
 #include <future>
 #include <memory>
@@ -107,6 +108,10 @@ class RunnerFixture : public ::testing::Test {
 
     std::vector<RunnerEvent> events() const;
     std::vector<LogEntry> logged();
+    /// What has been handed on so far; what still waits in the log is not.
+    std::vector<LogEntry> handedOn() const;
+    /// From here on events cannot be taken.
+    void loseEvents() { events_are_lost_ = true; }
     rtcf_unit_test::Journal& journal() { return *rtcf_unit_test_journal(); }
     BridgeRecord& bridge() { return *bridge_; }
 
@@ -118,6 +123,7 @@ class RunnerFixture : public ::testing::Test {
    private:
     mutable std::mutex mutex_;
     std::vector<RunnerEvent> events_;
+    std::atomic<bool> events_are_lost_{false};
     std::vector<LogEntry> logged_;
     executor::FlightRecorder recorder_;
     executor::Log log_;

@@ -1,0 +1,348 @@
+// What a runner does to change its graph: transactions.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "refusal.hpp"
+#include "runner/runner.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+}  // namespace
+
+MappingFilter Runner::filter() const {
+    return {NamePattern("whitelist", settings_.whitelist),
+            NamePattern("blacklist", settings_.blacklist)};
+}
+
+std::int64_t Runner::adoptionTimeout() const noexcept {
+    return kSecond + 10 * settings_.loop.period_ns;
+}
+
+std::shared_ptr<Instance> Runner::makeInstance(ComponentDefinition definition,
+                                               const std::string& library, const Progress& progress,
+                                               bool configure) {
+    const std::string full_name = definition.fullName();
+    progress("loading " + full_name);
+    note(full_name + ".constructor");
+    const std::shared_ptr<const Library> code = libraries_.open(library);
+    auto instance =
+        std::make_shared<Instance>(std::move(definition), code, name_, loop_.clock(), log_,
+                                   recorder_, bridge_ ? bridge_->hooks() : nullptr);
+    if (!configure) {
+        instance->freezePorts();
+        return instance;
+    }
+    progress("configuring " + full_name);
+    note(full_name + ".configure");
+    instance->configure();
+    return instance;
+}
+
+void Runner::requireNoReplay() const {
+    if (!replay_) return;
+    throw Refusal(RefusalKind::FailedPrecondition,
+                  fmt::format("a replay of {0} is under way: wait for its end, or stop it: "
+                              "rtcfctl -r {0} stop",
+                              name_));
+}
+
+std::string Runner::whatDoesNotReturn() const {
+    const std::string activity = recorder_.realtimeActivity();
+    return (activity.empty() ? "a component" : activity + "()") + " does not return";
+}
+
+void Runner::adoptAtBoundary(Adoption& adoption) {
+    note({});
+    if (loop_.adopt(adoption, adoptionTimeout())) return;
+    throw Refusal(RefusalKind::Unavailable,
+                  fmt::format("the loop of {} reaches no cycle boundary: {}; nothing has changed",
+                              name_, whatDoesNotReturn()));
+}
+
+std::vector<std::string> Runner::adopt(Change change, const Progress& progress) {
+    noticeEnd();
+    requireNoReplay();
+    const Graph graph = change.graph;
+    Wiring wiring = wire(graph, filter(), change.loading);
+    checkTaps(wiring);
+    Adoption adoption;
+    std::unique_ptr<Plan> plan = buildPlan(graph, std::move(wiring), *plan_, settings_.frequency_hz,
+                                           adoption, settings_.bridge);
+    adoption.values = change.values;
+    adoption.hand_overs = change.hand_overs;
+    adoption.copies = change.copies;
+    adoption.period_ns = change.period_ns;
+    if (loop_.running() || state_ == RunnerState::Stepping) {
+        for (const auto& instance : change.arriving) {
+            progress("starting " + instance->fullName());
+            note(instance->fullName() + ".start");
+            instance->start();
+        }
+    }
+    progress("adopting the change");
+    adoptAtBoundary(adoption);
+    plan->noteKept(adoption, *plan_);
+    std::swap(plan_, plan);
+    // It stands, whatever goes wrong from here on.
+    guarded("making a change known", [&] { adopted(change); });
+    // Out of the loop since its last boundary: what left may take its time.
+    for (const auto& instance : change.leaving) {
+        noteFaultsOf(*instance);
+        note(instance->fullName() + ".stop");
+        instance->stop();
+        note(instance->fullName() + ".cleanup");
+        instance->cleanup();
+    }
+    guarded("looking after the loop", [this] { noticeEnd(); });
+    for (const HandOver& hand_over : adoption.hand_overs) {
+        if (!hand_over.skipped) continue;
+        change.notes.push_back(fmt::format(
+            "{} begins at its initial state: what it replaces was taken out after a fault",
+            hand_over.successor->fullName()));
+    }
+    return std::move(change.notes);
+}
+
+void Runner::handOver(Change& change, const Instance& previous, const Instance& successor) {
+    HandOver hand_over{&successor.component(), &previous.component(), {}};
+    planHandOver(previous.component(), successor.component(), hand_over.states, change.notes);
+    std::size_t bytes = 0;
+    for (const StateCopy& state : hand_over.states) bytes += state.size;
+    for (const HandOver& other : change.hand_overs) {
+        for (const StateCopy& state : other.states) bytes += state.size;
+    }
+    if (bytes > kLargestState) {
+        throw Refusal(RefusalKind::ResourceExhausted,
+                      fmt::format("{} bytes of state are to be handed over at once, {} at most: "
+                                  "replace fewer components at a time",
+                                  bytes, kLargestState));
+    }
+    change.hand_overs.push_back(std::move(hand_over));
+}
+
+void Runner::adopted(const Change& change) {
+    if (!change.values.empty()) {
+        for (const GraphNode& node : plan_->graph.nodes()) node.instance->releaseStaged();
+    }
+    if (simulated_) {
+        for (const auto& injector : plan_->bridgeTable().inputs) injector->setQueueing(true);
+    }
+    publish(change.changed);
+    if (bridge_) bridge_->setTable(bridgeTable());
+}
+
+void Runner::checkTaps(const Wiring& wiring) const {
+    std::size_t taps = 0;
+    for (const auto& [name, connection] : wiring.connections)
+        taps += connection.published ? 1 + connection.others.size() : 0;
+    // What is above a limit that was lowered may stay, and shrink.
+    if (taps <= most_taps_ || taps <= plan_->taps.size()) return;
+    throw Refusal(RefusalKind::ResourceExhausted,
+                  fmt::format("{} published outputs (taps) are more than the {} allowed: let the "
+                              "whitelist match fewer, or raise taps under [limits] in rtcfd's "
+                              "settings",
+                              taps, most_taps_));
+}
+
+ChangeOutcome Runner::load(ComponentDefinition definition, const std::string& library,
+                           const Progress& progress) {
+    plan_->graph.requireFree(definition.fullName());
+    const std::set<std::string> breaks = definition.breaks;
+    const std::shared_ptr<Instance> instance =
+        makeInstance(std::move(definition), library, progress);
+    Change change;
+    change.graph = plan_->graph;
+    change.graph.add({instance, breaks});
+    change.loading = instance->fullName();
+    change.arriving = {instance};
+    adopt(std::move(change), progress);
+    return outcomeOf(*instance);
+}
+
+ChangeOutcome Runner::outcomeOf(const Instance& arrived) const {
+    ChangeOutcome result = outcome(arrived.fullName());
+    for (const std::string& remap : arrived.uselessRemaps()) {
+        result.notes.push_back(
+            fmt::format("remap {} names no port of {}", remap, arrived.fullName()));
+    }
+    result.kept = arrived.keptParameters();
+    for (const std::string& line : arrived.lostParameters()) result.notes.push_back(line);
+    addRemarks(result, arrived.fullName());
+    return result;
+}
+
+void Runner::addRemarks(ChangeOutcome& outcome, const std::string& component) const {
+    for (std::string& line : remarks(plan_->graph, plan_->wiring, filter(), component))
+        outcome.notes.push_back(std::move(line));
+}
+
+ChangeOutcome Runner::unload(const std::vector<std::string>& names, const Progress& progress) {
+    if (names.empty())
+        throw Refusal(RefusalKind::InvalidArgument, "no component to unload is named");
+    Change change;
+    change.graph = plan_->graph;
+    for (const std::string& name : names) {
+        change.leaving.push_back(change.graph.get(name).instance);
+        change.graph.remove(name);
+    }
+    progress("unloading");
+    adopt(std::move(change), progress);
+    return outcome(names.size() == 1 ? names[0] : "");
+}
+
+ChangeOutcome Runner::replace(const std::string& name, ComponentDefinition definition,
+                              const std::string& library, bool reset, const Progress& progress) {
+    const GraphNode old = plan_->graph.get(name);
+    if (definition.fullName() != name) plan_->graph.requireFree(definition.fullName());
+    if (!reset) {
+        const auto& declared = old.instance->component().parameters();
+        for (std::size_t i = 0; i < declared.size(); ++i) {
+            const ParameterDeclaration& declaration = declared[i]->declaration();
+            const ParameterValue& value = old.instance->parameterValues()[i];
+            definition.inherited.push_back(
+                {declaration.name, value, !sameValue(value, declaration.default_value)});
+        }
+    }
+    const std::set<std::string> breaks = definition.breaks;
+    const std::shared_ptr<Instance> instance =
+        makeInstance(std::move(definition), library, progress);
+    Change change;
+    change.graph = plan_->graph;
+    change.graph.replace(name, {instance, breaks});
+    change.loading = instance->fullName();
+    change.arriving = {instance};
+    change.leaving = {old.instance};
+    handOver(change, *old.instance, *instance);
+    std::vector<std::string> notes = adopt(std::move(change), progress);
+    ChangeOutcome result = outcomeOf(*instance);
+    result.notes.insert(result.notes.end(), notes.begin(), notes.end());
+    return result;
+}
+
+ChangeOutcome Runner::apply(const std::vector<WantedComponent>& wanted, bool dry_run,
+                            const Progress& progress) {
+    std::vector<Difference> differences = compare(plan_->graph, wanted);
+    std::vector<std::pair<std::shared_ptr<Instance>, std::vector<ParameterValue>>> previous;
+    for (const GraphNode& node : plan_->graph.nodes()) {
+        previous.emplace_back(node.instance, node.instance->parameterValues());
+    }
+    const auto restoreParameters = [&] {
+        for (auto& [instance, values] : previous) instance->restoreParameterValues(values);
+    };
+    std::vector<std::string> notes;
+    try {
+        Change change;
+        change.graph = plan_->graph;
+        for (const Difference& difference : differences)
+            addDifference(change, difference, progress, dry_run);
+        if (dry_run) {
+            (void)wire(change.graph, filter(), {});
+            restoreParameters();
+        } else if (!differences.empty()) {
+            notes = adopt(std::move(change), progress);
+        }
+    } catch (...) {
+        restoreParameters();
+        throw;
+    }
+    ChangeOutcome result = outcome();
+    result.notes = std::move(notes);
+    result.differences = std::move(differences);
+    for (Difference& difference : result.differences) {
+        difference.wanted = nullptr;
+        if (!dry_run) addRemarks(result, difference.component);
+    }
+    return result;
+}
+
+void Runner::addDifference(Change& change, const Difference& difference, const Progress& progress,
+                           bool look) {
+    const std::string& name = difference.component;
+    switch (difference.kind) {
+        case Difference::Kind::Unload:
+            change.leaving.push_back(change.graph.get(name).instance);
+            change.graph.remove(name);
+            return;
+        case Difference::Kind::Breaks:
+            change.graph.setBreaks(name, difference.wanted->definition.breaks);
+            return;
+        case Difference::Kind::Parameters: {
+            const auto staged =
+                change.graph.get(name).instance->stageParameters(difference.parameters);
+            change.values.insert(change.values.end(), staged.begin(), staged.end());
+            change.changed.insert(name);
+            return;
+        }
+        case Difference::Kind::Load:
+        case Difference::Kind::Replace:
+            break;
+    }
+    const ComponentDefinition& definition = difference.wanted->definition;
+    const std::shared_ptr<Instance> instance =
+        makeInstance(definition, difference.wanted->library, progress, !look);
+    change.arriving.push_back(instance);
+    if (difference.kind == Difference::Kind::Load) {
+        change.graph.add({instance, definition.breaks});
+        return;
+    }
+    const std::shared_ptr<Instance> old = change.graph.get(name).instance;
+    change.graph.replace(name, {instance, definition.breaks});
+    change.leaving.push_back(old);
+    handOver(change, *old, *instance);
+}
+
+ChangeOutcome Runner::setBreaks(const std::vector<std::pair<std::string, std::string>>& ports,
+                                bool broken) {
+    if (ports.empty()) throw Refusal(RefusalKind::InvalidArgument, "no input is named");
+    Change change;
+    change.graph = plan_->graph;
+    for (const auto& [component, port] : ports) change.graph.setBreak(component, port, broken);
+    adopt(std::move(change), [](const std::string&) {});
+    return outcome(ports[0].first);
+}
+
+ChangeOutcome Runner::reset(const std::string& name) {
+    const Component& component = plan_->graph.get(name).instance->component();
+    if (component.states().empty()) {
+        throw Refusal(RefusalKind::FailedPrecondition,
+                      fmt::format("{} declares no state (rtcf::State) that could be reset", name));
+    }
+    Change change;
+    change.graph = plan_->graph;
+    change.copies = planReset(component);
+    adopt(std::move(change), [](const std::string&) {});
+    return outcome(name);
+}
+
+ChangeOutcome Runner::setParameters(
+    const std::string& name, const std::vector<std::pair<std::string, ParameterValue>>& batch) {
+    Instance& instance = *plan_->graph.get(name).instance;
+    const std::vector<ParameterValue> previous = instance.parameterValues();
+    noticeEnd();
+    requireNoReplay();
+    // Values alone: the schedule stays as it is.
+    Adoption adoption;
+    adoption.values = instance.stageParameters(batch);
+    try {
+        adoptAtBoundary(adoption);
+    } catch (...) {
+        instance.restoreParameterValues(previous);
+        throw;
+    }
+    // It stands, whatever goes wrong from here on.
+    instance.releaseStaged();
+    ++plan_->schedule.generation;  // which the cycle does not look at
+    guarded("making a change known", [&] {
+        publish({name});
+        if (bridge_) bridge_->setTable(bridgeTable());
+        noticeEnd();
+    });
+    return outcome(name);
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,85 @@
+// What a runner tells of that nobody asked for: faults, overruns, messages that are lost.
+#include <fmt/format.h>
+
+#include "refusal.hpp"
+#include "runner/runner.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+}  // namespace
+
+const GraphNode* Runner::nodeOf(const Component* component) const noexcept {
+    for (const GraphNode& node : plan_->graph.nodes()) {
+        if (&node.instance->component() == component) return &node;
+    }
+    return nullptr;
+}
+
+void Runner::noteLoopFault() {
+    const LoopFault& fault = loop_.fault();
+    setState(fault.kind == LoopFault::Kind::None ? RunnerState::Stopped : RunnerState::Faulted);
+    if (state_ == RunnerState::Faulted) {
+        RunnerEvent event{RunnerEvent::Kind::LoopEnded, {}, {}, fault.iteration};
+        if (fault.kind == LoopFault::Kind::Overruns) {
+            event.message = fmt::format("loop stopped in iteration {}: more than {} overruns",
+                                        fault.iteration, settings_.loop.max_overruns);
+        }
+        if (fault.component != nullptr) {
+            event.component = fault.component_name.data();
+            const std::string what = fault.kind == LoopFault::Kind::NotFinite
+                                         ? fmt::format("output {} is not finite", fault.text.data())
+                                         : fmt::format("update() threw: {}", fault.text.data());
+            event.message = fmt::format("loop stopped in iteration {}: {}: {}", fault.iteration,
+                                        event.component, what);
+            // It may have been unloaded at the boundary at which the loop ended.
+            if (const GraphNode* node = nodeOf(fault.component); node != nullptr) {
+                node->instance->setFault(fmt::format("iteration {}: {}", fault.iteration, what));
+            }
+        }
+        status_ = event.message;
+        tell(event);
+    }
+}
+
+// Components that failed while the loop went on: each kind said once, until the next start.
+void Runner::noteComponentFaults() {
+    const std::uint64_t count = loop_.figures().faults.value();
+    if (std::exchange(told_faults_, count) == count) return;
+    for (const GraphNode& node : plan_->graph.nodes()) noteFaultsOf(*node.instance);
+}
+
+void Runner::noteFaultsOf(Instance& instance) {
+    ComponentFaults& faults = instance.figures()->faults;
+    const auto say = [&](const ComponentFault* fault, const char* text) {
+        if (fault == nullptr) return;
+        const std::string what = fmt::vformat(text, fmt::make_format_args(fault->text.data()));
+        instance.setFault(fmt::format("iteration {}: {}", fault->iteration, what));
+        tell({RunnerEvent::Kind::ComponentFailed,
+              fmt::format("{}: iteration {}: {}", instance.fullName(), fault->iteration, what),
+              instance.fullName(), fault->iteration});
+        publish({instance.fullName()});
+    };
+    say(faults.not_finite.take(), "output {} is not finite: readers keep its last value");
+    say(faults.taken_out.take(), "update() threw: {}; taken out, the loop goes on");
+}
+
+void Runner::noteOverruns(bool last) {
+    std::string line = overrun_report_.take(loop_, plan_->graph, last);
+    if (line.empty()) return;
+    if (lacks_realtime_ && settings_.loop.max_overruns != 0)
+        line += "; max_overruns ends no loop that runs degraded";
+    tell({RunnerEvent::Kind::Overruns, std::move(line), {}, loop_.figures().iteration.load()});
+}
+
+void Runner::noteSizes() {
+    const std::int64_t now = monotonicNow();
+    if (now < sizes_due_ns_) return;
+    sizes_due_ns_ = now + kSecond / 2;
+    size_watch_.look(plan_->taps, plan_->injectors, settings_.bridge.largest_message, now);
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,179 @@
+// How a runner begins and ends its loop, and with which settings it runs.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "refusal.hpp"
+#include "runner/runner.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+template <typename T>
+bool contains(const std::vector<T>& items, const T& item) {
+    return std::find(items.begin(), items.end(), item) != items.end();
+}
+
+}  // namespace
+
+void Runner::configure(RunnerSettings settings) {
+    validate(settings);
+    const RunnerSettings previous = std::exchange(settings_, std::move(settings));
+    try {
+        Change change;
+        change.graph = plan_->graph;
+        if (settings_.loop.period_ns != previous.loop.period_ns)
+            change.period_ns = settings_.loop.period_ns;
+        adopt(std::move(change), [](const std::string&) {});
+    } catch (...) {
+        settings_ = previous;
+        throw;
+    }
+    tuned_spin_ns_ = -1;
+    if (loop_.joinable()) {
+        for (const RealtimeProblem& problem : loop_.retune(loopSettings())) {
+            if (!contains(degraded_, problem.text)) degraded_.push_back(problem.text);
+        }
+    }
+    stall_monitor_.setTimeout(settings_.stall_timeout_ns);
+    log_.setLimit(settings_.log_limit);
+    if (bridge_) bridge_->configure(settings_.bridge);
+    publishPicture();
+}
+
+ChangeOutcome Runner::start(const Progress& progress) {
+    noticeEnd();
+    if (loop_.running()) return outcome();
+    if (state_ == RunnerState::Stepping) endStepping();
+    startAll(progress);
+    try {
+        simulate(wantsSimulation(progress));
+        progress("starting the loop");
+        degraded_.clear();
+        for (RealtimeProblem& problem : lockAndStart())
+            degraded_.push_back(std::move(problem.text));
+    } catch (...) {
+        simulate(false);
+        stopAll();
+        throw;
+    }
+    setState(RunnerState::Running);
+    status_.clear();
+    publish();
+    for (const std::string& problem : degraded_) {
+        tell({RunnerEvent::Kind::Degraded, "degraded real time: " + problem, {}, 0});
+    }
+    ChangeOutcome result = outcome();
+    for (const std::string& problem : degraded_)
+        result.notes.push_back("degraded real time: " + problem);
+    return result;
+}
+
+// A stop is final: no work that was posted before it begins cycles.
+void Runner::requireNoStop() const {
+    if (loop_.stops() == job_stops_) return;
+    throw Refusal(
+        RefusalKind::FailedPrecondition,
+        fmt::format("the loop of {} is not started: a stop was asked for after the start", name_));
+}
+
+RealtimeProblems Runner::lockAndStart() {
+    lacks_realtime_ = false;
+    if (simulated_) return loop_.start(loopSettings(), job_stops_);
+    RealtimeProblems problems = lockMemory(settings_.loop.realtime);
+    for (RealtimeProblem& problem : checkScheduling(settings_.loop.realtime))
+        problems.push_back(std::move(problem));
+    for (const RealtimeProblem& problem : problems) {
+        if (!problem.essential) continue;
+        lacks_realtime_ = true;
+        if (!settings_.realtime_required) continue;
+        throw Refusal(RefusalKind::FailedPrecondition,
+                      fmt::format("no real time: {}; or let it run degraded: rtcfctl runner set {} "
+                                  "--realtime preferred",
+                                  problem.text, name_));
+    }
+    tuned_spin_ns_ = -1;
+    for (RealtimeProblem& problem : loop_.start(loopSettings(), job_stops_))
+        problems.push_back(std::move(problem));
+    return problems;
+}
+
+// As chosen; but where there is no real time, cycles are late that the graph is not to blame for.
+LoopSettings Runner::loopSettings() const {
+    LoopSettings settings = settings_.loop;
+    if (lacks_realtime_) settings.max_overruns = 0;
+    return settings;
+}
+
+// spin = auto: as long as 99 of 100 wake-ups of the last second were late, at most a tenth of the
+// period.
+void Runner::tuneSpin() {
+    if (!settings_.spin_auto || monotonicNow() - tuned_at_ns_ < kSecond) return;
+    const HistogramSnapshot now = loop_.figures().wake_up.snapshot();
+    const DistributionSummary late = summarize(difference(now, tuned_from_), 1.0);
+    tuned_from_ = now;
+    tuned_at_ns_ = monotonicNow();
+    if (late.count == 0) return;
+    tuned_spin_ns_ = std::min(static_cast<std::int64_t>(late.p99), settings_.loop.period_ns / 10);
+    loop_.setSpin(tuned_spin_ns_);
+}
+
+ChangeOutcome Runner::stop(const Progress& progress) {
+    if (loop_.joinable()) {
+        progress("stopping the loop");
+        if (!loop_.stopRequested())
+            loop_.requestStop();  // it must not void a start that came since
+        if (!loop_.join(adoptionTimeout())) {
+            throw Refusal(RefusalKind::Unavailable,
+                          fmt::format("the loop of {} does not reach the end of its cycle: {}",
+                                      name_, whatDoesNotReturn()));
+        }
+        loopEnded();
+    } else if (state_ == RunnerState::Stepping) {
+        endStepping();
+    }
+    return outcome();
+}
+
+void Runner::loopEnded() {
+    loop_.join(INT64_MAX);
+    simulate(false);
+    noteOverruns(true);
+    noteLoopFault();
+    stopAll();
+    publish({loop_.fault().component_name.data()});
+}
+
+void Runner::startAll(const Progress& progress) {
+    std::vector<Instance*> started;
+    try {
+        for (const std::size_t index : plan_->wiring.order) {
+            Instance& instance = *plan_->graph.nodes()[index].instance;
+            progress("starting " + instance.fullName());
+            requireNoStop();
+            note(instance.fullName() + ".start");
+            started.push_back(&instance);
+            instance.setFault({});
+            instance.start();
+        }
+        requireNoStop();
+    } catch (...) {
+        for (auto instance = started.rbegin(); instance != started.rend(); ++instance)
+            (*instance)->stop();
+        throw;
+    }
+}
+
+void Runner::stopAll() noexcept {
+    // Against the order of execution: a component may rely on what it reads as long as it runs.
+    for (auto index = plan_->wiring.order.rbegin(); index != plan_->wiring.order.rend(); ++index) {
+        Instance& instance = *plan_->graph.nodes()[*index].instance;
+        note(instance.fullName() + ".stop");
+        instance.stop();
+    }
+}
+
+}  // namespace rtcf::executor

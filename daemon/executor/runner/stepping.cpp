@@ -1,0 +1,142 @@
+// A runner's cycles without real time: steps and replays.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "refusal.hpp"
+#include "runner/runner.hpp"
+
+namespace rtcf::executor {
+
+// Other cycles than the loop's are run only while it does not run.
+void Runner::requireNoLoop() {
+    noticeEnd();
+    if (!loop_.joinable()) return;
+    throw Refusal(
+        RefusalKind::FailedPrecondition,
+        fmt::format("the loop of {0} runs in real time: stop it first: rtcfctl -r {0} stop",
+                    name_));
+}
+
+// Of components that have started.
+void Runner::beginStepping(std::int64_t stamp_ns) {
+    try {
+        loop_.beginStepping(settings_.loop, job_stops_, stamp_ns);
+    } catch (...) {
+        stopAll();
+        throw;
+    }
+}
+
+ChangeOutcome Runner::step(std::uint64_t cycles, const Progress& progress) {
+    constexpr std::uint64_t kChunk = 10000;  // cycles between reports
+    requireNoLoop();
+    if (state_ != RunnerState::Stepping) {
+        startAll(progress);
+        beginStepping();
+        setState(RunnerState::Stepping);
+        status_.clear();
+        publish();
+    }
+    std::uint64_t left = cycles;
+    while (left > 0) {
+        const std::uint64_t wanted = std::min(left, kChunk);
+        const std::uint64_t done = loop_.step(wanted);
+        left -= done;
+        log_.drain();
+        note({});  // a long run is not a hook that hangs
+        if (done < wanted || ending_) break;
+        if (left > 0) progress(fmt::format("{} of {} cycles", cycles - left, cycles));
+    }
+    if (loop_.fault().kind != LoopFault::Kind::None || loop_.stopRequested()) endStepping();
+    ChangeOutcome result = outcome();
+    result.cycles = cycles - left;
+    return result;
+}
+
+ReplayOutcome Runner::replay(const ReplayChunk& chunk, const Progress& progress) {
+    ReplayOutcome outcome;
+    if (chunk.begin) {
+        outcome = beginReplay(chunk, progress);
+    } else if (!replay_) {
+        throw Refusal(RefusalKind::FailedPrecondition,
+                      fmt::format("no replay of {} is under way: it was stopped", name_));
+    } else {
+        try {
+            outcome = replay_->run(chunk);
+        } catch (...) {
+            endStepping();
+            throw;
+        }
+    }
+    log_.drain();
+    note({});
+    const bool ended = loop_.fault().kind != LoopFault::Kind::None || loop_.stopRequested();
+    if ((chunk.end && !outcome.more) || ended) endStepping();
+    if (ended) throw Refusal(RefusalKind::FailedPrecondition, status_);
+    return outcome;
+}
+
+ReplayOutcome Runner::beginReplay(const ReplayChunk& chunk, const Progress& progress) {
+    requireNoLoop();
+    if (state_ == RunnerState::Stepping) endStepping();
+    Replay::check(plan_->bridgeTable(), chunk.topics);
+    renewComponents(progress);
+    if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>());
+    try {
+        startAll(progress);
+        beginStepping(chunk.start_ns);
+    } catch (...) {
+        if (bridge_) bridge_->setTable(bridgeTable());
+        throw;
+    }
+    setState(RunnerState::Stepping);
+    status_.clear();
+    replay_ = std::make_unique<Replay>(plan_->bridgeTable(), loop_, chunk.start_ns);
+    publish();
+    ReplayOutcome outcome;
+    replay_->describe(outcome);
+    return outcome;
+}
+
+// The same components with the same parameters, but nothing that they or their inputs remember.
+void Runner::renewComponents(const Progress& progress) {
+    Change renewed;
+    Change previous;
+    previous.graph = plan_->graph;
+    for (const GraphNode& node : plan_->graph.nodes()) {
+        const Instance& old = *node.instance;
+        ComponentDefinition definition = old.definition();
+        definition.parameters.clear();
+        const auto& parameters = old.component().parameters();
+        for (std::size_t i = 0; i < parameters.size(); ++i) {
+            definition.parameters.emplace_back(parameters[i]->declaration().name,
+                                               old.parameterValues()[i]);
+        }
+        auto instance = makeInstance(std::move(definition), old.library().path(), progress);
+        if (old.hasPhase()) instance->setPhase(old.phase());
+        renewed.graph.add({instance, node.breaks});
+        renewed.leaving.push_back(node.instance);
+    }
+    adopt({}, progress);  // so that no connection's value stays
+    try {
+        adopt(std::move(renewed), progress);
+    } catch (...) {
+        adopt(std::move(previous), progress);
+        throw;
+    }
+}
+
+void Runner::endStepping() {
+    loop_.endStepping();
+    if (replay_) {
+        replay_->discardOutputs();  // ROS sees nothing of them
+        replay_.reset();
+        if (bridge_) bridge_->setTable(bridgeTable());
+    }
+    noteLoopFault();
+    stopAll();
+    publish({loop_.fault().component_name.data()});
+}
+
+}  // namespace rtcf::executor

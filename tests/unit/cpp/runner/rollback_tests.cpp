@@ -1,0 +1,139 @@
+// What is refused, or fails in any way, leaves nothing behind and ends nothing.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <new>
+
+#include "support/runner_fixture.hpp"
+
+namespace rtcf::test {
+namespace {
+
+using executor::Difference;
+using executor::ReplayChunk;
+using executor::WantedComponent;
+
+const std::string kUnitTest = RTCF_UNIT_COMPONENTS "/rtcf_unit_test.so";
+
+class Rollback : public RunnerFixture {
+   protected:
+    ChangeOutcome apply(const std::vector<WantedComponent>& wanted) {
+        return onGraphThread(
+            [&] { return runner().apply(wanted, false, [](const std::string&) {}); });
+    }
+
+    static WantedComponent wanted(const std::string& type, const std::string& name) {
+        ComponentDefinition component = definition(type, name);
+        component.remaps = {{"in", name + "_in"}, {"out", name + "_out"}};
+        return {component, kUnitTest};
+    }
+
+    ParameterValue parameter(const std::string& component, const std::string& name) {
+        const auto snapshot = runner().snapshot();
+        for (const auto& each : snapshot->get(component).parameters) {
+            if (each.declaration.name == name) return each.value;
+        }
+        return {};
+    }
+};
+
+// Its records refer to its name: they are handed on before that goes.
+TEST_F(Rollback, RefusedComponentHasSaidAllThatItLogged) {
+    ComponentDefinition refused = definition("Recorder", "A");
+    refused.parameters = {{"refuses", std::string("prepare")}};
+    EXPECT_NE(refusal([&] { load(refused); }).find("told to refuse prepare"), std::string::npos);
+    const auto entries = handedOn();
+    const auto said = std::find_if(entries.begin(), entries.end(), [](const LogEntry& entry) {
+        return entry.message == "refuses to prepare";
+    });
+    ASSERT_NE(said, entries.end()) << "it still waits, and its component's name is gone";
+    EXPECT_EQ(said->component, "/A");
+}
+
+TEST_F(Rollback, GraphWithInfiniteDefaultIsAppliedTwice) {
+    EXPECT_EQ(apply({wanted("Recorder", "A")}).differences.size(), 1U);
+    EXPECT_TRUE(apply({wanted("Recorder", "A")}).differences.empty());
+}
+
+TEST_F(Rollback, ParameterGoesBackToItsInfiniteDefault) {
+    WantedComponent limited = wanted("Recorder", "A");
+    limited.definition.parameters = {{"limit", 5.0}};
+    apply({limited});
+    EXPECT_EQ(parameter("/A", "limit"), ParameterValue(5.0));
+    const auto differences = apply({wanted("Recorder", "A")}).differences;
+    ASSERT_EQ(differences.size(), 1U);
+    EXPECT_EQ(differences[0].kind, Difference::Kind::Parameters);
+    EXPECT_EQ(parameter("/A", "limit"), ParameterValue(std::numeric_limits<double>::infinity()));
+}
+
+TEST_F(Rollback, OtherInfiniteValuesStayRefused) {
+    load(definition("Recorder", "A"));
+    const double infinity = std::numeric_limits<double>::infinity();
+    EXPECT_EQ(refusal([&] { setParameters("/A", {{"gain", infinity}}); }),
+              "/A: parameter gain must be finite");
+    EXPECT_EQ(refusal([&] { setParameters("/A", {{"limit", -infinity}}); }),
+              "/A: parameter limit must be finite");
+}
+
+TEST_F(Rollback, ReplayOfAGraphWithInfiniteDefaultBegins) {
+    load(definition("Recorder", "A"));
+    ReplayChunk chunk;
+    chunk.begin = true;
+    EXPECT_EQ(refusal([&] {
+                  onGraphThread([&] { return runner().replay(chunk, [](const std::string&) {}); });
+              }),
+              "");
+}
+
+// Memory that runs out in the middle of a change, say.
+TEST_F(Rollback, AnyExceptionTakesTheWholeChangeBack) {
+    WantedComponent writer = wanted("Touchy", "A");
+    WantedComponent reader = wanted("Touchy", "B");
+    reader.definition.remaps = {{"in", "A_out"}, {"out", "B_out"}};
+    apply({writer, reader});
+    const auto before = generation();
+    writer.definition.parameters = {{"gain", 2.0}};
+    reader.definition.breaks = {"in"};  // which needs a copy of the value
+    journal().copies_throw = true;
+    const bool thrown = onGraphThread([&] {
+        try {
+            runner().apply({writer, reader}, false, [](const std::string&) {});
+        } catch (const std::bad_alloc&) {
+            return true;
+        }
+        return false;
+    });
+    journal().copies_throw = false;
+    EXPECT_TRUE(thrown);
+    EXPECT_EQ(generation(), before);
+    EXPECT_EQ(parameter("/A", "gain"), ParameterValue(1.0));
+    EXPECT_EQ(apply({writer, reader}).differences.size(), 2U) << "neither has happened yet";
+}
+
+TEST_F(Rollback, NoExceptionInAChangeByRosEndsTheProcess) {
+    load(definition("Recorder", "A"));
+    start();
+    loseEvents();
+    std::promise<std::string> answer;
+    bridge().request("/A", {{"gain", 2.0}},
+                     [&](const std::string& refused) { answer.set_value(refused); });
+    EXPECT_EQ(answer.get_future().get(), "");
+    EXPECT_EQ(parameter("/A", "gain"), ParameterValue(2.0));
+    bridge().request("/A", {{"gain", 3.0}}, [](const std::string&) { throw std::bad_alloc(); });
+    EXPECT_TRUE(runs());
+    EXPECT_EQ(stop().order, std::vector<std::string>{"/A"});
+}
+
+// Said or not: the loop ends in order.
+TEST_F(Rollback, FaultThatCannotBeReportedEndsTheLoopInOrder) {
+    ComponentDefinition failing = definition("Recorder", "A");
+    failing.parameters = {{"throws_at", std::int64_t{10}}};
+    load(failing);
+    loseEvents();
+    start();
+    EXPECT_TRUE(eventually([this] { return journal().count("/A stop") == 1; }));
+    EXPECT_TRUE(eventually([this] { return state() == RunnerState::Faulted; }));
+}
+
+}  // namespace
+}  // namespace rtcf::test
