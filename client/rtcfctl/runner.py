@@ -222,6 +222,11 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
     add_quantity(
         to, "--largest-message", "ros_largest_message_kb", "of variable size, in both directions"
     )
+    to.add_argument(
+        "--ros-peers",
+        choices=_RIGHTS,
+        help="what ROS peers may do: ROS knows no users",
+    )
 
 
 def add_quantity(to: argparse.ArgumentParser, option: str, dest: str, text: str) -> None:
@@ -244,11 +249,6 @@ def add_quantity(to: argparse.ArgumentParser, option: str, dest: str, text: str)
         type=value,
         metavar=unit.upper() or "N",
         help=f"{text} ({quantity.range()}, default {quantity.default:g})",
-    )
-    to.add_argument(
-        "--ros-peers",
-        choices=_RIGHTS,
-        help="what ROS peers may do: ROS knows no users",
     )
 
 
