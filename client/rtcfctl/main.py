@@ -23,6 +23,7 @@ _MODULES = {
     "unload": "component",
     "replace": "component",
     "release": "component",
+    "reset": "component",
     "list": "component",
     "info": "component",
     "order": "graph",
