@@ -23,7 +23,7 @@ _MODULES = {
     "unload": "component",
     "replace": "component",
     "release": "component",
-    "reset": "component",
+    "reset": "parameter",
     "list": "component",
     "info": "component",
     "order": "graph",

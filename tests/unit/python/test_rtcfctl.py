@@ -190,3 +190,11 @@ def test_the_verb_is_found_among_global_options(line: str) -> None:
     words = line.split()
     whole = parser().parse_args(words)
     assert vars(parser(verb_of(words)).parse_args(words)) == vars(whole)
+
+
+def test_each_verb_is_found_in_the_module_that_is_said_to_have_it() -> None:
+    (whole,) = (each for each in parser()._actions if isinstance(each.choices, dict))
+    assert isinstance(whole.choices, dict)
+    for verb in whole.choices:
+        found = (each for each in parser(verb_of([verb]))._actions if each.choices)
+        assert any(verb in (each.choices or ()) for each in found), verb
