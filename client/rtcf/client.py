@@ -125,7 +125,7 @@ class Client:
 
         request = control_pb2.StopRequest(runner=runner)
         return direct_stop.where_rtcfd_does_not(
-            lambda heard: self._change(self._stub.Stop, request, heard),
+            lambda heard: self._change(self._stub.Stop, request, heard, patient=False),
             runner or DEFAULT_RUNNER,
             self.socket,
             on_progress,
@@ -366,8 +366,10 @@ class Client:
         request: Any,
         on_progress: OnProgress | None,
         timeout_s: float | None = CHANGE_TIMEOUT_S,
+        *,
+        patient: bool = True,
     ) -> control_pb2.ChangeResult:
-        until = time.monotonic() + _CROWDED_S
+        until = time.monotonic() + (_CROWDED_S if patient else 0.0)
         while True:
             try:
                 return self._change_once(method, request, on_progress, timeout_s)
