@@ -282,6 +282,9 @@ class RunnerCore(ABC):
         """Do one change in its turn."""
 
         async def told() -> Result:
+            if self.leaving and not self.up:
+                # The disk is the next rtcfd's from here on.
+                raise Unavailable("rtcfd is being restarted")
             try:
                 return await work()
             finally:

@@ -46,6 +46,7 @@ class Machine:
         monkeypatch.setattr("rtcfd.executor.executor.subprocess.Popen", self.popen)
         monkeypatch.setattr(executor, "Child", lambda process: process)
         monkeypatch.setattr(executor, "Process", lambda _: self.adopted)
+        monkeypatch.setattr("rtcfd.executor.executor._belongs", lambda *_: True)
         connect = Link.connect.__func__  # type: ignore[attr-defined]
 
         async def remember(cls: Any, peer: str, path: Path, on_unasked: Any) -> Any:
