@@ -82,7 +82,7 @@ class HangsInSafe final : public rtcf::Component {
 
 class HangsInTakeOver final : public rtcf::Component {
     void update() override {}
-    void takeOver(const rtcf::Component& /*previous*/) noexcept override { hang(); }
+    void takeOver(const rtcf::Predecessor& /*previous*/) noexcept override { hang(); }
 };
 
 class HangsInWait final : public rtcf::Source {

@@ -55,7 +55,7 @@ class Watch final : public rtcf::Component {
 // Takes 6 ms to take over.
 class SlowSuccessor final : public rtcf::Component {
     void update() override {}
-    void takeOver(const rtcf::Component& /*previous*/) noexcept override {
+    void takeOver(const rtcf::Predecessor& /*previous*/) noexcept override {
         const std::int64_t until = now() + 6'000'000;
         while (now() < until) {
         }
