@@ -11,7 +11,7 @@ import rtcf
 from daemon_process import Daemon, wait_for, with_ros
 from ros_processes import Master
 from rtcf.v1 import runner_pb2
-from values import iteration, number
+from values import iteration
 
 MESSAGES = 6000
 FREQUENCY_HZ = 2000.0
@@ -79,4 +79,4 @@ def _in4_of_r2(daemon: Daemon) -> float | None:
     done = daemon.ctl("info", "R2", "-o", "json")
     assert done.returncode == 0, done.stderr
     (port,) = (port for port in json.loads(done.stdout)["ports"] if port["name"] == "in4")
-    return None if port["value"] is None else number(port["value"])
+    return None if port["value"] is None else float(port["value"]["data"])

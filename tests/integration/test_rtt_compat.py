@@ -10,7 +10,7 @@ import rosgraph
 import rtcf
 from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for, with_ros
 from ros_processes import Master
-from values import iteration, number
+from values import iteration
 
 LISTING = Path(__file__).parents[1] / "components" / "compat" / "listing.cpp"
 TUNED = Path(__file__).with_name("tuned")
@@ -132,4 +132,4 @@ def _value(daemon: Daemon, component: str, port: str) -> float | None:
     done = daemon.ctl("info", component, "-o", "json")
     assert done.returncode == 0, done.stderr
     (found,) = (each for each in json.loads(done.stdout)["ports"] if each["name"] == port)
-    return None if found["value"] is None else round(number(found["value"]), 6)
+    return None if found["value"] is None else round(float(found["value"]["data"]), 6)
