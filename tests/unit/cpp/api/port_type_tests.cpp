@@ -323,8 +323,12 @@ TEST(SameType, IsByNameMd5SizeAndAlignment) {
     EXPECT_FALSE(sameType(original, other));
 }
 
+TEST(SameType, IsThatOfAMessageOfOneFieldWithTheSameLayout) {
+    EXPECT_TRUE(sameType(typeInfo<double>(), typeInfo<std_msgs::Float64>()));
+    EXPECT_FALSE(sameType(typeInfo<float>(), typeInfo<std_msgs::Float64>()));
+}
+
 TEST(SameType, TellsTypesOfTheSameMessageApart) {
-    EXPECT_FALSE(sameType(typeInfo<double>(), typeInfo<std_msgs::Float64>()));
     EXPECT_FALSE(sameType(typeInfo<Eigen::Matrix2d>(), typeInfo<Eigen::Matrix<double, 4, 1>>()));
     EXPECT_FALSE(sameType(typeInfo<Eigen::Matrix<double, 2, 3>>(),
                           typeInfo<Eigen::Matrix<double, 2, 3, Eigen::RowMajor>>()))

@@ -95,7 +95,7 @@ TEST_F(ServerTest, HelloTellsRunnerAndProtocol) {
     Request request;
     request.mutable_hello()->set_protocol(1);
     const Response response = client.ask(request);
-    EXPECT_EQ(response.hello().protocol(), 2U);
+    EXPECT_EQ(response.hello().protocol(), 3U);
     EXPECT_EQ(response.hello().runner(), "rt_runner");
     EXPECT_EQ(response.hello().pid(), ::getpid());
 }
