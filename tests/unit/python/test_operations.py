@@ -328,8 +328,10 @@ def reload(service: DaemonUnderTest) -> str:
 
 
 def test_a_reload_finds_its_daemon_and_says_what_ros_may_now(service: DaemonUnderTest) -> None:
-    service.settings.write_text(f'[daemon]\nsocket = "{service.socket}"\nros_services = "admin"\n')
-    assert "rights of ROS services changed" in reload(service)
+    service.settings.write_text(
+        f'[daemon]\nsocket = "{service.socket}"\n[runner.ros]\npeers = "tune"\n'
+    )
+    assert "defaults of runners changed" in reload(service)
 
 
 def test_a_graph_that_a_reload_refused_is_tried_again(service: DaemonUnderTest) -> None:
