@@ -177,8 +177,8 @@ def test_what_was_latched_before_there_was_a_master_is_not_lost(tmp_path: Path) 
 @pytest.mark.parametrize(
     ("option", "value", "words"),
     [
-        ("--decimation", "0", ["decimation 0", "1 to 1000000"]),
-        ("--largest-message", "65537", ["largest message 65537", "65536 KiB"]),
+        ("--decimation", "0", ["decimation of 0", "1 to 1000000"]),
+        ("--largest-message", "65537", ["largest message of 65537", "65536 KiB"]),
         ("--latch", "(a", ["latch", "'(a'"]),
         ("--decimate", "(a", ["decimate", "'(a'"]),
         ("--namespace", "/a b", ["namespace", "/a b"]),

@@ -31,7 +31,8 @@ constexpr std::uint32_t kMostReadOfServer = 8 * kMega;
 constexpr std::uint32_t kMostHeader = kMega;
 constexpr std::uint32_t kMostHeaderOfServer = 64 * 1024;
 constexpr std::size_t kMostWaiting = 4 * kMega;  // for one slow subscriber
-constexpr std::size_t kMostXmlRpc = 8 * kMega;   // a call, or the answer of a master
+// A call, or the answer of a master; as a text that grows, it takes some times that.
+constexpr std::size_t kMostXmlRpc = 4 * kMega;
 constexpr std::uint32_t kSkippedAtOnce = 16 * 1024;
 
 // Which injector has a topic. By topic, as that is all that roscpp's links know.
