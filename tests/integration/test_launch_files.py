@@ -19,7 +19,7 @@ from values import iteration
 
 RUNNER_SERVICES = (
     "activate_rt_loop", "deactivate_rt_loop", "get_introspection_information", "get_loop",
-    "load_orocos_component", "unload_orocos_component",
+    "load_orocos_component", "unload_orocos_component", "load_component", "unload_component",
 )  # fmt: skip
 # What roscore itself has.
 ROSCORE_TOPICS = {"/rosout", "/rosout_agg"}
