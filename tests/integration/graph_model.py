@@ -91,8 +91,8 @@ def unload(graph: Graph, names: Iterable[str]) -> Graph:
 
 
 def replaced(graph: Graph, old: str, mixer: Mixer) -> Graph:
-    """Return the graph with another component in the place of an old one, whose flags and
-    breaks it takes over unless it has its own."""
+    """Return the graph with another component in the place of an old one, whose flags, breaks
+    and parameters it takes over unless it has its own."""
     if old not in graph:
         raise Refused(f"no {old}")
     if mixer.name != old and mixer.name in graph:
@@ -101,6 +101,7 @@ def replaced(graph: Graph, old: str, mixer: Mixer) -> Graph:
         mixer,
         first=mixer.first or graph[old].first,
         breaks=mixer.breaks or graph[old].breaks,
+        parameters={**graph[old].parameters, **mixer.parameters},
     )
     _check_hooks(mixer)
     left = {name: each for name, each in graph.items() if name != old}
