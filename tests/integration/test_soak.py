@@ -322,7 +322,7 @@ def soak(tmp_path: Path) -> Iterator[Soak]:
 
 # Hypothesis begins with some runs that are short.
 @pytest.mark.parametrize(
-    ("runs", "changes"), [(15, 200), pytest.param(230, 10_000, marks=pytest.mark.long)]
+    ("runs", "changes"), [(20, 200), pytest.param(230, 10_000, marks=pytest.mark.long)]
 )
 def test_random_changes_leave_the_graph_of_the_model(soak: Soak, runs: int, changes: int) -> None:
     class Machine(GraphMachine):
