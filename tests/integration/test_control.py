@@ -60,7 +60,7 @@ def test_a_cycle_is_refused_with_the_command_that_breaks_it(client: rtcf.Client)
         ),
         (rtcf.component("rtcf_examples", "Mimo", ignore="("), "INVALID_ARGUMENT", r"\("),
     ],
-    ids=["duplicate name", "second writer of what is read", "type mismatch", "bad value", "bad expression"],
+    ids=["duplicate name", "second writer", "type mismatch", "bad value", "bad expression"],
 )
 def test_a_refused_load_changes_nothing(
     client: rtcf.Client, spec: graph_pb2.ComponentSpec, code: str, text: str
