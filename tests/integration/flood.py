@@ -32,7 +32,7 @@ def stubs(path: str) -> Iterator[control_pb2_grpc.ControlStub]:
     while True:
         options = (("grpc.use_local_subchannel_pool", 1), ("grpc.max_metadata_size", 1 << 20))
         channel = grpc.insecure_channel(f"unix:{path}", options=options)
-        yield control_pb2_grpc.ControlStub(channel)
+        yield control_pb2_grpc.ControlStub(channel)  # type: ignore[no-untyped-call]
 
 
 def again(work: Callable[[], object]) -> None:
@@ -51,7 +51,13 @@ def again(work: Callable[[], object]) -> None:
 def idle(path: str, _: str) -> None:
     """Connections that say nothing."""
     peers = [connected(path) for _ in range(300)]
-    again(lambda: (time.sleep(0.01), peers.append(connected(path)), peers.pop(0).close()))
+
+    def exchange() -> None:
+        time.sleep(0.01)
+        peers.append(connected(path))
+        peers.pop(0).close()
+
+    again(exchange)
 
 
 def reconnects(path: str, _: str) -> None:
@@ -84,7 +90,12 @@ def watches(path: str, _: str) -> None:
         for stub in (next(clients) for _ in range(30))
         for _ in range(50)
     ]
-    again(lambda: (time.sleep(0.1), kept))
+
+    def hold() -> list[object]:
+        time.sleep(0.1)
+        return kept
+
+    again(hold)
 
 
 def half_closed(path: str, _: str) -> None:

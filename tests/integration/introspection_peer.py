@@ -9,6 +9,7 @@ introspection_peer.py diagnostics NAME LEVEL  prints all statuses, until that na
 
 import sys
 import threading
+from collections.abc import Callable
 from typing import Any
 
 import rospy
@@ -32,7 +33,8 @@ def _cycles(topic: str, kind: Any, count: int) -> None:
 
     def take(message: Any) -> None:
         if len(cycles) < count:
-            cycles.append(_TEXT[kind](message))
+            text: Callable[[Any], str] = _TEXT[kind]
+            cycles.append(text(message))
         else:
             full.set()
 
