@@ -127,7 +127,7 @@ def test_of_an_exception_only_the_throw_itself_is_reported(
         stack = " ".join(frame.function for frame in each.frames)
         # Made where it is thrown, freed at the end of the clause that caught it.
         assert re.search(
-            r"Throws::fault\(\)|__cxa_|~runtime_error\(\)|^free \S* ?rtcf::executor::Loop::update<",
+            r"Throws::fault\(\)|__cxa_|~runtime_error\(\)|^free \S* ?rtcf::executor::Cycle::update",
             stack,
         ), stack
 
