@@ -28,8 +28,8 @@ def test_the_journal_tells_what_happened_and_who_did_it(service: Service) -> Non
     assert loaded["RTCF_UID"] == service.machine.run("id", "-u", "alice").stdout.strip()
     assert int(loaded["RTCF_PID"]) > 1
     about = [entry["MESSAGE"] for entry in service.journal("RTCF_RUNNER=rt_runner")]
-    assert "/M loaded (rtcf_examples/Mimo)" in about
-    assert "loop started" in about
+    assert "rt_runner: /M loaded (rtcf_examples/Mimo)" in about
+    assert "rt_runner: loop started" in about
     assert all(entry["SYSLOG_IDENTIFIER"] == "rtcfd" for entry in service.journal()
                if "RTCF_RUNNER" in entry)  # fmt: skip
 

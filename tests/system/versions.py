@@ -14,7 +14,7 @@ for deb in {debs}/*.deb; do
   find /srv/up -name '*.py' -exec touch {{}} +
   if [ -d /srv/up{package} ]; then
     sed -i 's/^VERSION = "\(.*\)"/VERSION = "\1+upgrade"/' /srv/up{package}/__init__.py
-    sed -i 's/^PROTOCOL = .*/PROTOCOL = {protocol}/' /srv/up{package}/link.py
+    sed -i 's/^PROTOCOL = .*/PROTOCOL = {protocol}/' /srv/up{package}/executor/link.py
     (cd /srv/up; find * -path DEBIAN -prune -o -type f -print0 | xargs -0 md5sum >DEBIAN/md5sums)
   fi
   dpkg-deb -Znone --build /srv/up {into}/ >/dev/null
@@ -25,14 +25,14 @@ done
 
 def protocol(machine: Machine) -> int:
     """Return the protocol of the rtcfd that is installed."""
-    text = machine.path(f"{_PACKAGE}/link.py").read_text()
+    text = machine.path(f"{_PACKAGE}/executor/link.py").read_text()
     (line,) = [line for line in text.splitlines() if line.startswith("PROTOCOL = ")]
     return int(line.partition("= ")[2])
 
 
 def speak(machine: Machine, number: int) -> None:
     """Make the rtcfd that is installed one of another protocol, from its next start on."""
-    machine.shell(f"sed -i 's/^PROTOCOL = .*/PROTOCOL = {number}/' {_PACKAGE}/link.py")
+    machine.shell(f"sed -i 's/^PROTOCOL = .*/PROTOCOL = {number}/' {_PACKAGE}/executor/link.py")
 
 
 def make_higher(machine: Machine, debs: str, into: str) -> str:
