@@ -183,5 +183,27 @@ TEST_F(Fault, LongExceptionTextIsCut) {
     EXPECT_NE(ends()[0].message.find("as told"), std::string::npos);
 }
 
+TEST_F(Fault, StatesAreNumbered) {
+    load(definition("Recorder", "A"));
+    const auto number = [this] { return runner().numberedState().number; };
+    EXPECT_EQ(number(), 0U);
+    start();
+    EXPECT_EQ(number(), 1U);
+    EXPECT_EQ(runner().numberedState().state, RunnerState::Running);
+    setParameters("/A", {{"gain", 2.0}});
+    EXPECT_EQ(number(), 1U);
+    stop();
+    EXPECT_EQ(number(), 2U);
+    unload("/A");
+    load(recorder("B", 1));
+    step(1);
+    EXPECT_EQ(number(), 3U);
+    step(1);
+    EXPECT_EQ(number(), 4U);
+    ASSERT_EQ(ends().size(), 1U);
+    EXPECT_EQ(ends()[0].state.number, 4U) << "an event tells which state it is about";
+    EXPECT_EQ(ends()[0].state.state, RunnerState::Faulted);
+}
+
 }  // namespace
 }  // namespace rtcf::test

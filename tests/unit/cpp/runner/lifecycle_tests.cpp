@@ -215,30 +215,6 @@ TEST_F(Lifecycle, StopVoidsStartsAndStepsThatWait) {
     EXPECT_TRUE(runs());
 }
 
-TEST_F(Lifecycle, StatesAreNumbered) {
-    load(definition("Recorder", "A"));
-    const auto number = [this] { return runner().numberedState().number; };
-    EXPECT_EQ(number(), 0U);
-    start();
-    EXPECT_EQ(number(), 1U);
-    EXPECT_EQ(runner().numberedState().state, RunnerState::Running);
-    setParameters("/A", {{"gain", 2.0}});
-    EXPECT_EQ(number(), 1U);
-    stop();
-    EXPECT_EQ(number(), 2U);
-    unload("/A");
-    ComponentDefinition failing = definition("Recorder", "B");
-    failing.parameters = {{"throws_at", std::int64_t{1}}};
-    load(failing);
-    step(1);
-    EXPECT_EQ(number(), 3U);
-    step(1);
-    EXPECT_EQ(number(), 4U);
-    ASSERT_EQ(events().back().kind, RunnerEvent::Kind::LoopEnded);
-    EXPECT_EQ(events().back().state.number, 4U) << "an event tells which state it is about";
-    EXPECT_EQ(events().back().state.state, RunnerState::Faulted);
-}
-
 TEST_F(Lifecycle, WhatHooksLogComesWithTheComponentsName) {
     load(definition("Chatter", "A"));
     start();
