@@ -73,12 +73,11 @@ def test_what_crashes_the_process_is_named_and_taken_out(
 
 
 def _stop_in_vain(daemon: Daemon, client: rtcf.Client, faulty: str) -> str:
-    """Stop a loop whose safe() ends its executor; return what is said of it."""
+    """Stop a loop whose safe() ends its executor: the answer names it; return the log."""
     client.load(rtcf.component("rtcf_faults", faulty, name="bad"))
     client.start()
     wait_for(lambda: state(client).iteration > 20, "20 cycles")
-    # Its executor may be ended before it can say why there is no answer.
-    with pytest.raises(rtcf.RefusedError):
+    with pytest.raises(rtcf.RefusedError, match=r"/bad\.safe"):
         client.stop()
     wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
     return daemon.log()

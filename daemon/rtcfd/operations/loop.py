@@ -86,7 +86,7 @@ async def stop_quietly(runner: RunnerCore) -> None:
 
 async def _ask_to_stop(runner: RunnerCore, progress: Progress | None) -> control_pb2.ChangeResult:
     request = wire.Request(stop=wire.Stop())
-    response = await runner.alive().request(
-        request, STOP_TIMEOUT_S, progress, lambda _: runner.loop.told(False)
+    response = await runner.ask(
+        request, progress, lambda _: runner.loop.told(False), STOP_TIMEOUT_S
     )
     return response.change

@@ -19,7 +19,7 @@ from rtcfd.common.limits import Limits
 from rtcfd.common.refusals import Refusal, Unavailable
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.events import logger_of
-from rtcfd.executor.executor import CONNECT_TIMEOUT_S, Executor
+from rtcfd.executor.executor import CONNECT_TIMEOUT_S, QUERY_TIMEOUT_S, Executor
 from rtcfd.executor.link import OnAnswer, Progress
 from rtcfd.executor.process import End
 from rtcfd.operations.figures import Figures
@@ -208,31 +208,35 @@ class RunnerCore(ABC):
     async def query(self, request: wire.Request) -> wire.Response:
         """Ask the executor what changes nothing in the graph."""
         await self.settle()
-        return await self.alive().request(request)
+        return await self.ask(request, timeout_s=QUERY_TIMEOUT_S)
 
     async def ask(
         self,
         request: wire.Request,
         progress: Progress | None = None,
         on_answer: OnAnswer | None = None,
+        timeout_s: float | None = None,
     ) -> wire.Response:
-        """Ask the executor for a change; its caller's limit is change()'s."""
+        """Ask the executor; of a change the caller's limit is change()'s.
+
+        What its end cuts off is answered with what is known of that end.
+        """
         executor = self.alive()
         seen = self.code.before(request)
         try:
-            response = await executor.request(request, None, progress, on_answer)
+            response = await executor.request(request, timeout_s, progress, on_answer)
             self.code.after(request, response.change, seen)
             return response
         except Unavailable:
             if executor.connected:
                 raise
-            # It may have died of this change: then its end says more than the lost link.
+            # It may have died of this: then its end says more than the lost link.
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(_LAST_WORDS_S):
                     await executor.ended.wait()
-            if executor is self._executor or self.closing:
+            if not executor.verdict:
                 raise
-            raise Unavailable(f"runner {self.name}: {self.trouble}") from None
+            raise Unavailable(f"runner {self.name}: {executor.verdict}") from None
 
     async def begin_figures(self, reset: bool) -> None:
         """Count from here on (`reset`), or from where the executor's statistics do."""

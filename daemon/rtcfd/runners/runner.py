@@ -131,7 +131,7 @@ class Runner(RunnerCore):
         self.loop.gone()
         verdict = judge(end, executor.note())
         died = f"its executor (pid {executor.pid}) {verdict} at {time.strftime('%H:%M:%S')}"
-        self.trouble = died
+        self.trouble = executor.verdict = died
         self.log.logger.error(
             "executor (pid %d) %s: its loop is down",
             executor.pid,

@@ -148,6 +148,24 @@ def test_a_stop_whose_caller_leaves_is_done_and_saved(service: DaemonUnderTest, 
     wait_for(lambda: status(service).state == STOPPED, "the end of the loop")
 
 
+@pytest.mark.parametrize("kind", ["stop", "get_component"])
+def test_what_the_end_of_an_executor_cuts_off_is_answered_with_what_is_known_of_that(
+    service: DaemonUnderTest, held: Held, kind: str
+) -> None:
+    with service.client() as client:
+        client.start()
+        with held.back(kind):
+            ask = (lambda c: c.stop()) if kind == "stop" else (lambda c: c.get_component("a"))
+            call = Call(service, ask)
+            wait_for(held.waits(kind), f"the {kind}")
+            with pytest.raises(rtcf.RefusedError):
+                client.set_parameters("/a", [rtcf.parse_parameter("die:=SIGSEGV")])
+            refusal = call.end()
+    assert "runner rt_runner: its executor" in refusal
+    assert "was killed by SIGSEGV" in refusal
+    assert "while /a.update was running" in refusal
+
+
 def test_the_end_of_a_loop_is_not_overtaken_by_the_answer_to_its_start(
     service: DaemonUnderTest, held: Held
 ) -> None:
