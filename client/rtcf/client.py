@@ -9,7 +9,7 @@ from typing import Any
 import grpc
 from rtcf_shared.errors import RtcfError
 
-from rtcf import direct_stop, errors
+from rtcf import direct_stop, failures
 from rtcf.tenancy import Tenancy
 from rtcf.v1 import control_pb2, control_pb2_grpc, graph_pb2, runner_pb2
 
@@ -337,7 +337,7 @@ class Client:
         try:
             yield from self._stub.WatchStatistics(request)
         except grpc.RpcError as error:
-            raise errors.from_grpc(error, self.socket) from None
+            raise failures.from_grpc(error, self.socket) from None
 
     def reset_statistics(self, runner: str = "") -> None:
         """Begin the figures anew."""
@@ -350,12 +350,12 @@ class Client:
                 return method(request, timeout=timeout_s)
             except grpc.RpcError as error:
                 if not self._crowded(error, until):
-                    raise errors.from_grpc(error, self.socket) from None
+                    raise failures.from_grpc(error, self.socket) from None
 
     def _crowded(self, error: Any, until: float) -> bool:
         """Tell whether to try again, after a moment: others were before us in the queue at the
         door, for which gRPC does not wait."""
-        if time.monotonic() > until or not errors.is_crowded(error, self.socket):
+        if time.monotonic() > until or not failures.is_crowded(error, self.socket):
             return False
         time.sleep(_RETRY_S)
         return True
@@ -375,7 +375,7 @@ class Client:
                 return self._change_once(method, request, on_progress, timeout_s)
             except grpc.RpcError as error:
                 if not self._crowded(error, until):
-                    raise errors.from_grpc(error, self.socket) from None
+                    raise failures.from_grpc(error, self.socket) from None
 
     @staticmethod
     def _change_once(

@@ -17,6 +17,7 @@ from pathlib import Path
 from rtcf_shared.errors import RtcfError
 
 from rtcf.errors import DaemonUnreachableError, RefusedError
+from rtcf.failures import refused
 from rtcf.v1 import control_pb2
 
 PATIENCE_S = 1.0  # with rtcfd, until a loop's executor is asked instead
@@ -53,9 +54,9 @@ def stop(runner: str, socket: str) -> None:
             problem = problem or error
         except OSError as error:
             problem = error
-    why = f": {problem.strerror or problem}" if isinstance(problem, PermissionError) else ""
+    why = f"{problem.strerror or problem}" if isinstance(problem, PermissionError) else ""
     raise DaemonUnreachableError(
-        f"no executor of runner {runner} can be stopped at {folders(socket)[-1]}{why}"
+        f"no executor of runner {runner} can be stopped at {folders(socket)[-1]}", why
     )
 
 
@@ -158,12 +159,17 @@ def _ask(path: Path, runner: str) -> None:
     word, _, reason = answer.decode(errors="replace").strip().partition(": ")
     if word == "stopped":
         return
+    about = {"runner": runner}
     if word == "refused":
-        raise RefusedError(f"runner {runner}: {reason}", "PERMISSION_DENIED")
+        raise refused(f"runner {runner}: {reason}", "PERMISSION_DENIED", "RIGHT_MISSING", about)
     if word == "late":
-        raise RefusedError(f"runner {runner} is asked to stop, and {reason}", "UNAVAILABLE")
-    raise RefusedError(
+        raise refused(
+            f"runner {runner} is asked to stop, and {reason}", "UNAVAILABLE", "LOOP_STUCK", about
+        )
+    raise refused(
         f"the executor of runner {runner} does not answer within {TIMEOUT_S:g} s: "
         "is it stopped by a debugger?",
         "UNAVAILABLE",
+        "EXECUTOR_SILENT",
+        about,
     )

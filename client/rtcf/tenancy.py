@@ -10,7 +10,7 @@ from typing import Any
 
 import grpc
 
-from rtcf import errors
+from rtcf import failures
 from rtcf.v1 import control_pb2
 
 
@@ -33,7 +33,7 @@ class Tenancy:
         try:
             yield from self._call
         except grpc.RpcError as error:
-            raise errors.from_grpc(error, self._socket) from None
+            raise failures.from_grpc(error, self._socket) from None
         finally:
             self._requests.put(None)
 

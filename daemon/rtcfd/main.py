@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import grpc
-from rtcf.v1 import control_pb2, control_pb2_grpc
+from rtcf.v1 import control_pb2, control_pb2_grpc, errors_pb2
 
 from rtcfd import VERSION, journal
 from rtcfd.access.admission import Admission
@@ -129,7 +129,8 @@ class Daemon:
             self._store.prepare()
         except OSError as error:
             raise FailedPrecondition(
-                f"cannot make the state folder {self._options.state_dir}: {error.strerror}"
+                f"cannot make the state folder {self._options.state_dir}: {error.strerror}",
+                errors_pb2.REASON_DAEMON_FAILED,
             ) from None
         self._options.settings.keep()
         listener = self._endpoint.listen()
@@ -208,7 +209,10 @@ class Daemon:
             except RuntimeError:
                 bound = 0
             if not bound:
-                raise FailedPrecondition(f"cannot listen on {door}: is its folder ours to write?")
+                raise FailedPrecondition(
+                    f"cannot listen on {door}: is its folder ours to write?",
+                    errors_pb2.REASON_DAEMON_FAILED,
+                )
 
     async def _end_servers(self, grace_s: float | None) -> None:
         await asyncio.gather(*(server.stop(grace_s) for server in self._servers.values()))

@@ -10,15 +10,24 @@ _MOST = 2000
 
 def suggestion(name: str, known: Iterable[str], most: int = 2) -> str:
     """Return '; did you mean "x"?' with at most so many, or nothing where no name is close."""
-    if len(name) > _LONGEST:
-        return ""  # what is compared costs by its length
-    known = itertools.islice(known, _MOST)
-    close = difflib.get_close_matches(name, list(known), n=most, cutoff=0.6)
+    close = _close(name, known, most)
     if not close:
         return ""
     return "; did you mean " + " or ".join(f'"{name}"' for name in close) + "?"
 
 
+def closest(name: str, known: Iterable[str]) -> str:
+    """Return the name that was probably meant, or nothing where none is close."""
+    return next(iter(_close(name, known, 1)), "")
+
+
 def listing(names: Iterable[str]) -> str:
     """Return names in order, separated by commas, or "none"."""
     return ", ".join(sorted(names)) or "none"
+
+
+def _close(name: str, known: Iterable[str], most: int) -> list[str]:
+    if len(name) > _LONGEST:
+        return []  # what is compared costs by its length
+    known = itertools.islice(known, _MOST)
+    return difflib.get_close_matches(name, list(known), n=most, cutoff=0.6)

@@ -30,7 +30,7 @@ def choose(socket: str, runner: str, master_uri: str, build_tree: Path | None) -
         with rtcf.Client(socket) as client:
             objection = _objection(client, runner, master_uri, component_folders([], build_tree))
     except rtcf.DaemonUnreachableError as error:
-        return Choice(False, str(error).partition(": ")[0])  # without how to mend it
+        return Choice(False, error.what)
     except rtcf.RtcfError as error:
         return Choice(False, f"the system daemon says: {error}")
     if objection:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import rtcf
+from rtcf.refusals import HolderGoneError
 from rtcf.v1 import control_pb2, graph_pb2
 
 from rtcf_launch import arguments, component_parameters
@@ -259,7 +260,7 @@ class LauncherNode:
         if isinstance(error, rtcf.RefusedError):
             if self._loaded:
                 raise Ending(Code.LOST, str(error))
-            if "holder of runner" in str(error):
+            if isinstance(error, HolderGoneError):
                 # It ended between our look and our call: wait for the next one.
                 self._load(self._find_runner())
                 return

@@ -12,6 +12,7 @@ from typing import Any
 
 import grpc
 from google.protobuf.message import DecodeError
+from rtcf.v1 import errors_pb2
 
 from rtcfd.access import calls, lengths
 from rtcfd.access.caller import ASKED_KEY, Caller, enter
@@ -103,7 +104,7 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
                 if client is not None and client.peer is not None:
                     text = f"{method} by {client.peer}: refused: {bounded(refusal)}"
                     self._log(logging.WARNING, text, client.peer, request)
-                await abort(context, refusal)
+                await abort(context, refusal, request)
             yield client.peer
 
     @contextlib.contextmanager
@@ -165,12 +166,18 @@ def _forgiving(method: str, deserialize: Callable[[bytes], Any]) -> Callable[[by
         if len(data) > largest:
             return _Malformed(
                 ResourceExhausted(
-                    f"a request of {len(data)} bytes is too large for {method}: at most {largest}"
+                    f"a request of {len(data)} bytes is too large for {method}: at most {largest}",
+                    errors_pb2.REASON_REQUEST_TOO_LARGE,
                 )
             )
         try:
             return deserialize(data)
         except DecodeError as error:
-            return _Malformed(InvalidArgument(f"the request of {method} is malformed: {error}"))
+            return _Malformed(
+                InvalidArgument(
+                    f"the request of {method} is malformed: {error}",
+                    errors_pb2.REASON_REQUEST_MALFORMED,
+                )
+            )
 
     return forgiving

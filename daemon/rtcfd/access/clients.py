@@ -21,6 +21,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from rtcf.v1 import errors_pb2
+
 from rtcfd.access.calls import Level
 from rtcfd.access.peer import Credentials, Directory, Peer, credentials, user_of
 from rtcfd.access.usage import TRUSTED, Usage
@@ -133,7 +135,9 @@ class Clients:
         """
         client = self._clients.get(shown.removeprefix(_SHOWN_PREFIX))
         if client is None or client.peer is None:
-            raise Refusal("this call did not come by the control socket")
+            raise Refusal(
+                "this call did not come by the control socket", errors_pb2.REASON_INTERNAL
+            )
         client.level = self._level_of(client.peer)
         client.last_call = time.monotonic()
         if client.refused and not self._full(client):
@@ -145,7 +149,9 @@ class Clients:
                 if client.trusted
                 else f"rtcfd serves as many clients as user {client.peer.user} may have, or as "
                 "there is room for: end some, or raise clients or clients_per_user under [limits] "
-                "in its settings"
+                "in its settings",
+                errors_pb2.REASON_TOO_MANY_CLIENTS,
+                user=client.peer.user,
             )
         with client.usage.calling(method, client.peer, client.level):
             client.calls += 1

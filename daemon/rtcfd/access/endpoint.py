@@ -4,6 +4,8 @@ import os
 import socket
 from pathlib import Path
 
+from rtcf.v1 import errors_pb2
+
 from rtcfd.common.refusals import FailedPrecondition
 from rtcfd.executor.command import MAX_SOCKET_PATH
 
@@ -33,7 +35,8 @@ class Endpoint:
         if len(os.fsencode(self.path)) > MAX_SOCKET_PATH:
             raise FailedPrecondition(
                 f"{self.path} is longer than the {MAX_SOCKET_PATH} characters of a unix socket's "
-                "path: choose a shorter one"
+                "path: choose a shorter one",
+                errors_pb2.REASON_DAEMON_FAILED,
             )
         self._make_way()
         listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -45,7 +48,8 @@ class Endpoint:
         except OSError as error:
             listener.close()
             raise FailedPrecondition(
-                f"cannot listen on {self.path}: {error.strerror}; is its folder ours to write?"
+                f"cannot listen on {self.path}: {error.strerror}; is its folder ours to write?",
+                errors_pb2.REASON_DAEMON_FAILED,
             ) from None
         finally:
             os.umask(umask)
@@ -67,7 +71,10 @@ class Endpoint:
         if not os.path.lexists(self.path):
             return
         if self.path.is_symlink() or not self.path.is_socket():
-            raise FailedPrecondition(f"{self.path} is in the way and is no socket: remove it")
+            raise FailedPrecondition(
+                f"{self.path} is in the way and is no socket: remove it",
+                errors_pb2.REASON_DAEMON_FAILED,
+            )
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
             try:
                 probe.connect(str(self.path))
@@ -75,9 +82,12 @@ class Endpoint:
                 self.path.unlink()
                 return
             except OSError as error:
-                raise FailedPrecondition(f"{self.path} is in the way: {error.strerror}") from None
+                raise FailedPrecondition(
+                    f"{self.path} is in the way: {error.strerror}", errors_pb2.REASON_DAEMON_FAILED
+                ) from None
         raise FailedPrecondition(
-            f"a daemon answers at {self.path} already: stop it, or choose another --socket"
+            f"a daemon answers at {self.path} already: stop it, or choose another --socket",
+            errors_pb2.REASON_DAEMON_FAILED,
         )
 
 
@@ -87,13 +97,17 @@ def _passed() -> socket.socket | None:
         return None
     count = os.environ.get("LISTEN_FDS", "")
     if count != "1":
-        raise FailedPrecondition(f"systemd passed {count or 'no'} sockets: rtcfd takes one")
+        raise FailedPrecondition(
+            f"systemd passed {count or 'no'} sockets: rtcfd takes one",
+            errors_pb2.REASON_DAEMON_FAILED,
+        )
     listener = socket.socket(fileno=_FIRST_PASSED)
     listening = listener.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
     if listener.family != socket.AF_UNIX or listener.type != socket.SOCK_STREAM or not listening:
         raise FailedPrecondition(
             "the socket that systemd passed is no listening unix stream socket: "
-            "see ListenStream= in rtcfd.socket"
+            "see ListenStream= in rtcfd.socket",
+            errors_pb2.REASON_DAEMON_FAILED,
         )
     listener.set_inheritable(False)
     return listener

@@ -6,6 +6,8 @@ costs by their length.
 
 from typing import Any
 
+from rtcf.v1 import errors_pb2
+
 from rtcfd.common.refusals import InvalidArgument
 
 LONGEST_NAME = 255  # ROS's own
@@ -44,5 +46,7 @@ def check(message: Any) -> None:
                 if len(text) > longest:
                     raise InvalidArgument(
                         f"{field.name} of {len(text)} characters is too long: at most {longest} "
-                        f"({text[:40]}…)"
+                        f"({text[:40]}…)",
+                        errors_pb2.REASON_TEXT_TOO_LONG,
+                        field=field.name,
                     )

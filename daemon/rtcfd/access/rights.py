@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import errors_pb2
 
 from rtcfd.access import calls
 from rtcfd.access.calls import WORDS, Level
@@ -66,13 +67,19 @@ class Access:
         if not peer.known:
             raise PermissionDenied(
                 f"{method} takes the right to {_deed(wants)}, and who user {peer.user} is cannot "
-                "be found out: the user database does not answer"
+                "be found out: the user database does not answer",
+                errors_pb2.REASON_RIGHT_MISSING,
+                right=wants.word,
+                user=peer.user,
             )
         raise PermissionDenied(
             f"{method} takes the right to {_deed(wants)}, and user {peer.user} has "
             f"{'none' if has == Level.NONE else f'only the right to {_deed(has)}'}: an "
             f'administrator grants it by {wants.word} = ["{peer.user}"] under [access] in '
-            "rtcfd's settings and `systemctl reload rtcfd`"
+            "rtcfd's settings and `systemctl reload rtcfd`",
+            errors_pb2.REASON_RIGHT_MISSING,
+            right=wants.word,
+            user=peer.user,
         )
 
     def for_executors(self, door: Path) -> wire.AccessRules:

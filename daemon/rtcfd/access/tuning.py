@@ -7,6 +7,8 @@ tune; who may operate is bound by none.
 import re
 from dataclasses import dataclass
 
+from rtcf.v1 import errors_pb2
+
 from rtcfd.access.calls import Level
 from rtcfd.access.peer import Peer
 from rtcfd.common.refusals import FailedPrecondition, PermissionDenied
@@ -51,7 +53,10 @@ class Tuning:
         allowed = ", ".join(sorted({each for rule in self.rules for each in rule.names}))
         raise PermissionDenied(
             f"user {self.user} may not set {name} of runner {runner}, but what matches {allowed}: "
-            "see [[access.parameters]] in rtcfd's settings"
+            "see [[access.parameters]] in rtcfd's settings",
+            errors_pb2.REASON_PARAMETER_FORBIDDEN,
+            parameter=name,
+            user=self.user,
         )
 
 
@@ -69,7 +74,9 @@ def require_pace(
     if not abs(new - old) <= most:
         raise FailedPrecondition(
             f"{name} may change by {rule.most_per_s:g} a second: from {old:g} to between "
-            f"{old - most:g} and {old + most:g} for now, not to {new:g}"
+            f"{old - most:g} and {old + most:g} for now, not to {new:g}",
+            errors_pb2.REASON_PARAMETER_TOO_FAST,
+            parameter=name,
         )
 
 

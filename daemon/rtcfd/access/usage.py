@@ -9,6 +9,8 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from rtcf.v1 import errors_pb2
+
 from rtcfd.access.calls import Level
 from rtcfd.access.peer import Peer
 from rtcfd.common.refusals import ResourceExhausted
@@ -63,7 +65,9 @@ class Usage:
                 if number >= most:
                     raise ResourceExhausted(
                         f"user {peer.user} has {number} {what} under way, the most at a time of "
-                        f"who may only {level.word}: end some"
+                        f"who may only {level.word}: end some",
+                        errors_pb2.REASON_TOO_MANY_CALLS,
+                        user=peer.user,
                     )
         self._calls += 1
         self._watches += watches

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import graph_pb2
+from rtcf.v1 import errors_pb2, graph_pb2
 from rtcf_shared.folders import packages
-from rtcf_shared.naming import listing, suggestion
+from rtcf_shared.naming import closest, listing, suggestion
 
 from rtcfd.catalog.describe import Describer
 from rtcfd.common.aside import Aside
@@ -86,7 +86,12 @@ class Catalog:
         known = await self._packages()
         libraries = known.get(package)
         if libraries is None:
-            raise NotFound(self._no_package(package, known))
+            raise NotFound(
+                self._no_package(package, known),
+                errors_pb2.REASON_PACKAGE_NOT_FOUND,
+                package=package,
+                suggestion=closest(package, known),
+            )
         contents = await self._contents(package, libraries)
         found = contents.types.get(type_name)
         if found is not None:
@@ -99,11 +104,18 @@ class Catalog:
             raise FailedPrecondition(
                 f'no type "{type_name}" in package "{package}" (types: '
                 f"{listing(contents.types)}), and not all of it loads: "
-                + "; ".join(contents.problems)
+                + "; ".join(contents.problems),
+                errors_pb2.REASON_LIBRARY_REFUSED,
+                package=package,
+                type=type_name,
             )
         raise NotFound(
             f'no type "{type_name}" in package "{package}"'
-            f"{suggestion(type_name, contents.types)} (types: {listing(contents.types)})"
+            f"{suggestion(type_name, contents.types)} (types: {listing(contents.types)})",
+            errors_pb2.REASON_TYPE_NOT_FOUND,
+            package=package,
+            type=type_name,
+            suggestion=closest(type_name, contents.types),
         )
 
     async def types(self, package: str = "") -> tuple[list[graph_pb2.ComponentType], list[str]]:
@@ -112,7 +124,12 @@ class Catalog:
         if package:
             check_base_name("package", package)
             if package not in known:
-                raise NotFound(self._no_package(package, known))
+                raise NotFound(
+                    self._no_package(package, known),
+                    errors_pb2.REASON_PACKAGE_NOT_FOUND,
+                    package=package,
+                    suggestion=closest(package, known),
+                )
             known = {package: known[package]}
         names = sorted(known)
         every = await asyncio.gather(*(self._contents(name, known[name]) for name in names))

@@ -11,6 +11,8 @@ import threading
 from collections.abc import Callable
 from typing import TypeVar
 
+from rtcf.v1 import errors_pb2
+
 from rtcfd.common.refusals import Unavailable
 
 Result = TypeVar("Result")
@@ -60,4 +62,7 @@ class Aside:
                     raise
                 return await done
         except TimeoutError:
-            raise Unavailable(f"the {self._what} does not answer within {timeout_s:g} s") from None
+            raise Unavailable(
+                f"the {self._what} does not answer within {timeout_s:g} s",
+                errors_pb2.REASON_MACHINE_SILENT,
+            ) from None

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, fields
 
+from rtcf.v1 import errors_pb2
+
 from rtcfd.common.refusals import ResourceExhausted
 
 
@@ -35,7 +37,9 @@ class Limits:
         if number > most:
             raise ResourceExhausted(
                 f"{number} {name} are more than the {most} allowed: raise {name} under [limits] "
-                "in rtcfd's settings"
+                "in rtcfd's settings",
+                errors_pb2.REASON_LIMIT_REACHED,
+                limit=name,
             )
 
 

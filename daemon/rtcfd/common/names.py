@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 
-from rtcf.v1 import graph_pb2
+from rtcf.v1 import errors_pb2, graph_pb2
 
 from rtcfd.common.refusals import InvalidArgument
 
@@ -18,10 +18,17 @@ def check_base_name(kind: str, name: str) -> str:
     """Return `name` if it is a ROS base name; `kind` ("runner", …) is for the message."""
     if not _BASE_NAME.fullmatch(name):
         raise InvalidArgument(
-            f'{kind} name "{name}" is not valid: use letters, digits and _, and begin with a letter'
+            f'{kind} name "{name}" is not valid: use letters, digits and _, and begin with a '
+            "letter",
+            errors_pb2.REASON_NAME_INVALID,
+            field=kind,
         )
     if len(name) > _MAX_LENGTH:
-        raise InvalidArgument(f"{kind} name of {len(name)} characters: at most {_MAX_LENGTH}")
+        raise InvalidArgument(
+            f"{kind} name of {len(name)} characters: at most {_MAX_LENGTH}",
+            errors_pb2.REASON_NAME_INVALID,
+            field=kind,
+        )
     return name
 
 
@@ -42,5 +49,9 @@ def check_graph(specs: Sequence[graph_pb2.ComponentSpec]) -> None:
     for spec in specs:
         name = full_name(spec)
         if name in seen:
-            raise InvalidArgument(f"component {name} is there twice in the graph")
+            raise InvalidArgument(
+                f"component {name} is there twice in the graph",
+                errors_pb2.REASON_COMPONENT_TWICE,
+                component=name,
+            )
         seen.add(name)

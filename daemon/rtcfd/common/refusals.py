@@ -1,12 +1,23 @@
-"""The exceptions of rtcfd: a refusal, in one line, and its kind.
+"""The exceptions of rtcfd: a refusal, in one line, with its kind and its reason.
 
-A refusal has changed nothing.  status_codes.py maps the kinds to gRPC status codes,
-executor/link.py maps the executor's error codes to them.
+A refusal has changed nothing.  status_codes.py makes gRPC's statuses of them;
+executor/link.py makes them of the executor's errors.
 """
+
+from rtcf.v1 import errors_pb2
 
 
 class Refusal(Exception):
-    """A request is refused; the text says what, where and how to mend it."""
+    """A request is refused; the text says what, where and how to mend it.
+
+    `reason` says it for programs (see errors.proto), with what it is `about`: names by
+    the keys of ErrorInfo.metadata.  What is empty says nothing.
+    """
+
+    def __init__(self, text: object, reason: "errors_pb2.Reason", **about: str) -> None:
+        super().__init__(text)
+        self.reason = reason
+        self.about = {key: value for key, value in about.items() if value}
 
 
 class InvalidArgument(Refusal):
@@ -39,3 +50,7 @@ class PermissionDenied(Refusal):
 
 class ResourceExhausted(Refusal):
     """A limit of the settings is reached."""
+
+
+class Internal(Refusal):
+    """A fault of rtcfd itself."""

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any, TypeVar
 
 from google.protobuf.descriptor import FieldDescriptor
-from rtcf.v1 import runner_pb2
+from rtcf.v1 import errors_pb2, runner_pb2
 from rtcf_shared import quantities
 from rtcf_shared.enums import word
 from rtcf_shared.quantities import Quantity
@@ -134,13 +134,17 @@ def check(settings: runner_pb2.RunnerSettings) -> None:
         if settings.cpu not in allowed:
             raise InvalidArgument(
                 f"CPU {settings.cpu} is not one rtcfd may use: choose of "
-                f"{_ranges(allowed)}, or -1 for the last of them"
+                f"{_ranges(allowed)}, or -1 for the last of them",
+                errors_pb2.REASON_VALUE_INVALID,
+                setting="cpu",
             )
     if settings.HasField("ros") and settings.ros.HasField("master_uri"):
         uri = settings.ros.master_uri
         if not uri.startswith(("http://", "https://")):
             raise InvalidArgument(
-                f'ROS master URI "{uri}" is not valid: write it as http://HOST:PORT'
+                f'ROS master URI "{uri}" is not valid: write it as http://HOST:PORT',
+                errors_pb2.REASON_VALUE_INVALID,
+                setting="master_uri",
             )
 
 
@@ -149,7 +153,11 @@ def _check_ranges(message: Any, known: Mapping[str, Quantity]) -> None:
         if message.HasField(field) and not quantity.holds(value := getattr(message, field)):
             name = field.removesuffix("_" + _SUFFIXES.get(quantity.unit, "")).replace("_", " ")
             unit = quantity.unit and f" {quantity.unit}"
-            raise InvalidArgument(f"{name} of {value:g}{unit} is out of range: {quantity.range()}")
+            raise InvalidArgument(
+                f"{name} of {value:g}{unit} is out of range: {quantity.range()}",
+                errors_pb2.REASON_VALUE_INVALID,
+                setting=field,
+            )
 
 
 def _ranges(numbers: set[int]) -> str:

@@ -1,16 +1,18 @@
-"""The one place where refusals become gRPC status codes."""
+"""The one place where refusals become gRPC statuses: a line for people, a reason for programs."""
 
 import logging
 from typing import Any, NoReturn
 from urllib.parse import quote
 
 import grpc
+from rtcf.v1 import errors_pb2
 
 from rtcfd.common import refusals
+from rtcfd.common.refusals import Refusal
 
 log = logging.getLogger(__name__)
 
-STATUS_CODES: dict[type[refusals.Refusal], grpc.StatusCode] = {
+STATUS_CODES: dict[type[Refusal], grpc.StatusCode] = {
     refusals.InvalidArgument: grpc.StatusCode.INVALID_ARGUMENT,
     refusals.NotFound: grpc.StatusCode.NOT_FOUND,
     refusals.AlreadyExists: grpc.StatusCode.ALREADY_EXISTS,
@@ -18,13 +20,17 @@ STATUS_CODES: dict[type[refusals.Refusal], grpc.StatusCode] = {
     refusals.Unavailable: grpc.StatusCode.UNAVAILABLE,
     refusals.PermissionDenied: grpc.StatusCode.PERMISSION_DENIED,
     refusals.ResourceExhausted: grpc.StatusCode.RESOURCE_EXHAUSTED,
+    refusals.Internal: grpc.StatusCode.INTERNAL,
 }
-# Tells a client that rtcfd itself spoke, and not gRPC about a lost connection.
-REFUSAL_KEY = "rtcf-refusal"
+DOMAIN = "rtcf"
+DETAILS_KEY = "grpc-status-details-bin"
+INFO_TYPE = "type.googleapis.com/google.rpc.ErrorInfo"
 
-
-# A refusal travels as metadata, of which a client that is not ours takes 8 KiB.
-_LONGEST = 4000  # bytes, as they are encoded
+# A refusal travels as metadata, of which a client that is not ours takes 8 KiB: the line twice,
+# for gRPC and in the details, where three bytes become four, and what it is about.
+_LONGEST = 2600  # bytes, as they are encoded
+_LONGEST_NAME = 100  # bytes
+_MOST_NAMES = 8
 
 
 def bounded(text: object) -> str:
@@ -37,19 +43,42 @@ def bounded(text: object) -> str:
     return line
 
 
-async def abort(context: Any, error: Exception) -> NoReturn:
-    """End a call with what an error says."""
-    if isinstance(error, refusals.Refusal):
-        code = next(
-            (found for kind in type(error).__mro__ if (found := STATUS_CODES.get(kind))),
-            grpc.StatusCode.FAILED_PRECONDITION,
-        )
-        text = bounded(error)
+def details(refusal: Refusal) -> bytes:
+    """Return what stands in `grpc-status-details-bin`; at most 4 KiB."""
+    info = errors_pb2.ErrorInfo(
+        reason=errors_pb2.Reason.Name(refusal.reason).removeprefix("REASON_"), domain=DOMAIN
+    )
+    for key, value in list(refusal.about.items())[:_MOST_NAMES]:
+        # Half a name would be another one: what is too long is left to the line.
+        if len(value.encode(errors="replace")) <= _LONGEST_NAME:
+            info.metadata[key] = value
+    status = errors_pb2.ErrorStatus(code=status_code(refusal).value[0], message=bounded(refusal))
+    status.details.add(type_url=INFO_TYPE, value=info.SerializeToString(deterministic=True))
+    encoded: bytes = status.SerializeToString()
+    return encoded
+
+
+def status_code(refusal: Refusal) -> grpc.StatusCode:
+    """Return gRPC's code of a refusal."""
+    return next(
+        (found for kind in type(refusal).__mro__ if (found := STATUS_CODES.get(kind))),
+        grpc.StatusCode.FAILED_PRECONDITION,
+    )
+
+
+async def abort(context: Any, error: Exception, request: Any = None) -> NoReturn:
+    """End a call with what an error says, and what the `request` it answers names."""
+    if isinstance(error, Refusal):
+        refusal = error
     else:
         log.error("internal error", exc_info=error)
-        code = grpc.StatusCode.INTERNAL
-        text = bounded(
-            f"internal error of rtcfd ({type(error).__name__}: {error}); its log has more"
+        refusal = refusals.Internal(
+            f"internal error of rtcfd ({type(error).__name__}: {error}); its log has more",
+            errors_pb2.REASON_INTERNAL,
         )
-    await context.abort(code, text, ((REFUSAL_KEY, "1"),))
+    for key in ("runner", "component"):
+        named = getattr(request, key, None)
+        if isinstance(named, str) and named:
+            refusal.about.setdefault(key, named)
+    await context.abort(status_code(refusal), bounded(refusal), ((DETAILS_KEY, details(refusal)),))
     raise AssertionError("abort() always raises")

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from rtcf.v1 import runner_pb2
+from rtcf.v1 import errors_pb2, runner_pb2
 from rtcf_shared.enums import choices
 from rtcf_shared.naming import listing, suggestion
 
@@ -59,7 +59,7 @@ class _Wrong(InvalidArgument):
     """Something is wrong with a key."""
 
     def __init__(self, key: str, what: str) -> None:
-        super().__init__(what)
+        super().__init__(what, errors_pb2.REASON_SETTINGS_FILE_INVALID)
         self.key = key
 
 
@@ -69,9 +69,11 @@ def read(file: Path) -> Config:
         text = file.read_text(encoding="utf-8")
         document = tomllib.loads(text)
     except OSError as error:
-        raise InvalidArgument(f"cannot read {file}: {error.strerror}") from None
+        raise InvalidArgument(
+            f"cannot read {file}: {error.strerror}", errors_pb2.REASON_SETTINGS_FILE_INVALID
+        ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InvalidArgument(f"{file}: {error}") from None
+        raise InvalidArgument(f"{file}: {error}", errors_pb2.REASON_SETTINGS_FILE_INVALID) from None
     config = Config(text=text)
     try:
         _check_keys("", document, ("daemon", "access", "limits", "runner"))
@@ -83,7 +85,9 @@ def read(file: Path) -> Config:
     except _Wrong as wrong:
         line = lines_of_keys(text).get(wrong.key)
         where = f"{file}:{line}" if line else str(file)
-        raise InvalidArgument(f"{where}: {wrong}") from None
+        raise InvalidArgument(
+            f"{where}: {wrong}", errors_pb2.REASON_SETTINGS_FILE_INVALID
+        ) from None
     return config
 
 

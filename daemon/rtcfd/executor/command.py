@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from rtcf.v1 import errors_pb2
+
 from rtcfd.common.refusals import FailedPrecondition
 
 # What belongs to rtcfd alone: an executor that answered systemd in its name
@@ -33,7 +35,8 @@ class ExecutorCommand:
         binary."""
         if not os.access(self.binary, os.X_OK):
             raise FailedPrecondition(
-                f"no executor at {self.binary}: install it, or name one with --executor"
+                f"no executor at {self.binary}: install it, or name one with --executor",
+                errors_pb2.REASON_DAEMON_FAILED,
             )
         _make(self.folder, 0o700)
         if self.stop_folder is not None:
@@ -71,7 +74,8 @@ def _make(folder: Path, mode: int) -> None:
     if found.st_uid != os.geteuid():
         raise FailedPrecondition(
             f"{folder} belongs to user {found.st_uid}, not to {os.geteuid()}: "
-            "remove it, or choose another --runtime-dir"
+            "remove it, or choose another --runtime-dir",
+            errors_pb2.REASON_DAEMON_FAILED,
         )
     folder.chmod(mode)
 
@@ -80,6 +84,7 @@ def _checked(path: Path) -> Path:
     if len(os.fsencode(path)) > MAX_SOCKET_PATH:
         raise FailedPrecondition(
             f"{path} is longer than the {MAX_SOCKET_PATH} characters of a unix socket's path: "
-            "choose a shorter --runtime-dir"
+            "choose a shorter --runtime-dir",
+            errors_pb2.REASON_NAME_INVALID,
         )
     return path

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import errors_pb2
 
 from rtcfd import VERSION
 from rtcfd.common.limits import Limits
@@ -84,14 +85,17 @@ class Executor:
                 restore_signals=False,
             )
         except OSError as error:
-            raise FailedPrecondition(f"cannot run {command.binary}: {error.strerror}") from None
+            raise FailedPrecondition(
+                f"cannot run {command.binary}: {error.strerror}", errors_pb2.REASON_EXECUTOR_FAILED
+            ) from None
         process = Child(started)
         executor = cls(runner, process, command.socket(runner), on_unasked, on_end)
         try:
             await executor._attach()
             if executor.foreign:
                 raise FailedPrecondition(
-                    f"{executor.foreign}: install both of one version, then restart rtcfd"
+                    f"{executor.foreign}: install both of one version, then restart rtcfd",
+                    errors_pb2.REASON_EXECUTOR_FOREIGN,
                 )
         except BaseException:
             process.signal(signal.SIGKILL)
@@ -138,7 +142,8 @@ class Executor:
             if isinstance(problem, Unavailable):
                 raise Unavailable(
                     f"{problem}; its loop may be running: `rtcfctl -r {runner} start` tries again, "
-                    f"`kill {executor.pid}` ends it"
+                    f"`kill {executor.pid}` ends it",
+                    errors_pb2.REASON_EXECUTOR_SILENT,
                 ) from None
             raise
         executor._begin_to_watch()
@@ -162,9 +167,9 @@ class Executor:
     ) -> wire.Response:
         """Send one request; see Link.request."""
         if self._link is None:
-            raise Unavailable(f"{self._peer} is not connected")
+            raise Unavailable(f"{self._peer} is not connected", errors_pb2.REASON_EXECUTOR_DOWN)
         if self.foreign and request.WhichOneof("kind") not in ("stop", "exit"):
-            raise FailedPrecondition(self.foreign)
+            raise FailedPrecondition(self.foreign, errors_pb2.REASON_EXECUTOR_FOREIGN)
         return await self._link.request(request, timeout_s, on_progress, on_answer)
 
     async def limit(self, limits: Limits) -> None:
@@ -209,7 +214,8 @@ class Executor:
             if self._process.end is not None:
                 raise FailedPrecondition(
                     f"{self._peer} {self._process.end} before it served; "
-                    "its reason is in rtcfd's log"
+                    "its reason is in rtcfd's log",
+                    errors_pb2.REASON_EXECUTOR_FAILED,
                 )
             try:
                 link = await Link.connect(self._peer, self._socket, self._on_unasked)
@@ -218,7 +224,8 @@ class Executor:
                 if loop.time() > deadline:
                     raise Unavailable(
                         f"{self._peer} does not serve {self._socket} "
-                        f"{CONNECT_TIMEOUT_S:g} s after its start"
+                        f"{CONNECT_TIMEOUT_S:g} s after its start",
+                        errors_pb2.REASON_EXECUTOR_SILENT,
                     ) from None
                 await asyncio.sleep(_RETRY_S)
         try:
@@ -232,13 +239,15 @@ class Executor:
         if not _belongs(link.peer_pid, self.pid):
             raise Unavailable(
                 f"{self._socket} is served by process {link.peer_pid}, which is not the executor "
-                f"of {self._runner} (pid {self.pid}): end that"
+                f"of {self._runner} (pid {self.pid}): end that",
+                errors_pb2.REASON_EXECUTOR_SILENT,
             )
         hello = await link.hello(timeout_s)
         if hello.runner != self._runner:
             raise Unavailable(
                 f'{self._socket} is served by the executor of runner "{hello.runner}", and is to '
-                f'be that of "{self._runner}": end it (pid {link.peer_pid})'
+                f'be that of "{self._runner}": end it (pid {link.peer_pid})',
+                errors_pb2.REASON_EXECUTOR_SILENT,
             )
         self.version = hello.version or "?"
         self._protocol = hello.protocol
@@ -316,7 +325,8 @@ def _remove_dead(socket: Path) -> None:
         socket.unlink(missing_ok=True)
     except OSError as error:
         raise FailedPrecondition(
-            f"{socket} is in the way and is no socket of an executor: remove it ({error.strerror})"
+            f"{socket} is in the way and is no socket of an executor: remove it ({error.strerror})",
+            errors_pb2.REASON_EXECUTOR_FAILED,
         ) from None
 
 

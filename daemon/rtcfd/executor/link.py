@@ -13,6 +13,7 @@ from pathlib import Path
 
 from google.protobuf.message import DecodeError
 from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import errors_pb2
 
 from rtcfd.common import refusals
 from rtcfd.common.tasks import looked_at
@@ -30,14 +31,21 @@ Progress = Callable[[str], None]
 Unasked = Callable[[wire.Response], None]
 OnAnswer = Callable[[wire.Response], None]
 
-_REFUSALS: dict[int, type[refusals.Refusal]] = {
-    wire.Error.CODE_INVALID_ARGUMENT: refusals.InvalidArgument,
-    wire.Error.CODE_NOT_FOUND: refusals.NotFound,
-    wire.Error.CODE_ALREADY_EXISTS: refusals.AlreadyExists,
-    wire.Error.CODE_FAILED_PRECONDITION: refusals.FailedPrecondition,
-    wire.Error.CODE_UNAVAILABLE: refusals.Unavailable,
-    wire.Error.CODE_NO_MASTER: refusals.NoMaster,
-    wire.Error.CODE_RESOURCE_EXHAUSTED: refusals.ResourceExhausted,
+# By code; and the reason of one that an executor which knows of none gives.
+_REFUSALS: dict[int, tuple[type[refusals.Refusal], errors_pb2.Reason]] = {
+    wire.Error.CODE_INVALID_ARGUMENT: (refusals.InvalidArgument, errors_pb2.REASON_VALUE_INVALID),
+    wire.Error.CODE_NOT_FOUND: (refusals.NotFound, errors_pb2.REASON_COMPONENT_NOT_FOUND),
+    wire.Error.CODE_ALREADY_EXISTS: (refusals.AlreadyExists, errors_pb2.REASON_COMPONENT_EXISTS),
+    wire.Error.CODE_FAILED_PRECONDITION: (
+        refusals.FailedPrecondition,
+        errors_pb2.REASON_COMPONENT_REFUSED,
+    ),
+    wire.Error.CODE_UNAVAILABLE: (refusals.Unavailable, errors_pb2.REASON_LOOP_STUCK),
+    wire.Error.CODE_NO_MASTER: (refusals.NoMaster, errors_pb2.REASON_NO_MASTER),
+    wire.Error.CODE_RESOURCE_EXHAUSTED: (
+        refusals.ResourceExhausted,
+        errors_pb2.REASON_LIMIT_REACHED,
+    ),
 }
 
 
@@ -83,7 +91,8 @@ class Link:
         if link.peer_uid not in (os.geteuid(), 0):
             await link.close()
             raise refusals.Unavailable(
-                f"{path} is served by user {link.peer_uid}, not by us: remove it"
+                f"{path} is served by user {link.peer_uid}, not by us: remove it",
+                errors_pb2.REASON_EXECUTOR_SILENT,
             )
         return link
 
@@ -108,7 +117,7 @@ class Link:
         `timeout_s` of wall-clock time passes (None: for callers with an own limit).
         """
         if self.ended.is_set():
-            raise refusals.Unavailable(self._lost())
+            raise refusals.Unavailable(self._lost(), errors_pb2.REASON_EXECUTOR_SILENT)
         request.id = self._next_id
         request.direct_stops = self.direct_stops
         self._next_id += 1
@@ -120,18 +129,20 @@ class Link:
                 response = await pending.result
         except TimeoutError:
             raise refusals.Unavailable(
-                f"{self.peer} did not answer {request.WhichOneof('kind')} within {timeout_s:g} s"
+                f"{self.peer} did not answer {request.WhichOneof('kind')} within {timeout_s:g} s",
+                errors_pb2.REASON_EXECUTOR_SILENT,
             ) from None
         except frames.FrameError as error:
-            raise refusals.InvalidArgument(f"request too large: {error}") from None
+            raise refusals.InvalidArgument(
+                f"request too large: {error}", errors_pb2.REASON_REQUEST_TOO_LARGE
+            ) from None
         except ConnectionError:
-            raise refusals.Unavailable(self._lost()) from None
+            raise refusals.Unavailable(self._lost(), errors_pb2.REASON_EXECUTOR_SILENT) from None
         finally:
             del self._pending[request.id]
             pending.result.cancel()
         if response.WhichOneof("kind") == "error":
-            refusal = _REFUSALS.get(response.error.code, refusals.FailedPrecondition)
-            raise refusal(response.error.message)
+            raise _refusal(response.error)
         return response
 
     async def close(self) -> None:
@@ -172,7 +183,16 @@ class Link:
         self.ended.set()
         for pending in self._pending.values():
             if not pending.result.done():
-                pending.result.set_exception(refusals.Unavailable(self._lost()))
+                pending.result.set_exception(
+                    refusals.Unavailable(self._lost(), errors_pb2.REASON_EXECUTOR_SILENT)
+                )
 
     def _lost(self) -> str:
         return self.problem or f"{self.peer} closed its connection"
+
+
+def _refusal(error: wire.Error) -> refusals.Refusal:
+    kind, reason = _REFUSALS.get(
+        error.code, (refusals.FailedPrecondition, errors_pb2.REASON_COMPONENT_REFUSED)
+    )
+    return kind(error.message, reason)

@@ -8,8 +8,8 @@ import time
 from collections.abc import Awaitable, Callable, Iterable
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import control_pb2, graph_pb2
-from rtcf_shared.naming import listing, suggestion
+from rtcf.v1 import control_pb2, errors_pb2, graph_pb2
+from rtcf_shared.naming import closest, listing, suggestion
 
 from rtcfd.access import caller
 from rtcfd.access.tuning import Tuning, require_pace
@@ -81,7 +81,9 @@ async def unload(
     forgotten: so a component that breaks its executor can be taken out.
     """
     if not names:
-        raise InvalidArgument("no component named to unload")
+        raise InvalidArgument(
+            "no component named to unload", errors_pb2.REASON_NAME_MISSING, field="components"
+        )
     full_names = [absolute(name) for name in names]
 
     async def work() -> control_pb2.ChangeResult:
@@ -147,7 +149,9 @@ async def release(
 ) -> control_pb2.ChangeResult:
     """Load components again that were left out of the loop."""
     if not names:
-        raise InvalidArgument("no component named to release")
+        raise InvalidArgument(
+            "no component named to release", errors_pb2.REASON_NAME_MISSING, field="components"
+        )
     full_names = [absolute(name) for name in names]
     what = ", ".join(full_names)
 
@@ -155,7 +159,11 @@ async def release(
         _check_known(runner, full_names)
         for name in full_names:
             if name not in runner.left_out:
-                raise NotFound(f"{name} is not left out of runner {runner.name}: it is in the loop")
+                raise NotFound(
+                    f"{name} is not left out of runner {runner.name}: it is in the loop",
+                    errors_pb2.REASON_COMPONENT_NOT_LEFT_OUT,
+                    component=name,
+                )
         specs = [runner.desired.components[name] for name in full_names]
         if len(specs) == 1:
             (load,) = await loads(runner.catalog, specs)
@@ -343,5 +351,8 @@ def _check_known(runner: RunnerCore, full_names: list[str]) -> None:
         if name not in known:
             raise NotFound(
                 f"no component {name} in runner {runner.name}"
-                f"{suggestion(name, known)} (components: {listing(known)})"
+                f"{suggestion(name, known)} (components: {listing(known)})",
+                errors_pb2.REASON_COMPONENT_NOT_FOUND,
+                component=name,
+                suggestion=closest(name, known),
             )

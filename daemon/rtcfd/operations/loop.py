@@ -8,7 +8,7 @@ it asks the executor, and stops what it started if the stop came in between.
 import asyncio
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import control_pb2
+from rtcf.v1 import control_pb2, errors_pb2
 
 from rtcfd.access import caller
 from rtcfd.common.refusals import FailedPrecondition, Refusal
@@ -29,7 +29,8 @@ def require_no_stop(runner: RunnerCore, asked: int) -> None:
     """Refuse what would run cycles and was asked for at the stop of number `asked`."""
     if runner.loop.stops != asked:
         raise FailedPrecondition(
-            f"runner {runner.name}: its loop was stopped after this was asked for: ask again"
+            f"runner {runner.name}: its loop was stopped after this was asked for: ask again",
+            errors_pb2.REASON_LOOP_STOPPED,
         )
 
 
@@ -54,7 +55,11 @@ async def start_in_turn(
 async def stop(runner: RunnerCore, progress: Progress) -> control_pb2.ChangeResult:
     """End the loop at the next boundary.  Never queues; a dead loop is a stopped loop."""
     runner.loop.stop()
-    runner.operations.withdraw("the loop was stopped after it was asked for", only_cycles=True)
+    runner.operations.withdraw(
+        "the loop was stopped after it was asked for",
+        errors_pb2.REASON_LOOP_STOPPED,
+        only_cycles=True,
+    )
 
     async def work() -> control_pb2.ChangeResult:
         # Beside each other: neither a slow disk nor a slow executor holds up the other.

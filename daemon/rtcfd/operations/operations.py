@@ -14,6 +14,8 @@ from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
+from rtcf.v1 import errors_pb2
+
 from rtcfd.common.refusals import FailedPrecondition, Refusal, Unavailable
 
 Result = TypeVar("Result")
@@ -62,11 +64,13 @@ class Operations:
         how = f"after {timeout_s:g} s ({self.busy() or 'waiting'})"
         if self._withdraw(operation):
             raise Unavailable(
-                f"{self._subject}: {what} has not begun {how}, and will not: see `rtcfctl status`"
+                f"{self._subject}: {what} has not begun {how}, and will not: see `rtcfctl status`",
+                errors_pb2.REASON_BUSY,
             )
         self._report_late(operation)
         raise Unavailable(
-            f"{self._subject}: {what} is not done {how}; it goes on: see `rtcfctl status`"
+            f"{self._subject}: {what} is not done {how}; it goes on: see `rtcfctl status`",
+            errors_pb2.REASON_BUSY,
         )
 
     async def begin(self, what: str, work: Callable[[], Awaitable[Result]]) -> Result:
@@ -93,13 +97,15 @@ class Operations:
 
         return self._spawn(run())
 
-    def withdraw(self, why: str, only_cycles: bool = False) -> None:
+    def withdraw(self, cause: str, reason: errors_pb2.Reason, only_cycles: bool = False) -> None:
         """Refuse what has not begun: all, or what would run cycles of a loop."""
         for operation in list(self._queue):
             if operation.runs_cycles or not only_cycles:
                 self._queue.remove(operation)
                 operation.done.set_exception(
-                    FailedPrecondition(f"{self._subject}: {operation.what} is withdrawn: {why}")
+                    FailedPrecondition(
+                        f"{self._subject}: {operation.what} is withdrawn: {cause}", reason
+                    )
                 )
 
     def busy(self, longer_than_s: float = 0.0) -> str:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import runner_pb2
+from rtcf.v1 import errors_pb2, runner_pb2
 
 from rtcfd.catalog.catalog import Catalog
 from rtcfd.common.limits import Limits
@@ -159,7 +159,9 @@ class RunnerCore(ABC):
                 executor = executor or await self._launch()
                 if self.closing:
                     await (executor.leave() if self.leaving else executor.shut_down())
-                    raise Unavailable(f"runner {self.name} is being ended")
+                    raise Unavailable(
+                        f"runner {self.name} is being ended", errors_pb2.REASON_RUNNER_ENDING
+                    )
                 self._executor = executor
                 self.figures = Figures()
                 if adopted:
@@ -236,7 +238,9 @@ class RunnerCore(ABC):
                     await executor.ended.wait()
             if not executor.verdict:
                 raise
-            raise Unavailable(f"runner {self.name}: {executor.verdict}") from None
+            raise Unavailable(
+                f"runner {self.name}: {executor.verdict}", errors_pb2.REASON_EXECUTOR_DOWN
+            ) from None
 
     async def begin_figures(self, reset: bool) -> None:
         """Count from here on (`reset`), or from where the executor's statistics do."""
@@ -249,7 +253,9 @@ class RunnerCore(ABC):
     def alive(self) -> Executor:
         """Return the executor, or refuse."""
         if self._executor is None:
-            raise Unavailable(f"runner {self.name} is down: {self.trouble}")
+            raise Unavailable(
+                f"runner {self.name} is down: {self.trouble}", errors_pb2.REASON_EXECUTOR_DOWN
+            )
         return self._executor
 
     async def _launch(self) -> Executor:
@@ -288,7 +294,7 @@ class RunnerCore(ABC):
         async def told() -> Result:
             if self.leaving and not self.up:
                 # The disk is the next rtcfd's from here on.
-                raise Unavailable("rtcfd is being restarted")
+                raise Unavailable("rtcfd is being restarted", errors_pb2.REASON_DAEMON_ENDING)
             try:
                 return await work()
             finally:

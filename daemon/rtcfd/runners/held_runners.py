@@ -8,7 +8,7 @@ host name included, is left for the next.  Functions on Runners and a Runner.
 import asyncio
 import contextlib
 
-from rtcf.v1 import control_pb2, runner_pb2
+from rtcf.v1 import control_pb2, errors_pb2, runner_pb2
 from rtcf_shared.naming import listing
 
 from rtcfd.access import caller
@@ -42,7 +42,9 @@ class Hold:
         """Take the runner, or come back to it; tell the holder."""
         request = self._request
         if not request.token:
-            raise InvalidArgument("a hold needs a token")
+            raise InvalidArgument(
+                "a hold needs a token", errors_pb2.REASON_NAME_MISSING, field="token"
+            )
         name = request.runner or DEFAULT_RUNNER
         self._outbox.progress(f"taking runner {name}")
         if request.attach:
@@ -78,7 +80,9 @@ class Hold:
 
     def _require_holder(self, terms: HoldTerms) -> None:
         if self._outbox.gone:
-            raise Unavailable(f"{terms.holder}, which wanted the runner, has left")
+            raise Unavailable(
+                f"{terms.holder}, which wanted the runner, has left", errors_pb2.REASON_CALLER_GONE
+            )
 
     async def _take(self, name: str) -> Runner:
         request = self._request
@@ -171,7 +175,9 @@ def _attach(runners: Runners, name: str, token: str) -> Runner:
     runner = runners.get(name)
     hold = runner.desired.hold
     if hold is None or hold.token != token or runner.hold_outbox is not None:
-        raise NotFound(f"runner {name} is not kept for its holder any more")
+        raise NotFound(
+            f"runner {name} is not kept for its holder any more", errors_pb2.REASON_HOLD_NOT_FOUND
+        )
     runner.log.info("%s is back", hold.holder)
     return runner
 
@@ -181,15 +187,19 @@ def _require_free(runner: Runner) -> None:
     if desired.hold is not None:
         raise FailedPrecondition(
             f"runner {runner.name} is held by {desired.hold.holder}: end that launch, "
-            "or give the runner of this one another name"
+            "or give the runner of this one another name",
+            errors_pb2.REASON_RUNNER_HELD,
+            holder=desired.hold.holder,
         )
     if desired.components:
         raise FailedPrecondition(
             f"runner {runner.name} has components of its own ({listing(desired.components)}): "
-            "unload them, or give the runner of this launch another name"
+            "unload them, or give the runner of this launch another name",
+            errors_pb2.REASON_RUNNER_NOT_EMPTY,
         )
     if runner.loop.running:
         raise FailedPrecondition(
             f"the loop of runner {runner.name} runs: stop it, or give the runner of this launch "
-            "another name"
+            "another name",
+            errors_pb2.REASON_LOOP_RUNS,
         )

@@ -9,7 +9,7 @@ import asyncio
 from collections.abc import Callable, Iterable
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import control_pb2
+from rtcf.v1 import control_pb2, errors_pb2
 
 from rtcfd.common.names import full_name
 from rtcfd.common.refusals import AlreadyExists, FailedPrecondition, NotFound, Refusal, Unavailable
@@ -88,13 +88,19 @@ class Leases:
 
         async def work() -> control_pb2.ChangeResult:
             if outbox.gone:
-                raise Unavailable(f"the caller that wanted {name} has left")
+                raise Unavailable(
+                    f"the caller that wanted {name} has left",
+                    errors_pb2.REASON_CALLER_GONE,
+                    component=name,
+                )
             self._check_hold(request.hold)
             runner.limits.check_components(len(runner.desired.components) + 1)
             if name in runner.desired.components:
                 raise AlreadyExists(
                     f"component {name} is there already in runner {runner.name}: "
-                    "give this one another name or namespace"
+                    "give this one another name or namespace",
+                    errors_pb2.REASON_COMPONENT_EXISTS,
+                    component=name,
                 )
             # Noted ahead: a rtcfd that dies meanwhile must not take it for one that stays.
             self._terms[name] = LeaseTerms(
@@ -138,7 +144,11 @@ class Leases:
             or name in self._outboxes
             or name in self._leaving
         ):
-            raise NotFound(f"runner {self._runner.name} keeps no {name} for its launcher any more")
+            raise NotFound(
+                f"runner {self._runner.name} keeps no {name} for its launcher any more",
+                errors_pb2.REASON_LEASE_NOT_FOUND,
+                component=name,
+            )
         self._outboxes[name] = outbox
         self._runner.log.info("%s: its holder is back", name)
         return control_pb2.ChangeResult(component=name)
@@ -228,7 +238,9 @@ class Leases:
     def _check_hold(self, token: str) -> None:
         hold = self._runner.desired.hold
         if token and (hold is None or hold.token != token):
-            raise FailedPrecondition(f"the holder of runner {self._runner.name} has ended")
+            raise FailedPrecondition(
+                f"the holder of runner {self._runner.name} has ended", errors_pb2.REASON_HOLDER_GONE
+            )
 
     async def _await(self, names: Iterable[str]) -> None:
         await asyncio.sleep(RETURN_S)

@@ -7,7 +7,7 @@ call, so what they may have done is one setting of the runner, in the words of `
 import logging
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import control_pb2
+from rtcf.v1 import control_pb2, errors_pb2
 
 from rtcfd.access.calls import Level
 from rtcfd.common.refusals import FailedPrecondition, Refusal
@@ -50,7 +50,8 @@ def _allowed(runner: RunnerCore, call: wire.ServiceCall) -> str:
     if kind is None:
         raise FailedPrecondition(
             f"runner {runner.name}: a call of unknown kind: install rtcfd and its executor of "
-            "the same version"
+            "the same version",
+            errors_pb2.REASON_REQUEST_MALFORMED,
         )
     has, needed = Level(runner.settings().ros.peers), _NEEDED[kind]
     if has < needed:
@@ -58,7 +59,9 @@ def _allowed(runner: RunnerCore, call: wire.ServiceCall) -> str:
             f"peers on ROS have {'no right' if has == Level.NONE else f'the right {has.word}'} on "
             f"runner {runner.name}, and `{kind}` takes {needed.word}: grant it with "
             f"rtcfctl runner set {runner.name} --ros-peers {needed.word}, or use "
-            f"rtcfctl -r {runner.name} {kind}"
+            f"rtcfctl -r {runner.name} {kind}",
+            errors_pb2.REASON_RIGHT_MISSING,
+            right=needed.word,
         )
     return str(kind)
 

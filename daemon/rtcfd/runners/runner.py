@@ -9,7 +9,7 @@ import contextlib
 import time
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+from rtcf.v1 import control_pb2, errors_pb2, graph_pb2, runner_pb2
 
 from rtcfd.common import runner_settings
 from rtcfd.common.refusals import NotFound, Refusal
@@ -61,7 +61,7 @@ class Runner(RunnerCore):
         `in_order`: for good, so that the next rtcfd does not start the loop."""
         self.closing = True
         self.loop.stops += 1
-        self.operations.withdraw(message)
+        self.operations.withdraw(message, errors_pb2.REASON_RUNNER_ENDING)
         if in_order and self.loop.wanted:
             self.loop.stop()
             await self.save()
@@ -79,14 +79,16 @@ class Runner(RunnerCore):
         self.leases.lose_patience()
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self.operations.drain(), LEAVE_TIMEOUT_S)
-        self.operations.withdraw("rtcfd is being restarted")
+        self.operations.withdraw("rtcfd is being restarted", errors_pb2.REASON_DAEMON_ENDING)
         await self.leave_executor()
 
     async def restart(self) -> None:
         """Begin anew with a fresh executor, whatever the one of now is stuck in; what is desired
         is loaded, held."""
         self.loop.stop()
-        self.operations.withdraw("its executor is being restarted", only_cycles=True)
+        self.operations.withdraw(
+            "its executor is being restarted", errors_pb2.REASON_LOOP_STOPPED, only_cycles=True
+        )
 
         async def fresh() -> None:
             if not self.up:
@@ -230,7 +232,9 @@ class Runner(RunnerCore):
         self.loop.stopped_at_ns = stop.at_ns
         self.loop.stop()
         self.loop.told(False)
-        self.operations.withdraw("the loop was stopped at its executor", only_cycles=True)
+        self.operations.withdraw(
+            "the loop was stopped at its executor", errors_pb2.REASON_LOOP_STOPPED, only_cycles=True
+        )
         self.tell()
         self.operations.in_background("noting a stop", self._note_direct_stop(stop))
 

@@ -5,8 +5,8 @@ import contextlib
 import logging
 from collections.abc import Callable, Iterable
 
-from rtcf.v1 import control_pb2, runner_pb2
-from rtcf_shared.naming import listing, suggestion
+from rtcf.v1 import control_pb2, errors_pb2, runner_pb2
+from rtcf_shared.naming import closest, listing, suggestion
 
 from rtcfd.catalog.catalog import loads
 from rtcfd.common import runner_settings
@@ -90,7 +90,10 @@ class Runners:
         if runner is None:
             raise NotFound(
                 f'no runner "{wanted}"{suggestion(wanted, self._runners)} '
-                f"(runners: {listing(self._runners)}); `rtcfctl runner add {wanted}` makes it"
+                f"(runners: {listing(self._runners)}); `rtcfctl runner add {wanted}` makes it",
+                errors_pb2.REASON_RUNNER_NOT_FOUND,
+                runner=wanted,
+                suggestion=closest(wanted, self._runners),
             )
         return runner
 
@@ -123,11 +126,12 @@ class Runners:
         on_added: Callable[[Runner], None] | None = None,
     ) -> Runner:
         if self.closing.is_set():
-            raise Unavailable("rtcfd is ending")
+            raise Unavailable("rtcfd is ending", errors_pb2.REASON_DAEMON_ENDING)
         name = check_base_name("runner", name or DEFAULT_RUNNER)
         if name in self._runners:
             raise AlreadyExists(
-                f"runner {name} is there already; `rtcfctl runner set {name}` changes it"
+                f"runner {name} is there already; `rtcfctl runner set {name}` changes it",
+                errors_pb2.REASON_RUNNER_EXISTS,
             )
         self._shared.limits.check_runners(len(self._runners) + 1)
         runner_settings.check(chosen)
@@ -185,7 +189,9 @@ class Runners:
         """Stop a runner and forget it."""
         runner = self.get(name)
         if runner.closing:
-            raise Unavailable(f"runner {runner.name} is being ended")
+            raise Unavailable(
+                f"runner {runner.name} is being ended", errors_pb2.REASON_RUNNER_ENDING
+            )
 
         async def work() -> None:
             await self._remove(runner)
@@ -205,11 +211,11 @@ class Runners:
         """Stop all loops in order and end all executors, at once.  `in_order`: for good, and not
         because the machine goes down."""
         self.closing.set()
-        self.operations.withdraw("rtcfd is ending")
-        why = control_pb2.LeaseEnded.WHY_DAEMON_ENDED
+        self.operations.withdraw("rtcfd is ending", errors_pb2.REASON_DAEMON_ENDING)
+        cause = control_pb2.LeaseEnded.WHY_DAEMON_ENDED
         runners = list(self._runners.values())
         await asyncio.gather(
-            *(each.shut_down(why, "rtcfd is being ended", in_order) for each in runners)
+            *(each.shut_down(cause, "rtcfd is being ended", in_order) for each in runners)
         )
         await self.operations.drain()
 

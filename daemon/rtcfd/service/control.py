@@ -11,7 +11,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any, Protocol
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import control_pb2, control_pb2_grpc, graph_pb2, runner_pb2
+from rtcf.v1 import control_pb2, control_pb2_grpc, errors_pb2, graph_pb2, runner_pb2
 
 from rtcfd import VERSION
 from rtcfd.catalog.catalog import Catalog
@@ -42,7 +42,7 @@ def _answering(method: Callable[..., Awaitable[Any]]) -> Any:
         try:
             return await method(self, request)
         except Exception as error:
-            await abort(context, error)
+            await abort(context, error, request)
 
     return wrapper
 
@@ -64,7 +64,7 @@ def _changing(
                 yield control_pb2.ChangeResponse(progress=line)
             yield control_pb2.ChangeResponse(result=task.result())
         except Exception as error:
-            await abort(context, error)
+            await abort(context, error, request)
         finally:
             if task is not None:
                 task.cancel()  # one that has begun goes on: see operations/operations.py
@@ -92,18 +92,23 @@ def _holding(method: Callable[..., tuple[Outbox, _Tenancy]]) -> Any:
     async def wrapper(self: "Control", requests: Any, context: Any) -> AsyncIterator[Any]:
         tasks: list[asyncio.Future[None]] = []
         tenancy: _Tenancy | None = None
+        opening_request: Any = None
         messages = aiter(requests)
         try:
             first = await anext(messages, None)
             if first is None or first.WhichOneof("kind") != "open":
-                raise InvalidArgument("the first message of such a call is `open`")
-            outbox, tenancy = method(self, first.open)
+                raise InvalidArgument(
+                    "the first message of such a call is `open`",
+                    errors_pb2.REASON_REQUEST_MALFORMED,
+                )
+            opening_request = first.open
+            outbox, tenancy = method(self, opening_request)
             opening = asyncio.ensure_future(_open(tenancy, outbox))
             tasks = [opening, asyncio.ensure_future(_listen(messages, opening, tenancy, outbox))]
             async for response in outbox:
                 yield response
         except Exception as error:
-            await abort(context, error)
+            await abort(context, error, opening_request)
         finally:
             if tenancy is not None and not outbox.ended:
                 tenancy.lost()
@@ -348,7 +353,7 @@ class Control(control_pb2_grpc.ControlServicer):
                 yield await self._statistics(request.runner)
                 await asyncio.sleep(interval_s)
         except Exception as error:
-            await abort(context, error)
+            await abort(context, error, request)
 
     @_answering
     async def ResetStatistics(self, request: control_pb2.ResetStatisticsRequest) -> Any:

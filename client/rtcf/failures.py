@@ -1,0 +1,127 @@
+"""The one place where gRPC's errors become exceptions of ours."""
+
+import errno
+import os
+import socket as sockets
+import stat
+from collections.abc import Mapping
+from typing import Any
+
+from rtcf.errors import DaemonUnreachableError, RefusedError, RtcfError
+
+# In the metadata of rtcfd's own refusals; gRPC's word on a lost connection lacks it.
+_DETAILS_KEY = "grpc-status-details-bin"
+_INFO_TYPE = "type.googleapis.com/google.rpc.ErrorInfo"
+_DOMAIN = "rtcf"
+_PROBE_TIMEOUT_S = 1.0
+
+
+def refused(
+    message: str, code: str, reason: str, about: Mapping[str, str] | None = None
+) -> RefusedError:
+    """Return the exception of a reason."""
+    from rtcf import refusals
+
+    return refusals.BY_REASON.get(reason, RefusedError)(message, code, reason, about)
+
+
+def from_grpc(error: Any, socket: str) -> RtcfError:
+    """Return what a grpc.RpcError of a call through `socket` means."""
+    code = error.code().name
+    text = error.details() or code
+    if details := _details(error):
+        return _from_details(text, code, details)
+    if code == "UNAVAILABLE":
+        return _unreachable(socket, text)
+    if code == "DEADLINE_EXCEEDED":
+        return DaemonUnreachableError(f"rtcfd at {socket} does not answer in time")
+    if code == "UNIMPLEMENTED":
+        return RtcfError(f"rtcfd at {socket} is older than this client: {text}")
+    if code == "RESOURCE_EXHAUSTED":  # gRPC's only one
+        return RtcfError(
+            "the request is larger than rtcfd accepts: send less at a time, or raise message_kb "
+            f"under [limits] in its settings ({text})"
+        )
+    return RtcfError(f"{text} ({code})")
+
+
+def _details(error: Any) -> bytes:
+    """Return rtcfd's own word on an error; empty: it is gRPC's."""
+    for key, value in error.trailing_metadata() or ():
+        if key == _DETAILS_KEY:
+            return bytes(value)
+    return b""
+
+
+def _from_details(text: str, code: str, details: bytes) -> RefusedError:
+    from google.protobuf.message import DecodeError
+
+    from rtcf.v1 import errors_pb2
+
+    try:
+        for each in errors_pb2.ErrorStatus.FromString(details).details:
+            if each.type_url == _INFO_TYPE:
+                info = errors_pb2.ErrorInfo.FromString(each.value)
+                if info.domain == _DOMAIN:
+                    return refused(text, code, info.reason, info.metadata)
+    except DecodeError:
+        pass
+    return RefusedError(text, code)
+
+
+def is_crowded(error: Any, socket: str) -> bool:
+    """Tell whether a call did not get through as the queue at the door is full."""
+    if error.code().name != "UNAVAILABLE" or _details(error):
+        return False
+    if "failed to connect" not in (error.details() or ""):
+        return False
+    # What gRPC makes of a full queue is an invalid argument. Somebody listens there, though.
+    with sockets.socket(sockets.AF_UNIX, sockets.SOCK_STREAM) as probe:
+        probe.setblocking(False)
+        return probe.connect_ex(socket) in (0, errno.EAGAIN)
+
+
+def _unreachable(socket: str, text: str) -> DaemonUnreachableError:
+    """Say why, by trying once more by hand: gRPC's own words do not help people."""
+    try:
+        with sockets.socket(sockets.AF_UNIX, sockets.SOCK_STREAM) as probe:
+            probe.settimeout(_PROBE_TIMEOUT_S)
+            probe.connect(socket)
+    except PermissionError:
+        return DaemonUnreachableError(f"permission denied on {socket}", _who_may(socket))
+    except (FileNotFoundError, ConnectionRefusedError):
+        return DaemonUnreachableError(
+            f"rtcfd is not running at {socket}",
+            "start it with `sudo systemctl start rtcfd`, or name another socket with --socket or "
+            "RTCF_SOCKET",
+        )
+    except OSError as error:
+        return DaemonUnreachableError(
+            f"cannot reach rtcfd at {socket}", f"{error.strerror or error}"
+        )
+    return DaemonUnreachableError(f"the connection to rtcfd at {socket} was lost", text)
+
+
+def _user() -> str:
+    import getpass
+
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):
+        return f"#{os.getuid()}"
+
+
+def _who_may(socket: str) -> str:
+    """Say how to be let in, but for ways that give more than that."""
+    import grp
+    import pwd
+
+    try:
+        found = os.stat(socket)
+        if found.st_mode & stat.S_IWGRP and found.st_gid != 0:
+            group = grp.getgrgid(found.st_gid).gr_name
+            return f"join its group (`sudo adduser {_user()} {group}`) and log in again"
+        owner = pwd.getpwuid(found.st_uid).pw_name
+    except (KeyError, OSError):
+        return "its owner keeps it to himself"
+    return f"it is the own rtcfd of user {owner}"

@@ -1,0 +1,42 @@
+"""Refusals of a real rtcfd as programs see them: reason, domain and what it is about."""
+
+import grpc
+import pytest
+import rtcf
+from daemon_process import Daemon
+from fig_1 import mimo
+from rtcf import refusals
+from rtcf.v1 import control_pb2, control_pb2_grpc, errors_pb2
+
+
+def test_a_program_learns_the_reason_and_the_name_that_was_meant(client: rtcf.Client) -> None:
+    with pytest.raises(refusals.RunnerNotFoundError) as refused:
+        client.start("rt_runer")
+    assert refused.value.about == {"runner": "rt_runer", "suggestion": "rt_runner"}
+    with pytest.raises(refusals.TypeNotFoundError) as unknown:
+        client.load(rtcf.component("rtcf_examples", "Minmo"))
+    assert unknown.value.about["type"] == "Minmo"
+    assert unknown.value.about["suggestion"] == "Mimo"
+    client.load(mimo("A", {}))
+    with pytest.raises(refusals.ComponentExistsError) as taken:
+        client.load(mimo("A", {}))
+    assert taken.value.code == "ALREADY_EXISTS"
+    with pytest.raises(refusals.ComponentNotFoundError) as missing:
+        client.get_component("B")
+    assert missing.value.about["component"] == "B"
+
+
+def test_any_grpc_client_finds_google_rpc_error_info(daemon: Daemon) -> None:
+    with grpc.insecure_channel(f"unix:{daemon.socket}") as channel:
+        stub = control_pb2_grpc.ControlStub(channel)  # type: ignore[no-untyped-call]
+        with pytest.raises(grpc.RpcError) as failed:
+            list(stub.Unload(control_pb2.UnloadRequest()))
+    metadata = dict(failed.value.trailing_metadata())
+    status = errors_pb2.ErrorStatus.FromString(metadata["grpc-status-details-bin"])
+    assert status.code == failed.value.code().value[0]
+    assert status.message == failed.value.details()
+    (detail,) = status.details
+    assert detail.type_url == "type.googleapis.com/google.rpc.ErrorInfo"
+    info = errors_pb2.ErrorInfo.FromString(detail.value)
+    assert (info.reason, info.domain) == ("NAME_MISSING", "rtcf")
+    assert info.metadata["field"] == "components"
