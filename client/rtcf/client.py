@@ -119,7 +119,7 @@ class Client:
         """End the loop at the next cycle boundary.
 
         Where rtcfd cannot be reached, has no place for another client, or does
-        not answer within a second, the loop's executor is asked itself; a note
+        not answer within half a second, the loop's executor is asked itself; a note
         of the result says so.
         """
 
@@ -132,7 +132,7 @@ class Client:
         )
 
     def stop_all(self) -> list[direct_stop.Stopped]:
-        """End all loops at once, at their executors; then tell rtcfd, if it answers in a second.
+        """End all loops at once, at their executors; then tell rtcfd, if it answers soon.
 
         Raises nothing: what came of each loop is in the result, by runner.
         """

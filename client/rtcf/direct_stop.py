@@ -20,7 +20,7 @@ from rtcf.errors import DaemonUnreachableError, RefusedError
 from rtcf.failures import refused
 from rtcf.v1 import control_pb2
 
-PATIENCE_S = 1.0  # with rtcfd, until a loop's executor is asked instead
+PATIENCE_S = 0.5  # with rtcfd, until a loop's executor is asked instead
 TIMEOUT_S = 5.0  # above the executor's own for a component that does not return
 
 

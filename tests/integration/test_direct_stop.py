@@ -74,7 +74,7 @@ def test_a_frozen_daemon_holds_up_no_stop_and_is_right_when_it_lives_again(
     with frozen(daemon):
         done = daemon.ctl("stop")
         assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
-        assert "at its executor, as rtcfd does not answer within 1 s" in done.stderr
+        assert "at its executor, as rtcfd does not answer within 0.5 s" in done.stderr
         # Disk says so, whatever becomes of rtcfd now.
         assert not mark(daemon).exists()
     assert not runs(client)
