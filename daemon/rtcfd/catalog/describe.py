@@ -23,19 +23,23 @@ FAILURE_KEPT_S = 5.0
 _AT_ONCE = 2
 _MAX_STDERR_LINE = 300
 
-_Key = tuple[str, int | None, int, int, int]
+_File = tuple[str, int | None]  # path, and whose libraries are trusted
+_Identity = tuple[int, int, int]  # inode, time of change, size
 
 
 @dataclass
 class _Known:
     """What is kept of one file as it is."""
 
+    identity: _Identity
     description: wire.LibraryDescription
     since: float = field(default_factory=time.monotonic)
 
-    def valid(self) -> bool:
+    def valid(self, identity: _Identity) -> bool:
         """Tell whether it need not be looked at again: what does not load may do so later, when
         what it links against is there."""
+        if identity != self.identity:
+            return False
         return not self.description.problem or time.monotonic() - self.since < FAILURE_KEPT_S
 
 
@@ -46,10 +50,15 @@ class Describer:
     binary: Path
 
     def __post_init__(self) -> None:
-        self._known: dict[_Key, _Known] = {}
-        self._running: dict[_Key, asyncio.Task[wire.LibraryDescription]] = {}
+        self._known: dict[_File, _Known] = {}
+        self._running: dict[tuple[_File, _Identity], asyncio.Task[wire.LibraryDescription]] = {}
         self._aside = Aside("folders of components")
         self._slots = asyncio.Semaphore(_AT_ONCE)
+
+    @property
+    def kept(self) -> list[str]:
+        """The libraries whose description is kept, one of each."""
+        return [path for path, _ in self._known]
 
     async def describe(
         self, library: Path, package: str, owner: int | None = None
@@ -64,21 +73,27 @@ class Describer:
             return _problem(f"cannot read it: {error.strerror}")
         except Refusal as refusal:
             return _problem(str(refusal))
-        key = (str(library), owner, found.st_ino, found.st_mtime_ns, found.st_size)
-        known = self._known.get(key)
-        if known is not None and known.valid():
+        file = (str(library), owner)
+        identity = (found.st_ino, found.st_mtime_ns, found.st_size)
+        known = self._known.get(file)
+        if known is not None and known.valid(identity):
             return known.description
         # Whoever asks for the same meanwhile waits for the same answer; who leaves ends nothing.
+        key = (file, identity)
         running = self._running.get(key)
         if running is None:
-            running = self._running[key] = asyncio.create_task(self._find(key, library, package))
+            finding = self._find(file, identity, package)
+            running = self._running[key] = asyncio.create_task(finding)
             running.add_done_callback(lambda _: self._running.pop(key, None))
         return await asyncio.shield(running)
 
-    async def _find(self, key: _Key, library: Path, package: str) -> wire.LibraryDescription:
+    async def _find(
+        self, file: _File, identity: _Identity, package: str
+    ) -> wire.LibraryDescription:
+        path, owner = file
         async with self._slots:
-            description = await self._run(library, package, key[1])
-        self._known[key] = _Known(description)
+            description = await self._run(Path(path), package, owner)
+        self._known[file] = _Known(identity, description)
         return description
 
     async def _run(self, library: Path, package: str, owner: int | None) -> wire.LibraryDescription:

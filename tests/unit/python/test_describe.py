@@ -1,0 +1,76 @@
+"""The describer of libraries: one process for all who ask, and no answer that stays wrong."""
+
+import asyncio
+import os
+from pathlib import Path
+
+import pytest
+from rtcfd.catalog import describe
+from rtcfd.catalog.describe import Describer
+
+
+@pytest.fixture
+def library(tmp_path: Path) -> Path:
+    found = tmp_path / "lib.so"
+    found.write_text("first")
+    return found
+
+
+@pytest.fixture
+def describer(tmp_path: Path) -> Describer:
+    """One whose process notes that it ran, and succeeds where what it needs is there."""
+    binary = tmp_path / "executor"
+    binary.write_text(
+        f"#!/bin/sh\necho >> {tmp_path}/runs\n"
+        f'[ -e {tmp_path}/needed ] || {{ echo "libneeded.so: cannot open" >&2; exit 1; }}\n'
+    )
+    binary.chmod(0o755)
+    return Describer(binary)
+
+
+def runs(folder: Path) -> int:
+    return len((folder / "runs").read_text())
+
+
+def test_who_asks_at_once_waits_for_one_process(
+    describer: Describer, library: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "needed").touch()
+
+    async def work() -> None:
+        await asyncio.gather(*(describer.describe(library, "pkg") for _ in range(20)))
+        await describer.describe(library, "pkg")
+
+    asyncio.run(work())
+    assert runs(tmp_path) == 1
+
+
+def test_what_did_not_load_is_looked_at_again_though_its_file_is_the_same(
+    describer: Describer, library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def work() -> None:
+        for _ in range(3):
+            found = await describer.describe(library, "pkg")
+            assert "libneeded.so: cannot open" in found.problem
+        assert runs(tmp_path) == 1  # who asks all the time starts no process each time
+        monkeypatch.setattr(describe, "FAILURE_KEPT_S", 0.0)
+        (tmp_path / "needed").touch()  # as another package is installed
+        assert not (await describer.describe(library, "pkg")).problem
+
+    asyncio.run(work())
+
+
+def test_of_a_file_that_is_rebuilt_again_and_again_the_last_is_kept(
+    describer: Describer, library: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "needed").touch()
+
+    async def work() -> None:
+        for number in range(5):
+            library.write_text("x" * number)
+            os.utime(library, (number, number))
+            await describer.describe(library, "pkg")
+        assert runs(tmp_path) == 5
+        assert len(describer.kept) == 1
+
+    asyncio.run(work())
