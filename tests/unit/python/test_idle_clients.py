@@ -1,0 +1,100 @@
+"""Connections that nobody uses end: those that never made a call, and those that made none for
+long; a call that lasts is no idleness."""
+
+import asyncio
+import socket
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import pytest
+from rtcfd.access import clients
+from rtcfd.access.calls import Level
+from rtcfd.access.clients import Clients, Doors
+from rtcfd.common.limits import Limits
+
+DEADLINE_S = 30.0
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(clients, "_LOOK_S", 0.02)
+
+
+class Front:
+    """Clients in front of a server that says nothing."""
+
+    def __init__(self, folder: Path, level: Level) -> None:
+        self._folder = folder
+        self.clients = Clients(
+            Doors(folder / "trusted", folder / "others"), Limits(), lambda _: level
+        )
+        self.shown: list[str] = []  # of each connection, as gRPC shows it
+
+    async def serve(self) -> None:
+        async def silent(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            name = writer.get_extra_info("socket").getpeername()
+            self.shown.append("unix-abstract:" + name[1:].decode())
+            await reader.read()
+            writer.close()
+
+        for door in ("trusted", "others"):
+            await asyncio.start_unix_server(silent, self._folder / door)
+        listener = socket.socket(socket.AF_UNIX)
+        listener.bind(str(self._folder / "s"))
+        listener.listen()
+        await self.clients.serve(listener)
+
+    async def connect(self) -> asyncio.StreamReader:
+        """Return what a new client reads; it is kept as long as the front is."""
+        number = len(self.shown)
+        reader, self._writer = await asyncio.open_unix_connection(self._folder / "s")
+        while len(self.shown) == number:
+            await asyncio.sleep(0.001)
+        return reader
+
+
+def with_front(
+    folder: Path, work: Callable[[Front], Awaitable[None]], level: Level = Level.OBSERVE
+) -> None:
+    async def run() -> None:
+        front = Front(folder, level)
+        await front.serve()
+        try:
+            async with asyncio.timeout(DEADLINE_S):
+                await work(front)
+        finally:
+            front.clients.close()
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize("level", [Level.NONE, Level.OBSERVE, Level.ADMIN])
+def test_a_connection_that_makes_no_call_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, level: Level
+) -> None:
+    monkeypatch.setattr(clients, "_FIRST_CALL_S", 0.05)
+
+    async def work(front: Front) -> None:
+        assert await (await front.connect()).read() == b""
+
+    with_front(tmp_path, work, level)
+
+
+def test_a_connection_that_makes_no_more_calls_ends_and_not_before_its_last_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(clients, "_FIRST_CALL_S", 3600.0)
+    monkeypatch.setattr(clients, "_IDLE_S", 0.05)
+
+    async def work(front: Front) -> None:
+        lasting = await front.connect()
+        with front.clients.calling(front.shown[0], "WatchStatistics"):
+            # One that came later, and was used, has been hung up on while this one was not.
+            idle = await front.connect()
+            with front.clients.calling(front.shown[1], "GetStatus"):
+                pass
+            assert await idle.read() == b""
+            assert not lasting.at_eof()
+        assert await lasting.read() == b""
+
+    with_front(tmp_path, work)
