@@ -109,7 +109,7 @@ def show_all(client: rtcf.Client, args: argparse.Namespace, output: Output) -> N
                 f"{each.spec.package}/{each.spec.type}",
                 (enumerator(each, "state").replace("_", " "), _STYLES.get(each.state, "")),
                 ", ".join(
-                    filter(None, (_notes(each.spec, each.holder), _changed(each), each.fault))
+                    filter(None, (_notes(each.spec, each.holder), _changed(each), _fault(each)))
                 ),
             )
             for each in components
@@ -139,7 +139,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
             "yellow",
         )
     if found.fault:
-        output.line(f"  fault: {found.fault}", "bold red")
+        output.line(f"  fault: {_fault(found)}", "bold red")
     if notes := _notes(found.spec, found.holder):
         output.line(f"  {notes}")
     if found.ports:
@@ -277,6 +277,10 @@ def _notes(spec: graph_pb2.ComponentSpec, holder: str) -> str:
 
 def _changed(found: graph_pb2.ComponentInfo) -> str:
     return "library changed" if found.library_changed else ""
+
+
+def _fault(found: graph_pb2.ComponentInfo) -> str:
+    return found.fault + (f" ({found.faults} in all)" if found.faults > 1 else "")
 
 
 def _flags(port: graph_pb2.PortInfo) -> str:

@@ -92,6 +92,9 @@ def _print(found: runner_pb2.RunnerStatistics, output: Output) -> None:
         ((*_row(each.component, each.duration), each.overruns) for each in found.components),
         right=(*_COLUMNS, "overruns"),
     )
+    for each in found.components:
+        if each.faults:
+            output.line(f"{each.component}: {each.faults} faults", "bold red")
     devices = [each for each in found.components if each.device_calls]
     if devices:
         columns = ("calls", "mean")

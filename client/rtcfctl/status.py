@@ -75,6 +75,12 @@ def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
     """Print what a table has no room for."""
     if runner.status:
         output.line(f"{runner.runner}: {runner.status}", "yellow")
+    if runner.faults:
+        output.line(
+            f"{runner.runner}: {runner.faults} faults of components since its loop began: "
+            "`rtcfctl list` shows whose",
+            "yellow",
+        )
     for library in runner.libraries_changed:
         output.line(
             f"{runner.runner}: {library} is another file now than components were loaded from: "

@@ -211,6 +211,24 @@ def test_a_value_that_is_not_finite_is_held_back(daemon: Daemon, client: rtcf.Cl
     assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
 
 
+def test_faults_beyond_those_that_are_told_are_counted(daemon: Daemon, client: rtcf.Client) -> None:
+    load(client, faulty("NotFinite"))
+    client.start()
+    wait_for(lambda: client.get_component("bad").faults > 20, "the faults")
+    # Told once, and counted wherever one looks.
+    assert daemon.log().count("is not finite: readers keep its last value") == 1
+    assert re.search(r"is not finite: .* \(\d+ in all\)", daemon.ctl("list").stdout)
+    assert re.search(r"fault: .* \(\d+ in all\)", daemon.ctl("info", "bad").stdout)
+    assert re.search(r"rt_runner: \d+ faults of components", daemon.ctl("status").stdout)
+    assert re.search(r"^/bad: \d+ faults$", daemon.ctl("stats").stdout, re.MULTILINE)
+    assert state(client).faults >= 20
+    client.stop()
+    # Of another loop others count.
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=1.0))
+    client.start()
+    assert client.get_component("bad").faults < 20
+
+
 def test_a_value_that_is_not_finite_stops_the_loop_where_it_is_to(
     daemon: Daemon, client: rtcf.Client
 ) -> None:

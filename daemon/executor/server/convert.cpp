@@ -528,6 +528,7 @@ pb::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t positio
     info.set_library(component.library);
     info.set_doc(component.doc);
     info.set_fault(component.fault);
+    info.set_faults(component.figures->faults.count.value());
     info.set_state(!component.fault.empty()        ? pb::COMPONENT_STATE_FAULTED
                    : state == RunnerState::Running ? pb::COMPONENT_STATE_RUNNING
                                                    : pb::COMPONENT_STATE_CONFIGURED);

@@ -620,6 +620,10 @@ pb::RunnerStatus Server::status() const {
     status.set_missed(loop.figures().missed.load(std::memory_order_relaxed));
     status.set_components(static_cast<std::uint32_t>(graph->components.size()));
     status.set_generation(graph->generation);
+    std::uint64_t faults = 0;
+    for (const auto& component : graph->components)
+        faults += component->figures->faults.count.value();
+    status.set_faults(faults);
     for (const std::string& line : picture.degraded) status.add_degraded(line);
     pb::RosStatus& ros = *status.mutable_ros();
     ros.set_enabled(picture.bridge.enabled);
@@ -677,6 +681,7 @@ pb::RunnerStatistics Server::statistics() const {
         }
         setDistribution(*statistics.mutable_duration(), summarize(present.duration, ns_per_tick));
         statistics.set_overruns(present.overruns);
+        statistics.set_faults(component->figures->faults.count.value());
         statistics.set_device_calls(present.device_calls);
         if (present.device_calls != 0) {
             statistics.set_device_mean_ns(static_cast<double>(present.device_time_ns) /
