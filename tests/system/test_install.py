@@ -5,7 +5,7 @@ from machine import Machine
 from rtcf_service import Service
 
 MAN_PAGES = ("rtcfctl.1", "rtcfd.8", "rtcf-executor.8", "rtcfd.toml.5", "rtcf-graph.5",
-             "rtcf-protocol.7")  # fmt: skip
+             "rtcf-protocol.7", "rtcf-compile.1")  # fmt: skip
 
 
 def test_installing_them_starts_the_service(machine: Machine) -> None:

@@ -4,7 +4,7 @@ from machine import Machine
 from rtcf_service import Service
 
 PACKAGES = ("librtcf-dev", "python3-rtcf", "ros-rtcf", "rtcf-check", "rtcf-components", "rtcf-doc",
-            "rtcfctl", "rtcfd")  # fmt: skip
+            "rtcf-python", "rtcfctl", "rtcfd")  # fmt: skip
 
 
 def test_removal_ends_everything_and_keeps_settings_and_state(machine: Machine) -> None:

@@ -1,0 +1,235 @@
+"""What a component declares: ports, parameters and state, as annotations of its class.
+
+`x: Output[np.float64, 2] = Output(unit="rad")` is kept as a Member with the layout of all members
+as one NumPy record, which compiled code sees as one C struct and the interpreter as views.
+"""
+
+import inspect
+import keyword
+import re
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+from rtcf.component.value_type import DeclarationError, ValueType, value_type
+
+# Fields of the record that every component has, beside those of its members.
+TIME_FIELDS = {
+    "time": np.dtype(np.int64),
+    "stamp": np.dtype(np.int64),
+    "period": np.dtype(np.int64),
+    "iteration": np.dtype(np.int64),
+    "dt": np.dtype(np.float64),
+    "frequency": np.dtype(np.float64),
+}
+HOOKS = ("start", "update", "safe")
+LOG_LEVELS = ("debug", "info", "warn", "error", "fatal")
+_RESERVED = {*TIME_FIELDS, *HOOKS, *LOG_LEVELS, "prepare", "configure", "stop", "cleanup", "fault"}
+
+
+class MemberAttribute:
+    """Base of what stands for a member in a class that has been instantiated."""
+
+
+@dataclass(frozen=True)
+class Declared:
+    """`Input[float]`: a kind and a type."""
+
+    kind: "type[Declarable]"
+    declared: object
+
+
+class Declarable:
+    """Base of Input, Output, Parameter and State."""
+
+    allowed: ClassVar[tuple[str, ...]] = ()
+
+    def __class_getitem__(cls, declared: object) -> Any:
+        """Give the annotation; what it says is looked at with the class."""
+        return Declared(cls, declared)
+
+    def __init__(self, initial: Any = None, **options: Any) -> None:
+        """Take an initial value, where the kind has one, and options."""
+        for option in options:
+            if option not in self.allowed:
+                raise DeclarationError(
+                    f"{type(self).__name__} knows no option {option!r}: "
+                    f"it has {', '.join(self.allowed) or 'none'}"
+                )
+        if initial is not None and type(self) in (Input, Output):
+            raise DeclarationError(f"an {type(self).__name__} has no initial value")
+        self.initial = initial
+        self.options = options
+
+
+class Input(Declarable):
+    """An input: `self.u.value`, `.new`, `.valid`, `.age` (ns), `.connected`."""
+
+
+class Output(Declarable):
+    """An output: `self.x.write(value)`. `finite=True` has values checked for NaN and infinity."""
+
+    allowed = ("unit", "finite")
+
+
+class Parameter(Declarable):
+    """A parameter, constant during a cycle: `self.kp`. Set from outside, within its bounds."""
+
+    allowed = ("unit", "doc", "min", "max")
+
+
+class State(Declarable):
+    """What is remembered from cycle to cycle: `self.integral += …`."""
+
+    allowed = ("unit", "doc")
+
+
+@dataclass(frozen=True)
+class Member:
+    """One port, parameter or state of a class."""
+
+    name: str
+    kind: type[Declarable]
+    type: ValueType
+    initial: np.ndarray[Any, Any]
+    options: dict[str, Any]
+    line: int
+
+
+@dataclass
+class Description:
+    """All that a component class declares."""
+
+    name: str
+    doc: str
+    members: dict[str, Member] = field(default_factory=dict)
+    constants: dict[str, Any] = field(default_factory=dict)
+
+    def of(self, kind: type[Declarable]) -> list[Member]:
+        """Return the members of a kind in order of their declaration."""
+        return [member for member in self.members.values() if member.kind is kind]
+
+    @property
+    def record(self) -> np.dtype[Any]:
+        """Return the layout of a component's memory: that of a C struct."""
+        fields: list[tuple[Any, ...]] = [("_component", np.int64)]
+        fields += [(f"_{name}", dtype) for name, dtype in TIME_FIELDS.items()]
+        fields.append(("_line", np.int64))
+        for member in self.members.values():
+            fields.append((member.name, member.type.scalar, member.type.shape))
+            if member.kind is Input:
+                fields.append((f"{member.name}__age", np.int64))
+                fields += [
+                    (f"{member.name}__{flag}", np.bool_) for flag in ("new", "valid", "connected")
+                ]
+            elif member.kind is Output:
+                fields.append((f"{member.name}__written", np.bool_))
+        return np.dtype(fields, align=True)
+
+
+def describe(cls: type) -> Description:
+    """Return what a class declares, its bases' members first; raise DeclarationError."""
+    result = Description(cls.__name__, _first_line(cls.__doc__) or cls.__name__)
+    for base in reversed(cls.__mro__):
+        if base in (object,) or base.__module__.startswith("rtcf.component"):
+            continue
+        lines = _lines(base)
+        annotations = inspect.get_annotations(base, eval_str=True)
+        for name, annotation in annotations.items():
+            try:
+                result.members[name] = _member(base, name, annotation, lines.get(name, 0))
+            except DeclarationError as error:
+                raise _at(error, base, lines.get(name, 0), name) from None
+        for name, value in vars(base).items():
+            if name.startswith(("__", "_declared_")) or name in annotations or callable(value):
+                continue
+            if isinstance(value, MemberAttribute):
+                continue
+            if isinstance(value, Declarable):
+                kind = type(value).__name__
+                raise _at(
+                    DeclarationError(f"has no annotation: write `{name}: {kind}[float] = …`"),
+                    base,
+                    lines.get(name, 0),
+                    name,
+                )
+            if not isinstance(value, staticmethod | classmethod | property):
+                result.constants[name] = value
+    return result
+
+
+def _member(owner: type, name: str, annotation: object, line: int) -> Member:
+    if isinstance(annotation, type) and issubclass(annotation, Declarable):
+        raise DeclarationError(f"says no type: write {annotation.__name__}[float]")
+    if not isinstance(annotation, Declared):
+        raise DeclarationError(
+            "is neither Input, Output, Parameter nor State: what is kept is a State[…], "
+            "what never changes stands without annotation"
+        )
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or "__" in name or keyword.iskeyword(name):
+        raise DeclarationError("is no name: a letter, then letters, digits and single _")
+    if name in _RESERVED:
+        raise DeclarationError("is a word that every component has: take another name")
+    kind, declared = annotation.kind, value_type(annotation.declared)
+    given = vars(owner).get(f"_declared_{name}", vars(owner).get(name))
+    if isinstance(given, MemberAttribute):
+        given = None
+    options, initial = {}, None
+    if isinstance(given, Declarable):
+        if type(given) is not kind:
+            raise DeclarationError(f"is declared as {kind.__name__} and as {type(given).__name__}")
+        options, initial = given.options, given.initial
+    elif given is not None:
+        if kind in (Input, Output):
+            raise DeclarationError(f"is an {kind.__name__} and has no initial value")
+        initial = given
+    if kind is Parameter and initial is None:
+        raise DeclarationError(f"has no default: write {name}: Parameter[…] = Parameter(1.0)")
+    if kind is Parameter and declared.shape and declared.is_bool:
+        raise DeclarationError("is an array of bools: a parameter is a number or an array of them")
+    return Member(name, kind, declared, _initial(declared, initial), options, line)
+
+
+def _initial(declared: ValueType, given: Any) -> np.ndarray[Any, Any]:
+    if given is None:
+        if declared.enumeration:
+            given = next(each for each in declared.enumeration)
+        else:
+            return np.zeros(declared.shape, declared.scalar)
+    value = np.asarray(given)
+    if declared.shape and value.shape == ():
+        value = np.full(declared.shape, value)
+    if value.shape != declared.shape:
+        raise DeclarationError(f"has shape {declared.shape}, its value {value.shape}")
+    if not np.can_cast(value.dtype, declared.scalar, "same_kind"):
+        raise DeclarationError(f"is {declared.scalar.name}, its value {value.dtype.name}")
+    if value.dtype.kind in "iu" and declared.scalar.kind in "iu":
+        limits = np.iinfo(declared.scalar)
+        if np.any(value < limits.min) or np.any(value > limits.max):
+            raise DeclarationError(f"{given} does not fit {declared.scalar.name}")
+    return value.astype(declared.scalar)
+
+
+def _first_line(doc: str | None) -> str:
+    return (doc or "").strip().partition("\n")[0].rstrip(".")
+
+
+def _lines(cls: type) -> dict[str, int]:
+    """Return the lines of a class's names, as far as its source is there."""
+    try:
+        source, begin = inspect.getsourcelines(cls)
+    except (OSError, TypeError):
+        return {}
+    found: dict[str, int] = {}
+    for number, line in enumerate(source, begin):
+        if match := re.match(r"\s+(\w+)\s*[:=]", line):
+            found.setdefault(match[1], number)
+    return found
+
+
+def _at(error: DeclarationError, cls: type, line: int, name: str) -> DeclarationError:
+    try:
+        file = inspect.getsourcefile(cls) or "?"
+    except TypeError:
+        file = "?"
+    return DeclarationError(f"{file}:{line}: {cls.__name__}.{name} {error}")

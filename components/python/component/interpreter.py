@@ -1,0 +1,224 @@
+"""A component in the interpreter: its members are views of one record, as in compiled code.
+
+For tests and for looking: the same class, the same names, one cycle by `update()`.
+"""
+
+import enum
+from typing import Any
+
+import numpy as np
+from rtcf.component.declaration import (
+    LOG_LEVELS,
+    TIME_FIELDS,
+    Description,
+    Input,
+    Member,
+    MemberAttribute,
+    Output,
+    Parameter,
+    State,
+    describe,
+)
+
+
+class Fault(Exception):
+    """What `self.fault(…)` raises: the loop ends in order, or goes on without an optional one."""
+
+
+class _Value:
+    """A value in the record, as Python's own number or as a view of an array."""
+
+    def __init__(self, record: Any, member: Member) -> None:
+        self._record, self._member = record, member
+
+    def get(self) -> Any:
+        value = self._record[self._member.name]
+        if self._member.type.shape:
+            return value
+        plain = value.item()
+        enumeration = self._member.type.enumeration
+        return enumeration(plain) if enumeration else plain
+
+    def set(self, value: Any) -> None:
+        member = self._member
+        new = np.asarray(value)
+        if new.shape not in (member.type.shape, ()):
+            raise ValueError(f"{member.name} has shape {member.type.shape}, not {new.shape}")
+        scalar = member.type.scalar
+        if (new.dtype.kind == "f" and scalar.kind != "f") or (
+            (new.dtype.kind == "b") != (scalar.kind == "b")
+        ):
+            raise TypeError(f"{member.name} is {scalar.name}, not {new.dtype.name}")
+        if new.dtype.kind == "O":
+            raise OverflowError(f"{member.name} is {scalar.name}: {value} does not fit")
+        self._record[member.name] = new
+
+
+class InputPort:
+    """An input as the interpreter sees it."""
+
+    def __init__(self, record: Any, member: Member) -> None:
+        self._value, self._record, self._name = _Value(record, member), record, member.name
+
+    @property
+    def value(self) -> Any:
+        """Return the newest value; zero before there was one."""
+        return self._value.get()
+
+    @property
+    def new(self) -> bool:
+        """Tell whether it was written since this component's last update."""
+        return bool(self._record[f"{self._name}__new"])
+
+    @property
+    def valid(self) -> bool:
+        """Tell whether there is a value at all."""
+        return bool(self._record[f"{self._name}__valid"])
+
+    @property
+    def connected(self) -> bool:
+        """Tell whether something feeds it."""
+        return bool(self._record[f"{self._name}__connected"])
+
+    @property
+    def age(self) -> int:
+        """Return how long ago it was written, ns; -1 without a value."""
+        return int(self._record[f"{self._name}__age"])
+
+    def put(self, value: Any) -> None:
+        """For tests: write it as another component would."""
+        self._value.set(value)
+        self._record[f"{self._name}__new"] = self._record[f"{self._name}__valid"] = True
+        self._record[f"{self._name}__connected"] = True
+        self._record[f"{self._name}__age"] = 0
+
+
+class OutputPort:
+    """An output as the interpreter sees it."""
+
+    def __init__(self, record: Any, member: Member) -> None:
+        self._value, self._record, self._name = _Value(record, member), record, member.name
+
+    def write(self, value: Any) -> None:
+        """Write a value; it is seen when the hook has ended."""
+        self._value.set(value)
+        self._record[f"{self._name}__written"] = True
+
+    @property
+    def value(self) -> Any:
+        """Return the value that was written last."""
+        return self._value.get()
+
+    @property
+    def written(self) -> bool:
+        """For tests: tell whether it was written in this cycle."""
+        return bool(self._record[f"{self._name}__written"])
+
+
+class _Attribute(MemberAttribute):
+    """A member of a component by its name."""
+
+    def __init__(self, member: Member) -> None:
+        self._member = member
+
+    def __get__(self, component: Any, owner: type) -> Any:
+        if component is None:
+            return self
+        if self._member.kind is Input:
+            return InputPort(component._record, self._member)
+        if self._member.kind is Output:
+            return OutputPort(component._record, self._member)
+        return _Value(component._record, self._member).get()
+
+    def __set__(self, component: Any, value: Any) -> None:
+        if self._member.kind is State:
+            _Value(component._record, self._member).set(value)
+        elif self._member.kind is Parameter:
+            raise AttributeError(f"{self._member.name} is a parameter: it is set from outside")
+        else:
+            raise AttributeError(f"{self._member.name} is a port: use .write(…)")
+
+
+class Component:
+    """Base class of components in Python."""
+
+    _record: Any
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Keep what was declared beside the names that instances use."""
+        super().__init_subclass__(**options)
+        for name in list(vars(cls).get("__annotations__", {})):
+            if name in vars(cls):
+                setattr(cls, f"_declared_{name}", vars(cls)[name])
+                delattr(cls, name)
+
+    def __init__(self, **parameters: Any) -> None:
+        """Make one in the interpreter, with parameters that differ from their defaults."""
+        description: Description = describe(type(self))
+        for name, member in description.members.items():
+            setattr(type(self), name, _Attribute(member))
+        record = np.zeros((), description.record)
+        for member in description.members.values():
+            record[member.name] = member.initial
+        for name in parameters:
+            if name not in {member.name for member in description.of(Parameter)}:
+                raise TypeError(f"{type(self).__name__} has no parameter {name!r}")
+            _Value(record, description.members[name]).set(parameters[name])
+        record["_period"], record["_dt"], record["_frequency"] = 1_000_000, 1e-3, 1e3
+        object.__setattr__(self, "_record", record)
+        object.__setattr__(self, "log", [])
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Refuse what is not declared."""
+        if not isinstance(getattr(type(self), name, None), _Attribute):
+            raise AttributeError(
+                f"{name} is not declared: write `{name}: State[float]` in class "
+                f"{type(self).__name__}"
+            )
+        object.__setattr__(self, name, value)
+
+    def start(self) -> None:
+        """Prepare for the loop to run; not in the real-time thread."""
+
+    def update(self) -> None:
+        """Compute one cycle; in the real-time thread."""
+        raise NotImplementedError
+
+    def safe(self) -> None:
+        """Write safe commands, in the component's last cycle; in the real-time thread."""
+
+    def fault(self, text: str) -> None:
+        """End this component's part in the loop, and say why."""
+        raise Fault(text)
+
+    def cycle(self) -> None:
+        """For tests: run one cycle, and let time go on."""
+        record = self._record
+        for name in record.dtype.names:
+            if name.endswith("__written"):
+                record[name] = False
+        self.update()
+        record["_iteration"] += 1
+        record["_time"] += record["_period"]
+        for name in record.dtype.names:
+            if name.endswith("__new"):
+                record[name] = False
+
+
+def _time(name: str) -> property:
+    return property(lambda self: self._record[f"_{name}"].item(), doc=f"The loop's {name}.")
+
+
+def _log(level: str) -> Any:
+    def log(self: Any, text: str, *values: Any) -> None:
+        plain = [each.value if isinstance(each, enum.Enum) else each for each in values]
+        self.log.append((level, text.format(*plain)))
+
+    log.__doc__ = f"Log at level {level}; the text is made outside the real-time thread."
+    return log
+
+
+for _each in TIME_FIELDS:
+    setattr(Component, _each, _time(_each))
+for _each in LOG_LEVELS:
+    setattr(Component, _each, _log(_each))

@@ -1,0 +1,98 @@
+"""What a port, a parameter or a state carries: a number, a bool, an enum, or an array of these."""
+
+import enum
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+class DeclarationError(Exception):
+    """A declaration that cannot be; its text says what to write."""
+
+
+_PYTHON = {float: np.float64, int: np.int64, bool: np.bool_}
+_CPP = {
+    "bool": "bool",
+    "int8": "std::int8_t",
+    "int16": "std::int16_t",
+    "int32": "std::int32_t",
+    "int64": "std::int64_t",
+    "uint8": "std::uint8_t",
+    "uint16": "std::uint16_t",
+    "uint32": "std::uint32_t",
+    "uint64": "std::uint64_t",
+    "float32": "float",
+    "float64": "double",
+}
+_LARGEST = 4096  # elements; as many doubles are 32 KiB
+
+
+@dataclass(frozen=True)
+class ValueType:
+    """A scalar of NumPy, by what C++ calls it, and a shape; () is a single value."""
+
+    scalar: np.dtype[Any]
+    shape: tuple[int, ...] = ()
+    enumeration: type[enum.IntEnum] | None = None
+
+    @property
+    def cpp(self) -> str:
+        """Return the C++ type of one element."""
+        return _CPP[self.scalar.name]
+
+    @property
+    def is_float(self) -> bool:
+        """Tell whether elements are floating-point numbers."""
+        return self.scalar.kind == "f"
+
+    @property
+    def is_bool(self) -> bool:
+        """Tell whether elements are bools."""
+        return self.scalar.kind == "b"
+
+    @property
+    def count(self) -> int:
+        """Return the number of elements."""
+        return int(np.prod(self.shape, dtype=np.int64))
+
+    def __str__(self) -> str:
+        """Return it as a declaration has it."""
+        name = self.enumeration.__name__ if self.enumeration else self.scalar.name
+        return ", ".join([name, *map(str, self.shape)])
+
+
+def value_type(declared: Any) -> ValueType:
+    """Return the type of `X` in `Input[X]`, where X is `type` or `type, size, …`."""
+    element, *sizes = declared if isinstance(declared, tuple) else (declared,)
+    if len(sizes) == 1 and isinstance(sizes[0], tuple):
+        sizes = list(sizes[0])
+    for size in sizes:
+        if not isinstance(size, int) or isinstance(size, bool) or size < 1:
+            raise DeclarationError(f"a size is a whole number above 0, not {size!r}")
+    if len(sizes) > 2:
+        raise DeclarationError(f"{len(sizes)} dimensions: an array has one or two")
+    if isinstance(element, type) and issubclass(element, enum.IntEnum):
+        if sizes:
+            raise DeclarationError("an array of enums: declare an array of np.int64")
+        return ValueType(np.dtype(np.int64), (), element)
+    if isinstance(element, type) and issubclass(element, enum.Enum):
+        raise DeclarationError(f"enum {element.__name__}: derive it from enum.IntEnum")
+    result = ValueType(_scalar(element), tuple(sizes))
+    if result.count > _LARGEST:
+        raise DeclarationError(f"{result.count} elements: an array has at most {_LARGEST}")
+    return result
+
+
+def _scalar(element: Any) -> np.dtype[Any]:
+    if isinstance(element, type):
+        element = _PYTHON.get(element, element)
+        if issubclass(element, np.generic) and np.dtype(element).name in _CPP:
+            return np.dtype(element)
+    if element in (list, np.ndarray):
+        raise DeclarationError("an array says its elements and its size: np.float64, 3")
+    name = getattr(element, "__name__", repr(element))
+    raise DeclarationError(
+        f"{name} is no type of a value: use float, int, bool, an enum.IntEnum, or a NumPy type "
+        "with a size, as np.float64, 3"
+    )

@@ -1,0 +1,1 @@
+"""Compiles components written in Python into ordinary libraries of components."""

@@ -1,0 +1,231 @@
+"""What a hook and the functions that it calls may not contain, seen from their trees alone."""
+
+import ast
+import math
+from collections.abc import Iterator
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from rtcf_compile.mistake import Mistake, at
+from rtcf_compile.source import Source
+
+_REFUSED: dict[type[ast.AST], tuple[str, str]] = {
+    ast.List: ("a list allocates", "use np.array((…)), or an array of State"),
+    ast.ListComp: ("a list allocates", "use a loop that fills an array"),
+    ast.Dict: ("a dict allocates", "use an enum.IntEnum and `if`, or an array by number"),
+    ast.DictComp: ("a dict allocates", "use an array by number"),
+    ast.Set: ("a set allocates", "compare one by one: x == 1 or x == 2"),
+    ast.SetComp: ("a set allocates", "use a loop"),
+    ast.GeneratorExp: ("a generator is no machine code", "use a loop"),
+    ast.Yield: ("a generator is no machine code", "keep what goes on in a State"),
+    ast.YieldFrom: ("a generator is no machine code", "keep what goes on in a State"),
+    ast.Await: ("the cycle waits for nothing", "keep what is awaited in a State and look again"),
+    ast.AsyncFunctionDef: ("the cycle waits for nothing", "use `def`"),
+    ast.JoinedStr: ("text is not made in the cycle", 'log with arguments: self.info("x {}", x)'),
+    ast.Global: ("a global variable would be shared by all instances", "declare a State"),
+    ast.Nonlocal: ("a variable of another function", "declare a State, or return the value"),
+    ast.Try: ("nothing is caught in the cycle", "test for it with `if` before it happens"),
+    ast.With: ("there is nothing to open or lock in the cycle", "do it without `with`"),
+    ast.Import: ("an import is no machine code", "import at the head of the file"),
+    ast.ImportFrom: ("an import is no machine code", "import at the head of the file"),
+    ast.Lambda: ("a lambda is not compiled", "define a function in the module"),
+    ast.FunctionDef: ("a function in a function", "define it in the module"),
+    ast.ClassDef: ("a class in a hook", "define it in the module"),
+    ast.Delete: ("nothing is deleted in the cycle", "set it to 0, or leave it"),
+    ast.Match: ("match is not compiled", "use if and elif"),
+    ast.Starred: ("a * takes apart what has no fixed size", "write the elements"),
+}
+_BUILTINS: dict[str, tuple[str, str]] = {
+    "print": ("printing calls the system", 'log: self.info("x {}", x)'),
+    "open": ("a file is opened by the system", "read it in the module, when it is compiled"),
+    "input": ("waits for a person", "use an Input or a Parameter"),
+    "str": ("text is not made in the cycle", 'log with arguments: self.info("x {}", x)'),
+    "repr": ("text is not made in the cycle", 'log with arguments: self.info("x {}", x)'),
+    "format": ("text is not made in the cycle", 'log with arguments: self.info("x {}", x)'),
+    "list": ("a list allocates", "use an array"),
+    "dict": ("a dict allocates", "use an array by number"),
+    "set": ("a set allocates", "use an array of bools"),
+    "sorted": ("a list allocates", "use np.sort on an array"),
+    "map": ("a generator is no machine code", "use a loop"),
+    "filter": ("a generator is no machine code", "use a loop with `if`"),
+    "getattr": ("names are fixed when compiled", "write self.name"),
+    "setattr": ("names are fixed when compiled", "write self.name = …"),
+    "hasattr": ("names are fixed when compiled", "declare it"),
+    "isinstance": ("types are fixed when compiled", "declare ports of that type"),
+    "eval": ("no Python runs in the cycle", "write the expression"),
+    "exec": ("no Python runs in the cycle", "write the statements"),
+    "super": ("is not compiled", "call the base's method by another name"),
+}
+_GROWS = {
+    "append": "use an array of State and a count",
+    "concatenate": "fill an array of the whole size by slices",
+    "hstack": "fill an array of the whole size by slices",
+    "vstack": "fill an array of the whole size by slices",
+    "insert": "use an array of State and a count",
+    "delete": "use an array of State and a count",
+    "resize": "declare the largest size",
+}
+_METHODS = {
+    "append": ("grows", "use an array of State and a count"),
+    "extend": ("grows", "use an array of State and a count"),
+    "insert": ("grows", "use an array of State and a count"),
+    "pop": ("shrinks", "use an array of State and a count"),
+    "format": ("text is not made in the cycle", 'log with arguments: self.info("x {}", x)'),
+    "tolist": ("a list allocates", "use the array"),
+}
+_MODULES = {
+    "time": ("reads another clock than the loop's", "use self.time, self.dt or .age"),
+    "datetime": ("reads another clock than the loop's", "use self.stamp"),
+    "random": (
+        "draws other numbers in a replay",
+        "compute them from a seed in a State",
+    ),
+    "os": ("calls the system", "do it in the module, when it is compiled"),
+    "sys": ("is the interpreter's", "there is none in the cycle"),
+    "threading": ("the cycle has one thread", "keep it in a State"),
+    "asyncio": ("the cycle waits for nothing", "keep it in a State"),
+    "socket": ("calls the system", "use an Input or Output; a device is for C++"),
+    "subprocess": ("calls the system", "do it outside the loop"),
+    "logging": ("formats and writes", 'log by self.info("x {}", x)'),
+    "rospy": ("is not real-time", "use an Input or Output: ROS is connected to ports"),
+}
+_LARGEST, _SMALLEST = 2**63 - 1, -(2**63)
+
+
+def check(source: Source) -> None:
+    """Raise the first Mistake of a function."""
+    tree, file = source.tree, source.file
+    if tree.decorator_list:
+        raise at(file, tree.decorator_list[0], "a decorator is not compiled", "call the function")
+    arguments = tree.args
+    if arguments.vararg or arguments.kwarg:
+        raise Mistake(file, tree.lineno, f"{tree.name} takes any number of arguments", "name them")
+    known = _names(source)
+    for node in _walk(tree):
+        if type(node) in _REFUSED:
+            raise at(file, node, *_REFUSED[type(node)])
+        if isinstance(node, ast.Constant):
+            _constant(node, file)
+        if isinstance(node, ast.BinOp | ast.UnaryOp):
+            _folded(node, file)
+        if isinstance(node, ast.Call):
+            _call(node, source)
+        if isinstance(node, ast.Attribute):
+            _module(node, source)
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and node.id not in known:
+            raise at(file, node, f"{node.id} is not defined", "declare it, or mend its name")
+        if isinstance(node, ast.While) and _endless(node):
+            raise at(file, node.test, "a loop without end", "bound it: for _ in range(…)")
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod) and _is_text(node.left):
+            raise at(file, node, *_REFUSED[ast.JoinedStr])
+
+
+def resolve(node: ast.AST, source: Source) -> Any:
+    """Return what a dotted name stands for in the module, or None."""
+    if isinstance(node, ast.Name):
+        scope = source.function.__globals__
+        if node.id in scope:
+            return scope[node.id]
+        builtins = scope.get("__builtins__", {})
+        builtins = vars(builtins) if isinstance(builtins, ModuleType) else builtins
+        return builtins.get(node.id)
+    if isinstance(node, ast.Attribute):
+        owner = resolve(node.value, source)
+        return getattr(owner, node.attr, None) if owner is not None else None
+    return None
+
+
+def _walk(tree: ast.FunctionDef) -> Iterator[ast.AST]:
+    """Yield the nodes of a body in order of the source; not annotations and docstrings."""
+    body = tree.body
+    if isinstance(body[0], ast.Expr) and _is_text(body[0].value):
+        body = body[1:]
+    waiting: list[ast.AST] = list(reversed(body))
+    while waiting:
+        node = waiting.pop()
+        yield node
+        children = list(ast.iter_child_nodes(node))
+        if isinstance(node, ast.AnnAssign):
+            children = [each for each in (node.target, node.value) if each is not None]
+        waiting.extend(reversed(children))
+
+
+def _names(source: Source) -> set[str]:
+    function = source.function
+    code = function.__code__
+    builtins = function.__globals__.get("__builtins__", {})
+    known = vars(builtins) if isinstance(builtins, ModuleType) else builtins
+    return {*code.co_varnames, *code.co_cellvars, *function.__globals__, *known}
+
+
+def _constant(node: ast.Constant, file: str) -> None:
+    value = node.value
+    if isinstance(value, int) and not isinstance(value, bool):
+        if not _SMALLEST <= value <= _LARGEST:
+            raise at(
+                file, node, "does not fit int64", "write it as a float, or keep it below 2**63"
+            )
+    elif isinstance(value, complex):
+        raise at(file, node, "a complex number", "use two floats")
+    elif isinstance(value, bytes):
+        raise at(file, node, "bytes are not compiled", "use an array of np.uint8")
+
+
+def _folded(node: ast.BinOp | ast.UnaryOp, file: str) -> None:
+    """Refuse arithmetic of literals that ends beyond int64, as 2**63."""
+    parts = list(ast.walk(node))
+    arithmetic = (ast.BinOp, ast.UnaryOp, ast.Constant, ast.operator, ast.unaryop)
+    if not all(isinstance(each, arithmetic) for each in parts):
+        return
+    numbers: list[Any] = [each.value for each in parts if isinstance(each, ast.Constant)]
+    if not all(type(each) is int and abs(each) < 2**64 for each in numbers):
+        return
+    powers = [each for each in parts if isinstance(each, ast.Pow)]
+    if len(powers) > 1 or (powers and max(numbers) > 1000 and len(numbers) > 1):
+        value: Any = math.inf if powers and all(abs(each) > 1 for each in numbers) else 0
+    else:
+        try:
+            value = eval(compile(ast.Expression(node), file, "eval"))
+        except (ArithmeticError, ValueError, TypeError):
+            return
+    if isinstance(value, int | float) and not _SMALLEST <= value <= _LARGEST:
+        raise at(file, node, "does not fit int64", "write it as a float, or keep it below 2**63")
+
+
+def _call(node: ast.Call, source: Source) -> None:
+    file, called = source.file, node.func
+    own = source.function.__globals__
+    if isinstance(called, ast.Name) and called.id in _BUILTINS and called.id not in own:
+        raise at(file, node, *_BUILTINS[called.id])
+    target = resolve(called, source)
+    name = getattr(target, "__name__", "")
+    if target is not None and getattr(np, name, None) is target and name in _GROWS:
+        raise at(file, node, f"np.{name} makes an array that grows", _GROWS[name])
+    if isinstance(called, ast.Attribute) and target is None and called.attr in _METHODS:
+        raise at(file, node, *_METHODS[called.attr])
+    if any(keyword.arg is None for keyword in node.keywords):
+        raise at(file, node, "** takes a dict apart", "write the arguments")
+
+
+def _module(node: ast.Attribute, source: Source) -> None:
+    owner = resolve(node.value, source)
+    if not isinstance(owner, ModuleType):
+        return
+    name = owner.__name__.partition(".")[0]
+    if owner.__name__.startswith("numpy.random"):
+        name = "random"
+    if name in _MODULES:
+        raise at(source.file, node, *_MODULES[name])
+    if owner in (np, math) and not hasattr(owner, node.attr):
+        raise at(source.file, node, f"{owner.__name__} has no {node.attr}", "mend the name")
+
+
+def _endless(node: ast.While) -> bool:
+    constant = isinstance(node.test, ast.Constant) and bool(node.test.value)
+    return constant and not any(isinstance(each, ast.Break | ast.Return) for each in ast.walk(node))
+
+
+def _is_text(node: ast.AST) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, str)

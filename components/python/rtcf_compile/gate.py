@@ -1,0 +1,96 @@
+"""The gate: compiled code may refer to mathematics, to moving memory, and to the shim's log calls.
+
+Whatever else it would need at run time is refused, with the line that it comes from.
+"""
+
+from typing import Any
+
+from rtcf_compile.mistake import Mistake
+
+_MATHEMATICS = [
+    "acos",
+    "acosh",
+    "asin",
+    "asinh",
+    "atan",
+    "atan2",
+    "atanh",
+    "cbrt",
+    "ceil",
+    "copysign",
+    "cos",
+    "cosh",
+    "erf",
+    "erfc",
+    "exp",
+    "exp2",
+    "expm1",
+    "fabs",
+    "floor",
+    "fma",
+    "fmax",
+    "fmin",
+    "fmod",
+    "hypot",
+    "ldexp",
+    "lgamma",
+    "log",
+    "log10",
+    "log1p",
+    "log2",
+    "nearbyint",
+    "nextafter",
+    "pow",
+    "remainder",
+    "rint",
+    "round",
+    "sin",
+    "sincos",
+    "sinh",
+    "sqrt",
+    "tan",
+    "tanh",
+    "tgamma",
+    "trunc",
+]
+ALLOWED = {
+    *_MATHEMATICS,
+    *(f"{name}f" for name in _MATHEMATICS),
+    *("memcpy", "memmove", "memset", "bcmp", "memcmp"),
+}
+_MEANING = {
+    "numba_gil_ensure": "the interpreter",
+    "NRT_": "memory that grows",
+    "numba_xx": "BLAS",
+    "numba_ez": "LAPACK",
+    "numba_raw": "LAPACK",
+    "numba_": "numba's run time",
+    "Py": "the interpreter",
+    "_Py": "the interpreter",
+    "printf": "printing",
+    "puts": "printing",
+}
+
+
+def check(module: Any, compiled: Any, hooks: Any) -> None:
+    """Raise Mistake if a module refers to what it must not."""
+    for function in module.functions:
+        name = function.name
+        if not function.is_declaration or name.startswith("llvm."):
+            continue
+        if name in ALLOWED or name.startswith(f"rtcf_log_{compiled.description.name}_"):
+            continue
+        if not _is_called(module, name):
+            continue
+        what = next((each for begin, each in _MEANING.items() if name.startswith(begin)), name)
+        raise Mistake(
+            compiled.file,
+            0,
+            f"{compiled.description.name}.{'/'.join(hooks)} would need {what} ({name})",
+            "use arithmetic, NumPy on small arrays",
+        )
+
+
+def _is_called(module: Any, name: str) -> bool:
+    text = str(module)
+    return text.count(f"@{name}(") + text.count(f'@"{name}"(') > 1

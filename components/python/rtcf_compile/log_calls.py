@@ -1,0 +1,67 @@
+"""A log call in compiled code: a call of a C function of the shim, arguments as they are."""
+
+from typing import Any
+
+import llvmlite.binding as llvm
+from llvmlite import ir
+from numba import types
+from numba.core.errors import TypingError
+from numba.extending import intrinsic
+
+from rtcf_compile.logs import Logs
+
+_CPP = {types.boolean: "bool", types.int64: "std::int64_t", types.float64: "double"}
+_PRESENT: list[Logs] = []
+
+
+def logs_are(logs: Logs) -> None:
+    """Say whose calls are compiled from here on."""
+    _PRESENT[:] = [logs]
+
+
+def log_call(number: int, count: int) -> Any:
+    """Return the function that stands for a call with that many arguments."""
+    names = [f"argument_{i}" for i in range(count)]
+    scope: dict[str, Any] = {"call": lambda *found: _typed(number, found)}
+    exec(
+        f"def rtcf_log(typing, {', '.join(['component', *names])}):\n"
+        f"    return call({', '.join(['component', *names])})\n",
+        scope,
+    )
+    return intrinsic(scope["rtcf_log"])
+
+
+def _typed(number: int, given: tuple[Any, ...]) -> tuple[Any, Any]:
+    logs = _PRESENT[0]
+    passed = []
+    for each in given[1:]:
+        if isinstance(each, types.Boolean):
+            passed.append(types.boolean)
+        elif isinstance(each, types.Integer):
+            passed.append(types.int64)
+        elif isinstance(each, types.Float):
+            passed.append(types.float64)
+        else:
+            raise TypingError(
+                "RTCF:a log call stores numbers and bools, no arrays:log elements one by one"
+            )
+    logs.calls[number].types = [_CPP[each] for each in passed]
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        values = [arguments[0]]
+        for value, found, wanted in zip(arguments[1:], given[1:], passed, strict=True):
+            cast = context.cast(builder, value, found, wanted)
+            if wanted is types.boolean:
+                cast = builder.zext(cast, ir.IntType(8))
+            values.append(cast)
+        function = ir.FunctionType(ir.VoidType(), [each.type for each in values])
+        name = logs.symbol(number)
+        # numba wants an address as it makes its own copy ready, which nobody calls.
+        llvm.add_symbol(name, 1)
+        declared = builder.module.globals.get(name)
+        if declared is None:
+            declared = ir.Function(builder.module, function, name)
+        builder.call(declared, values)
+        return context.get_dummy_value()
+
+    return types.none(types.int64, *given[1:]), generate

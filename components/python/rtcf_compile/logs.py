@@ -1,0 +1,53 @@
+"""Log calls of a component: the text and the types of the arguments that each stores."""
+
+import ast
+from dataclasses import dataclass, field
+
+from rtcf_compile.mistake import at
+from rtcf_compile.source import Source
+
+
+@dataclass
+class LogCall:
+    """One call in the source."""
+
+    level: str
+    text: str
+    file: str
+    line: int
+    function: str
+    count: int
+    types: list[str] = field(default_factory=list)  # of C++; known when it has been compiled
+
+
+class Logs:
+    """All log calls of a component class, by number."""
+
+    def __init__(self, component: str) -> None:
+        """Those of a class of that name."""
+        self.component = component
+        self.calls: list[LogCall] = []
+
+    def add(self, level: str, node: ast.Call, source: Source) -> int:
+        """Note a call; return its number."""
+        text = node.args[0] if node.args else None
+        if not isinstance(text, ast.Constant) or not isinstance(text.value, str):
+            raise at(
+                source.file,
+                node,
+                "a log call has a constant text",
+                f'self.{level}("x {{}}", x)',
+            )
+        if node.keywords:
+            raise at(source.file, node, "a log call has no named arguments", "give them in order")
+        count = len(node.args) - 1
+        if count > 8:
+            raise at(source.file, node, "has more than 8 arguments", "write two calls")
+        self.calls.append(
+            LogCall(level, text.value, source.file, node.lineno, source.tree.name, count)
+        )
+        return len(self.calls) - 1
+
+    def symbol(self, number: int) -> str:
+        """Return the name of the C function that a call becomes."""
+        return f"rtcf_log_{self.component}_{number}"

@@ -1,0 +1,163 @@
+"""From rewritten functions to an object file, by numba and LLVM.
+
+Of what numba makes the inner functions are kept, linked with the arena, made one piece, and
+emitted for any processor of the architecture: neither the interpreter nor numba's run time is
+left.
+"""
+
+import os
+import re
+import warnings
+from dataclasses import dataclass, field
+from types import FunctionType
+from typing import Any
+
+# Read when numba is imported: code for this machine alone would not run on the robot's.
+os.environ["NUMBA_CPU_NAME"] = "generic"
+os.environ["NUMBA_CPU_FEATURES"] = ""
+
+import llvmlite.binding as llvm
+import numba
+from numba.core import errors
+from rtcf.component import Component, describe
+from rtcf.component.declaration import Description
+
+import rtcf_compile.overloads  # noqa: F401, registers them
+from rtcf_compile import arena, explain, gate, log_calls, trial
+from rtcf_compile.functions import Functions
+from rtcf_compile.logs import Logs
+from rtcf_compile.raises import Raise, raises_in
+
+warnings.filterwarnings("ignore", category=errors.NumbaWarning)
+llvm.initialize()
+llvm.initialize_native_target()
+llvm.initialize_native_asmprinter()
+
+_NRT_COUNTS = re.compile(
+    r"^define [^\n]*@NRT_(?:incref|decref)\([^\n]*\{\n.*?^\}\n"
+    r"|^declare [^\n]*@NRT_(?:incref|decref)\([^\n]*\n",
+    re.M | re.S,
+)
+_OPTIONS = {"boundscheck": True, "error_model": "python"}
+# What runs in the real-time thread, and beside it: each has an arena of its own.
+_THREADS = (("update", "safe"), ("start",))
+ARENA = 64 * 1024
+
+
+@dataclass
+class Compiled:
+    """A component class as machine code."""
+
+    description: Description
+    file: str
+    objects: list[bytes]
+    hooks: list[str]
+    logs: Logs
+    used: set[str]
+    lines: set[int]
+    raises: dict[int, Raise] = field(default_factory=dict)
+
+    def symbol(self, hook: str) -> str:
+        """Return the name of a hook's C function."""
+        return f"rtcf_{self.description.name}_{hook}"
+
+
+def compile_component(cls: type[Component], arena_bytes: int = ARENA) -> Compiled:
+    """Compile a class; raise Mistake."""
+    description = describe(cls)
+    functions = Functions(cls, description, _compiler)
+    hooks = functions.hooks()
+    log_calls.logs_are(functions.logs)
+    record = numba.from_dtype(description.record)
+    result = Compiled(
+        description,
+        functions.file(),
+        [],
+        list(hooks),
+        functions.logs,
+        functions.used,
+        functions.lines,
+    )
+    for thread in _THREADS:
+        inner = {hook: _inner(hooks[hook], record) for hook in thread if hook in hooks}
+        if inner:
+            module = _linked(result, inner, arena_bytes)
+            result.raises |= raises_in(str(module), functions.file())
+            gate.check(module, result, inner)
+            result.objects.append(_machine().emit_object(module))
+    trial.run(cls, functions.file())
+    return result
+
+
+def _compiler(function: FunctionType) -> Any:
+    return numba.njit(**_OPTIONS)(function)
+
+
+def _inner(function: FunctionType, record: Any) -> tuple[str, str]:
+    """Return the name of the inner function and the assembly that has it."""
+    dispatcher = _compiler(function)
+    try:
+        dispatcher.compile((record,))
+    except errors.NumbaError as error:
+        raise explain.mistake(error, function) from None
+    result = next(iter(dispatcher.overloads.values()))
+    return result.fndesc.mangled_name, result.library.get_llvm_str()
+
+
+def _linked(compiled: Compiled, inner: dict[str, tuple[str, str]], arena_bytes: int) -> Any:
+    """Return one module with the entries of these hooks, and nothing that they do not need."""
+    parts, base = [], arena.assembly(arena_bytes)
+    for hook, (name, text) in inner.items():
+        # Ours take their place; numba's count by locked instructions.
+        text = _NRT_COUNTS.sub("", text) + "declare void @NRT_incref(i8*)\n"
+        text += "declare void @NRT_decref(i8*)\n"
+        found = re.search(
+            rf"^define [^\n]*@{re.escape(name)}\(i8\*\*[^,]*, (\{{[^}}]*\}})\*\*[^,]*, "
+            r"(\[[^\]]*\]\*)",
+            text,
+            re.M,
+        )
+        if found is None:
+            raise RuntimeError(f"numba {numba.__version__}: functions have a form not known here")
+        base += arena.entry(compiled.symbol(hook), name, found[2], found[1])
+        part = llvm.parse_assembly(text)
+        _keep(part, {name})
+        parts.append(part)
+    module = llvm.parse_assembly(base)
+    for part in parts:
+        module.link_in(part)
+    _keep(module, {compiled.symbol(hook) for hook in inner})
+    _optimise(module)
+    module.verify()
+    return module
+
+
+def _keep(module: Any, names: set[str]) -> None:
+    """Drop what those functions do not need."""
+    for function in module.functions:
+        if not function.is_declaration:
+            function.linkage = "external" if function.name in names else "internal"
+    passes = llvm.ModulePassManager()
+    passes.add_global_dce_pass()
+    passes.run(module)
+
+
+def _optimise(module: Any) -> None:
+    passes = llvm.ModulePassManager()
+    builder = llvm.PassManagerBuilder()
+    builder.opt_level = 3
+    builder.loop_vectorize = True
+    builder.slp_vectorize = True
+    builder.inlining_threshold = 1000
+    machine = _machine()  # the passes refer to it
+    machine.add_analysis_passes(passes)
+    builder.populate(passes)
+    passes.run(module)
+    passes = llvm.ModulePassManager()
+    passes.add_global_dce_pass()
+    passes.run(module)
+
+
+def _machine() -> Any:
+    target = llvm.Target.from_default_triple()
+    return target.create_target_machine(cpu="generic", opt=3, reloc="pic", codemodel="default")

@@ -1,0 +1,54 @@
+"""`rtcf-compile`: a library of components of Python sources."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+DONE, REFUSED, USAGE = range(3)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit code."""
+    parser = argparse.ArgumentParser(
+        prog="rtcf-compile",
+        description="Makes a library of components of Python sources; it needs no Python to run.",
+        epilog="Exit codes: 0 done, 1 refused, 2 usage.",
+    )
+    parser.add_argument("sources", metavar="SOURCE", nargs="+", type=Path)
+    parser.add_argument("-o", dest="output", metavar="LIB", type=Path, help="the library to write")
+    args = parser.parse_args(arguments)
+    if args.output is None:
+        parser.error("say what to do with it: -o LIB")
+    from rtcf.component import DeclarationError
+
+    from rtcf_compile.mistake import Mistake
+
+    try:
+        classes = _classes(args.sources)
+        # numba takes a second to import: only for what is well up to here.
+        from rtcf_compile import build, lowering
+
+        build.library([lowering.compile_component(each) for each in classes], args.output)
+    except (Mistake, DeclarationError) as error:
+        print(f"rtcf-compile: {' '.join(str(error).split())}", file=sys.stderr)
+        return REFUSED
+    return DONE
+
+
+def _classes(files: list[Path]) -> list[type]:
+    from rtcf_compile import source
+    from rtcf_compile.mistake import Mistake
+
+    found: dict[str, type] = {}
+    for file in files:
+        here = source.components(source.load(file))
+        if not here:
+            raise Mistake(
+                str(file), 0, "has no component", "class Name(Component): with `def update(self):`"
+            )
+        for each in here:
+            if each.__name__ in found:
+                raise Mistake(str(file), 0, f"{each.__name__} is there twice", "rename one")
+            found[each.__name__] = each
+    return list(found.values())

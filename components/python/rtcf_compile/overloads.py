@@ -1,0 +1,266 @@
+"""The helpers as numba compiles them. Imported only where something is compiled."""
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import types
+from numba.core.errors import TypingError
+from numba.extending import overload
+
+from rtcf_compile import helpers
+
+# numba takes an overload apart by its parameters' names and reads its returned function as source.
+_OPTIONS = {"boundscheck": False, "error_model": "numpy"}
+
+
+def _compiled_as(helper: Callable[..., Any]) -> Callable[[Callable[..., Any]], None]:
+    """Register what chooses a helper's implementation by types; numba wants no annotations."""
+
+    def register(choose: Callable[..., Any]) -> None:
+        choose.__annotations__ = {}
+
+        @functools.wraps(choose)
+        def plain(*types_of: Any, **named: Any) -> Any:
+            implementation = choose(*types_of, **named)
+            implementation.__annotations__ = {}
+            return implementation
+
+        overload(helper, jit_options=_OPTIONS)(plain)
+
+    return register
+
+
+@_compiled_as(helpers.rtcf_float)
+def _float(value: Any) -> Any:
+    if isinstance(value, types.Float | types.Integer):
+        return lambda value: float(value)
+    raise TypingError(f"RTCF:a number is set to {_words(value)}:give it a float")
+
+
+@_compiled_as(helpers.rtcf_int)
+def _int(value: Any) -> Any:
+    if isinstance(value, types.Integer):
+        return lambda value: value
+    raise TypingError(f"RTCF:a whole number is set to {_words(value)}:round it by int(…)")
+
+
+@_compiled_as(helpers.rtcf_bool)
+def _bool(value: Any) -> Any:
+    if isinstance(value, types.Boolean):
+        return lambda value: value
+    raise TypingError(f"RTCF:a bool is set to {_words(value)}:compare it: x != 0")
+
+
+@_compiled_as(helpers.rtcf_matmul)
+def _matmul(a: Any, b: Any) -> Any:
+    if not isinstance(a, types.Array) or not isinstance(b, types.Array):
+        raise TypingError(f"RTCF:@ of {_words(a)} and {_words(b)}:it takes arrays; use *")
+    if not isinstance(a.dtype, types.Float) and not isinstance(b.dtype, types.Float):
+        raise TypingError(f"RTCF:@ of {_words(a)} and {_words(b)}:one of them must be of floats")
+    if (a.ndim, b.ndim) == (2, 2):
+
+        def matrix(a: Any, b: Any) -> Any:
+            if a.shape[1] != b.shape[0]:
+                raise ValueError("@ of shapes that do not fit")
+            result = np.empty((a.shape[0], b.shape[1]))
+            for i in range(a.shape[0]):
+                for j in range(b.shape[1]):
+                    result[i, j] = 0.0
+                for k in range(a.shape[1]):
+                    factor = a[i, k]
+                    for j in range(b.shape[1]):
+                        result[i, j] += factor * b[k, j]
+            return result
+
+        return matrix
+    if (a.ndim, b.ndim) == (2, 1):
+
+        def times_vector(a: Any, b: Any) -> Any:
+            if a.shape[1] != b.shape[0]:
+                raise ValueError("@ of shapes that do not fit")
+            result = np.empty(a.shape[0])
+            for i in range(a.shape[0]):
+                total = 0.0
+                for k in range(a.shape[1]):
+                    total += a[i, k] * b[k]
+                result[i] = total
+            return result
+
+        return times_vector
+    if (a.ndim, b.ndim) == (1, 2):
+
+        def vector_times(a: Any, b: Any) -> Any:
+            if a.shape[0] != b.shape[0]:
+                raise ValueError("@ of shapes that do not fit")
+            result = np.empty(b.shape[1])
+            for j in range(b.shape[1]):
+                total = 0.0
+                for k in range(a.shape[0]):
+                    total += a[k] * b[k, j]
+                result[j] = total
+            return result
+
+        return vector_times
+
+    def inner(a: Any, b: Any) -> Any:
+        if a.shape[0] != b.shape[0]:
+            raise ValueError("@ of shapes that do not fit")
+        total = 0.0
+        for k in range(a.shape[0]):
+            total += a[k] * b[k]
+        return total
+
+    return inner
+
+
+@_compiled_as(helpers.rtcf_assign)
+def _assign(target: Any, value: Any) -> Any:
+    if not isinstance(target, types.Array):
+        raise TypingError(f"RTCF:{_words(target)} is set as an array:use =")
+    new = value.dtype if isinstance(value, types.Array) else value
+    if isinstance(new, types.Float) and not isinstance(target.dtype, types.Float):
+        raise TypingError(f"RTCF:elements of {target.dtype} are set to {new}:round them first")
+    if isinstance(value, types.Number | types.Boolean):
+        if target.ndim == 1:
+
+            def fill(target: Any, value: Any) -> None:
+                for i in range(target.shape[0]):
+                    target[i] = value
+
+            return fill
+
+        def fill_all(target: Any, value: Any) -> None:
+            for i in range(target.shape[0]):
+                for j in range(target.shape[1]):
+                    target[i, j] = value
+
+        return fill_all
+    if isinstance(value, types.UniTuple | types.Tuple) and target.ndim == 1:
+        return lambda target, value: helpers.rtcf_assign(target, np.array(value))
+    if not isinstance(value, types.Array) or value.ndim != target.ndim:
+        raise TypingError(
+            f"RTCF:{_words(target)} is set to {_words(value)}:it takes an array of its shape"
+        )
+    if target.ndim == 1:
+
+        def vector(target: Any, value: Any) -> None:
+            if target.shape[0] != value.shape[0]:
+                raise ValueError("an array is set to one of another shape")
+            for i in range(target.shape[0]):
+                target[i] = value[i]
+
+        return vector
+
+    def matrix(target: Any, value: Any) -> None:
+        if target.shape[0] != value.shape[0] or target.shape[1] != value.shape[1]:
+            raise ValueError("an array is set to one of another shape")
+        for i in range(target.shape[0]):
+            for j in range(target.shape[1]):
+                target[i, j] = value[i, j]
+
+    return matrix
+
+
+@_compiled_as(helpers.rtcf_solve)
+def _solve(a: Any, b: Any) -> Any:
+    if b.ndim == 1:
+
+        def vector(a: Any, b: Any) -> Any:
+            x = np.empty((b.shape[0], 1))
+            for i in range(b.shape[0]):
+                x[i, 0] = b[i]
+            return _eliminated(a, x)[:, 0].copy()
+
+        return vector
+    return lambda a, b: _eliminated(a, b)
+
+
+def _eliminated(a: Any, b: Any) -> Any:
+    raise NotImplementedError
+
+
+@_compiled_as(_eliminated)
+def _eliminate(a: Any, b: Any) -> Any:
+    def eliminate(a: Any, b: Any) -> Any:
+        n = a.shape[0]
+        if a.shape[1] != n or b.shape[0] != n:
+            raise ValueError("solve of shapes that do not fit")
+        width = b.shape[1]
+        matrix, x = np.empty((n, n)), np.empty((n, width))
+        for i in range(n):
+            for j in range(n):
+                matrix[i, j] = a[i, j]
+            for j in range(width):
+                x[i, j] = b[i, j]
+        for k in range(n):
+            pivot = k
+            for i in range(k + 1, n):
+                if abs(matrix[i, k]) > abs(matrix[pivot, k]):
+                    pivot = i
+            if matrix[pivot, k] == 0.0:
+                raise ValueError("solve: the matrix is singular")
+            if pivot != k:
+                for j in range(n):
+                    matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+                for j in range(width):
+                    x[k, j], x[pivot, j] = x[pivot, j], x[k, j]
+            for i in range(k + 1, n):
+                factor = matrix[i, k] / matrix[k, k]
+                for j in range(k + 1, n):
+                    matrix[i, j] = matrix[i, j] - factor * matrix[k, j]
+                for j in range(width):
+                    x[i, j] = x[i, j] - factor * x[k, j]
+        for i in range(n - 1, -1, -1):
+            for j in range(width):
+                for k in range(i + 1, n):
+                    x[i, j] = x[i, j] - matrix[i, k] * x[k, j]
+                x[i, j] = x[i, j] / matrix[i, i]
+        return x
+
+    return eliminate
+
+
+@_compiled_as(helpers.rtcf_inv)
+def _inv(a: Any) -> Any:
+    return lambda a: _eliminated(a, np.eye(a.shape[0]))
+
+
+@_compiled_as(helpers.rtcf_cholesky)
+def _cholesky(a: Any) -> Any:
+    def cholesky(a: Any) -> Any:
+        n = a.shape[0]
+        if a.shape[1] != n:
+            raise ValueError("cholesky of a matrix that is not square")
+        result = np.zeros((n, n))
+        for i in range(n):
+            for j in range(i + 1):
+                total = a[i, j]
+                for k in range(j):
+                    total = total - result[i, k] * result[j, k]
+                if i != j:
+                    result[i, j] = total / result[j, j]
+                elif total <= 0.0:
+                    raise ValueError("cholesky: the matrix is not positive definite")
+                else:
+                    result[i, i] = np.sqrt(total)
+        return result
+
+    return cholesky
+
+
+def _words(value: Any) -> str:
+    """Return numba's type in the words of NumPy."""
+    if isinstance(value, types.Array):
+        dimensions = "a vector" if value.ndim == 1 else f"an array of {value.ndim} dimensions"
+        return f"{dimensions} of {value.dtype}"
+    if isinstance(value, types.Boolean):
+        return "a bool"
+    if isinstance(value, types.Float):
+        return "a float"
+    if isinstance(value, types.Integer):
+        return "an int"
+    if isinstance(value, types.BaseTuple):
+        return "a tuple"
+    return "None" if isinstance(value, types.NoneType) else str(value)

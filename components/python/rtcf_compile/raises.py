@@ -1,0 +1,59 @@
+"""What compiled code may raise: constants that numba puts into the code, as pickled bytes.
+
+The shim finds by a hash of these bytes what was raised and where; nothing is unpickled there.
+"""
+
+import pickle
+import re
+from dataclasses import dataclass
+
+from rtcf.component import Fault
+
+_CONSTANT = re.compile(
+    r'^@"?\.const\.pickledata\.[\w.]+"? = [^\n]*constant \[\d+ x i8\] c"([^"\n]*)"', re.M
+)
+_WORDS = {
+    "division by zero": "division by zero",
+    "Allocation failed (probably too large).": "temporaries are more than the arena has; "
+    "make fewer of them in a loop",
+}
+
+
+@dataclass(frozen=True)
+class Raise:
+    """One place that raises; line 0: in a function that was called from the hook's line."""
+
+    file: str
+    line: int
+    text: str
+
+
+def raises_in(assembly: str, file: str) -> dict[int, Raise]:
+    """Return what the code of a module may raise, by the hash of its bytes."""
+    found = {}
+    for constant in _CONSTANT.finditer(assembly):
+        data = _bytes(constant[1])
+        try:
+            exception, arguments, place = pickle.loads(data)[:3]
+        except (pickle.UnpicklingError, ValueError, TypeError, EOFError):
+            continue  # numba's own: a hash, an environment
+        text = str(arguments[0]) if arguments else ""
+        text = _WORDS.get(text, text)
+        if exception is not Fault:
+            text = f"{exception.__name__}: {text}" if text else exception.__name__
+        there = place is not None and place[1] == file
+        found[hash_of(data)] = Raise(file, place[2] if there else 0, text)
+    return found
+
+
+def hash_of(data: bytes) -> int:
+    """Return FNV-1a of 64 bits, as the shim computes it."""
+    value = 0xCBF29CE484222325
+    for byte in data:
+        value = (value ^ byte) * 0x100000001B3 & 0xFFFFFFFFFFFFFFFF
+    return value
+
+
+def _bytes(text: str) -> bytes:
+    plain = re.sub(r"\\([0-9A-Fa-f]{2})", lambda found: chr(int(found[1], 16)), text)
+    return plain.encode("latin-1")

@@ -1,0 +1,107 @@
+"""The source of a component: modules are run once, as Python, and their functions read as trees."""
+
+import ast
+import hashlib
+import importlib.util
+import inspect
+import linecache
+import sys
+import textwrap
+from dataclasses import dataclass
+from pathlib import Path
+from types import FunctionType, ModuleType
+from typing import Any
+
+from rtcf.component import Component, DeclarationError
+
+from rtcf_compile.mistake import Mistake
+
+
+@dataclass(frozen=True)
+class Source:
+    """A function of the component's author: its tree, with the line numbers of its file."""
+
+    function: FunctionType
+    tree: ast.FunctionDef
+    file: str
+
+
+def load(file: Path) -> ModuleType:
+    """Run a module as Python does and return it; raise Mistake where that fails."""
+    file = file.resolve()
+    name = f"rtcf_source_{hashlib.sha256(str(file).encode()).hexdigest()[:8]}_{file.stem}"
+    linecache.checkcache(str(file))
+    spec = importlib.util.spec_from_file_location(name, file)
+    if spec is None or spec.loader is None or not file.is_file():
+        raise Mistake(str(file), 0, "no such Python file", "give the path of one that ends in .py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    sys.path.insert(0, str(file.parent))
+    try:
+        spec.loader.exec_module(module)
+    except SyntaxError as error:
+        raise Mistake(
+            str(error.filename or file), error.lineno or 0, str(error.msg), "mend the syntax"
+        ) from None
+    except DeclarationError as error:
+        raise Mistake(
+            str(file), _line_in(file, error), str(error), "mend the declaration"
+        ) from None
+    except Exception as error:
+        raise Mistake(
+            str(file),
+            _line_in(file, error),
+            f"{type(error).__name__}: {error}",
+            "the module has to run as Python first",
+        ) from None
+    finally:
+        sys.path.pop(0)
+    return module
+
+
+def components(module: ModuleType) -> list[type[Component]]:
+    """Return the component classes that a module defines, in order."""
+    found = [
+        each
+        for each in vars(module).values()
+        if isinstance(each, type)
+        and issubclass(each, Component)
+        and each.__module__ == module.__name__
+    ]
+    return sorted(dict.fromkeys(found), key=lambda each: inspect.getsourcelines(each)[1])
+
+
+def read(function: FunctionType) -> Source:
+    """Return a function's tree."""
+    file = inspect.getsourcefile(function) or "?"
+    try:
+        lines, begin = inspect.getsourcelines(function)
+    except OSError:
+        raise Mistake(
+            file, 0, f"{function.__name__} has no source", "define it in a file"
+        ) from None
+    tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
+    ast.increment_lineno(tree, begin - 1)
+    if not isinstance(tree, ast.FunctionDef):
+        kind = "is async" if isinstance(tree, ast.AsyncFunctionDef) else "is a lambda"
+        raise Mistake(file, begin, f"{function.__name__} {kind}", "write it by `def`")
+    return Source(function, tree, file)
+
+
+def is_own(value: Any) -> bool:
+    """Tell whether it is a Python function of the component's author, to be compiled too."""
+    if not isinstance(value, FunctionType):
+        return False
+    module = sys.modules.get(value.__module__ or "")
+    file = getattr(module, "__file__", None) or ""
+    packages = ("/dist-packages/", "/site-packages/", "/lib/python3")
+    return bool(file) and not any(each in file for each in packages)
+
+
+def _line_in(file: Path, error: BaseException) -> int:
+    line, trace = 0, error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename == str(file):
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    return line

@@ -1,0 +1,52 @@
+"""A first run in the interpreter: shapes that do not fit are found before there is a library.
+
+numba knows how many dimensions an array has, not how long they are; NumPy does when it runs.
+"""
+
+import re
+import warnings
+from typing import Any
+
+import numpy as np
+from rtcf.component import Component
+from rtcf.component.declaration import Input, describe
+
+from rtcf_compile.mistake import Mistake
+
+_CYCLES = 20
+_SHAPES = re.compile(r"matmul|broadcast|shape|dimension|size \d", re.IGNORECASE)
+
+
+def run(cls: type[Component], file: str) -> None:
+    """Run some cycles with values drawn from a fixed seed; raise Mistake if shapes do not fit."""
+    draw = np.random.default_rng(1)
+    component = cls()
+    inputs = describe(cls).of(Input)
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        try:
+            component.start()
+            for cycle in range(_CYCLES):
+                for member in inputs:
+                    value: Any = draw.normal(0.0, 10.0 ** (cycle % 4), member.type.shape)
+                    if member.type.is_bool:
+                        value = value > 0
+                    getattr(component, member.name).put(value.astype(member.type.scalar))
+                component.cycle()
+            component.safe()
+        except Exception as error:
+            # What a component raises of its own is for the loop to see.
+            text = " ".join(str(error).split())
+            if isinstance(error, ValueError) and _SHAPES.search(text):
+                if "matmul" in text:
+                    text = "@ of shapes that do not fit"
+                raise Mistake(file, _line(error, file), text, "make the shapes fit") from None
+
+
+def _line(error: BaseException, file: str) -> int:
+    line, trace = 0, error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename == file:
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    return line

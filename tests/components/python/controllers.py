@@ -1,0 +1,144 @@
+"""Components in Python for the tests: what they do, and each way to fail."""
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+from rtcf.component import Component, Input, Output, Parameter, State
+
+A = np.array([[1.0, 0.001], [0.0, 0.98]])
+B = np.array([0.0, 0.02])
+
+
+@dataclass(frozen=True)
+class Plant:
+    """Constants of a motor."""
+
+    gain: float
+    offset: float
+
+
+MOTOR = Plant(gain=0.5, offset=0.0)
+
+
+class Mode(enum.IntEnum):
+    """What a controller is doing."""
+
+    IDLE = 0
+    RUN = 1
+    LIMITED = 2
+
+
+def clamp(value, low, high):
+    """Return the value within bounds."""
+    return min(max(value, low), high)
+
+
+class Ramp(Component):
+    """Counts cycles, in all types of a port."""
+
+    count: Output[int]
+    seconds: Output[float] = Output(unit="s")
+    even: Output[bool]
+    pair: Output[np.float64, 2] = Output(unit="m, m/s")
+    step: Parameter[int] = Parameter(1, min=1, max=1000, doc="by which it counts")
+    total: State[int]
+    passed: State[float] = State(0.0, unit="s", doc="since it was loaded")
+
+    def update(self):
+        """Count."""
+        self.total += self.step
+        self.passed += self.dt
+        self.count.write(self.total)
+        self.seconds.write(self.passed)
+        self.even.write(self.total % 2 == 0)
+        self.pair.write(np.array((self.passed, 1.0)))
+
+    def safe(self):
+        """Go to zero."""
+        self.count.write(0)
+
+
+class Observer(Component):
+    """Luenberger observer of a motor."""
+
+    seconds: Input[float]
+    pair: Input[np.float64, 2]
+    x: Output[np.float64, 2] = Output(unit="rad, rad/s")
+    low: Parameter[float] = Parameter(0.4, doc="gain of the angle")
+    high: Parameter[float] = Parameter(12.0, doc="gain of the speed")
+    estimate: State[np.float64, 2]
+    mode: State[Mode] = State(Mode.IDLE)
+    seen: State[int]
+
+    def start(self):
+        """Begin at rest."""
+        self.seen = 0
+
+    def update(self):
+        """Predict and correct."""
+        if not self.seconds.new:
+            return
+        self.seen += 1
+        if self.seen == 3:
+            self.info("third value {} after {} ms", self.seconds.value, self.seen)
+        error = self.pair.value[0] - self.estimate[0]
+        self.estimate[:] = A @ self.estimate + B * MOTOR.gain + self.dt * self.gains() * error
+        self.mode = Mode.RUN
+        self.limit(1e6)
+        self.x.write(self.estimate)
+
+    def gains(self):
+        """Return both gains."""
+        return np.array((self.low, self.high))
+
+    def limit(self, bound):
+        """Keep the estimate within bounds."""
+        for i in range(2):
+            if abs(self.estimate[i]) > bound:
+                self.mode = Mode.LIMITED
+            self.estimate[i] = clamp(self.estimate[i], -bound, bound)
+
+
+def quotient(a, b):
+    """Return a / b."""
+    return a / b
+
+
+class Failing(Component):
+    """Fails in the way that its parameter says."""
+
+    out: Output[float]
+    way: Parameter[int] = Parameter(0, min=0, max=9)
+    after: Parameter[int] = Parameter(20)
+    zero: State[float]
+    place: State[int] = State(5)
+    few: State[np.float64, 3]
+    updates: State[int]
+
+    def start(self):
+        """Refuse one way at once."""
+        if self.way == 9:
+            raise ValueError("does not want to start")
+
+    def update(self):
+        """Write, and fail in the end."""
+        self.out.write(1.0)
+        self.updates += 1
+        if self.updates < self.after:
+            return
+        self.out.write(666.0)
+        if self.way == 1:
+            raise ValueError("the limit is passed")
+        if self.way == 2:
+            self.few[self.place] = 1.0
+        if self.way == 3:
+            self.zero = quotient(1.0, self.zero)
+        if self.way == 4:
+            self.fault("no reply from the drive")
+        if self.way == 5:
+            self.few[:] = np.ones(self.place)
+        if self.way == 6:
+            self.few[0] = np.ones(self.place * 100000)[self.place]
+        if self.way == 7:
+            self.place = self.place % (self.place - 5)

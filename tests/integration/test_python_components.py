@@ -1,0 +1,172 @@
+"""Components written in Python, compiled, in a real loop: values, state, logs and faults."""
+
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rtcf
+from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for
+from rtcf.v1 import graph_pb2, runner_pb2
+from values import state
+
+SOURCE = Path(__file__).parents[1] / "components" / "python" / "controllers.py"
+COMPILE_DEADLINE_S = 600.0
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Compile the components once."""
+    folder = tmp_path_factory.mktemp("lib")
+    done = subprocess.run(
+        [
+            str(BUILD_TREE / "bin" / "rtcf-compile"),
+            str(SOURCE),
+            *("-o", str(folder / "py" / "controllers.so")),
+        ],
+        env=clean_environment(),
+        capture_output=True,
+        text=True,
+        timeout=COMPILE_DEADLINE_S,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    return folder
+
+
+@pytest.fixture
+def daemon(tmp_path: Path, folder: Path) -> Iterator[Daemon]:
+    """Give an rtcfd that finds them."""
+    daemon = Daemon(tmp_path, arguments=("--path", str(folder)))
+    daemon.start()
+    yield daemon
+    if not daemon.ended:
+        daemon.end()
+
+
+def _load_both(client: rtcf.Client) -> None:
+    client.load(rtcf.component("py", "Ramp", name="ramp", parameters=["step:=3"]))
+    client.load(rtcf.component("py", "Observer", name="observer"))
+
+
+def _states(client: rtcf.Client, name: str) -> dict[str, str]:
+    return {each.name: each.value for each in client.get_component(name).states}
+
+
+def _ports(client: rtcf.Client, name: str) -> dict[str, graph_pb2.PortInfo]:
+    return {each.name: each for each in client.get_component(name).ports}
+
+
+def test_it_computes_in_the_loop_what_it_says(daemon: Daemon, client: rtcf.Client) -> None:
+    _load_both(client)
+    assert client.get_order() == ["/ramp", "/observer"]
+    client.step(250)
+    assert _states(client, "ramp")["total"] == "750"
+    assert float(_states(client, "ramp")["passed"]) == pytest.approx(0.25)
+    assert _states(client, "observer")["seen"] == "250"
+    assert _states(client, "observer")["mode"] == "1"
+    estimate = x = 0.0
+    for cycle in range(1, 251):
+        error = cycle * 0.001 - x
+        x, estimate = (
+            x + 0.001 * estimate + 0.001 * 0.4 * error,
+            0.98 * estimate + 0.02 * 0.5 + 0.001 * 12.0 * error,
+        )
+    shown = re.findall(r"[-\d.e]+", _states(client, "observer")["estimate"])
+    assert [float(each) for each in shown] == pytest.approx([x, estimate], rel=1e-5)
+
+
+def test_its_declarations_are_those_of_any_component(client: rtcf.Client, daemon: Daemon) -> None:
+    _load_both(client)
+    ramp = client.get_component("ramp")
+    assert ramp.doc == "Counts cycles, in all types of a port"
+    (step,) = ramp.parameters
+    assert (step.minimum, step.maximum, step.doc) == (1.0, 1000.0, "by which it counts")
+    assert {each.name: each.unit for each in ramp.states} == {"total": "", "passed": "s"}
+    types = {name: port.type for name, port in _ports(client, "ramp").items()}
+    assert types == {
+        "count": "int64",
+        "seconds": "double",
+        "even": "bool",
+        "pair": "Eigen::Matrix<double,2,1>",
+    }
+    refused = daemon.ctl("set", "ramp", "step:=0")
+    assert refused.returncode == 1 and "step" in refused.stderr
+
+
+def test_a_parameter_set_counts_from_the_next_cycle(client: rtcf.Client, daemon: Daemon) -> None:
+    _load_both(client)
+    client.step(10)
+    assert daemon.ctl("set", "ramp", "step:=10").returncode == 0
+    client.step(10)
+    assert _states(client, "ramp")["total"] == "130"
+
+
+def test_state_goes_over_to_a_replacement_and_back_by_reset(
+    client: rtcf.Client, daemon: Daemon
+) -> None:
+    _load_both(client)
+    client.step(100)
+    assert not client.replace("ramp", rtcf.component("py", "Ramp", name="ramp")).notes
+    assert _states(client, "ramp")["total"] == "300"
+    client.step(1)
+    assert _states(client, "ramp")["total"] == "303"
+    assert daemon.ctl("reset", "ramp").returncode == 0
+    assert _states(client, "ramp")["total"] == "0"
+
+
+def test_it_logs_what_its_arguments_were(client: rtcf.Client, daemon: Daemon) -> None:
+    _load_both(client)
+    client.step(5)
+    wait_for(lambda: "third value 0.003 after 3 ms" in daemon.log(), "the record")
+
+
+def test_safe_is_its_last_cycle(client: rtcf.Client, daemon: Daemon) -> None:
+    _load_both(client)
+    client.start()
+    wait_for(lambda: state(client).iteration > 20, "20 cycles")
+    client.stop()
+    assert _ports(client, "ramp")["count"].value == "data: 0"
+
+
+WAYS = {
+    1: r"`raise ValueError\(\"the limit is passed\"\)`: ValueError: the limit is passed",
+    2: r"`self\.few\[self\.place\] = 1\.0`: IndexError: .*out of bounds",
+    3: r"`self\.zero = quotient\(1\.0, self\.zero\)`: ZeroDivisionError: division by zero",
+    4: r"`self\.fault\(\"no reply from the drive\"\)`: no reply from the drive",
+    5: r"`self\.few\[:\] = np\.ones\(self\.place\)`: ValueError: .*another shape",
+    6: r"`self\.few\[0\] = .*`: MemoryError: temporaries are more than the arena has",
+    7: r"`self\.place = .*`: ZeroDivisionError: ",
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_fault_names_file_line_and_text(client: rtcf.Client, daemon: Daemon, way: int) -> None:
+    client.load(
+        rtcf.component("py", "Failing", name="bad", parameters=[f"way:={way}", "after:=20"])
+    )
+    client.start()
+    wait_for(lambda: state(client).state == runner_pb2.RUNNER_STATE_FAULTED, "the fault")
+    fault = client.get_component("bad").fault
+    found = re.search(rf"controllers\.py:(\d+): {WAYS[way]}", fault)
+    assert found, fault
+    line = SOURCE.read_text().splitlines()[int(found[1]) - 1].strip()
+    assert f"`{line}`" in fault
+    assert f"controllers.py:{found[1]}" in daemon.log()
+    assert "666" not in _ports(client, "bad")["out"].value
+
+
+def test_what_start_raises_refuses_the_start(client: rtcf.Client, daemon: Daemon) -> None:
+    client.load(rtcf.component("py", "Failing", name="bad", parameters=["way:=9"]))
+    with pytest.raises(rtcf.RefusedError, match=r"controllers\.py:\d+: .*does not want to start"):
+        client.start()
+
+
+def test_the_loop_has_no_python_in_it(client: rtcf.Client, daemon: Daemon) -> None:
+    _load_both(client)
+    client.start()
+    wait_for(lambda: state(client).iteration > 20, "20 cycles")
+    maps = Path(f"/proc/{state(client).pid}/maps").read_text()
+    assert "controllers.so" in maps
+    assert not re.search(r"libpython|numba|llvmlite|libLLVM", maps)

@@ -1,0 +1,169 @@
+"""Mistakes in components written in Python: each is one line that says where, what, the way out."""
+
+import re
+from pathlib import Path
+
+import pytest
+from rtcf_compile.main import main
+
+PAGE = Path(__file__).parents[3] / "docs" / "python-components.md"
+HEAD = """\
+import enum
+import random
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from rtcf.component import Component, Input, Output, Parameter, State
+
+A = np.eye(2)
+GAINS = {"kp": 1.0}
+NAMES = [1, 2]
+
+
+def twice(x):
+    return 2 * twice(x - 1) if x > 0 else 0
+
+
+class Faulty(Component):
+    u: Input[float]
+    x: Output[np.float64, 2]
+    y: Output[float]
+    kp: Parameter[float] = Parameter(1.0)
+    z: State[np.float64, 2]
+    n: State[int]
+    on: State[bool]
+"""
+
+# What is written in update (a mark {} is where the line is expected), what is said of it.
+IN_UPDATE = {
+    "list growth": ("values = [1.0]", "a list allocates"),
+    "append": ("self.z.append(1.0)", "grows"),
+    "list comprehension": ("self.z[:] = np.array([i for i in range(2)])", "a list allocates"),
+    "dict": ("gains = {'kp': 1.0}", "a dict allocates"),
+    "dict of the module": ("self.y.write(GAINS['kp'])", "a dict of the module"),
+    "list of the module": ("self.n = NAMES[0]", "a list of the module"),
+    "set": ("a = {1, 2}", "a set allocates"),
+    "string formatting": ("name = 'x %d' % self.n", "text is not made"),
+    "format method": ("name = 'x {}'.format(self.n)", "text is not made"),
+    "f-string in a log call": ("self.info(f'x {self.n}')", "text is not made"),
+    "log without constant text": ("self.info(self.n)", "constant text"),
+    "array in a log call": ("self.info('z {}', self.z)", "a log call stores numbers"),
+    "global variable": ("global A", "shared by all instances"),
+    "print": ("print(self.n)", "printing calls the system"),
+    "undeclared attribute": ("self.sum = 1.0", "is not declared"),
+    "undefined name": ("self.n = sum_of", "sum_of is not defined"),
+    "parameter set": ("self.kp = 2.0", "a parameter is set from outside"),
+    "input set": ("self.u = 2.0", "is an Input"),
+    "port as value": ("self.y.write(self.u)", "is an Input"),
+    "output assigned": ("self.y = 2.0", "is an Output"),
+    "port's unknown field": ("self.n = self.u.count", "an Input has no count"),
+    "wrong shape": ("self.z[:] = np.zeros(3)", "shape"),
+    "product of wrong shapes": ("self.z[:] = A @ np.zeros(3)", "@ of shapes"),
+    "number set to an array": ("self.y.write(self.z)", "a number is set to"),
+    "array set to a matrix": ("self.z[:] = np.eye(2)", "is set to"),
+    "int set to a float": ("self.n = 0.5", "a whole number is set to a float"),
+    "bool set to a number": ("self.on = self.n", "a bool is set to an int"),
+    "integer overflow": ("self.n = 2**63", "does not fit int64"),
+    "big literal": ("self.n = 9223372036854775808", "does not fit int64"),
+    "recursion": ("self.n = twice(self.n)", "twice calls itself"),
+    "generator": ("yield self.n", "a generator is no machine code"),
+    "generator expression": ("self.n = sum(i for i in range(3))", "a generator is no machine code"),
+    "np.append": ("self.z[:] = np.append(self.z, 1.0)", "np.append makes an array that grows"),
+    "np.concatenate": ("a = np.concatenate((self.z, self.z))", "an array that grows"),
+    "eigenvalues": ("a = np.linalg.eigvals(A)", "calls LAPACK"),
+    "another clock": ("t = time.time()", "another clock than the loop's"),
+    "random numbers": ("r = random.random()", "draws other numbers in a replay"),
+    "NumPy's random numbers": ("r = np.random.rand()", "draws other numbers in a replay"),
+    "a file": ("f = open('x')", "a file is opened by the system"),
+    "try": (
+        "try:\n            pass\n        except ValueError:\n            pass",
+        "nothing is caught",
+    ),
+    "with": ("with self.n:\n            pass", "nothing to open or lock"),
+    "import": ("import math", "an import is no machine code"),
+    "lambda": ("f = lambda x: x", "a lambda is not compiled"),
+    "function in a function": ("def f(x):\n            return x", "a function in a function"),
+    "class in a hook": ("class A:\n            pass", "a class in a hook"),
+    "endless loop": ("while True:\n            self.n += 1", "a loop without end"),
+    "returning a value": ("return self.n", "a hook returns nothing"),
+    "write as value": ("a = self.y.write(1.0)", "a write is no value"),
+    "self passed on": ("twice(self)", "self is no value here"),
+    "several targets": ("self.n, self.kp = 1, 2.0", "sets several at once"),
+    "two types of a variable": (
+        "a = 1.0\n        if self.on:\n            a = self.z\n        self.y.write(a)",
+        "a is once",
+    ),
+    "unsupported function of NumPy": ("a = np.polyfit(self.z, self.z, 1)", "np.polyfit"),
+    "misspelled function of NumPy": ("a = np.sinn(1.0)", "numpy has no sinn"),
+    "read call": ("self.u.read()", "inputs are read before each update"),
+    "fault with a variable": ("self.fault(self.n)", "a fault has one constant text"),
+    "isinstance": ("a = isinstance(self.n, int)", "types are fixed when compiled"),
+    "time set": ("self.dt = 1.0", "is the loop's"),
+    "complex number": ("a = 1j", "a complex number"),
+}
+IN_CLASS = {
+    "missing annotation": ("    v = State(0.0)", "has no annotation"),
+    "annotation without a type": ("    v: State", "says no type"),
+    "annotation of another kind": ("    v: float = 0.0", "is neither Input, Output"),
+    "list as a type": ("    v: State[list]", "says its elements and its size"),
+    "size of a variable": ("    v: State[np.float64, -1]", "a size is a whole number"),
+    "parameter without default": ("    v: Parameter[float]", "has no default"),
+    "initial value of another shape": ("    v: State[np.float64, 3] = State([1.0, 2.0])", "shape"),
+    "initial value of another type": ("    v: State[int] = State(0.5)", "is int64"),
+    "unknown option": ("    v: State[int] = State(unitt='m')", "knows no option"),
+    "reserved name": ("    dt: State[float]", "a word that every component has"),
+}
+
+
+def compiled(tmp_path: Path, source: str, capsys: pytest.CaptureFixture[str]) -> str:
+    """Compile a source that is refused; return what was said."""
+    file = tmp_path / "faulty.py"
+    file.write_text(source)
+    assert main([str(file), "-o", str(tmp_path / "faulty.so")]) == 1
+    assert not (tmp_path / "faulty.so").exists()
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1, said
+    return said
+
+
+@pytest.mark.parametrize("name", IN_UPDATE)
+def test_it_is_one_line_with_the_way_out(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, expected = IN_UPDATE[name]
+    source = f"{HEAD}\n    def update(self):\n        self.n += 1\n        {text}\n"
+    said = compiled(tmp_path, source, capsys)
+    found = re.fullmatch(r"rtcf-compile: .*faulty\.py:(\d+): (?:`.*?`: )?(.*): (.+)\n", said)
+    assert found, said
+    assert expected in said
+    begin = source.split(text)[0].count("\n") + 1
+    in_function = HEAD.split("def twice")[0].count("\n") + 1
+    assert int(found[1]) in (*range(begin, begin + text.count("\n") + 1), in_function), said
+
+
+@pytest.mark.parametrize("name", [name for name, (_, said) in IN_CLASS.items() if said])
+def test_a_declaration_is_refused_at_its_line(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, expected = IN_CLASS[name]
+    source = f"{HEAD}{text}\n\n    def update(self):\n        self.n += 1\n"
+    said = compiled(tmp_path, source, capsys)
+    assert expected is not None and expected in said
+    assert f"faulty.py:{HEAD.count(chr(10)) + 1}: " in said
+
+
+def test_a_class_without_update_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "write `def update(self):`" in compiled(tmp_path, HEAD, capsys)
+    assert "has no component" in compiled(tmp_path, "x = 1\n", capsys)
+    assert "mend the syntax" in compiled(tmp_path, "x = = 1\n", capsys)
+    assert "has to run as Python first" in compiled(tmp_path, "import no_such_module\n", capsys)
+
+
+def test_each_of_them_is_in_the_documentation() -> None:
+    page = PAGE.read_text()
+    listed = re.findall(r"^\| ([^|]+?) \|", page, re.MULTILINE)
+    for name in (*IN_UPDATE, *(name for name, (_, said) in IN_CLASS.items() if said)):
+        assert name in listed, name
