@@ -107,7 +107,7 @@ class Functions:
         for number, call in enumerate(self.logs.calls):
             scope[f"rtcf_log_{number}"] = _log(number, call.count)
         self._making.pop()
-        return _made(tree, scope, source)
+        return made(tree, scope, source)
 
     def _compiled_method(self, function: FunctionType) -> Any:
         if function not in self._made:
@@ -133,10 +133,11 @@ class Functions:
         source.tree.returns = None
         for each in source.tree.args.args:
             each.annotation = None
-        made = self._compiler(_made(source.tree, self._scope(source, products.constants), source))
+        plain = made(source.tree, self._scope(source, products.constants), source)
+        own = self._compiler(plain)
         self._making.pop()
-        self._made[function] = made
-        return made
+        self._made[function] = own
+        return own
 
     def _scope(self, source: Source, constants: dict[str, Any]) -> dict[str, Any]:
         scope = {**source.function.__globals__, **helpers.BY_NAME, **constants}
@@ -177,7 +178,8 @@ def _constant(node: ast.Name, value: Any, source: Source) -> None:
     raise at(source.file, node, f"is of type {type(value).__name__}", "use numbers and arrays")
 
 
-def _made(tree: ast.FunctionDef, scope: dict[str, Any], source: Source) -> FunctionType:
+def made(tree: ast.FunctionDef, scope: dict[str, Any], source: Source) -> FunctionType:
+    """Return a function of a rewritten tree, with the names that it sees."""
     module = ast.fix_missing_locations(ast.Module([tree], []))
     code = compile(module, source.file, "exec", dont_inherit=True)
     inner = next(each for each in code.co_consts if isinstance(each, CodeType))

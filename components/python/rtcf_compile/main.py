@@ -4,6 +4,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 DONE, REFUSED, USAGE = range(3)
 
@@ -17,9 +18,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("sources", metavar="SOURCE", nargs="+", type=Path)
     parser.add_argument("-o", dest="output", metavar="LIB", type=Path, help="the library to write")
+    parser.add_argument(
+        "--verify",
+        metavar="CYCLES",
+        nargs="?",
+        const=10_000,
+        type=int,
+        help="compare with the interpreter for that many cycles (default: 10000)",
+    )
+    parser.add_argument("--seed", metavar="N", type=int, default=1, help="of --verify's inputs")
     args = parser.parse_args(arguments)
-    if args.output is None:
-        parser.error("say what to do with it: -o LIB")
+    if args.output is None and args.verify is None:
+        parser.error("say what to do with it: -o LIB, --verify")
     from rtcf.component import DeclarationError
 
     from rtcf_compile.mistake import Mistake
@@ -29,11 +39,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # numba takes a second to import: only for what is well up to here.
         from rtcf_compile import build, lowering
 
-        build.library([lowering.compile_component(each) for each in classes], args.output)
+        compiled = [lowering.compile_component(each) for each in classes]
+        if args.verify is not None and not _verified(classes, compiled, args):
+            return REFUSED
+        if args.output is not None:
+            build.library(compiled, args.output)
     except (Mistake, DeclarationError) as error:
         print(f"rtcf-compile: {' '.join(str(error).split())}", file=sys.stderr)
         return REFUSED
     return DONE
+
+
+def _verified(classes: list[type], compiled: list[Any], args: argparse.Namespace) -> bool:
+    from rtcf_compile import verify
+
+    good = True
+    for cls, machine_code in zip(classes, compiled, strict=True):
+        found = verify.compare(cls, machine_code, args.verify, args.seed)
+        print(found)
+        good = good and not found.differences
+    return good
 
 
 def _classes(files: list[Path]) -> list[type]:

@@ -1,0 +1,143 @@
+"""Components of a size that people write, compared with the interpreter and with C++."""
+
+import enum
+
+import numpy as np
+from rtcf.component import Component, Input, Output, Parameter, State
+
+
+class Pid(Component):
+    """PID controller with limited effort and a filtered derivative."""
+
+    setpoint: Input[float]
+    measured: Input[float]
+    effort: Output[float] = Output(unit="N m")
+    kp: Parameter[float] = Parameter(2.0, min=0.0, max=10.0)
+    ki: Parameter[float] = Parameter(1.0, min=0.0, max=10.0)
+    kd: Parameter[float] = Parameter(0.01, min=0.0, max=1.0)
+    limit: Parameter[float] = Parameter(10.0, min=0.1, max=100.0)
+    integral: State[float]
+    filtered: State[float]
+    last: State[float]
+
+    def update(self):
+        """Control."""
+        error = self.setpoint.value - self.measured.value
+        bound = self.limit
+        self.integral = min(max(self.integral + self.ki * error * self.dt, -bound), bound)
+        rate = (error - self.last) / self.dt
+        self.filtered += 0.1 * (rate - self.filtered)
+        self.last = error
+        effort = self.kp * error + self.integral + self.kd * self.filtered
+        self.effort.write(min(max(effort, -bound), bound))
+
+
+DT = 1e-3
+F = np.eye(6)
+F[:3, 3:] = DT * np.eye(3)
+H = np.hstack((np.eye(3), np.zeros((3, 3))))
+Q = 1e-4 * np.eye(6)
+R = 1e-2 * np.eye(3)
+
+
+class Kalman(Component):
+    """Kalman filter of a position in space: six states, three measured."""
+
+    position: Input[np.float64, 3]
+    estimate: Output[np.float64, 6]
+    x: State[np.float64, 6]
+    p: State[np.float64, 6, 6] = State(np.eye(6))
+
+    def update(self):
+        """Predict and correct."""
+        self.x = F @ self.x
+        self.p = F @ self.p @ F.T + Q
+        if self.position.new:
+            innovation = self.p[:3, :3] + R
+            gain = self.p[:, :3] @ np.linalg.inv(innovation)
+            self.x += gain @ (self.position.value - self.x[:3])
+            self.p = (np.eye(6) - gain @ H) @ self.p
+        self.estimate.write(self.x)
+
+
+class Phase(enum.IntEnum):
+    """Of a machine."""
+
+    IDLE = 0
+    ACCELERATE = 1
+    CRUISE = 2
+    BRAKE = 3
+
+
+class Machine(Component):
+    """Goes through phases by what it is told, and logs each change."""
+
+    wanted: Input[float]
+    enable: Input[bool]
+    speed: Output[float] = Output(unit="m/s")
+    phase_out: Output[Phase]
+    steepness: Parameter[float] = Parameter(0.5, min=0.01, max=1.0)
+    phase: State[Phase] = State(Phase.IDLE)
+    velocity: State[float]
+    changes: State[int]
+
+    def update(self):
+        """Decide, then move."""
+        before = self.phase
+        target = self.wanted.value if self.enable.value else 0.0
+        if not np.isfinite(target):
+            target = 0.0
+        gap = target - self.velocity
+        if abs(gap) < 1e-6:
+            self.phase = Phase.IDLE if target == 0.0 else Phase.CRUISE
+        elif gap > 0.0:
+            self.phase = Phase.ACCELERATE
+        else:
+            self.phase = Phase.BRAKE
+        if self.phase == Phase.ACCELERATE:
+            self.velocity += min(gap, self.steepness)
+        elif self.phase == Phase.BRAKE:
+            self.velocity += max(gap, -self.steepness)
+        if self.phase != before:
+            self.changes += 1
+            self.info("phase {} after {}, at {:.3f}", self.phase, before, self.velocity)
+        self.speed.write(self.velocity)
+        self.phase_out.write(self.phase)
+
+
+class Raiser(Component):
+    """Raises in a cycle that its input decides."""
+
+    value: Input[float]
+    out: Output[float]
+    total: State[float]
+
+    def update(self):
+        """Sum up, until there is a reason not to."""
+        value = self.value.value
+        if np.isnan(value):
+            raise ValueError("not a number")
+        if value > 1e3:
+            self.fault("out of range")
+        self.total = 0.9 * self.total + 1.0 / (1.0 + value * value)
+        self.out.write(np.sqrt(self.total) + 1.0 / value)
+
+
+class Solver(Component):
+    """What np.linalg has, on small matrices."""
+
+    a: Input[np.float64, 4, 4]
+    b: Input[np.float64, 4]
+    x: Output[np.float64, 4]
+    lower: Output[np.float64, 4, 4]
+    spectrum: State[np.float64, 4]
+
+    def update(self):
+        """Solve, and decompose."""
+        matrix = np.clip(self.a.value, -1e6, 1e6)
+        if not np.all(np.isfinite(matrix)):
+            return
+        regular = matrix @ matrix.T + np.eye(4)
+        self.x.write(np.linalg.solve(regular, self.b.value))
+        self.lower.write(np.linalg.cholesky(regular))
+        self.spectrum[1:] = np.where(self.b.value[1:] > 0.0, np.sin(self.b.value[1:]), 0.0)
