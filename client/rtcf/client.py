@@ -278,6 +278,22 @@ class Client:
         )
         return self._change(self._stub.SetParameters, request, on_progress)
 
+    def undo_parameters(
+        self, component: str, runner: str = "", on_progress: OnProgress | None = None
+    ) -> control_pb2.ChangeResult:
+        """Take back what was changed last of a component's parameters; again, what was before."""
+        request = control_pb2.UndoParametersRequest(runner=runner, component=component)
+        return self._change(self._stub.UndoParameters, request, on_progress)
+
+    def get_history(
+        self, component: str = "", parameter: str = "", runner: str = "", most: int = 0
+    ) -> list[control_pb2.ParameterChange]:
+        """Return who set which parameter to what, oldest first; `most`: the newest so many."""
+        request = control_pb2.GetHistoryRequest(
+            runner=runner, component=component, parameter=parameter, most=most
+        )
+        return list(self._ask(self._stub.GetHistory, request).changes)
+
     def reset_state(
         self, component: str, runner: str = "", on_progress: OnProgress | None = None
     ) -> control_pb2.ChangeResult:

@@ -166,6 +166,10 @@ class ParameterTooFastError(RefusedError):
     """It may change by so much a second only."""
 
 
+class NothingToUndoError(RefusedError):
+    """No change of the parameter is known, or it was changed otherwise since."""
+
+
 class ExecutorFailedError(RefusedError):
     """The executor does not start."""
 
@@ -288,6 +292,7 @@ BY_REASON: dict[str, type[RefusedError]] = {
     "RUNNER_NOT_EMPTY": RunnerNotEmptyError,
     "HOLDER_GONE": HolderGoneError,
     "PARAMETER_TOO_FAST": ParameterTooFastError,
+    "NOTHING_TO_UNDO": NothingToUndoError,
     "EXECUTOR_FAILED": ExecutorFailedError,
     "EXECUTOR_FOREIGN": ExecutorForeignError,
     "COMPONENT_REFUSED": ComponentRefusedError,

@@ -125,7 +125,8 @@ class _Line:
                     for port in component.ports
                     if port.direction == graph_pb2.DIRECTION_INPUT
                 )
-        elif source == "PARAMETER:=VALUE" and self._given:
+        elif source in ("PARAMETER", "PARAMETER:=VALUE") and self._given:
             with contextlib.suppress(rtcf.RefusedError):
                 info = client.get_component(self._given[0], runner)
-                yield from (f"{parameter.name}:=" for parameter in info.parameters)
+                after = source.removeprefix("PARAMETER").removesuffix("VALUE")
+                yield from (f"{parameter.name}{after}" for parameter in info.parameters)

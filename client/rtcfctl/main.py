@@ -33,6 +33,8 @@ _MODULES = {
     "apply": "files",
     "save": "files",
     "set": "parameter",
+    "history": "parameter",
+    "undo": "parameter",
     "types": "types",
     "stats": "stats",
     "check": "check",

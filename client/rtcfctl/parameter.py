@@ -1,11 +1,15 @@
-"""`rtcfctl set|reset`."""
+"""`rtcfctl set|history|undo|reset`."""
 
 import argparse
+import time
 from typing import Any
 
 import rtcf
 
+from rtcfctl import words
 from rtcfctl.output import Output
+
+_MOST = 20  # lines
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
@@ -16,6 +20,20 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     setting.add_argument("component", metavar="NAME")
     setting.add_argument("parameters", metavar="PARAMETER:=VALUE", nargs="+")
     setting.set_defaults(run=set_parameters)
+
+    past = verbs.add_parser("history", parents=[common], help="who set which parameter, and when")
+    past.add_argument("component", metavar="NAME", nargs="?", default="")
+    past.add_argument("parameter", metavar="PARAMETER", nargs="?", default="")
+    past.add_argument(
+        "-n", dest="most", type=int, default=_MOST, metavar="N", help="the last N (default: 20)"
+    )
+    past.set_defaults(run=show_history)
+
+    undoing = verbs.add_parser(
+        "undo", parents=[common], help="take back what was changed last of a component's parameters"
+    )
+    undoing.add_argument("component", metavar="NAME")
+    undoing.set_defaults(run=undo)
 
     resetting = verbs.add_parser(
         "reset", parents=[common], help="take a component's state back to its initial values"
@@ -29,6 +47,36 @@ def set_parameters(client: rtcf.Client, args: argparse.Namespace, output: Output
     parameters = [rtcf.parse_parameter(text) for text in args.parameters]
     result = client.set_parameters(args.component, parameters, args.runner, output.progress)
     output.changed(f"set {', '.join(args.parameters)} of {args.component}", result)
+
+
+def show_history(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Print who set what when."""
+    if args.most < 1:
+        raise ValueError(f"-n {args.most}: at least 1")
+    found = client.get_history(args.component, args.parameter, args.runner, args.most)
+    if not output.for_people:
+        output.data(found)
+        return
+    output.table(
+        ("when", "who", "how", "parameter", "before", "value"),
+        (
+            (
+                time.strftime("%F %T", time.localtime(each.time_ns / 1e9)),
+                each.who,
+                each.how,
+                f"{each.component}.{each.parameter}",
+                words.value(each.before) if each.HasField("before") else "-",
+                words.value(each.value),
+            )
+            for each in found
+        ),
+    )
+
+
+def undo(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Take back the last change."""
+    result = client.undo_parameters(args.component, args.runner, output.progress)
+    output.changed(f"took back the last change of {args.component}", result)
 
 
 def reset_state(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:

@@ -73,6 +73,17 @@ def test_dynparam_sets_parameters_of_all_types_in_a_running_loop(
     )
     assert state
 
+    # Who did it is known as far as ROS tells, and it can be taken back.
+    wait_for(lambda: client.get_history(_NAME), "the history")
+    (rate,) = client.get_history(_NAME, "rate")
+    assert (rate.who, rate.how, rate.value.double_value) == (
+        "a ROS peer",
+        "dynamic_reconfigure",
+        2.5,
+    )
+    client.undo_parameters(_NAME)
+    assert values(client)["rate"] == rate.before.double_value
+
     # And the other way round.
     daemon.ctl("set", _NAME, "rate:=7", "mode:=idle")
     shown = yaml.safe_load(dynparam(master, "get", _NAME))

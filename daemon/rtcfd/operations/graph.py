@@ -4,25 +4,25 @@ Functions on a RunnerCore; each is one transaction of its executor.
 """
 
 import asyncio
-import time
 from collections.abc import Awaitable, Callable, Iterable
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2, graph_pb2
+from rtcf_shared.graph_writer import same_value
 from rtcf_shared.naming import closest, listing, suggestion
 
 from rtcfd.access import caller
-from rtcfd.access.tuning import Tuning, require_pace
+from rtcfd.access.caller import Caller
 from rtcfd.catalog.catalog import loads
 from rtcfd.common import runner_settings
 from rtcfd.common.names import absolute, check_graph, full_name
 from rtcfd.common.refusals import InvalidArgument, NoMaster, NotFound, Refusal
 from rtcfd.executor.link import Progress
+from rtcfd.operations import parameters
 from rtcfd.operations.runner_core import RunnerCore
 from rtcfd.state.desired import replacement
 
 _MASTER_POLL_S = 0.5
-_LONGEST_WORD = 60  # of a value in the log
 
 
 async def load(
@@ -31,6 +31,7 @@ async def load(
     """Load a component."""
     library = await runner.catalog.find(spec.package, spec.type)
     note = library.note(spec)
+    acting = caller.current()
 
     async def work() -> control_pb2.ChangeResult:
         runner.limits.check_components(len(runner.desired.components) + 1)
@@ -38,6 +39,7 @@ async def load(
         result = (await runner.ask(request, progress)).change
         runner.left_out.pop(result.component, None)
         runner.desired.put(result.component, spec)
+        parameters.note(runner, result.component, spec.parameters, {}, acting, "load")
         return await _saved(runner, result)
 
     what = f"{spec.package}/{spec.type}"
@@ -114,6 +116,7 @@ async def replace(
     package = given.package or (before.package if before else "")
     type_name = given.type or (before.type if before else "")
     library = await runner.catalog.find(package, type_name)
+    acting = caller.current()
 
     async def work() -> control_pb2.ChangeResult:
         spec = replacement(runner.desired.components.get(old), given)
@@ -132,6 +135,9 @@ async def replace(
             )
             asked = wire.Request(replace=change)
         result = (await runner.ask(asked, progress)).change
+        known = runner.desired.components.get(old, graph_pb2.ComponentSpec()).parameters
+        values = {each.name: each.value for each in known}
+        parameters.note(runner, result.component, spec.parameters, values, acting, "replace")
         spec.parameters.extend(result.kept)
         runner.left_out.pop(old, None)
         runner.desired.drop([old])
@@ -190,6 +196,7 @@ async def apply(
     check_graph(request.components)
     runner_settings.check(request.settings)
     runner.limits.check_components(len(request.components))
+    acting = caller.current()
 
     async def work() -> control_pb2.ChangeResult:
         before = runner.settings()
@@ -220,6 +227,7 @@ async def apply(
             )
         if request.dry_run:
             return result
+        _note_parameters(runner, request.components, acting)
         runner.desired.become(request.components)
         runner.left_out.clear()
         runner.desired.choose(request.settings)
@@ -261,69 +269,21 @@ async def set_breaks(
     return result
 
 
-async def set_parameters(
-    runner: RunnerCore, request: control_pb2.SetParametersRequest, progress: Progress
-) -> control_pb2.ChangeResult:
-    """Change parameters of one component."""
-    name = absolute(request.component)
-
-    acting = caller.current()
-
-    async def work() -> control_pb2.ChangeResult:
-        if acting is not None and acting.tuning is not None:
-            await _require_tuning(runner, name, request.parameters, acting.tuning)
-        result = (await runner.ask(wire.Request(set_parameters=request), progress)).change
-        runner.desired.set_parameters(name, request.parameters)
-        return await _saved(runner, result)
-
-    result = await runner.change(f"a change of parameters of {name}", work)
-    note_parameters(runner, name, request.parameters, caller.name())
-    return result
-
-
-async def _require_tuning(
-    runner: RunnerCore,
-    component: str,
-    changes: Iterable[graph_pb2.ParameterSetting],
-    tuning: Tuning,
+def _note_parameters(
+    runner: RunnerCore, specs: Iterable[graph_pb2.ComponentSpec], acting: Caller | None
 ) -> None:
-    """Refuse what somebody may not set, or not that fast."""
-    query = control_pb2.GetComponentRequest(component=component)
-    found = (await runner.ask(wire.Request(get_component=query))).component
-    values = {each.name: _plain(each.value) for each in found.parameters}
-    now = time.monotonic()
-    names = {each.name: f"{component}.{each.name}" for each in changes}
-    for each in changes:
-        name = names[each.name]
-        rule = tuning.rule(runner.name, name)
-        last = runner.tuned.get(name)
-        require_pace(rule, name, values.get(each.name), _plain(each.value), last, now)
-    for name in names.values():
-        runner.tuned[name] = now
-
-
-def _plain(value: graph_pb2.ParameterValue) -> object:
-    kind = value.WhichOneof("kind")
-    return None if kind is None else getattr(value, kind)
-
-
-def note_parameters(
-    runner: RunnerCore, component: str, changes: Iterable[graph_pb2.ParameterSetting], who: str
-) -> None:
-    """Log parameters that were changed, with who did it: always."""
-    words = ", ".join(f"{each.name} = {_word(each.value)}" for each in changes)
-    acting = caller.current()
-    runner.log.logger.info(
-        "%s: %s set by %s",
-        component,
-        words,
-        who,
-        extra={"runner": runner.name, "peer": None if acting is None else acting.peer},
-    )
-
-
-def _word(value: graph_pb2.ParameterValue) -> str:
-    return f"{_plain(value)}"[:_LONGEST_WORD]
+    """Note parameters that a graph has changed."""
+    for spec in specs:
+        name = full_name(spec)
+        before = runner.desired.components.get(name)
+        known = {} if before is None else {each.name: each.value for each in before.parameters}
+        changed = [
+            each
+            for each in spec.parameters
+            if each.name not in known or not same_value(known[each.name], each.value)
+        ]
+        quiet = before is None  # it is loaded, with a thousand others maybe
+        parameters.note(runner, name, changed, known, acting, "apply", quiet=quiet)
 
 
 async def reset_state(

@@ -308,10 +308,14 @@ class RunnerCore(ABC):
             async with self._saving:
                 if self._forgotten:
                     return []
-                text, running = self.shared.store.text(self.desired), self.desired.running
+                store = self.shared.store
+                text, running = store.text(self.desired), self.desired.running
+                changes, anew = self.desired.history.to_write()
                 # Not here: fsync may take long.
-                await asyncio.to_thread(self.shared.store.save, self.name, text, running)
+                await asyncio.to_thread(store.save, self.name, text, running)
+                await asyncio.to_thread(store.save_history, self.name, changes, anew)
         except OSError as error:
+            self.desired.history.not_written()
             self.unsaved = f"not saved: {error.strerror}"
             self.log.error("its state is %s", self.unsaved)
             return [self.unsaved]

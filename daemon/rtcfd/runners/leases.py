@@ -13,7 +13,7 @@ from rtcf.v1 import control_pb2, errors_pb2
 
 from rtcfd.common.names import full_name
 from rtcfd.common.refusals import AlreadyExists, FailedPrecondition, NotFound, Refusal, Unavailable
-from rtcfd.operations import graph
+from rtcfd.operations import graph, parameters
 from rtcfd.operations.loop import stop_quietly
 from rtcfd.operations.runner_core import RunnerCore
 from rtcfd.runners.outbox import Outbox
@@ -113,6 +113,8 @@ class Leases:
                 load = wire.Request(load=library.load(spec))
                 result = (await runner.ask(load, outbox.progress)).change
                 runner.desired.put(name, spec)
+                holder = request.holder or "a lease"
+                parameters.note(runner, name, spec.parameters, {}, None, "launch", holder)
             except BaseException:
                 self._outboxes.pop(name, None)
                 # Left to the next rtcfd, the executor may load it yet: then it is still leased.

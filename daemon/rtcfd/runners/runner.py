@@ -9,14 +9,14 @@ import contextlib
 import time
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import control_pb2, errors_pb2, graph_pb2, runner_pb2
+from rtcf.v1 import control_pb2, errors_pb2, runner_pb2
 
 from rtcfd.common import runner_settings
-from rtcfd.common.refusals import NotFound, Refusal
+from rtcfd.common.refusals import Refusal
 from rtcfd.executor.events import Events
 from rtcfd.executor.executor import Executor
 from rtcfd.executor.process import End
-from rtcfd.operations.graph import note_parameters
+from rtcfd.operations.parameters import follow_ros
 from rtcfd.operations.runner_core import RunnerCore, Surroundings
 from rtcfd.recovery.bring_up import bring_up, recover, resumes
 from rtcfd.recovery.verdict import Crashes, judge
@@ -259,18 +259,7 @@ class Runner(RunnerCore):
 
         async def work() -> None:
             changes, self._changed_by_ros = self._changed_by_ros, {}
-            for component, names in changes.items():
-                # Not what was told: more may have happened since.
-                request = control_pb2.GetComponentRequest(component=component)
-                with contextlib.suppress(NotFound):  # gone since, and its parameters with it
-                    response = await self.ask(wire.Request(get_component=request))
-                    settings = [
-                        graph_pb2.ParameterSetting(name=each.name, value=each.value)
-                        for each in response.component.parameters
-                        if each.name in names
-                    ]
-                    self.desired.set_parameters(component, settings)
-                    note_parameters(self, component, settings, "a ROS peer, dynamic_reconfigure")
+            await follow_ros(self, changes)
             await self.save()
 
         try:

@@ -19,7 +19,7 @@ from rtcfd.common.names import absolute
 from rtcfd.common.refusals import InvalidArgument
 from rtcfd.common.status_codes import abort
 from rtcfd.executor.link import Progress
-from rtcfd.operations import graph
+from rtcfd.operations import graph, parameters
 from rtcfd.operations.loop import stop
 from rtcfd.recovery import starting
 from rtcfd.runners.held_runners import Hold
@@ -270,7 +270,18 @@ class Control(control_pb2_grpc.ControlServicer):
     def SetParameters(self, request: control_pb2.SetParametersRequest) -> Any:
         """Change parameters."""
         runner = self._runners.get(request.runner)
-        return lambda progress: graph.set_parameters(runner, request, progress)
+        return lambda progress: parameters.set_parameters(runner, request, progress)
+
+    @_changing
+    def UndoParameters(self, request: control_pb2.UndoParametersRequest) -> Any:
+        """Take back what was changed last."""
+        runner = self._runners.get(request.runner)
+        return lambda progress: parameters.undo(runner, request, progress)
+
+    @_answering
+    async def GetHistory(self, request: control_pb2.GetHistoryRequest) -> Any:
+        """Who set what when."""
+        return parameters.history(self._runners.get(request.runner), request)
 
     @_changing
     def ResetState(self, request: control_pb2.ResetStateRequest) -> Any:

@@ -12,6 +12,7 @@ from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 
 from rtcfd.common import names, runner_settings
 from rtcfd.common.names import absolute
+from rtcfd.state.history import History
 
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
@@ -52,6 +53,7 @@ class Desired:
         self.left_out: dict[str, str] = {}  # components that are not loaded, and why
         self.leased: dict[str, LeaseTerms] = {}  # components that are held; not saved themselves
         self.hold: HoldTerms | None = None
+        self.history = History()  # of its parameters
         self._components: dict[str, graph_pb2.ComponentSpec] = {}
         # The text of each component as it is saved: a change of one among
         # a thousand costs the text of one.

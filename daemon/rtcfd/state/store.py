@@ -9,7 +9,7 @@ import json
 import logging
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +18,16 @@ from rtcf.v1 import graph_pb2, runner_pb2
 
 from rtcfd.common.names import check_base_name, full_name
 from rtcfd.common.refusals import Refusal
+from rtcfd.state import history
 from rtcfd.state.desired import Desired, HoldTerms, LeaseTerms, this_boot
+from rtcfd.state.history import Change
 
 log = logging.getLogger(__name__)
 
 VERSION = 2
 _SUFFIX = ".json"
 _MARK = ".running"
+_HISTORY = ".history"
 
 _Document = dict[str, Any]
 
@@ -80,6 +83,7 @@ class Store:
                 if desired.running and mark is not None and not mark.exists():
                     # Stopped, and there was nobody or no room to write it down.
                     desired.running, desired.ended_boot = False, this_boot()
+                self._read_history(desired)
                 states.append(desired)
                 if version != VERSION:
                     self._keep_beside(file, text, version)
@@ -145,12 +149,39 @@ class Store:
             mark.touch(mode=0o640)
         self._sync_folder(self._folder)
 
+    def save_history(self, runner: str, changes: Sequence[Change], anew: bool) -> None:
+        """Write what History.to_write() gave; raises OSError.  May run on any thread.
+
+        It is for people, who can do without the last line after a power cut: no fsync.
+        """
+        if self._folder is None or not changes:
+            return
+        file = self._folder / f"{runner}{_HISTORY}"
+        if anew:
+            temporary = self._folder / f".{runner}{_HISTORY}.new"
+            temporary.write_text(history.text(changes), encoding="utf-8")
+            temporary.replace(file)
+            return
+        with file.open("a", encoding="utf-8") as out:
+            out.write(history.text(changes))
+
+    def _read_history(self, desired: Desired) -> None:
+        assert self._folder is not None
+        file = self._folder / f"{desired.runner}{_HISTORY}"
+        try:
+            desired.history.read(file.read_text(encoding="utf-8", errors="replace"))
+        except FileNotFoundError:
+            pass
+        except OSError as error:
+            self._report(f"{file} cannot be read: {error.strerror}")
+
     def remove(self, runner: str) -> None:
         """Forget a runner; raises OSError."""
         if self._folder is None:
             return
         (self._folder / f"{runner}{_SUFFIX}").unlink(missing_ok=True)
         (self._folder / f"{runner}{_MARK}").unlink(missing_ok=True)
+        (self._folder / f"{runner}{_HISTORY}").unlink(missing_ok=True)
         self._sync_folder(self._folder)
 
     @staticmethod

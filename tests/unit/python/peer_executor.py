@@ -253,6 +253,7 @@ class Peer:
                 raise Refused(wire.Error.CODE_NOT_FOUND, f"no component {name}")
         for name in request.components:
             del self.components[name]
+            self.live.pop(name, None)
         return self.changed()
 
     async def replace(self, request: wire.Replace, id_: int) -> wire.Response:

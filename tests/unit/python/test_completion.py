@@ -35,6 +35,11 @@ def offered(daemon: DaemonUnderTest) -> DaemonUnderTest:
         ("load demo F", ["Fine"]),
         ("-r other info ", [""]),
         ("load demo Fine --param ", [""]),
+        ("set alpha ", ["kp:="]),
+        ("history al", ["alpha"]),
+        ("history alpha ", ["kp"]),
+        ("undo al", ["alpha"]),
+        ("break ", ["alpha.in1"]),
         ("nonsense ", [""]),
     ],
 )

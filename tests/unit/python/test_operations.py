@@ -148,14 +148,14 @@ def test_a_stop_whose_caller_leaves_is_done_and_saved(service: DaemonUnderTest, 
     wait_for(lambda: status(service).state == STOPPED, "the end of the loop")
 
 
-@pytest.mark.parametrize("kind", ["stop", "get_component"])
+@pytest.mark.parametrize("kind", ["stop", "get_statistics"])
 def test_what_the_end_of_an_executor_cuts_off_is_answered_with_what_is_known_of_that(
     service: DaemonUnderTest, held: Held, kind: str
 ) -> None:
     with service.client() as client:
         client.start()
         with held.back(kind):
-            ask = (lambda c: c.stop()) if kind == "stop" else (lambda c: c.get_component("a"))
+            ask = (lambda c: c.stop()) if kind == "stop" else (lambda c: c.get_statistics())
             call = Call(service, ask)
             wait_for(held.waits(kind), f"the {kind}")
             with pytest.raises(rtcf.RefusedError):

@@ -1,0 +1,248 @@
+"""Changes of parameters: by clients, by ROS peers, and taken back; with who made them.
+
+Functions on a RunnerCore; each is one transaction of its executor.
+"""
+
+import contextlib
+import time
+from collections.abc import Iterable, Mapping
+
+from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import control_pb2, errors_pb2, graph_pb2
+from rtcf_shared.graph_writer import same_value
+
+from rtcfd.access import caller
+from rtcfd.access.caller import Caller
+from rtcfd.access.tuning import require_pace
+from rtcfd.common.names import absolute
+from rtcfd.common.refusals import FailedPrecondition, NotFound
+from rtcfd.executor.link import Progress
+from rtcfd.operations.runner_core import RunnerCore
+from rtcfd.state.history import Change
+
+_LONGEST_WORD = 60  # of a value in a line
+_MOST_CHANGES = 500  # in one answer
+
+Settings = Iterable[graph_pb2.ParameterSetting]
+
+
+async def set_parameters(
+    runner: RunnerCore, request: control_pb2.SetParametersRequest, progress: Progress
+) -> control_pb2.ChangeResult:
+    """Change parameters of one component."""
+    name = absolute(request.component)
+    # Not looked up when it is its turn, which may come by another's call.
+    acting = caller.current()
+
+    async def work() -> control_pb2.ChangeResult:
+        return await _set(runner, name, list(request.parameters), acting, progress)
+
+    return await runner.change(f"a change of parameters of {name}", work)
+
+
+async def undo(
+    runner: RunnerCore, request: control_pb2.UndoParametersRequest, progress: Progress
+) -> control_pb2.ChangeResult:
+    """Take back what was changed last of one component; again, what was changed before that."""
+    name = absolute(request.component)
+    acting = caller.current()
+
+    async def work() -> control_pb2.ChangeResult:
+        last = runner.desired.history.to_take_back(name)
+        if not last:
+            raise FailedPrecondition(
+                f"no change of parameters of {name} in runner {runner.name} is known that is not "
+                f"taken back: `rtcfctl -r {runner.name} history {name}` lists what is known",
+                errors_pb2.REASON_NOTHING_TO_UNDO,
+                component=name,
+            )
+        now = await _values(runner, name)
+        settings = [_taken_back(runner, each, now) for each in last]
+        result = await _set(runner, name, settings, acting, progress, last[0].number)
+        words = ", ".join(f"{each.name} = {_word(each.value)}" for each in settings)
+        result.notes.append(f"{words}, as before {last[0].who} changed it")
+        return result
+
+    return await runner.change(f"an undo of parameters of {name}", work)
+
+
+def history(
+    runner: RunnerCore, request: control_pb2.GetHistoryRequest
+) -> control_pb2.GetHistoryResponse:
+    """Return who set what when, oldest first: the newest of what is known."""
+    component = absolute(request.component) if request.component else ""
+    found = runner.desired.history.of(component, request.parameter)
+    most = min(request.most or _MOST_CHANGES, _MOST_CHANGES)
+    return control_pb2.GetHistoryResponse(
+        changes=[
+            control_pb2.ParameterChange(
+                component=each.component,
+                parameter=each.parameter,
+                before=each.before,
+                value=each.value,
+                time_ns=each.time_ns,
+                who=each.who,
+                how=each.how,
+            )
+            for each in found[-most:]
+        ]
+    )
+
+
+async def follow_ros(runner: RunnerCore, changed: Mapping[str, set[str]]) -> None:
+    """Note parameters, by component, that ROS peers have changed."""
+    for component, names in changed.items():
+        # Not what was told: more may have happened since.
+        with contextlib.suppress(NotFound):  # gone since, and its parameters with it
+            found = await _component(runner, component)
+            known = _last_values(runner, found)
+            settings = [
+                graph_pb2.ParameterSetting(name=each.name, value=each.value)
+                for each in found.parameters
+                if each.name in names
+            ]
+            runner.desired.set_parameters(component, settings)
+            note(runner, component, settings, known, None, "dynamic_reconfigure")
+
+
+def note(
+    runner: RunnerCore,
+    component: str,
+    settings: Settings,
+    before: Mapping[str, graph_pb2.ParameterValue],
+    acting: Caller | None,
+    how: str,
+    who: str = "",
+    takes_back: int = 0,
+    quiet: bool = False,
+) -> None:
+    """Note parameters that were changed, with who did it: in the history and, unless they came
+    with a whole graph (`quiet`), in the log."""
+    settings = list({each.name: each for each in settings}.values())
+    if not settings:
+        return
+    who = who or _who(acting, how)
+    runner.desired.history.note(
+        component,
+        [(each.name, before.get(each.name), each.value) for each in settings],
+        who,
+        how,
+        takes_back,
+    )
+    if quiet:
+        return
+    words = ", ".join(f"{each.name} = {_word(each.value)}" for each in settings)
+    runner.log.logger.info(
+        "%s: %s %s by %s",
+        component,
+        words,
+        "taken back" if takes_back else "set",
+        who if how == "set" or takes_back else f"{who}, {how}",
+        extra={"runner": runner.name, "peer": None if acting is None else acting.peer},
+    )
+
+
+async def _set(
+    runner: RunnerCore,
+    name: str,
+    settings: list[graph_pb2.ParameterSetting],
+    acting: Caller | None,
+    progress: Progress,
+    takes_back: int = 0,
+) -> control_pb2.ChangeResult:
+    before = await _values(runner, name)
+    if acting is not None and acting.tuning is not None:
+        _require_tuning(runner, name, settings, before, acting)
+    request = control_pb2.SetParametersRequest(component=name, parameters=settings)
+    result = (await runner.ask(wire.Request(set_parameters=request), progress)).change
+    runner.desired.set_parameters(name, settings)
+    note(runner, name, settings, before, acting, "undo" if takes_back else "set", "", takes_back)
+    result.notes.extend(await runner.save())
+    return result
+
+
+def _taken_back(
+    runner: RunnerCore, change: Change, now: Mapping[str, graph_pb2.ParameterValue]
+) -> graph_pb2.ParameterSetting:
+    """Return what takes a change back; refuse where that would take back something else."""
+    name = f"{change.component}.{change.parameter}"
+    if change.before is None:
+        raise FailedPrecondition(
+            f"{name} came with the component ({change.how} by {change.who}): there is no value "
+            f"before to go back to; `rtcfctl -r {runner.name} set` sets another",
+            errors_pb2.REASON_NOTHING_TO_UNDO,
+            component=change.component,
+            parameter=change.parameter,
+        )
+    found = now.get(change.parameter)
+    if found is None or not same_value(found, change.value):
+        raise FailedPrecondition(
+            f"{name} is {'no more' if found is None else _word(found)}, not "
+            f"{_word(change.value)} as {change.who} changed it to: it was changed otherwise since; "
+            f"`rtcfctl -r {runner.name} set` sets another value",
+            errors_pb2.REASON_NOTHING_TO_UNDO,
+            component=change.component,
+            parameter=change.parameter,
+        )
+    return graph_pb2.ParameterSetting(name=change.parameter, value=change.before)
+
+
+def _require_tuning(
+    runner: RunnerCore,
+    component: str,
+    changes: Settings,
+    values: Mapping[str, graph_pb2.ParameterValue],
+    acting: Caller,
+) -> None:
+    """Refuse what somebody may not set, or not that fast."""
+    assert acting.tuning is not None
+    now = time.monotonic()
+    tuned = {}
+    for each in changes:
+        name = f"{component}.{each.name}"
+        rule = acting.tuning.rule(runner.name, name)
+        if each.name in values:  # else its component refuses it
+            last = runner.tuned.get(name)
+            require_pace(rule, name, _plain(values[each.name]), _plain(each.value), last, now)
+            tuned[name] = now
+    there = runner.desired.components
+    runner.tuned = {
+        name: at for name, at in runner.tuned.items() if name.rpartition(".")[0] in there
+    } | tuned
+
+
+async def _component(runner: RunnerCore, name: str) -> graph_pb2.ComponentInfo:
+    query = wire.Request(get_component=control_pb2.GetComponentRequest(component=name))
+    found: graph_pb2.ComponentInfo = (await runner.ask(query)).component
+    return found
+
+
+async def _values(runner: RunnerCore, name: str) -> dict[str, graph_pb2.ParameterValue]:
+    found = await _component(runner, name)
+    return {each.name: each.value for each in found.parameters}
+
+
+def _last_values(
+    runner: RunnerCore, found: graph_pb2.ComponentInfo
+) -> dict[str, graph_pb2.ParameterValue]:
+    """Return the values that parameters had as far as rtcfd was told."""
+    values = {each.name: each.default_value for each in found.parameters}
+    spec = runner.desired.components.get(found.full_name)
+    if spec is not None:
+        values.update({each.name: each.value for each in spec.parameters})
+    return values
+
+
+def _who(acting: Caller | None, how: str) -> str:
+    if how == "dynamic_reconfigure":
+        return "a ROS peer"
+    return "rtcfd" if acting is None else acting.peer.user
+
+
+def _plain(value: graph_pb2.ParameterValue) -> object:
+    kind = value.WhichOneof("kind")
+    return None if kind is None else getattr(value, kind)
+
+
+def _word(value: graph_pb2.ParameterValue) -> str:
+    return f"{_plain(value)}"[:_LONGEST_WORD]

@@ -1,0 +1,148 @@
+"""Who set which parameter to what, and when: the last changes of one runner's components.
+
+Part of its Desired; store.py keeps it on disk.  Bounded by component, so that
+one that is tuned all day leaves the others theirs, and in all.
+"""
+
+import json
+import time
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from google.protobuf import json_format
+from rtcf.v1 import graph_pb2
+
+MOST_OF_A_COMPONENT = 200
+MOST = 4000
+
+Value = graph_pb2.ParameterValue
+
+
+@dataclass(frozen=True)
+class Change:
+    """Of one parameter.  Those that were made at one cycle boundary have one number."""
+
+    number: int
+    time_ns: int  # since 1970
+    component: str  # full name
+    parameter: str
+    before: Value | None  # None: it was not there, or is not known
+    value: Value
+    who: str  # for people
+    how: str  # "set", "undo", "load", "replace", "apply", "dynamic_reconfigure"
+    takes_back: int = 0  # the number of what it undoes; 0 = nothing
+
+
+class History:
+    """The changes, oldest first."""
+
+    def __init__(self) -> None:
+        self._changes: dict[str, deque[Change]] = {}  # by component
+        self._count = 0
+        self._last = 0  # number
+        self._new: list[Change] = []  # not on disk yet
+        self._on_disk = 0  # lines
+
+    def note(
+        self,
+        component: str,
+        changes: Iterable[tuple[str, Value | None, Value]],
+        who: str,
+        how: str,
+        takes_back: int = 0,
+    ) -> None:
+        """Note parameters of one component: name, value before, value."""
+        self._last += 1
+        now = time.time_ns()
+        for name, before, value in changes:
+            change = Change(self._last, now, component, name, before, value, who, how, takes_back)
+            self._put(change)
+            self._new.append(change)
+
+    def of(self, component: str = "", parameter: str = "") -> list[Change]:
+        """Return the changes of a component, or of all, and of a parameter, or of all."""
+        chosen = [
+            each
+            for name in ([component] if component else self._changes)
+            for each in self._changes.get(name, ())
+            if not parameter or each.parameter == parameter
+        ]
+        return sorted(chosen, key=lambda each: each.number)
+
+    def to_take_back(self, component: str) -> list[Change]:
+        """Return what was changed last of a component and has not been taken back since: all
+        that was changed at once; nothing if there is none."""
+        changes = self._changes.get(component, ())
+        undone = {each.takes_back for each in changes}
+        numbers = [
+            each.number for each in changes if not each.takes_back and each.number not in undone
+        ]
+        return [each for each in changes if numbers and each.number == numbers[-1]]
+
+    def to_write(self) -> tuple[list[Change], bool]:
+        """Return what is to be written, and whether that is all there is, in the place of what is
+        on disk; else it is to be appended.  From then on it counts as written."""
+        changes, self._new = self._new, []
+        anew = self._on_disk + len(changes) > 2 * MOST
+        if anew:
+            changes = self.of()
+            self._on_disk = 0
+        self._on_disk += len(changes)
+        return changes, anew
+
+    def not_written(self) -> None:
+        """What to_write() gave did not get to disk: all there is is written the next time."""
+        self._on_disk = 2 * MOST + 1
+
+    def read(self, text: str) -> None:
+        """Take what was written; a line that is none, as of a power cut, is passed over."""
+        for line in text.splitlines():
+            self._on_disk += 1
+            try:
+                change = _change(line)
+            except (ValueError, TypeError, KeyError, json_format.ParseError):
+                continue
+            self._put(change)
+            self._last = max(self._last, change.number)
+
+    def _put(self, change: Change) -> None:
+        changes = self._changes.setdefault(change.component, deque())
+        changes.append(change)
+        self._count += 1
+        if len(changes) > MOST_OF_A_COMPONENT:
+            self._drop(change.component)
+        elif self._count > MOST:
+            self._drop(min(self._changes, key=lambda name: self._changes[name][0].number))
+
+    def _drop(self, component: str) -> None:
+        changes = self._changes[component]
+        changes.popleft()
+        self._count -= 1
+        if not changes:
+            del self._changes[component]
+
+
+def text(changes: Iterable[Change]) -> str:
+    """Return what read() takes; on any thread."""
+    return "".join(_line(each) for each in changes)
+
+
+def _line(change: Change) -> str:
+    fields: dict[str, Any] = dict(vars(change))
+    for name in ("before", "value"):
+        if fields[name] is not None:
+            fields[name] = json_format.MessageToDict(fields[name], preserving_proto_field_name=True)
+    return json.dumps(fields) + "\n"
+
+
+def _change(line: str) -> Change:
+    fields = json.loads(line)
+    for name in ("before", "value"):
+        if fields[name] is not None:
+            fields[name] = json_format.ParseDict(fields[name], Value())
+    change = Change(**fields)
+    if type(change.number) is not int or not isinstance(change.component, str):
+        raise ValueError("no change")
+    return change

@@ -1,0 +1,243 @@
+"""Who set which parameter to what, and when: kept, bounded, taken back."""
+
+import os
+import signal
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+import rtcf
+from daemon_under_test import DaemonUnderTest, wait_for
+from hypothesis import given, seed
+from hypothesis import strategies as st
+from rtcf.v1 import control_pb2, graph_pb2
+from rtcfd.state import history
+from rtcfd.state.desired import Desired
+from rtcfd.state.history import History
+from rtcfd.state.store import Store
+from strangers import open_to_strangers, root_only, stranger
+
+SEED = int(os.environ.get("RTCF_SEED", "1"))
+
+steps = st.one_of(
+    st.tuples(
+        st.just("set"), st.sampled_from("ab"), st.dictionaries(st.sampled_from("xyz"), st.floats(),
+                                                               min_size=1)
+    ),
+    st.tuples(st.just("undo"), st.sampled_from("ab"), st.none()),
+    st.tuples(st.just("restart"), st.none(), st.none()),
+)  # fmt: skip
+
+
+def value(number: float) -> graph_pb2.ParameterValue:
+    return graph_pb2.ParameterValue(double_value=number)
+
+
+@seed(SEED)
+@given(st.lists(steps, max_size=60))
+def test_changes_are_taken_back_in_the_order_they_were_made(sequence: list[tuple]) -> None:  # type: ignore[type-arg]
+    changes = History()
+    disk = ""
+    model: dict[str, list[dict[str, str]]] = defaultdict(list)  # what is not taken back
+    for what, component, values in sequence:
+        if what == "set":
+            changes.note(
+                component, [(each, None, value(number)) for each, number in values.items()],
+                "ann", "set",
+            )  # fmt: skip
+            model[component].append({each: str(value(values[each])) for each in values})
+        elif what == "undo":
+            found = changes.to_take_back(component)
+            expected = model[component].pop() if model[component] else {}
+            assert {each.parameter: str(each.value) for each in found} == expected
+            if found:
+                back = [(each.parameter, each.value, value(0.0)) for each in found]
+                changes.note(component, back, "bob", "undo", found[0].number)
+        else:
+            new, anew = changes.to_write()
+            disk = history.text(new) if anew else disk + history.text(new)
+            before = [str(each) for each in changes.of()]
+            changes = History()
+            changes.read(disk)
+            assert [str(each) for each in changes.of()] == before
+
+
+def test_one_component_that_is_tuned_all_day_leaves_others_theirs() -> None:
+    changes = History()
+    changes.note("/quiet", [("kp", None, value(1.0))], "ann", "set")
+    for number in range(10 * history.MOST):
+        changes.note("/busy", [("kp", None, value(number))], "ann", "set")
+    assert len(changes.of("/busy")) == history.MOST_OF_A_COMPONENT
+    assert len(changes.of("/quiet")) == 1
+
+
+def test_all_together_have_a_bound_too_and_the_oldest_goes() -> None:
+    changes = History()
+    for number in range(history.MOST + 10):
+        changes.note(f"/c{number}", [("kp", None, value(number))], "ann", "set")
+    found = changes.of()
+    assert (len(found), found[0].component) == (history.MOST, "/c10")
+
+
+def test_the_file_is_bounded_too(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    desired = Desired("arm")
+    store.save("arm", store.text(desired), False)
+    lines = 0
+    for number in range(30):
+        changes = [("kp", None, value(number))] * (history.MOST // 10)
+        desired.history.note("/a", changes, "ann", "set")
+        store.save_history("arm", *desired.history.to_write())
+        lines = max(lines, len((tmp_path / "arm.history").read_text().splitlines()))
+    assert lines <= 2 * history.MOST
+    (again,) = store.load()
+    assert [str(each) for each in again.history.of()] == [str(e) for e in desired.history.of()]
+    store.remove("arm")
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_did_not_get_to_disk_does_so_the_next_time() -> None:
+    changes = History()
+    changes.note("/a", [("kp", None, value(1.0))], "ann", "set")
+    changes.to_write()
+    changes.not_written()
+    changes.note("/a", [("kp", value(1.0), value(2.0))], "ann", "set")
+    found, anew = changes.to_write()
+    assert (anew, len(found)) == (True, 2)
+    assert changes.to_write() == ([], False)
+
+
+def test_lines_that_are_none_are_passed_over(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    store.save("arm", store.text(Desired("arm")), False)
+    good = History()
+    good.note("/a", [("kp", value(1.0), value(2.0))], "ann", "set")
+    torn = history.text(good.of())[:-20]
+    (tmp_path / "arm.history").write_text(
+        "[]\n7\n{}\n\0\nnull\n" + history.text(good.of()) + torn, encoding="utf-8"
+    )
+    (found,) = store.load()
+    assert [each.parameter for each in found.history.of()] == ["kp"]
+    assert not store.problems
+
+
+def kp(client: rtcf.Client) -> float:
+    return float(client.get_component("pid").parameters[0].value.double_value)
+
+
+def test_what_was_set_is_taken_back_step_by_step_also_after_a_restart(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
+    client.load(rtcf.component("demo", "Fine", name="pid", parameters=["kp:=1.5"]))
+    for text in ("kp:=2.5", "kp:=3.5"):
+        client.set_parameters("pid", [rtcf.parse_parameter(text)])
+    assert "kp = 2.5, as before root changed it" in "".join(client.undo_parameters("pid").notes)
+    assert kp(client) == 2.5
+    daemon.end()
+    daemon.start()
+    with daemon.client() as again:
+        again.undo_parameters("pid")
+        assert kp(again) == 1.5
+        with pytest.raises(rtcf.RefusedError, match=r"/pid.kp came with the component \(load by"):
+            again.undo_parameters("pid")
+        assert [
+            (each.how, each.who, each.HasField("before") and each.before.double_value,
+             each.value.double_value)
+            for each in again.get_history("pid", "kp")
+        ] == [
+            ("load", "root", False, 1.5),
+            ("set", "root", 1.5, 2.5),
+            ("set", "root", 2.5, 3.5),
+            ("undo", "root", 3.5, 2.5),
+            ("undo", "root", 2.5, 1.5),
+        ]  # fmt: skip
+        assert [each.how for each in again.get_history(most=2)] == ["undo", "undo"]
+        assert not again.get_history("pid", "ki")
+    shown = daemon.ctl("history", "pid", "-n", "2").stdout.splitlines()
+    assert len(shown) == 3
+    assert all(len(line) <= 80 for line in shown)
+    assert "/pid.kp" in shown[2]
+
+
+def test_what_was_changed_otherwise_since_is_not_taken_back(client: rtcf.Client) -> None:
+    client.load(rtcf.component("demo", "Fine", name="pid"))
+    client.set_parameters("pid", [rtcf.parse_parameter("kp:=2.5")])
+    client.unload(["pid"])
+    client.load(rtcf.component("demo", "Fine", name="pid"))
+    with pytest.raises(rtcf.RefusedError, match="it was changed otherwise since"):
+        client.undo_parameters("pid")
+    with pytest.raises(rtcf.RefusedError, match="no change of parameters of /other"):
+        client.undo_parameters("other")
+
+
+def test_a_graph_that_is_applied_says_what_it_changed(client: rtcf.Client) -> None:
+    for text in ("kp:=1.5", "kp:=1.5", "kp:=2.0"):
+        spec = rtcf.component("demo", "Fine", name="pid", parameters=[text])
+        client._change(client._stub.Apply, control_pb2.ApplyRequest(components=[spec]), None)
+    assert [each.value.double_value for each in client.get_history("pid")] == [1.5, 2.0]
+
+
+def test_a_launch_is_named(client: rtcf.Client) -> None:
+    spec = rtcf.component("demo", "Fine", name="pid", parameters=["kp:=1.5"])
+    opening = control_pb2.OpenLease(component=spec, holder="launch of ann")
+    tenancy = client.lease_component(opening)
+    wait_for(lambda: client.get_history("pid"), "the change")
+    (change,) = client.get_history("pid")
+    assert (change.who, change.how) == ("launch of ann", "launch")
+    tenancy.end()
+
+
+def test_a_change_whose_caller_left_is_noted_with_who_made_it(
+    stopped_daemon: DaemonUnderTest, tmp_path: Path
+) -> None:
+    held = tmp_path / "held"
+    held.mkdir()
+    stopped_daemon.environment["PEER_HELD"] = str(held)
+    stopped_daemon.start()
+    with stopped_daemon.client() as client:
+        client.load(rtcf.component("demo", "Fine", name="pid"))
+        (held / "set_parameters").touch()
+        request = control_pb2.SetParametersRequest(
+            component="pid", parameters=[rtcf.parse_parameter("kp:=2.5")]
+        )
+        call = client._stub.SetParameters(request)
+        wait_for((held / "set_parameters waits").exists, "the change")
+        call.cancel()
+        (held / "set_parameters").unlink()
+        wait_for(lambda: client.get_history("pid"), "the note")
+        assert client.get_history("pid")[0].who == "root"
+    assert "/pid: kp = 2.5 set by root" in stopped_daemon.log()
+    assert stopped_daemon.end(signal.SIGTERM) == 0
+
+
+UNDO = """
+import sys, rtcf
+with rtcf.Client(sys.argv[1]) as client:
+    for _ in range(2):
+        try:
+            client.undo_parameters("pid")
+            print("undone", flush=True)
+        except rtcf.RtcfError as error:
+            print(error, flush=True)
+    print(len(client.get_history()), flush=True)
+"""
+
+
+@root_only
+def test_who_undoes_is_bound_as_who_sets() -> None:
+    rules = (
+        "[access]\nobserve = ['nobody']\n"
+        "[[access.parameters]]\nwho = ['nobody']\nnames = ['/pid.kp']\nmost_per_s = 0.5\n"
+    )
+    with open_to_strangers(rules) as daemon:
+        daemon.package("demo", types={"Fine": "fine"})
+        with daemon.client() as client:
+            client.load(rtcf.component("demo", "Fine", name="pid"))
+            for text in ("kp:=9.0", "kp:=9.1"):
+                client.set_parameters("pid", [rtcf.parse_parameter(text)])
+        with stranger(UNDO, str(daemon.socket), user="nobody") as process:
+            assert process.stdout is not None
+            said = [process.stdout.readline() for _ in range(3)]
+    assert said[0] == "undone\n"
+    assert "/pid.kp may change by 0.5 a second" in said[1]
+    assert said[2] == "3\n"
