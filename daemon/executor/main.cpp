@@ -36,6 +36,7 @@ using rtcf::LogLevel;
 
 struct Options {
     std::string runner;
+    std::string daemon;
     std::string socket;
     std::string stop_socket;
     std::string resume_mark;
@@ -46,7 +47,8 @@ struct Options {
 };
 
 constexpr const char* kUsage =
-    "usage: rtcf-executor --runner NAME --socket PATH [--stop-socket PATH] [--resume-mark FILE]\n"
+    "usage: rtcf-executor --runner NAME --socket PATH [--daemon NAME] [--stop-socket PATH]\n"
+    "                     [--resume-mark FILE]\n"
     "       rtcf-executor --describe LIBRARY --package PACKAGE [--trust UID]...\n"
     "       rtcf-executor --check LIBRARY --package PACKAGE --type TYPE [--cycles N] [--param "
     "NAME:=VALUE]...\n"
@@ -62,6 +64,7 @@ int parse(int argc, char** argv, Options& options) {
         kSocket,
         kStopSocket,
         kResumeMark,
+        kDaemon,
         kDescribe,
         kPackage,
         kCheck,
@@ -76,6 +79,7 @@ int parse(int argc, char** argv, Options& options) {
                             {"socket", required_argument, nullptr, kSocket},
                             {"stop-socket", required_argument, nullptr, kStopSocket},
                             {"resume-mark", required_argument, nullptr, kResumeMark},
+                            {"daemon", required_argument, nullptr, kDaemon},
                             {"describe", required_argument, nullptr, kDescribe},
                             {"package", required_argument, nullptr, kPackage},
                             {"check", required_argument, nullptr, kCheck},
@@ -100,6 +104,9 @@ int parse(int argc, char** argv, Options& options) {
                 break;
             case kResumeMark:
                 options.resume_mark = optarg;
+                break;
+            case kDaemon:
+                options.daemon = optarg;
                 break;
             case kDescribe:
                 options.describe = optarg;
@@ -210,7 +217,7 @@ int run(const Options& options) {
         const LogDrain drain(log);
         Runner runner(options.runner, log, publish,
                       std::make_unique<rtcf::ros1::RosNode>(
-                          options.runner,
+                          options.daemon, options.runner,
                           [&](const std::string& message) {
                               publish(RunnerEvent{RunnerEvent::Kind::Ros, message, {}, 0});
                           },

@@ -5,10 +5,12 @@
 
 namespace rtcf::ros1 {
 
-RosNode::RosNode(const std::string& runner, executor::BridgeReport report, executor::Log& log,
-                 Rosout& rosout, executor::AskSupervisor ask)
+RosNode::RosNode(const std::string& daemon, const std::string& runner,
+                 executor::BridgeReport report, executor::Log& log, Rosout& rosout,
+                 executor::AskSupervisor ask)
     : ask_(std::move(ask)),
-      watch_(std::make_unique<MasterWatch>(runner, std::move(report), log, rosout)),
+      watch_(
+          std::make_unique<MasterWatch>(nodeName(daemon, runner), std::move(report), log, rosout)),
       thread_(quietThread("ros-watch", [this] { watch_->run(); })) {}
 
 RosNode::~RosNode() {

@@ -20,14 +20,15 @@ class Rosout;
 /// waits for one; it outlives masters that go and come.
 class RosNode final : public executor::Bridge {
    public:
-    /// @param runner names the node, `/rtcfd/<host>/<runner>`
+    /// @param daemon names the daemon among those of this host; empty: the system's
+    /// @param runner names the node, `/rtcfd/<host>/<runner>` or `/rtcfd/<host>/<daemon>/<runner>`
     /// @param report hears of what changes; not called after the destructor
     /// @param log    what is said by ROS_* macros goes there; its levels are the loggers'; outlives
     /// this
     /// @param rosout opened and closed with the node; outlives this
     /// @param ask who decides on changes that ROS peers ask for by services
-    RosNode(const std::string& runner, executor::BridgeReport report, executor::Log& log,
-            Rosout& rosout, executor::AskSupervisor ask);
+    RosNode(const std::string& daemon, const std::string& runner, executor::BridgeReport report,
+            executor::Log& log, Rosout& rosout, executor::AskSupervisor ask);
 
     /// Withdraws from the master and closes all topics, in less than two seconds whatever the
     /// master does. Taps and injectors are not used any more afterwards.

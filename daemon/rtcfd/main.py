@@ -62,6 +62,7 @@ class Daemon:
             # Who can connect to us can do so too; it is the executor that looks at rights.
             0o700 if given.foreground else 0o750,
             self._store.mark,
+            private=given.foreground,
         )
         self._endpoint = Endpoint(given.socket, private=given.foreground)
         folder = self._command.folder

@@ -31,7 +31,12 @@ SERVICES = {
 @pytest.fixture
 def settings(master: Master) -> str:
     """Let the loops of `daemon` have a ROS node."""
-    return with_ros(master.uri, fig_1.WHITELIST)
+    return _with_ros(master.uri, fig_1.WHITELIST)
+
+
+def _with_ros(master_uri: str, whitelist: str) -> str:
+    """Return settings for a node whose services are where RTCF 2021 has them."""
+    return with_ros(master_uri, whitelist) + "ns = '/rt_runner'\n"
 
 
 def _wait_for_services(master: Master) -> None:
@@ -148,13 +153,14 @@ def test_diagnostics_tell_the_health_of_loop_and_components(
     client.load(rtcf.component("rtcf_faults", "Throws", name="Bomb", parameters=["after:=2000"]))
     client.load(rtcf.component("rtcf_examples", "Mimo", name="Sum"))
     client.start()
-    peer = _peer(master, "diagnostics", "rt_runner: loop", "2")
+    node = client.get_status("rt_runner").runners[0].ros.node.removeprefix("/")
+    peer = _peer(master, "diagnostics", f"{node}: loop", "2")
     statuses = [line.split("|") for line in _lines(peer)]
     # name, level, message, then key=value
-    loop = [each for each in statuses if each[0] == "rt_runner: loop"]
-    bomb = [each for each in statuses if each[0] == "rt_runner: /Bomb"]
+    loop = [each for each in statuses if each[0] == f"{node}: loop"]
+    bomb = [each for each in statuses if each[0] == f"{node}: /Bomb"]
     names = {each[0] for each in statuses}
-    assert names == {"rt_runner: loop", "rt_runner: /Bomb", "rt_runner: /Sum"}
+    assert names == {f"{node}: loop", f"{node}: /Bomb", f"{node}: /Sum"}
     assert loop[-1][1] == "2"
     assert "/Bomb: update() threw" in loop[-1][2]
     assert bomb[-1][1] == "2"
@@ -271,7 +277,7 @@ def test_refusals_say_what_is_wrong(
 def test_ros_may_do_what_the_settings_allow(
     tmp_path: Path, master: Master, access: str, loads: bool, starts: bool
 ) -> None:
-    settings = with_ros(master.uri, "") + f'peers = "{access}"\n'
+    settings = _with_ros(master.uri, "") + f'peers = "{access}"\n'
     daemon = Daemon(tmp_path, settings)
     daemon.start()
     try:
@@ -292,7 +298,7 @@ def test_services_and_topics_are_there_again_after_a_restart_of_the_master(
 ) -> None:
     master = Master(tmp_path)
     master.start()
-    daemon = Daemon(tmp_path, with_ros(master.uri, ""))
+    daemon = Daemon(tmp_path, _with_ros(master.uri, ""))
     daemon.start()
     try:
         _wait_for_services(master)

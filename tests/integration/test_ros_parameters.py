@@ -223,3 +223,85 @@ def test_a_component_that_leaves_takes_its_server_along(
         return not any(name.startswith(f"{_NAME}/") for name in names)
 
     wait_for(gone, "its topics and its service to go")
+
+
+def _load(client: rtcf.Client, *parameters: str) -> None:
+    client.load(
+        rtcf.component("rtcf_test", "Knobs", name="knobs", ns="/arm", parameters=list(parameters))
+    )
+
+
+def _holds(client: rtcf.Client, master: Master, rate: float) -> None:
+    """Wait until loop and parameter server have this value."""
+    wait_for(
+        lambda: (values(client)["rate"], master.parameter(f"{_NAME}/rate")) == (rate, rate),
+        f"{rate} to hold, not {values(client)['rate']} and {master.parameter(f'{_NAME}/rate')}",
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "there", "holds"),
+    [([], None, 1.5), ([], 3.0, 3.0), (["rate:=2.5"], 3.0, 2.5), (["rate:=2.5"], None, 2.5)],
+)
+def test_of_a_component_that_is_loaded_a_given_value_wins_then_the_parameter_server_s(
+    tmp_path: Path, master: Master, given: list[str], there: float | None, holds: float
+) -> None:
+    daemon = Daemon(tmp_path, with_ros(master.uri, ""))
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0))
+            wait_for(lambda: client.get_status("rt_runner").runners[0].ros.connected, "the node")
+            if there is not None:
+                master.run("rosparam", "set", f"{_NAME}/rate", str(there))
+            _load(client, *given)
+            _holds(client, master, holds)
+            # It leaves nothing of its own, and what was somebody else's.
+            client.unload([_NAME])
+            wait_for(lambda: master.parameter(f"{_NAME}/rate") == there, "what was there before")
+            wait_for(lambda: master.parameter(f"{_NAME}/count") is None, "the others to go")
+    finally:
+        daemon.end()
+        if there is not None:
+            master.run("rosparam", "delete", _NAME)
+
+
+def test_a_new_master_s_values_win_over_those_of_the_loop(tmp_path: Path) -> None:
+    master = Master(tmp_path)
+    master.start()
+    daemon = Daemon(tmp_path, with_ros(master.uri, ""))
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0))
+            _load(client, "rate:=2.0", "count:=3")
+            _holds(client, master, 2.0)
+            master.end()
+            wait_for(
+                lambda: not client.get_status("rt_runner").runners[0].ros.connected, "its absence"
+            )
+            # A launch file sets its parameters before anything else is there.
+            master.start()
+            master.run("rosparam", "set", f"{_NAME}/rate", "9.0")
+            _holds(client, master, 9.0)
+            wait_for(lambda: master.parameter(f"{_NAME}/count") == 3, "what it did not have")
+    finally:
+        daemon.end()
+        master.end()
+
+
+def test_a_text_that_xml_cannot_carry_stays_off_the_parameter_server(
+    knobs: tuple[Daemon, rtcf.Client], master: Master
+) -> None:
+    daemon, client = knobs
+    wait_for(lambda: master.parameter(f"{_NAME}/rate") == 1.5, "the parameter server")
+    before = master.parameter(f"{_NAME}/label")
+    daemon.ctl("set", _NAME, "label:=a\x01b")
+    wait_for(lambda: values(client)["label"] == "a\x01b", "the value")
+    ros = lambda: client.get_status("rt_runner").runners[0].ros  # noqa: E731
+    wait_for(lambda: f"{_NAME}/label" in ros().problem, "the status to say so")
+    assert ros().connected
+    assert master.parameter(f"{_NAME}/label") == before
+    # All others go on.
+    daemon.ctl("set", _NAME, "rate:=4")
+    wait_for(lambda: master.parameter(f"{_NAME}/rate") == 4.0, "the parameter server")

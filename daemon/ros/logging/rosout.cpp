@@ -3,7 +3,7 @@
 #include <ros/node_handle.h>
 #include <rosgraph_msgs/Log.h>
 
-#include <utility>
+#include "ros/roscpp/handles.hpp"
 
 #include "runner/runner_view.hpp"
 
@@ -92,14 +92,7 @@ void Rosout::open(ros::NodeHandle& handle, const std::string& node) {
     node_ = node;
 }
 
-void Rosout::close() {
-    ros::Publisher closing;
-    {
-        const std::lock_guard lock(mutex_);
-        std::swap(closing, publisher_);
-    }
-    closing.shutdown();
-}
+void Rosout::close() { shutDown(mutex_, publisher_); }
 
 bool Rosout::isOpen() const {
     const std::lock_guard lock(mutex_);

@@ -1,8 +1,10 @@
 #include "ros/parameters/parameter_mirror.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 namespace rtcf::ros1 {
@@ -45,12 +47,36 @@ std::optional<ParameterValue> fromXmlRpc(XmlRpc::XmlRpcValue& value, const std::
     }
 }
 
-XmlRpc::XmlRpcValue arguments(const std::string& first, const std::string& second) {
-    XmlRpc::XmlRpcValue array;
-    array[0] = first;
-    array[1] = second;
-    return array;
+// XML cannot carry control characters, nor what is no UTF-8; it changes carriage returns.
+bool canBeSent(const ParameterValue& value) {
+    const auto* const text = std::get_if<std::string>(&value);
+    if (text == nullptr) return true;
+    int following = 0;  // bytes of a character that has begun
+    for (const char each : *text) {
+        const auto byte = static_cast<unsigned char>(each);
+        const bool follows = (byte & 0xC0U) == 0x80U;
+        if (follows != (following > 0)) return false;
+        if (follows) {
+            --following;
+        } else if (byte >= 0xF0U) {
+            following = byte < 0xF5U ? 3 : -1;
+        } else if (byte >= 0xE0U) {
+            following = 2;
+        } else if (byte >= 0xC2U) {
+            following = 1;
+        } else if (byte >= 0x80U || byte == 0x7FU ||
+                   (byte < 0x20U && each != '\t' && each != '\n')) {
+            return false;
+        }
+        if (following < 0) return false;
+    }
+    return following == 0;
 }
+
+constexpr auto kEach = std::chrono::milliseconds(1000);  // for one answer
+constexpr std::size_t kMost = 400;                       // calls in one turn
+
+std::chrono::steady_clock::time_point soon() { return std::chrono::steady_clock::now() + kEach; }
 
 }  // namespace
 
@@ -64,6 +90,11 @@ void ParameterMirror::noteWritten(const std::string& key) {
     }
 }
 
+std::string ParameterMirror::problem() const {
+    const std::lock_guard lock(pending_->mutex);
+    return pending_->problem;
+}
+
 void ParameterMirror::forget() {
     known_.clear();
     const std::lock_guard lock(pending_->mutex);
@@ -72,127 +103,208 @@ void ParameterMirror::forget() {
     pending_->refused.clear();
 }
 
-bool ParameterMirror::reconcile(MasterClient& master, const Caller& caller,
-                                const executor::ParameterSet& set) {
-    const std::string& component = set.full_name;
-    Values& known = known_[component];
-    bool written = false;
-    bool followed = false;
-    bool refused = false;
+Reconciled ParameterMirror::reconcile(ParallelCalls& master, const Caller& caller,
+                                      const std::vector<Component>& components) {
+    std::vector<Component> present;
+    std::vector<Component> refused;
     {
         const std::lock_guard lock(pending_->mutex);
-        // While the loop is asked, nobody knows which value is to hold.
-        if (pending_->asked.count(component) != 0) return true;
-        followed = pending_->followed.count(component) != 0;
-        written = pending_->written.count(component) != 0;
-        refused = pending_->refused.count(component) != 0;
+        for (const Component& component : components) {
+            const std::string& name = component.set->full_name;
+            // While the loop is asked, nobody knows which value is to hold.
+            if (pending_->asked.count(name) != 0) continue;
+            present.push_back(component);
+            if (pending_->refused.count(name) != 0) refused.push_back(component);
+        }
     }
-    if (refused) {
-        // Before it is read again, and asked for again.
-        if (!write(master, caller, set, known)) return false;
+    Reconciled result = Reconciled::Done;
+    // Before it is read again, and asked for again.
+    if (!refused.empty()) {
+        if (!write(master, caller, refused, result)) return result;
         const std::lock_guard lock(pending_->mutex);
-        pending_->refused.erase(component);
+        for (const Component& component : refused) {
+            pending_->refused.erase(component.set->full_name);
+            known_[component.set->full_name].others.clear();
+        }
     }
-    if (written) {
-        if (!read(master, caller, set, known)) return false;
-        const std::lock_guard lock(pending_->mutex);
-        if (pending_->asked.count(component) != 0) return true;
-    }
-    if (!write(master, caller, set, known)) return false;
-    return followed || follow(master, caller, set, known);
-}
-
-bool ParameterMirror::write(MasterClient& master, const Caller& caller,
-                            const executor::ParameterSet& set, Values& known) const {
-    for (const auto& [declaration, value] : set.parameters) {
-        const auto found = known.find(declaration.name);
-        if (found != known.end() && found->second == value) continue;
-        XmlRpc::XmlRpcValue call = arguments(caller.name, set.full_name + "/" + declaration.name);
-        call[2] = toXmlRpc(value);
-        if (master.call("setParam", call).silent()) return false;
-        known[declaration.name] = value;
-    }
-    return true;
-}
-
-bool ParameterMirror::follow(MasterClient& master, const Caller& caller,
-                             const executor::ParameterSet& set, Values& known) {
-    XmlRpc::XmlRpcValue call = arguments(caller.name, caller.uri);
-    call[2] = set.full_name;
-    MasterAnswer answer = master.call("subscribeParam", call);
-    if (answer.silent()) return false;
+    if (!read(master, caller, present, result)) return result;
     {
         const std::lock_guard lock(pending_->mutex);
-        pending_->followed.insert(set.full_name);
+        const auto waits = [this](const Component& component) {
+            const std::string& name = component.set->full_name;
+            return pending_->asked.count(name) != 0 || pending_->followed.count(name) == 0;
+        };
+        present.erase(std::remove_if(present.begin(), present.end(), waits), present.end());
     }
-    if (answer) take(answer.value, set, known);
-    return true;
+    write(master, caller, present, result);
+    return result;
 }
 
-bool ParameterMirror::read(MasterClient& master, const Caller& caller,
-                           const executor::ParameterSet& set, Values& known) {
+// @return false if nothing more is to be done in this turn
+bool ParameterMirror::read(ParallelCalls& master, const Caller& caller,
+                           const std::vector<Component>& components, Reconciled& result) {
+    std::vector<const Component*> asked;
+    std::vector<bool> first;
+    std::vector<MasterCall> calls;
     {
-        // What is written from now on is looked at again.
         const std::lock_guard lock(pending_->mutex);
-        pending_->written.erase(set.full_name);
+        for (const Component& component : components) {
+            const std::string& name = component.set->full_name;
+            const bool followed = pending_->followed.count(name) != 0;
+            // What is written from now on is looked at again.
+            if (followed && pending_->written.erase(name) == 0) continue;
+            if (calls.size() == kMost) {
+                if (followed) pending_->written.insert(name);
+                result = result & Reconciled::Again;
+                break;
+            }
+            asked.push_back(&component);
+            first.push_back(!followed);
+            calls.push_back(
+                followed ? MasterCall{"getParam", texts({caller.name, name})}
+                         : MasterCall{"subscribeParam", texts({caller.name, caller.uri, name})});
+        }
     }
-    MasterAnswer answer = master.call("getParam", arguments(caller.name, set.full_name));
-    if (answer.silent()) {
-        noteWritten(set.full_name + "/");
-        return false;
+    std::vector<MasterAnswer> answers = master.run(calls, kEach, soon());
+    for (std::size_t i = 0; i < answers.size(); ++i) {
+        const std::string& name = asked[i]->set->full_name;
+        if (answers[i].silent()) {
+            if (!first[i]) noteWritten(name + "/");
+            result = Reconciled::Later;
+            continue;
+        }
+        if (first[i]) {
+            const std::lock_guard lock(pending_->mutex);
+            pending_->followed.insert(name);
+        }
+        take(answers[i].value, *asked[i], first[i]);
     }
-    take(answer.value, set, known);
-    return true;
+    return result != Reconciled::Later;
 }
 
 // @param values the master's of the component's namespace, a struct if there are any
-void ParameterMirror::take(XmlRpc::XmlRpcValue& values, const executor::ParameterSet& set,
-                           Values& known) {
+// @param first  for the first time at this master
+void ParameterMirror::take(XmlRpc::XmlRpcValue& values, const Component& component, bool first) {
+    const executor::ParameterSet& set = *component.set;
+    Known& known = known_[set.full_name];
     const bool any = values.getType() == XmlRpc::XmlRpcValue::TypeStruct;
     executor::ParameterBatch batch;
     for (const auto& [declaration, value] : set.parameters) {
+        const std::string& name = declaration.name;
         std::optional<ParameterValue> found;
-        if (any && values.hasMember(declaration.name))
-            found = fromXmlRpc(values[declaration.name], declaration.type);
+        if (any && values.hasMember(name)) found = fromXmlRpc(values[name], declaration.type);
         if (!found) {
-            known.erase(declaration.name);
+            known.values.erase(name);
+            known.others.erase(name);
             continue;
         }
-        if (*found != value) batch.emplace_back(declaration.name, *found);
-        known[declaration.name] = *std::move(found);
+        const auto before = known.values.find(name);
+        if (before == known.values.end() || before->second != *found) {
+            known.others[name] = values[name];
+            known.ours.erase(name);
+        }
+        known.values[name] = *found;
+        const bool was_given = first && component.is_new && value != declaration.default_value;
+        if (*found != value && !was_given) batch.emplace_back(name, *std::move(found));
     }
-    if (batch.empty()) return;
+    if (!batch.empty() && follows_) ask(set.full_name, std::move(batch));
+}
+
+void ParameterMirror::ask(const std::string& component, executor::ParameterBatch batch) {
     {
         const std::lock_guard lock(pending_->mutex);
-        pending_->asked.insert(set.full_name);
+        pending_->asked.insert(component);
     }
-    request_(set.full_name, std::move(batch),
-             [pending = pending_, name = set.full_name](const std::string& refusal) {
+    request_(component, std::move(batch),
+             [pending = pending_, name = component](const std::string& refusal) {
                  const std::lock_guard lock(pending->mutex);
                  pending->asked.erase(name);
                  if (!refusal.empty()) pending->refused.insert(name);
              });
 }
 
-bool ParameterMirror::leave(MasterClient& master, const Caller& caller,
-                            const std::string& component) {
-    known_.erase(component);
+// @return false if nothing more is to be done in this turn
+bool ParameterMirror::write(ParallelCalls& master, const Caller& caller,
+                            const std::vector<Component>& components, Reconciled& result) {
+    struct Written {
+        Known* known;
+        const executor::ParameterSnapshot* parameter;
+    };
+    std::vector<Written> writing;
+    std::string problem;
+    std::vector<MasterCall> calls;
+    for (const Component& component : components) {
+        Known& known = known_[component.set->full_name];
+        for (const executor::ParameterSnapshot& parameter : component.set->parameters) {
+            const std::string& name = parameter.declaration.name;
+            const std::string full = component.set->full_name + "/" + name;
+            if (!canBeSent(parameter.value)) {
+                problem = "the parameter server cannot have the value of " + full +
+                          ": it has characters that XML-RPC cannot carry";
+                continue;
+            }
+            const auto found = known.values.find(name);
+            if (found != known.values.end() && found->second == parameter.value) continue;
+            if (calls.size() == kMost) {
+                result = result & Reconciled::Again;
+                break;
+            }
+            XmlRpc::XmlRpcValue arguments = texts({caller.name, full});
+            arguments[2] = toXmlRpc(parameter.value);
+            calls.push_back({"setParam", arguments});
+            writing.push_back({&known, &parameter});
+        }
+    }
     {
         const std::lock_guard lock(pending_->mutex);
-        pending_->written.erase(component);
-        pending_->refused.erase(component);
-        if (pending_->followed.erase(component) == 0) return true;
+        pending_->problem = problem;
     }
-    XmlRpc::XmlRpcValue call = arguments(caller.name, caller.uri);
-    call[2] = component;
-    return !master.call("unsubscribeParam", call).silent();
+    const std::vector<MasterAnswer> answers = master.run(calls, kEach, soon());
+    for (std::size_t i = 0; i < answers.size(); ++i) {
+        if (answers[i].silent()) {
+            result = Reconciled::Later;
+            continue;
+        }
+        // Of one that is refused there is no use in asking again either.
+        const std::string& name = writing[i].parameter->declaration.name;
+        writing[i].known->values[name] = writing[i].parameter->value;
+        writing[i].known->ours.insert(name);
+    }
+    return result == Reconciled::Done;
 }
 
-void ParameterMirror::leaveAll(MasterClient& master, const Caller& caller) {
-    while (!known_.empty()) {
-        const std::string component = known_.begin()->first;
-        if (!leave(master, caller, component)) forget();
+void ParameterMirror::leave(ParallelCalls& master, const Caller& caller,
+                            const std::set<std::string>& components,
+                            std::chrono::steady_clock::time_point deadline) {
+    std::vector<MasterCall> calls;
+    for (const std::string& component : components) {
+        {
+            const std::lock_guard lock(pending_->mutex);
+            pending_->written.erase(component);
+            pending_->refused.erase(component);
+            if (pending_->followed.erase(component) != 0) {
+                calls.push_back({"unsubscribeParam", texts({caller.name, caller.uri, component})});
+            }
+        }
+        const auto known = known_.find(component);
+        if (known == known_.end()) continue;
+        for (const std::string& name : known->second.ours) {
+            XmlRpc::XmlRpcValue arguments = texts({caller.name, component + "/" + name});
+            const auto other = known->second.others.find(name);
+            if (other != known->second.others.end()) arguments[2] = other->second;
+            const bool delete_it = other == known->second.others.end();
+            calls.push_back({delete_it ? "deleteParam" : "setParam", arguments});
+        }
+        known_.erase(known);
     }
+    master.run(calls, kEach, deadline);
+}
+
+void ParameterMirror::leaveAll(ParallelCalls& master, const Caller& caller,
+                               std::chrono::steady_clock::time_point deadline) {
+    std::set<std::string> all;
+    for (const auto& [component, known] : known_) all.insert(component);
+    leave(master, caller, all, deadline);
 }
 
 }  // namespace rtcf::ros1

@@ -55,29 +55,22 @@ void ReconfigureServer::open(ros::NodeHandle& handle, ros::CallbackQueueInterfac
     updates_ = updates;
     service_ = service;
     problem_ = problem;
+    retry_.note(problem.empty());
     if (updates_) updates_.publish(valuesOf(*set_));
 }
 
 void ReconfigureServer::close() {
-    ros::Publisher descriptions;
-    ros::Publisher updates;
-    ros::ServiceServer service;
-    {
-        const std::lock_guard lock(mutex_);
-        std::swap(descriptions, descriptions_);
-        std::swap(updates, updates_);
-        std::swap(service, service_);
-    }
-    // Waits for a call that is being answered, which takes the lock.
-    service.shutdown();
-    updates.shutdown();
-    descriptions.shutdown();
+    shutDown(mutex_, service_);
+    shutDown(mutex_, updates_);
+    shutDown(mutex_, descriptions_);
 }
 
 bool ReconfigureServer::isOpen() const {
     const std::lock_guard lock(mutex_);
     return service_ != nullptr;
 }
+
+bool ReconfigureServer::isDue() const { return !isOpen() && retry_.due(); }
 
 std::string ReconfigureServer::problem() const {
     const std::lock_guard lock(mutex_);

@@ -15,6 +15,7 @@
 #include <string>
 
 #include "bridge/bridge.hpp"
+#include "ros/roscpp/handles.hpp"
 
 namespace ros {
 class CallbackQueueInterface;
@@ -43,6 +44,8 @@ class ReconfigureServer {
     void open(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue);
     void close();
     bool isOpen() const;
+    /// It is to be opened: it is not yet, and has not failed just now.
+    bool isDue() const;
     /// Why it could not be opened, one line; empty if it could.
     std::string problem() const;
 
@@ -63,6 +66,7 @@ class ReconfigureServer {
     ros::Publisher descriptions_;
     ros::Publisher updates_;
     ros::ServiceServer service_;
+    Retry retry_;  // watch thread
 };
 
 }  // namespace rtcf::ros1

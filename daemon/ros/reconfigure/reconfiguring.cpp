@@ -12,8 +12,8 @@ namespace rtcf::ros1 {
 
 namespace {
 
-// For one call: the watch has more to look at than a thousand components' parameters.
-constexpr auto kTurn = std::chrono::milliseconds(300);
+// For what components that have left take back.
+constexpr auto kLeaving = std::chrono::milliseconds(1000);
 
 bool sameChoices(const std::vector<Choice>& one, const std::vector<Choice>& other) {
     return std::equal(
@@ -60,15 +60,17 @@ void Reconfiguring::setSets(const Sets& sets) {
         } else {
             wanted[set->full_name] =
                 std::make_shared<ReconfigureServer>(set, request_, range_, stop_);
+            if (met_) new_.insert(set->full_name);
         }
     }
     wanted_ = std::move(wanted);
 }
 
-bool Reconfiguring::reconcile(ros::NodeHandle& handle, MasterClient& master,
-                              const ParameterMirror::Caller& caller) {
+Reconciled Reconfiguring::reconcile(ros::NodeHandle& handle, ParallelCalls& master,
+                                    const ParameterMirror::Caller& caller) {
     Servers wanted;
     Servers closing;
+    std::vector<ParameterMirror::Component> components;
     {
         const std::lock_guard lock(mutex_);
         wanted = wanted_;
@@ -81,40 +83,56 @@ bool Reconfiguring::reconcile(ros::NodeHandle& handle, MasterClient& master,
             closing.insert(*server);
             server = servers_.erase(server);
         }
+        met_ = true;
+        for (const auto& [component, server] : wanted)
+            components.push_back({server->set(), new_.count(component) != 0});
     }
+    std::set<std::string> left;
     for (const auto& [component, server] : closing) {
         server->close();
-        mirror_.leave(master, caller, component);
+        left.insert(component);
     }
-    const auto until = std::chrono::steady_clock::now() + kTurn;
+    mirror_.leave(master, caller, left, std::chrono::steady_clock::now() + kLeaving);
+    Reconciled result = Reconciled::Done;
     for (const auto& [component, server] : wanted) {
-        if (std::chrono::steady_clock::now() > until) return false;
-        if (!server->isOpen() && server->problem().empty()) {
-            server->open(handle, queue_);
-            const std::lock_guard lock(mutex_);
-            servers_[component] = server;
-        }
-        if (!mirror_.reconcile(master, caller, *server->set())) return false;
+        if (!server->isDue()) continue;
+        server->open(handle, queue_);
+        if (!server->isOpen()) result = Reconciled::Later;
+        const std::lock_guard lock(mutex_);
+        servers_[component] = server;
     }
-    return true;
+    return result & mirror_.reconcile(master, caller, components);
 }
 
-void Reconfiguring::closeAll() {
+void Reconfiguring::forget() {
+    {
+        const std::lock_guard lock(mutex_);
+        met_ = false;
+        new_.clear();
+    }
+    mirror_.forget();
+}
+
+void Reconfiguring::closeAll(ParallelCalls& master, const ParameterMirror::Caller& caller,
+                             std::chrono::steady_clock::time_point deadline) {
     Servers closing;
     {
         const std::lock_guard lock(mutex_);
         closing.swap(servers_);
     }
     for (const auto& [component, server] : closing) server->close();
-    mirror_.forget();
+    mirror_.leaveAll(master, caller, deadline);
+    forget();
 }
 
 std::string Reconfiguring::problem() const {
-    const std::lock_guard lock(mutex_);
-    for (const auto& [component, server] : servers_) {
-        if (!server->problem().empty()) return server->problem();
+    {
+        const std::lock_guard lock(mutex_);
+        for (const auto& [component, server] : servers_) {
+            if (!server->problem().empty()) return server->problem();
+        }
     }
-    return {};
+    return mirror_.problem();
 }
 
 void Reconfiguring::run() {

@@ -6,10 +6,12 @@
 #include <ros/callback_queue.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -49,14 +51,16 @@ class Reconfiguring {
     /// Nobody answers requests any more: those under way fail. Any thread.
     void end() noexcept { stop_ = true; }
 
-    /// Opens, closes and uploads until all is as it should be, or for a while. Watch thread, with a
-    /// master. @return false if there is more to do
-    bool reconcile(ros::NodeHandle& handle, MasterClient& master,
-                   const ParameterMirror::Caller& caller);
-    /// The values at the master's parameter server.
-    ParameterMirror& mirror() noexcept { return mirror_; }
+    /// Opens, closes and uploads what is wanted. Watch thread, with a master.
+    Reconciled reconcile(ros::NodeHandle& handle, ParallelCalls& master,
+                         const ParameterMirror::Caller& caller);
+    /// The master says that a parameter or a namespace has been written. Any thread.
+    void noteWritten(const std::string& key) { mirror_.noteWritten(key); }
+    /// The master is another one. Watch thread.
+    void forget();
     /// Closes all; reconcile() opens them again. Watch thread.
-    void closeAll();
+    void closeAll(ParallelCalls& master, const ParameterMirror::Caller& caller,
+                  std::chrono::steady_clock::time_point deadline);
 
     /// Why one could not be opened; empty if all could. Any thread.
     std::string problem() const;
@@ -70,9 +74,11 @@ class Reconfiguring {
     RangePolicy range_;
     ros::CallbackQueue queue_;
     std::atomic<bool> stop_{false};
-    mutable std::mutex mutex_;  // wanted_ and servers_
-    Servers wanted_;            // by component
-    Servers servers_;           // that have been opened
+    mutable std::mutex mutex_;   // all down to new_
+    Servers wanted_;             // by component
+    Servers servers_;            // that have been opened
+    bool met_ = false;           // the components that were there when the master came
+    std::set<std::string> new_;  // components that came later
     ParameterMirror mirror_;
     std::thread thread_;
 };

@@ -3,10 +3,7 @@
 #include <ros/master.h>
 
 #include <chrono>
-#include <stdexcept>
 #include <utility>
-
-#include "ros/roscpp/master_client.hpp"
 
 namespace rtcf::ros1 {
 
@@ -20,6 +17,7 @@ std::atomic<MasterCalls*> current_calls{nullptr};
 
 struct Note {
     bool open = false;
+    bool registered = false;
     std::string unanswered;
 };
 thread_local Note note;
@@ -30,13 +28,16 @@ std::int64_t nowMs() {
         .count();
 }
 
-bool registers(const std::string& method) {
-    return method.rfind("register", 0) == 0 || method.rfind("unregister", 0) == 0;
+std::string silence(const std::string& uri, const std::string& what) {
+    return "no ROS master answers at " + uri + " (" + what +
+           "): start one (roscore), or load with --wait";
 }
 
 }  // namespace
 
-MasterCalls::MasterCalls() { current_calls = this; }
+MasterCalls::MasterCalls(Registrar::Connect connect) : registrar_(std::move(connect)) {
+    current_calls = this;
+}
 
 MasterCalls::~MasterCalls() { current_calls = nullptr; }
 
@@ -44,63 +45,65 @@ MasterCalls* MasterCalls::current() noexcept { return current_calls; }
 
 void MasterCalls::beginNote() noexcept {
     note.open = true;
+    note.registered = false;
     note.unanswered.clear();
 }
 
 std::string MasterCalls::endNote() noexcept {
+    constexpr auto kPatience = std::chrono::seconds(5);  // with a slow master and much to tell
     note.open = false;
+    MasterCalls* const calls = current();
+    if (note.registered && note.unanswered.empty() && calls != nullptr && !calls->ended_ &&
+        !calls->registrar_.flush(Registrar::Clock::now() + kPatience)) {
+        const std::lock_guard lock(calls->mutex_);
+        note.unanswered = silence(calls->uri_, "registrations");
+    }
     return std::move(note.unanswered);
 }
 
-void MasterCalls::useMaster(const std::string& uri) {
-    const std::lock_guard lock(mutex_);
-    if (!splitMasterUri(uri, host_, port_))
-        throw std::invalid_argument("'" + uri + "' is no ROS master's URI");
-    uri_ = uri;
-    deaf_until_ms_ = 0;
-}
-
-std::map<std::string, std::string> MasterCalls::services() const {
-    const std::lock_guard lock(mutex_);
-    return services_;
-}
-
-void MasterCalls::noteService(const std::string& method, const XmlRpc::XmlRpcValue& arguments) {
-    if (method != "registerService" && method != "unregisterService") return;
-    XmlRpc::XmlRpcValue values = arguments;
-    const std::lock_guard lock(mutex_);
-    if (method == "registerService") {
-        services_[values[1]] = static_cast<std::string&>(values[2]);
-    } else {
-        services_.erase(values[1]);
+void MasterCalls::useMaster(const std::string& uri, const MasterAddress& address) {
+    {
+        const std::lock_guard lock(mutex_);
+        uri_ = uri;
     }
+    moveTo(address);
+    registrar_.forget();
+}
+
+void MasterCalls::moveTo(const MasterAddress& address) {
+    {
+        const std::lock_guard lock(mutex_);
+        address_ = address;
+    }
+    deaf_until_ms_ = 0;
+    registrar_.useMaster(address);
 }
 
 bool MasterCalls::call(const std::string& method, const XmlRpc::XmlRpcValue& arguments,
                        XmlRpc::XmlRpcValue& value) {
-    noteService(method, arguments);
+    if (registrar_.note(method, arguments)) {
+        note.registered = true;
+        value.setSize(0);  // the publishers of a topic, which are connected when they are known
+        return true;
+    }
     MasterAnswer answer;
     const std::int64_t begin = nowMs();
-    // One that hangs is not waited for again by each of a hundred topics that close.
+    // One that hangs is not waited for again by each of a hundred calls.
     if (!ended_ && begin >= deaf_until_ms_) {
-        std::string host;
-        std::uint32_t port = 0;
+        MasterAddress address;
         {
             const std::lock_guard lock(mutex_);
-            host = host_;
-            port = port_;
+            address = address_;
         }
-        MasterClient master(host, port, kTimeout, ended_);
+        MasterClient master(address, kTimeout, ended_);
         answer = master.call(method.c_str(), arguments);
         if (answer.silent() && nowMs() - begin >= kTimeout.count())
             deaf_until_ms_ = nowMs() + kDeafness;
     }
     if (answer.silent()) {
-        if (registers(method)) missed_ = true;
         if (note.open && note.unanswered.empty()) {
             const std::lock_guard lock(mutex_);
-            note.unanswered = "no ROS master answers at " + uri_ + " (" + method +
-                              "): start one (roscore), or load with --wait";
+            note.unanswered = silence(uri_, method);
         }
         return false;
     }

@@ -2,6 +2,7 @@
 /// roscpp's own calls to its master, made here instead. roscpp waits for an
 /// answer as long as it takes, and tells most of its callers nothing if none
 /// comes: here each takes a second at most, and what got no answer is noted.
+/// Registrations are not waited for at all: the registrar makes them.
 /// ros::master::execute() of this program takes the place of the library's.
 #pragma once
 
@@ -9,9 +10,11 @@
 
 #include <atomic>
 #include <cstdint>
-#include <map>
 #include <mutex>
 #include <string>
+
+#include "ros/roscpp/master_client.hpp"
+#include "ros/roscpp/registrar.hpp"
 
 namespace rtcf::ros1 {
 
@@ -19,27 +22,29 @@ namespace rtcf::ros1 {
 /// thread; not real-time.
 class MasterCalls {
    public:
-    MasterCalls();
+    /// @param connect of the registrar
+    explicit MasterCalls(Registrar::Connect connect);
     ~MasterCalls();
     MasterCalls(const MasterCalls&) = delete;
     MasterCalls& operator=(const MasterCalls&) = delete;
 
-    /// The master to call. @throws std::invalid_argument if the URI is none
-    void useMaster(const std::string& uri);
+    /// The master to call, which knows nothing of us yet.
+    void useMaster(const std::string& uri, const MasterAddress& address);
+    /// The same master at another address.
+    void moveTo(const MasterAddress& address);
 
-    /// From now on no call gets an answer; those under way end within 50 ms.
+    /// From now on no call gets an answer; those under way end within 50 ms. Registrations are
+    /// noted all the same.
     void end() noexcept { ended_ = true; }
 
-    /// Services that this process has advertised, and their URIs, whether the master knows or not.
-    std::map<std::string, std::string> services() const;
-
-    /// True once after a registration that the master may not have got.
-    bool takeMissed() noexcept { return missed_.exchange(false); }
+    /// What the master is told of topics and services.
+    Registrar& registrar() noexcept { return registrar_; }
 
     /// @name Of the calling thread
     /// @{
     static void beginNote() noexcept;
-    /// @return the first call since beginNote() that got no answer, one line; empty = none
+    /// Waits until the master has been told of what was registered since beginNote().
+    /// @return the first call since then that got no answer, one line; empty = none
     static std::string endNote() noexcept;
     /// @}
 
@@ -50,16 +55,12 @@ class MasterCalls {
     static MasterCalls* current() noexcept;
 
    private:
-    void noteService(const std::string& method, const XmlRpc::XmlRpcValue& arguments);
-
     std::atomic<bool> ended_{false};
-    std::atomic<bool> missed_{false};
     std::atomic<std::int64_t> deaf_until_ms_{0};  // the master left a call without an answer
-    mutable std::mutex mutex_;                    // down to services_
+    mutable std::mutex mutex_;                    // down to address_
     std::string uri_;
-    std::string host_;
-    std::uint32_t port_ = 0;
-    std::map<std::string, std::string> services_;
+    MasterAddress address_;
+    Registrar registrar_;
 };
 
 }  // namespace rtcf::ros1

@@ -3,13 +3,25 @@
 #include <ros/network.h>
 #include <xmlrpcpp/XmlRpcException.h>
 
+#include <algorithm>
+#include <thread>
+
 namespace rtcf::ros1 {
 
 namespace {
 
-// Answers of the ROS APIs are [code, message, value]; 1 is success.
+// Answers of the ROS APIs are [code, message, value]; 1 is success. A fault is one to a call that
+// the server could not read.
 MasterAnswer unpack(XmlRpc::XmlRpcValue& response) {
     MasterAnswer answer;
+    if (response.getType() == XmlRpc::XmlRpcValue::TypeStruct &&
+        response.hasMember("faultString")) {
+        answer.kind = MasterAnswer::Kind::Refused;
+        XmlRpc::XmlRpcValue& why = response["faultString"];
+        if (why.getType() == XmlRpc::XmlRpcValue::TypeString)
+            answer.message = static_cast<std::string&>(why);
+        return answer;
+    }
     if (response.getType() != XmlRpc::XmlRpcValue::TypeArray || response.size() != 3 ||
         response[0].getType() != XmlRpc::XmlRpcValue::TypeInt) {
         answer.message = "it does not answer like a ROS master";
@@ -24,6 +36,36 @@ MasterAnswer unpack(XmlRpc::XmlRpcValue& response) {
     return answer;
 }
 
+MasterAnswer silence() {
+    MasterAnswer answer;
+    answer.message = "no answer";
+    return answer;
+}
+
+// A call that has been begun. @return its answer; nothing = not yet
+std::optional<MasterAnswer> look(XmlRpc::XmlRpcClient& client, double wait_s) {
+    try {
+        client._disp.work(wait_s);
+        XmlRpc::XmlRpcValue response;
+        if (client.executeCheckDone(response)) return unpack(response);
+        // The dispatcher lets go of a connection that failed.
+        if (client._disp._sources.empty()) return silence();
+    } catch (const XmlRpc::XmlRpcException& error) {
+        MasterAnswer answer;
+        answer.message = error.getMessage();
+        return answer;
+    }
+    return std::nullopt;
+}
+
+bool begin(XmlRpc::XmlRpcClient& client, const char* method, const XmlRpc::XmlRpcValue& arguments) {
+    try {
+        return client.executeNonBlock(method, arguments);
+    } catch (const XmlRpc::XmlRpcException&) {
+        return false;
+    }
+}
+
 }  // namespace
 
 std::string MasterAnswer::text() {
@@ -31,29 +73,91 @@ std::string MasterAnswer::text() {
     return static_cast<std::string&>(value);
 }
 
-MasterClient::MasterClient(const std::string& host, std::uint32_t port,
-                           std::chrono::milliseconds timeout, const std::atomic<bool>& cancel)
-    : client_(host.c_str(), static_cast<int>(port), "/"), timeout_(timeout), cancel_(cancel) {}
+XmlRpc::XmlRpcValue texts(const std::vector<std::string>& arguments) {
+    XmlRpc::XmlRpcValue value;
+    value.setSize(static_cast<int>(arguments.size()));
+    for (std::size_t i = 0; i < arguments.size(); ++i) value[static_cast<int>(i)] = arguments[i];
+    return value;
+}
+
+MasterClient::MasterClient(const MasterAddress& server, std::chrono::milliseconds timeout,
+                           const std::atomic<bool>& cancel)
+    : client_(server.address.c_str(), static_cast<int>(server.port), "/"),
+      timeout_(timeout),
+      cancel_(cancel) {}
 
 MasterAnswer MasterClient::call(const char* method, const XmlRpc::XmlRpcValue& arguments) {
     constexpr double kSlice = 0.05;  // s, between looks at cancel_
-    MasterAnswer answer;
-    answer.message = "no answer";
-    const auto deadline = std::chrono::steady_clock::now() + timeout_;
-    try {
-        if (!client_.executeNonBlock(method, arguments)) return answer;
-        XmlRpc::XmlRpcValue response;
-        while (!cancel_ && std::chrono::steady_clock::now() < deadline) {
-            client_._disp.work(kSlice);
-            if (client_.executeCheckDone(response)) return unpack(response);
-            // The dispatcher lets go of a connection that failed.
-            if (client_._disp._sources.empty()) break;
-        }
-    } catch (const XmlRpc::XmlRpcException& error) {
-        answer.message = error.getMessage();
+    const auto deadline = Clock::now() + timeout_;
+    if (!begin(client_, method, arguments)) return silence();
+    while (!cancel_ && Clock::now() < deadline) {
+        std::optional<MasterAnswer> answer = look(client_, kSlice);
+        if (!answer) continue;
+        if (answer->silent()) client_.close();
+        return *std::move(answer);
     }
     client_.close();
-    return answer;
+    return silence();
+}
+
+struct ParallelCalls::Line {
+    explicit Line(const MasterAddress& server)
+        : client(server.address.c_str(), static_cast<int>(server.port), "/") {}
+
+    XmlRpc::XmlRpcClient client;
+    std::optional<std::size_t> call;  // under way
+    Clock::time_point begun;
+};
+
+ParallelCalls::ParallelCalls(const MasterAddress& server, const std::atomic<bool>& cancel)
+    : server_(server), cancel_(cancel) {}
+
+ParallelCalls::~ParallelCalls() = default;
+
+std::vector<MasterAnswer> ParallelCalls::run(const std::vector<MasterCall>& calls,
+                                             std::chrono::milliseconds each,
+                                             Clock::time_point deadline) {
+    constexpr std::size_t kMost = 16;  // connections
+    constexpr auto kSlice = std::chrono::milliseconds(1);
+    std::vector<MasterAnswer> answers(calls.size(), silence());
+    while (lines_.size() < std::min(calls.size(), kMost))
+        lines_.push_back(std::make_unique<Line>(server_));
+    std::size_t next = 0;
+    bool deaf = false;  // no more are begun
+    for (bool busy = true; busy;) {
+        busy = false;
+        deaf = deaf || cancel_ || Clock::now() > deadline;
+        for (const auto& line : lines_) {
+            if (!line->call && !deaf && next < calls.size()) {
+                line->call = next++;
+                line->begun = Clock::now();
+                const MasterCall& call = calls[*line->call];
+                if (!begin(line->client, call.method.c_str(), call.arguments)) {
+                    line->call.reset();
+                    line->client.close();
+                    deaf = true;
+                }
+            }
+            if (!line->call) continue;
+            if (std::optional<MasterAnswer> answer = look(line->client, 0.0)) {
+                if (answer->silent()) {
+                    line->client.close();
+                    deaf = true;
+                }
+                answers[*line->call] = *std::move(answer);
+                line->call.reset();
+                busy = busy || (!deaf && next < calls.size());
+            } else if (cancel_ || Clock::now() > std::min(deadline, line->begun + each)) {
+                line->client.close();
+                line->call.reset();
+                deaf = true;
+            } else {
+                busy = true;
+            }
+        }
+        if (busy) std::this_thread::sleep_for(kSlice);
+    }
+    return answers;
 }
 
 bool splitMasterUri(const std::string& uri, std::string& host, std::uint32_t& port) {

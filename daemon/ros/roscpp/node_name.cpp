@@ -23,14 +23,15 @@ std::string legal(const std::string& text, const char* if_empty) {
 
 }  // namespace
 
-NodeName nodeName(const std::string& host, const std::string& runner) {
-    return {"/rtcfd/" + legal(host, "localhost"), legal(runner, "rt_runner")};
+NodeName nodeName(const std::string& host, const std::string& daemon, const std::string& runner) {
+    const std::string below = daemon.empty() ? "" : "/" + legal(daemon, "");
+    return {"/rtcfd/" + legal(host, "localhost") + below, legal(runner, "rt_runner")};
 }
 
-NodeName nodeName(const std::string& runner) {
+NodeName nodeName(const std::string& daemon, const std::string& runner) {
     std::array<char, HOST_NAME_MAX + 1> host{};
     if (gethostname(host.data(), host.size() - 1) != 0) host[0] = '\0';
-    return nodeName(host.data(), runner);
+    return nodeName(host.data(), daemon, runner);
 }
 
 }  // namespace rtcf::ros1

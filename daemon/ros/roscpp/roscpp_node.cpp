@@ -8,7 +8,12 @@
 #include <ros/xmlrpc_manager.h>
 #include <xmlrpcpp/XmlRpcException.h>
 
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <set>
 #include <stdexcept>
+#include <system_error>
 
 #include "ros/roscpp/quiet_thread.hpp"
 #include "ros/roscpp/reconnection.hpp"
@@ -35,24 +40,55 @@ const std::string& getNamespace() {
 
 namespace rtcf::ros1 {
 
+namespace {
+
+constexpr const char* kThreads = "/proc/self/task";
+
+std::set<int> threads() {
+    std::set<int> found;
+    std::error_code ignored;
+    for (const auto& entry : std::filesystem::directory_iterator(kThreads, ignored))
+        found.insert(std::stoi(entry.path().filename()));
+    return found;
+}
+
+// roscpp's own threads have the name of the one that starts them. It starts these, in this order.
+void nameThreads(const std::set<int>& before) {
+    const std::array<const char*, 3> names{"roscpp-poll", "roscpp-xmlrpc", "roscpp-queue"};
+    std::size_t next = 0;
+    for (const int thread : threads()) {
+        if (before.count(thread) != 0 || next == names.size()) continue;
+        std::ofstream file(std::string(kThreads) + "/" + std::to_string(thread) + "/comm");
+        file << names.at(next++);
+    }
+}
+
+}  // namespace
+
 RoscppNode::RoscppNode(NodeName name, ShutdownRequest on_shutdown_request,
                        ParameterWritten on_parameter_written)
     : name_(std::move(name)),
       on_shutdown_request_(std::move(on_shutdown_request)),
-      on_parameter_written_(std::move(on_parameter_written)) {}
+      on_parameter_written_(std::move(on_parameter_written)),
+      calls_([this](const std::string& topic, const XmlRpc::XmlRpcValue& publishers) {
+          connect(topic, publishers);
+      }) {}
 
 RoscppNode::~RoscppNode() { stop(); }
 
-void RoscppNode::start(const std::string& master_uri, const std::string& hostname) {
+void RoscppNode::start(const std::string& master_uri, const MasterAddress& address,
+                       const std::string& hostname) {
     if (ros::isShuttingDown()) throw std::runtime_error("ROS has been shut down in this process");
-    calls_.useMaster(master_uri);
+    calls_.useMaster(master_uri, address);
     reconnectSoon();
     ros::M_string settings{{"__master", master_uri}, {"__ns", name_.name_space}};
     if (!hostname.empty()) settings["__hostname"] = hostname;
     ros::init(settings, name_.base,
               ros::init_options::NoSigintHandler | ros::init_options::NoRosout);
+    const std::set<int> before = threads();
     try {
         ros::start();
+        nameThreads(before);
     } catch (const XmlRpc::XmlRpcException& error) {  // not a std::exception
         throw std::runtime_error("the master's answer is not understood: " + error.getMessage());
     }
@@ -87,14 +123,23 @@ void RoscppNode::start(const std::string& master_uri, const std::string& hostnam
 
 bool RoscppNode::alive() const { return ros::ok() && !ros::isShuttingDown(); }
 
-void RoscppNode::useMaster(const std::string& master_uri) {
-    calls_.useMaster(master_uri);
+void RoscppNode::useMaster(const std::string& master_uri, const MasterAddress& address) {
+    calls_.useMaster(master_uri, address);
     ros::master::init({{"__master", master_uri}});  // what components may ask roscpp for
 }
 
 std::string RoscppNode::uri() const { return ros::XMLRPCManager::instance()->getServerURI(); }
 
 std::uint32_t RoscppNode::port() const { return ros::XMLRPCManager::instance()->getServerPort(); }
+
+// As the master itself does when publishers come and go.
+void RoscppNode::connect(const std::string& topic, const XmlRpc::XmlRpcValue& publishers) {
+    constexpr auto kTimeout = std::chrono::milliseconds(1000);
+    const std::atomic<bool> never{false};
+    XmlRpc::XmlRpcValue update = texts({"/master", topic, ""});
+    update[2] = publishers;
+    MasterClient({"127.0.0.1", port()}, kTimeout, never).call("publisherUpdate", update);
+}
 
 void RoscppNode::stop() {
     leaveMaster();

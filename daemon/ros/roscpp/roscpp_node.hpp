@@ -36,16 +36,20 @@ class RoscppNode {
 
     const NodeName& name() const { return name_; }
 
+    /// Another name, until the node is started.
+    void rename(NodeName name) { name_ = std::move(name); }
+
     /// Starts the node; its master must be there.
     /// @param hostname name or address that peers are told; empty: of the environment
     /// @throws std::exception if roscpp cannot
-    void start(const std::string& master_uri, const std::string& hostname);
+    void start(const std::string& master_uri, const MasterAddress& address,
+               const std::string& hostname);
     bool started() const { return handle_ != nullptr; }
     /// False if roscpp has been shut down by someone in this process.
     bool alive() const;
 
     /// Another master from now on, which knows nothing of the node yet.
-    void useMaster(const std::string& master_uri);
+    void useMaster(const std::string& master_uri, const MasterAddress& address);
 
     /// The URI by which peers call the node, and its port on this host.
     std::string uri() const;
@@ -59,12 +63,15 @@ class RoscppNode {
 
     /// What is said to the master by way of roscpp.
     MasterCalls& calls() noexcept { return calls_; }
-    const MasterCalls& calls() const noexcept { return calls_; }
+    /// What it is told of topics and services.
+    Registrar& registrar() noexcept { return calls_.registrar(); }
 
     /// Ends the node for good, without a word to any master.
     void stop();
 
    private:
+    void connect(const std::string& topic, const XmlRpc::XmlRpcValue& publishers);
+
     NodeName name_;
     ShutdownRequest on_shutdown_request_;
     ParameterWritten on_parameter_written_;

@@ -8,6 +8,7 @@
 #include <chrono>
 
 #include "graph/names.hpp"
+#include "ros/roscpp/handles.hpp"
 #include "ros/roscpp/quiet_thread.hpp"
 #include "runner/runner_view.hpp"
 
@@ -58,15 +59,8 @@ void CycleTopic::open(ros::NodeHandle& handle, const std::string& name_space) {
 }
 
 void CycleTopic::close() {
-    ros::Publisher cycles;
-    ros::Publisher iteration_info;
-    {
-        const std::lock_guard lock(mutex_);
-        std::swap(cycles, cycles_);
-        std::swap(iteration_info, iteration_info_);
-    }
-    cycles.shutdown();
-    iteration_info.shutdown();
+    shutDown(mutex_, cycles_);
+    shutDown(mutex_, iteration_info_);
 }
 
 void CycleTopic::run() {

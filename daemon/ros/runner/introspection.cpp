@@ -7,6 +7,7 @@
 #include <chrono>
 #include <utility>
 
+#include "ros/roscpp/handles.hpp"
 #include "ros/roscpp/quiet_thread.hpp"
 #include "runner/runner.hpp"
 #include "runner/runner_view.hpp"
@@ -35,7 +36,8 @@ Introspection::~Introspection() {
     health_.join();
 }
 
-void Introspection::open(ros::NodeHandle& handle, const std::string& name_space) {
+void Introspection::open(ros::NodeHandle& handle, const std::string& node,
+                         const std::string& name_space) {
     if (open_ && name_space == name_space_) return;
     close();
     open_ = true;
@@ -45,6 +47,7 @@ void Introspection::open(ros::NodeHandle& handle, const std::string& name_space)
         handle.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10);
     {
         const std::lock_guard lock(mutex_);
+        report_.nameAfter(node);
         diagnostics_ = diagnostics;
     }
     services_.open(handle, name_space);
@@ -54,12 +57,7 @@ void Introspection::close() {
     if (!open_) return;
     open_ = false;
     services_.close();
-    ros::Publisher diagnostics;
-    {
-        const std::lock_guard lock(mutex_);
-        std::swap(diagnostics, diagnostics_);
-    }
-    diagnostics.shutdown();
+    shutDown(mutex_, diagnostics_);
     cycles_.close();
 }
 

@@ -26,8 +26,9 @@ class Introspection {
     Introspection(executor::RunnerView& runner, const executor::AskSupervisor& ask,
                   executor::Log& log);
 
-    /// Opens what is not open yet, in this namespace and no other. With a master.
-    void open(ros::NodeHandle& handle, const std::string& name_space);
+    /// Opens what is not open yet, in this namespace and no other. Watch thread.
+    /// @param node full name of the node: what the health is reported of
+    void open(ros::NodeHandle& handle, const std::string& node, const std::string& name_space);
     void close();
     bool isOpen() const { return open_; }
     ~Introspection();

@@ -163,7 +163,7 @@ rtcf_msgs::RunnerInfo runnerInfo(const rtcf_msgs::GetLoop::Response& loop) {
 }
 
 DiagnosticReport::DiagnosticReport(const executor::RunnerView& runner, std::string hardware)
-    : runner_(runner), hardware_(std::move(hardware)) {}
+    : runner_(runner), hardware_(std::move(hardware)), name_(runner.name()) {}
 
 diagnostic_msgs::DiagnosticArray DiagnosticReport::take() {
     diagnostic_msgs::DiagnosticArray array;
@@ -175,7 +175,7 @@ diagnostic_msgs::DiagnosticArray DiagnosticReport::take() {
         Counts& last = counts[component->figures];
         if (const auto found = components_.find(component->figures); found != components_.end())
             last = std::move(found->second);
-        array.status.push_back(componentStatus(runner_.name() + ": " + component->full_name,
+        array.status.push_back(componentStatus(name_ + ": " + component->full_name,
                                                component->fault, *component->figures, ns_per_tick,
                                                last));
     }
@@ -204,7 +204,7 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
     time_ns_ = now_ns;
 
     DiagnosticStatus status;
-    status.name = runner_.name() + ": loop";
+    status.name = name_ + ": loop";
     status.level = DiagnosticStatus::OK;
     status.message = stateName(picture.state);
     const std::uint64_t overruns =

@@ -34,6 +34,9 @@ class DiagnosticReport {
     /// @param hardware names the machine
     DiagnosticReport(const executor::RunnerView& runner, std::string hardware);
 
+    /// What statuses are named after: unique among all that report.
+    void nameAfter(const std::string& node) { name_ = node.substr(node.find_first_not_of('/')); }
+
     /// One status for the loop, one for each component; without a stamp.
     diagnostic_msgs::DiagnosticArray take();
 
@@ -54,6 +57,7 @@ class DiagnosticReport {
 
     const executor::RunnerView& runner_;
     const std::string hardware_;
+    std::string name_;
     executor::HistogramSnapshot duration_;
     executor::HistogramSnapshot latency_;
     std::uint64_t overruns_ = 0;

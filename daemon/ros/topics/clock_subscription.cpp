@@ -17,17 +17,17 @@ bool ClockSubscription::delivers() const {
     return open_ && clock_ != nullptr;
 }
 
-bool ClockSubscription::reconcile(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue,
-                                  bool simulated) {
+Reconciled ClockSubscription::reconcile(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue,
+                                        bool simulated) {
     bool wanted = simulated;
     {
         const std::lock_guard lock(mutex_);
         wanted = wanted || clock_ != nullptr;
     }
-    if (wanted == static_cast<bool>(subscriber_)) return false;
+    if (wanted == static_cast<bool>(subscriber_)) return Reconciled::Done;
     if (!wanted) {
         close();
-        return true;
+        return Reconciled::Done;
     }
     using Message = boost::shared_ptr<const rosgraph_msgs::Clock>;
     const boost::function<void(const Message&)> take = [this](const Message& message) {
@@ -43,7 +43,7 @@ bool ClockSubscription::reconcile(ros::NodeHandle& handle, ros::CallbackQueueInt
     subscriber_ = handle.subscribe(options);
     open_ = static_cast<bool>(subscriber_);
     if (!open_) ros::Time::init();
-    return true;
+    return open_ ? Reconciled::Done : Reconciled::Later;
 }
 
 void ClockSubscription::close() {

@@ -10,6 +10,7 @@
 #include <mutex>
 
 #include "loop/simulated_clock.hpp"
+#include "ros/roscpp/reconciled.hpp"
 
 namespace ros {
 class CallbackQueueInterface;
@@ -27,8 +28,8 @@ class ClockSubscription {
 
     /// Subscribes or unsubscribes, as is wanted. Speaks to the master.
     /// @param simulated whether the master says that time is simulated
-    /// @return true if anything was opened or closed
-    bool reconcile(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue, bool simulated);
+    Reconciled reconcile(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue,
+                         bool simulated);
     void close();
 
     /// Somebody gets the ticks from now on. Any thread.

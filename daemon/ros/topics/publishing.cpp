@@ -45,7 +45,8 @@ void Publishing::prepare(const executor::BridgeSettings& settings) {
     changed_.notify_all();
 }
 
-bool Publishing::reconcile(ros::NodeHandle& handle, const executor::BridgeSettings& settings) {
+Reconciled Publishing::reconcile(ros::NodeHandle& handle,
+                                 const executor::BridgeSettings& settings) {
     const executor::NamePattern latched("latch", settings.latch);
     std::vector<std::shared_ptr<TopicPublisher>> opening;
     std::vector<std::shared_ptr<TopicPublisher>> closing;
@@ -60,12 +61,12 @@ bool Publishing::reconcile(ros::NodeHandle& handle, const executor::BridgeSettin
             if (found != publishers_.end() && found->second->serves(tap->type()) &&
                 found->second->queue() == settings.queue && found->second->latch() == latch) {
                 wanted[tap->topic()] = found->second;
-                if (!found->second->isOpen() && found->second->problem().empty())
-                    opening.push_back(found->second);
+                if (found->second->isDue()) opening.push_back(found->second);
                 continue;
             }
             auto publisher =
                 std::make_shared<TopicPublisher>(tap->topic(), tap->type(), settings.queue, latch);
+            if (found != publishers_.end()) publisher->inherit(*found->second);
             wanted[tap->topic()] = publisher;
             opening.push_back(std::move(publisher));
         }
@@ -73,23 +74,27 @@ bool Publishing::reconcile(ros::NodeHandle& handle, const executor::BridgeSettin
             const auto found = wanted.find(topic);
             if (found == wanted.end() || found->second != publisher) closing.push_back(publisher);
         }
-        if (opening.empty() && closing.empty()) return false;
+        if (opening.empty() && closing.empty()) return Reconciled::Done;
         publishers_ = std::move(wanted);
         ++generation_;
     }
     changed_.notify_all();
-    // Without the lock: these call the master. A topic that changes its type closes first.
+    // Without the lock: peers come and go. A topic that changes its type closes first.
     for (const auto& publisher : closing) publisher->close();
-    for (const auto& publisher : opening) publisher->open(handle);
-    return true;
+    Reconciled result = Reconciled::Done;
+    for (const auto& publisher : opening) {
+        publisher->open(handle);
+        if (!publisher->isOpen()) result = Reconciled::Later;
+    }
+    return result;
 }
 
 void Publishing::closeAll() {
     std::map<std::string, std::shared_ptr<TopicPublisher>> closing;
     {
+        // They stay, with the last messages of those that are latched.
         const std::lock_guard lock(mutex_);
-        closing.swap(publishers_);
-        ++generation_;
+        closing = publishers_;
     }
     for (const auto& [topic, publisher] : closing) publisher->close();
 }

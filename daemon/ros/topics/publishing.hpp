@@ -13,6 +13,7 @@
 
 #include "bridge/bridge.hpp"
 #include "bridge/tap.hpp"
+#include "ros/roscpp/reconciled.hpp"
 #include "ros/topics/topic_publisher.hpp"
 
 namespace rtcf::ros1 {
@@ -35,9 +36,8 @@ class Publishing {
     /// Makes ready for topics that are to be opened once there is a master: of those that are
     /// latched, the last message is kept. Watch thread.
     void prepare(const executor::BridgeSettings& settings);
-    /// Opens and closes topics until they are those of the taps. Watch thread, with a master.
-    /// @return true if anything was opened or closed
-    bool reconcile(ros::NodeHandle& handle, const executor::BridgeSettings& settings);
+    /// Opens and closes topics until they are those of the taps. Watch thread, with a node.
+    Reconciled reconcile(ros::NodeHandle& handle, const executor::BridgeSettings& settings);
     /// Closes all topics; reconcile() opens them again. Watch thread.
     void closeAll();
 

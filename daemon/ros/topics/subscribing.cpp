@@ -38,7 +38,7 @@ void Subscribing::setInjectors(Injectors injectors) {
     }
 }
 
-bool Subscribing::reconcileTopics(ros::NodeHandle& handle, bool master) {
+Reconciled Subscribing::reconcileTopics(ros::NodeHandle& handle, bool master) {
     std::vector<std::shared_ptr<TopicSubscriber>> closing_first;
     std::vector<std::shared_ptr<TopicSubscriber>> opening;
     std::vector<std::shared_ptr<TopicSubscriber>> closing;
@@ -56,8 +56,7 @@ bool Subscribing::reconcileTopics(ros::NodeHandle& handle, bool master) {
             auto subscriber = found != subscribers_.end()
                                   ? found->second
                                   : std::make_shared<TopicSubscriber>(injector);
-            const bool due = !subscriber->isOpen() && subscriber->problem().empty();
-            if (due && (master || served.count(connection(*injector)) != 0))
+            if (subscriber->isDue() && (master || served.count(connection(*injector)) != 0))
                 opening.push_back(subscriber);
             wanted[injector] = std::move(subscriber);
             topics[injector->topic()] = connection(*injector);
@@ -76,13 +75,14 @@ bool Subscribing::reconcileTopics(ros::NodeHandle& handle, bool master) {
         }
         subscribers_ = std::move(wanted);
     }
-    // Without the lock: these call the master.
+    // Without the lock, as closing waits for callbacks.
     for (const auto& subscriber : closing_first) subscriber->close();
+    Reconciled result = Reconciled::Done;
     for (const auto& subscriber : opening) {
-        if (!subscriber->open(handle, queue_)) break;
+        if (!subscriber->open(handle, queue_)) result = Reconciled::Later;
     }
     for (const auto& subscriber : closing) subscriber->close();
-    return !(closing_first.empty() && opening.empty() && closing.empty());
+    return result;
 }
 
 void Subscribing::closeAll() {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "bridge/injector.hpp"
+#include "ros/roscpp/reconciled.hpp"
 #include "ros/topics/clock_subscription.hpp"
 
 namespace ros {
@@ -46,10 +47,8 @@ class Subscribing {
 
     /// Subscribes and unsubscribes until the topics are those of the injectors. Watch thread.
     /// @param simulated whether the master says that time is simulated
-    /// @return true if anything was opened or closed
-    bool reconcile(ros::NodeHandle& handle, bool simulated) {
-        const bool topics = reconcileTopics(handle, true);
-        return clock_.reconcile(handle, queue_, simulated) || topics;
+    Reconciled reconcile(ros::NodeHandle& handle, bool simulated) {
+        return reconcileTopics(handle, true) & clock_.reconcile(handle, queue_, simulated);
     }
     /// The same without a master: only new injectors of topics that are subscribed.
     void reconcileWithoutMaster(ros::NodeHandle& handle) { reconcileTopics(handle, false); }
@@ -65,7 +64,7 @@ class Subscribing {
     using Subscribers =
         std::map<std::shared_ptr<executor::Injector>, std::shared_ptr<TopicSubscriber>>;
 
-    bool reconcileTopics(ros::NodeHandle& handle, bool master);
+    Reconciled reconcileTopics(ros::NodeHandle& handle, bool master);
     void run();
 
     ros::CallbackQueue queue_;

@@ -59,26 +59,23 @@ void TopicPublisher::open(ros::NodeHandle& handle) {
     const std::lock_guard lock(mutex_);
     publisher_ = publisher;
     if (publisher_ && !kept_.empty()) send(kept_.data(), kept_.size());
-    kept_.clear();
-    if (!problem.empty()) problem_ = "cannot publish " + topic_ + " as " + type_ + ": " + problem;
+    problem_ = problem.empty() ? "" : "cannot publish " + topic_ + " as " + type_ + ": " + problem;
+    retry_.note(problem_.empty());
 }
 
-void TopicPublisher::close() {
-    ros::Publisher closing;
-    {
-        const std::lock_guard lock(mutex_);
-        std::swap(closing, publisher_);
-    }
-    closing.shutdown();
+bool TopicPublisher::isDue() const { return !isOpen() && retry_.due(); }
+
+void TopicPublisher::inherit(const TopicPublisher& before) {
+    const std::scoped_lock lock(mutex_, before.mutex_);
+    if (latch_ && before.type_ == type_ && before.md5_ == md5_) kept_ = before.kept_;
 }
+
+void TopicPublisher::close() { shutDown(mutex_, publisher_); }
 
 void TopicPublisher::publish(const std::uint8_t* bytes, std::uint32_t size) {
     const std::lock_guard lock(mutex_);
-    if (publisher_) {
-        send(bytes, size);
-    } else if (latch_) {
-        kept_.assign(bytes, bytes + size);
-    }
+    if (publisher_) send(bytes, size);
+    if (latch_) kept_.assign(bytes, bytes + size);
 }
 
 }  // namespace rtcf::ros1

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "ros/roscpp/handles.hpp"
 #include "rtcf/port_type.hpp"
 
 namespace ros {
@@ -29,6 +30,10 @@ class TopicPublisher {
     std::uint32_t queue() const { return queue_; }
     bool latch() const { return latch_; }
     bool isOpen() const;
+    /// It is to be opened: it is not yet, and has not failed just now. Watch thread.
+    bool isDue() const;
+    /// Takes over what another one of its topic has kept, if the type is the same.
+    void inherit(const TopicPublisher& before);
     /// Why it could not be opened, one line; empty if it could.
     std::string problem() const;
     /// Messages lost as too much waited for slow subscribers, of all topics.
@@ -38,7 +43,7 @@ class TopicPublisher {
     void close();
 
     /// Sends one message. While it is closed none is sent; of a latched topic the last one is
-    /// kept, and sent when it opens. The bytes are copied only for that, or for a subscriber.
+    /// kept, and sent whenever it opens. The bytes are copied only for that, or for a subscriber.
     void publish(const std::uint8_t* bytes, std::uint32_t size);
 
    private:
@@ -55,6 +60,7 @@ class TopicPublisher {
     std::uint64_t lost_ = 0;
     std::vector<std::uint8_t> kept_;
     ros::Publisher publisher_;
+    Retry retry_;  // watch thread
 };
 
 }  // namespace rtcf::ros1

@@ -39,17 +39,15 @@ bool TopicSubscriber::open(ros::NodeHandle& handle, ros::CallbackQueueInterface&
     const std::lock_guard lock(mutex_);
     subscriber_ = subscriber;
     problem_ = problem;
-    return subscriber_ != nullptr || !problem_.empty();
+    retry_.note(subscriber_ != nullptr);
+    return subscriber_ != nullptr;
 }
+
+bool TopicSubscriber::isDue() const { return !isOpen() && retry_.due(); }
 
 void TopicSubscriber::close() {
     mute();
-    ros::Subscriber closing;
-    {
-        const std::lock_guard lock(mutex_);
-        std::swap(closing, subscriber_);
-    }
-    closing.shutdown();
+    shutDown(mutex_, subscriber_);
 }
 
 bool TopicSubscriber::isOpen() const {

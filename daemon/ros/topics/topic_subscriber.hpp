@@ -10,6 +10,7 @@
 #include <string>
 
 #include "bridge/injector.hpp"
+#include "ros/roscpp/handles.hpp"
 
 namespace ros {
 class CallbackQueueInterface;
@@ -27,11 +28,13 @@ class TopicSubscriber {
     /// Delivers nothing from now on. Any thread; returns at once.
     void mute() { *muted_ = true; }
 
-    /// @return false if the master did not answer: to be tried again
+    /// @return false if it could not: to be tried again
     bool open(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue);
     void close();
 
     bool isOpen() const;
+    /// It is to be opened: it is not yet, and has not failed just now. Watch thread.
+    bool isDue() const;
     /// Why it could not be opened, one line; empty if it could.
     std::string problem() const;
 
@@ -41,6 +44,7 @@ class TopicSubscriber {
     mutable std::mutex mutex_;                  // all below
     ros::Subscriber subscriber_;
     std::string problem_;
+    Retry retry_;  // watch thread
 };
 
 }  // namespace rtcf::ros1

@@ -1,6 +1,7 @@
 """How an executor is called: its binary, its socket, its environment."""
 
 import contextlib
+import hashlib
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,6 +30,7 @@ class ExecutorCommand:
     stop_folder: Path | None = None
     stop_mode: int = 0o700
     mark: Callable[[str], Path | None] = lambda runner: None  # see Store.mark
+    private: bool = False  # not the system's daemon
 
     def prepare(self) -> None:
         """Make the socket folders, of which only our user may enter the first, and check the
@@ -56,11 +58,21 @@ class ExecutorCommand:
     def arguments(self, runner: str) -> list[str]:
         """Return the command line."""
         line = [str(self.binary), "--runner", runner, "--socket", str(self.socket(runner))]
+        if name := self.daemon_name():
+            line += ["--daemon", name]
         if self.stop_folder is not None:
             line += ["--stop-socket", str(_checked(self.stop_folder / runner))]
         if mark := self.mark(runner):
             line += ["--resume-mark", str(mark)]
         return line
+
+    def daemon_name(self) -> str:
+        """Return what tells this daemon from others of the machine; empty: it is the system's."""
+        if not self.private:
+            return ""
+        # The same after a restart, and no other daemon's: two cannot share a folder.
+        folder = hashlib.sha256(os.fsencode(self.folder.absolute())).hexdigest()
+        return f"u{os.geteuid()}_{folder[:6]}"
 
     @staticmethod
     def environment() -> dict[str, str]:

@@ -368,6 +368,7 @@ def main() -> int:
     for option in (
         "--runner",
         "--socket",
+        "--daemon",
         "--stop-socket",
         "--resume-mark",
         "--package",

@@ -5,14 +5,18 @@
 using rtcf::ros1::nodeName;
 
 TEST(NodeName, IsOfHostAndRunner) {
-    EXPECT_EQ(nodeName("robot", "arm").full(), "/rtcfd/robot/arm");
+    EXPECT_EQ(nodeName("robot", "", "arm").full(), "/rtcfd/robot/arm");
+}
+
+TEST(NodeName, OfAPrivateDaemonIsNotTheSystems) {
+    EXPECT_EQ(nodeName("robot", "eve-3f", "arm").full(), "/rtcfd/robot/eve_3f/arm");
 }
 
 TEST(NodeName, ReplacesWhatRosDoesNotAllow) {
-    EXPECT_EQ(nodeName("pi-4.lab.example", "left arm/2").full(),
+    EXPECT_EQ(nodeName("pi-4.lab.example", "", "left arm/2").full(),
               "/rtcfd/pi_4_lab_example/left_arm_2");
 }
 
 TEST(NodeName, StandsInForWhatIsEmpty) {
-    EXPECT_EQ(nodeName("", "").full(), "/rtcfd/localhost/rt_runner");
+    EXPECT_EQ(nodeName("", "", "").full(), "/rtcfd/localhost/rt_runner");
 }

@@ -58,11 +58,21 @@ void RosFixture::startDeafMaster() {
     startMaster({"/usr/bin/python3", RTCF_DEAF_MASTER, std::to_string(port_)});
 }
 
+void RosFixture::startSlowMaster(std::chrono::milliseconds each) {
+    const std::string real = std::to_string(freePort());
+    auto environment = this->environment();
+    environment["ROS_MASTER_URI"] = "http://127.0.0.1:" + real;
+    real_master_ = std::make_unique<ChildProcess>(
+        std::vector<std::string>{"rosmaster", "--core", "-p", real}, environment);
+    startMaster({"/usr/bin/python3", RTCF_SLOW_MASTER, std::to_string(port_), real,
+                 std::to_string(each.count())});
+}
+
 void RosFixture::startMaster(const std::vector<std::string>& command) {
     master_ = std::make_unique<ChildProcess>(command, environment());
     ASSERT_TRUE(eventually([this] {
         const std::atomic<bool> never{false};
-        rtcf::ros1::MasterClient client("127.0.0.1", static_cast<std::uint32_t>(port_), 500ms,
+        rtcf::ros1::MasterClient client({"127.0.0.1", static_cast<std::uint32_t>(port_)}, 500ms,
                                         never);
         XmlRpc::XmlRpcValue arguments;
         arguments[0] = std::string("/test");
@@ -102,7 +112,7 @@ std::string RosFixture::lookAtLoggers() {
 
 void RosFixture::startNode() {
     node_ = std::make_unique<rtcf::ros1::RosNode>(
-        "rt_runner",
+        "", "rt_runner",
         [this](const std::string& message) {
             const std::lock_guard lock(mutex_);
             reports_.push_back(message);

@@ -69,7 +69,12 @@ class RosFixture : public ::testing::Test {
     void startMaster();
     /// Starts one that answers until a topic is registered.
     void startDeafMaster();
-    void stopMaster() { master_.reset(); }
+    /// Starts a real one behind one that takes its time for each call.
+    void startSlowMaster(std::chrono::milliseconds each);
+    void stopMaster() {
+        master_.reset();
+        real_master_.reset();
+    }
     ChildProcess& master() { return *master_; }
     std::string masterUri() const { return "http://127.0.0.1:" + std::to_string(port_); }
 
@@ -107,7 +112,8 @@ class RosFixture : public ::testing::Test {
     std::filesystem::path folder_;
     int port_ = 0;
     std::unique_ptr<ChildProcess> master_;
-    mutable std::mutex mutex_;  // reports_
+    std::unique_ptr<ChildProcess> real_master_;  // behind a slow one
+    mutable std::mutex mutex_;                   // reports_
     std::vector<std::string> reports_;
     rtcf::ros1::Rosout rosout_;
     rtcf::executor::Log log_{[this](rtcf::executor::LogEntry&& entry) { rosout_.publish(entry); }};

@@ -1,9 +1,27 @@
+#include <dlfcn.h>
+#include <netdb.h>
+#include <ros/node_handle.h>
+#include <std_msgs/Int32.h>
+
 #include <csignal>
 #include <thread>
 
+#include "ros/roscpp/node_name.hpp"
 #include "ros_fixture.hpp"
 
 class RosNodeTest : public RosFixture {};
+
+// Takes the place of the C library's: asked for this name, it is as slow as resolvers can be.
+extern "C" int getaddrinfo(const char* node, const char* service, const addrinfo* hints,
+                           addrinfo** found) {
+    using Function = int (*)(const char*, const char*, const addrinfo*, addrinfo**);
+    static const auto real = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "getaddrinfo"));
+    if (node != nullptr && std::string(node) == "slow.example") {
+        std::this_thread::sleep_for(10s);
+        return EAI_NONAME;
+    }
+    return real(node, service, hints, found);
+}
 
 TEST_F(RosNodeTest, ValuesFlowBothWays) {
     startMaster();
@@ -216,6 +234,75 @@ TEST_F(RosNodeTest, StaysOffOnceKilledUntilConfiguredAgain) {
     EXPECT_NE(flow(source, *listener), "");
 }
 
+TEST_F(RosNodeTest, ComesBackAtANewMasterOnceKilled) {
+    startMaster();
+    Source source("/out");
+    startNode();
+    serve({&source}, {});
+    ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    run({"rosnode", "kill", rosNode().status().node});
+    ASSERT_TRUE(eventually([&] { return reported("asked to shut down"); }));
+    stopMaster();
+    startMaster();
+    EXPECT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    const auto listener = listen("/out");
+    EXPECT_NE(flow(source, *listener), "");
+}
+
+TEST_F(RosNodeTest, TakesNoNameFromANodeThatHasIt) {
+    startMaster();
+    const std::string name = rtcf::ros1::nodeName("", "rt_runner").full();
+    auto twin = node(name);
+    ASSERT_EQ(twin->line(10s).value_or(""), "ready");
+    startNode();
+    ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    EXPECT_EQ(rosNode().status().node, name + "_2");
+    EXPECT_TRUE(reported("this one is " + name + "_2"));
+    EXPECT_NE(run({"rosnode", "ping", "-c1", name}).find("reply"), std::string::npos);
+}
+
+TEST_F(RosNodeTest, KeepsLatchedValuesWhenItGoesAndComes) {
+    startMaster();
+    Source source("/out");
+    startNode();
+    rtcf::executor::BridgeSettings settings;
+    settings.master_uri = masterUri();
+    settings.latch = "/out";
+    rosNode().configure(settings);
+    serve({&source}, {});
+    ASSERT_TRUE(eventually([&] { return rosNode().status().publications == 1; }));
+    source.write(3.5);
+    ASSERT_EQ(listen("/out")->line(20s).value_or(""), "3.5");
+    settings.queue = 7;
+    rosNode().configure(settings);
+    EXPECT_EQ(listen("/out")->line(20s).value_or(""), "3.5");
+    settings.enabled = false;
+    rosNode().configure(settings);
+    ASSERT_TRUE(eventually([&] { return rosNode().status().publications == 0; }));
+    settings.enabled = true;
+    rosNode().configure(settings);
+    EXPECT_EQ(listen("/out")->line(20s).value_or(""), "3.5");
+}
+
+TEST_F(RosNodeTest, OpensLaterWhatItCouldNotOpen) {
+    startMaster();
+    Source source("/out");
+    startNode();
+    ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    {
+        ros::NodeHandle handle("/");
+        ros::Publisher other = handle.advertise<std_msgs::Int32>("/out", 1);
+        serve({&source}, {});
+        ASSERT_TRUE(eventually([&] {
+            return rosNode().status().problem.find("cannot publish /out") != std::string::npos;
+        }));
+    }
+    EXPECT_TRUE(eventually([&] { return rosNode().status().publications == 1; }));
+    EXPECT_TRUE(eventually([&] { return rosNode().status().problem.empty(); }));
+    const auto listener = listen("/out");
+    EXPECT_NE(flow(source, *listener), "");
+}
+
 TEST_F(RosNodeTest, FollowsItsSettings) {
     startMaster();
     Source source("/out");
@@ -304,6 +391,62 @@ TEST_F(RosNodeTest, EndsSoonWithAMasterThatHangsInACall) {
     startNode();
     serve({&source}, {});
     ASSERT_EQ(master().line(10s).value_or(""), "asked");
+    const auto begin = std::chrono::steady_clock::now();
+    stopNode();
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
+}
+
+TEST_F(RosNodeTest, LeavesNothingAtASlowMaster) {
+    startSlowMaster(100ms);
+    std::vector<std::unique_ptr<Source>> sources;
+    std::vector<std::unique_ptr<Sink>> sinks;
+    std::vector<Source*> outputs;
+    std::vector<Sink*> inputs;
+    for (int i = 0; i < 40; ++i) {
+        sources.push_back(std::make_unique<Source>("/out" + std::to_string(i)));
+        sinks.push_back(std::make_unique<Sink>("/in" + std::to_string(i)));
+        outputs.push_back(sources.back().get());
+        inputs.push_back(sinks.back().get());
+    }
+    startNode();
+    serve(outputs, inputs);
+    ASSERT_TRUE(eventually([&] { return rosNode().status().subscriptions == 40; }));
+    const std::string name = rosNode().status().node;
+    ASSERT_TRUE(eventually(
+        [&] { return run({"rosnode", "info", name}).find("/in39") != std::string::npos; }));
+    // As a graph that is torn down does, at once before the end.
+    serve({}, {});
+    const auto begin = std::chrono::steady_clock::now();
+    stopNode();
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
+    EXPECT_EQ(run({"rosnode", "list"}).find(name), std::string::npos);
+    EXPECT_FALSE(reported("may be left"));
+}
+
+TEST_F(RosNodeTest, SaysWhatItHadToLeaveAtAMasterThatHangs) {
+    startMaster();
+    Source source("/out");
+    startNode();
+    serve({&source}, {});
+    ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    master().signal(SIGSTOP);
+    stopNode();
+    EXPECT_TRUE(reported("registrations of ROS node"));
+    EXPECT_TRUE(reported("may be left"));
+}
+
+// A resolver that takes long for a name, in the place of the C library's.
+TEST_F(RosNodeTest, AwaitsNoSlowResolver) {
+    startMaster();
+    startNode();
+    ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    rtcf::executor::BridgeSettings settings;
+    settings.master_uri = "http://slow.example:11311";
+    rosNode().configure(settings);
+    EXPECT_TRUE(eventually([&] {
+        return rosNode().status().problem.find("'slow.example' has no address") !=
+               std::string::npos;
+    }));
     const auto begin = std::chrono::steady_clock::now();
     stopNode();
     EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);

@@ -1,0 +1,317 @@
+#include "ros/master/master_link.hpp"
+
+#include <cstdlib>
+#include <utility>
+
+#include "ros/master/listener.hpp"
+
+namespace rtcf::ros1 {
+
+namespace {
+
+constexpr auto kCallTimeout = std::chrono::milliseconds(1000);
+constexpr auto kResolving = std::chrono::milliseconds(500);
+
+}  // namespace
+
+// What a master says when it is looked at.
+struct MasterLink::Sight {
+    bool silent = true;
+    std::string node_uri;  // of the node that has our name; empty: none
+    std::optional<int> pid;
+    std::optional<bool> simulated;
+};
+
+MasterLink::MasterLink(NodeName name, Say say, const std::function<void()>& wake,
+                       const RoscppNode::ParameterWritten& written)
+    : say_(std::move(say)),
+      wanted_name_(name),
+      node_(
+          std::move(name),
+          [this, wake](const std::string& /*reason*/) {
+              {
+                  const std::lock_guard lock(mutex_);
+                  shutdown_request_ = true;
+              }
+              wake();
+          },
+          written) {}
+
+std::string MasterLink::uriOf(const executor::BridgeSettings& settings) {
+    if (!settings.master_uri.empty()) return settings.master_uri;
+    const char* environment = std::getenv("ROS_MASTER_URI");
+    return environment != nullptr && *environment != '\0' ? environment : "http://localhost:11311";
+}
+
+MasterLink::State MasterLink::look(const executor::BridgeSettings& settings) {
+    if (failed_) return State::Failed;
+    const std::string uri = uriOf(settings);
+    MasterAddress address;
+    if (!locate(uri, address)) return State::Away;
+    if (!node_.started() && !start(uri, address, settings.hostname))
+        return failed_ ? State::Failed : State::Away;
+    if (!node_.alive()) {
+        failed_ = true;
+        problem_ =
+            "something in this process has shut down ROS: restart the executor to have it again";
+        return State::Failed;
+    }
+    if (uri != uri_) {
+        moveTo(uri, address);
+    } else if (address.address != address_.address) {
+        useAddress(address);
+        node_.calls().moveTo(address);
+    }
+    if (settings.hostname != hostname_) {
+        hostname_ = settings.hostname;
+        say_("the new ROS hostname takes effect at the next start of the executor");
+    }
+    // Before the look, whose answers are to be newer.
+    const bool told = node_.registrar().hasTold();
+    const bool asked_to_go = takeShutdownRequest();
+    const Sight found = sight();
+    if (asked_to_go) obeyShutdownRequest(found);
+    if (found.silent) {
+        hosts_.doubt(host_);
+        was_silent_ = true;
+        if (off_ != Why::No) return State::Off;
+        problem_ = "no ROS master answers at " + uri_ + "; open connections go on";
+        say_("the ROS master at " + uri_ + " does not answer any more: open connections go on");
+        return State::Silent;
+    }
+    const bool is_new = found.pid && master_pid_ && *master_pid_ != *found.pid;
+    if (is_new && off_ == Why::Killed) off_ = Why::No;
+    if (off_ == Why::Killed || nameIsTaken(found)) {
+        problem_ = whyOff();
+        return State::Off;
+    }
+    simulated_ = found.simulated;
+    const bool returned = std::exchange(was_silent_, false);
+    // A hook may have registered something at a new master before we have looked.
+    const bool lost = is_new || (told && found.node_uri != node_.uri());
+    if (lost) new_ = true;
+    // One that was out of reach has told us nothing of publishers that came or went meanwhile.
+    if (lost || returned) node_.registrar().forget();
+    master_pid_ = found.pid;
+    node_.registrar().show(true);
+    node_.registrar().retry();
+    if (lost || returned) {
+        if (!node_.registrar().flush(Clock::now() + kCallTimeout))
+            return away("the ROS master at " + uri_ + " did not take all registrations");
+        say_(lost ? "ROS node " + name().full() + " is registered again at " + uri_
+                  : "the ROS master at " + uri_ + " answers again");
+    }
+    problem_.clear();
+    up_ = true;
+    return State::Up;
+}
+
+void MasterLink::revive() {
+    const std::lock_guard lock(mutex_);
+    revived_ = true;
+}
+
+std::size_t MasterLink::leave(Clock::time_point deadline) {
+    up_ = false;
+    if (!node_.started()) return 0;
+    return node_.registrar().withdraw(deadline);
+}
+
+std::size_t MasterLink::end(Clock::time_point deadline) {
+    const std::size_t left = node_.started() && node_.alive() ? leave(deadline) : 0;
+    node_.stop();
+    return left;
+}
+
+void MasterLink::tell() {
+    constexpr auto kPatience = std::chrono::milliseconds(500);
+    node_.registrar().flush(Clock::now() + kPatience);
+}
+
+void MasterLink::hurry() noexcept {
+    hurry_ = true;
+    node_.leaveMaster();
+}
+
+MasterLink::State MasterLink::away(const std::string& problem) {
+    problem_ = problem;
+    return State::Away;
+}
+
+bool MasterLink::locate(const std::string& uri, MasterAddress& address) {
+    std::string host;
+    if (!splitMasterUri(uri, host, address.port)) {
+        away("the ROS master's URI '" + uri + "' is none; it has the form http://HOST:PORT");
+        return false;
+    }
+    host_ = host;
+    const std::optional<std::string> found = hosts_.address(host, kResolving);
+    if (!found) {
+        away("no ROS master answers at " + uri + ": the name '" + host + "' has no address yet");
+        say_(problem_);
+        return false;
+    }
+    address.address = *found;
+    return true;
+}
+
+bool MasterLink::start(const std::string& uri, const MasterAddress& address,
+                       const std::string& hostname) {
+    ParallelCalls master(address, hurry_);
+    if (!chooseName(master)) {
+        away("no ROS master answers at " + uri);
+        say_(problem_ + ": waiting for one");
+        return false;
+    }
+    try {
+        node_.start(uri, address, hostname);
+    } catch (const std::exception& error) {
+        failed_ = true;
+        problem_ = std::string("the ROS node could not be started: ") + error.what();
+        say_(problem_);
+        return false;
+    }
+    uri_ = uri;
+    useAddress(address);
+    hostname_ = hostname;
+    new_ = true;
+    say_("ROS node " + name().full() + " is up at " + uri);
+    return true;
+}
+
+// The name, or the first one after it that no other node has: a second node of a name would end
+// the first. @return false if the master does not answer
+bool MasterLink::chooseName(ParallelCalls& master) {
+    constexpr int kMost = 9;
+    std::vector<MasterCall> calls;
+    std::vector<NodeName> names;
+    for (int i = 1; i <= kMost; ++i) {
+        NodeName name = wanted_name_;
+        if (i > 1) name.base += "_" + std::to_string(i);
+        calls.push_back({"lookupNode", texts({name.full(), name.full()})});
+        names.push_back(std::move(name));
+    }
+    std::vector<MasterAnswer> found = master.run(calls, kCallTimeout, Clock::now() + kCallTimeout);
+    for (std::size_t i = 0; i < found.size(); ++i) {
+        if (found[i].silent()) return false;
+        bool here = false;
+        // One of this machine that does not answer has died.
+        const bool taken = found[i] && (answers(found[i].text(), here) || !here);
+        if (taken && i + 1 < found.size()) continue;
+        if (i != 0) {
+            say_("another node named " + wanted_name_.full() +
+                 " runs at this ROS master: this one is " + names[i].full());
+        }
+        node_.rename(std::move(names[i]));
+        return true;
+    }
+    return false;
+}
+
+void MasterLink::moveTo(const std::string& uri, const MasterAddress& address) {
+    node_.registrar().withdraw(Clock::now() + kCallTimeout);
+    node_.useMaster(uri, address);
+    uri_ = uri;
+    useAddress(address);
+    was_silent_ = false;
+    new_ = true;
+    master_pid_.reset();
+    off_ = Why::No;
+}
+
+void MasterLink::useAddress(const MasterAddress& address) {
+    address_ = address;
+    looks_ = std::make_unique<ParallelCalls>(address, hurry_);
+}
+
+MasterLink::Sight MasterLink::sight() {
+    const std::string caller = node_.name().full();
+    const std::vector<MasterCall> calls{{"lookupNode", texts({caller, caller})},
+                                        {"getPid", texts({caller})},
+                                        {"getParam", texts({caller, "/use_sim_time"})}};
+    std::vector<MasterAnswer> answers =
+        looks_->run(calls, kCallTimeout, Clock::now() + kCallTimeout);
+    Sight sight;
+    MasterAnswer& node = answers[0];
+    MasterAnswer& pid = answers[1];
+    MasterAnswer& time = answers[2];
+    sight.silent = node.silent() || pid.silent();
+    if (node) sight.node_uri = node.text();
+    if (pid && pid.value.getType() == XmlRpc::XmlRpcValue::TypeInt)
+        sight.pid = static_cast<int&>(pid.value);
+    // As it may be set at any time before a loop starts, it is asked for again and again.
+    if (!time.silent()) {
+        sight.simulated = time && time.value.getType() == XmlRpc::XmlRpcValue::TypeBoolean &&
+                          static_cast<bool&>(time.value);
+    }
+    return sight;
+}
+
+bool MasterLink::lives(const std::string& node) {
+    std::vector<MasterAnswer> found = calls().run({{"lookupNode", texts({name().full(), node})}},
+                                                  kCallTimeout, Clock::now() + kCallTimeout);
+    bool here = false;
+    return found[0] && (answers(found[0].text(), here) || !here);
+}
+
+// @param here set if the node is on this machine
+bool MasterLink::answers(const std::string& node_uri, bool& here) {
+    std::string host;
+    MasterAddress address;
+    if (!splitMasterUri(node_uri, host, address.port)) return false;
+    const std::optional<std::string> found = hosts_.address(host, kResolving);
+    if (!found) return true;  // who cannot be asked may be alive
+    address.address = *found;
+    here = isOfThisMachine(address.address);
+    MasterClient node(address, kCallTimeout, hurry_);
+    return !node.call("getPid", texts({name().full()})).silent();
+}
+
+bool MasterLink::takeShutdownRequest() {
+    const std::lock_guard lock(mutex_);
+    if (std::exchange(revived_, false) && off_ == Why::Killed) off_ = Why::No;
+    return std::exchange(shutdown_request_, false);
+}
+
+// The node itself stays, so that it can come back; roscpp cannot be started twice. The master asks
+// for it when another node takes the name, anybody else by `rosnode kill`.
+void MasterLink::obeyShutdownRequest(const Sight& sight) {
+    if (sight.silent) {  // who it was will be seen later
+        const std::lock_guard lock(mutex_);
+        shutdown_request_ = true;
+        return;
+    }
+    const bool taken = !sight.node_uri.empty() && sight.node_uri != node_.uri();
+    off_ = taken ? Why::NameTaken : Why::Killed;
+    say_(whyOff());
+}
+
+std::string MasterLink::whyOff() const {
+    if (off_ == Why::Killed) {
+        return "ROS node " + name().full() +
+               " was asked to shut down: it is off until there is a new master, or `rtcfctl runner "
+               "set --ros`";
+    }
+    return "another node named " + name().full() +
+           " runs at this ROS master: give its host or runner another name";
+}
+
+// True if another node has our name and we are not to fight for it: until the
+// master has told us to go, or, afterwards, until that node does not answer.
+bool MasterLink::nameIsTaken(const Sight& sight) {
+    constexpr int kPatience = 3;  // looks
+    if (sight.node_uri.empty() || sight.node_uri == node_.uri()) {
+        taken_ = 0;
+        off_ = Why::No;
+        return false;
+    }
+    bool here = false;
+    const bool alive = answers(sight.node_uri, here);
+    taken_ = off_ == Why::NameTaken && alive ? 0 : taken_ + 1;
+    if (taken_ < kPatience) return true;
+    taken_ = 0;
+    off_ = Why::No;
+    return false;
+}
+
+}  // namespace rtcf::ros1

@@ -1,0 +1,88 @@
+#include "ros/master/subjects.hpp"
+
+#include <utility>
+
+namespace rtcf::ros1 {
+
+Subjects::Subjects(Rosout& rosout, executor::Log& log)
+    : rosout_(rosout),
+      log_(log),
+      reconfiguring_([&log](const std::string& component, const std::string& line) {
+          log.write(LogLevel::Warn, component, line + " (asked for by dynamic_reconfigure)");
+      }) {}
+
+void Subjects::attach(executor::RunnerView& runner, const executor::AskSupervisor& ask) {
+    auto introspection = std::make_unique<Introspection>(runner, ask, log_);
+    const std::lock_guard lock(mutex_);
+    introspection_ = std::move(introspection);
+    rosout_.show(&runner);
+}
+
+void Subjects::detach() {
+    const std::lock_guard lock(mutex_);
+    introspection_.reset();
+}
+
+void Subjects::configure(const executor::BridgeSettings& settings) {
+    reconfiguring_.refuseOutOfRange(settings.refuse_out_of_range);
+}
+
+void Subjects::setTable(const executor::BridgeTable& table) {
+    publishing_.setTaps(table.outputs);
+    subscribing_.setInjectors(table.inputs);
+    reconfiguring_.setSets(table.parameters);
+}
+
+void Subjects::setClock(std::shared_ptr<executor::SimulatedClock> clock) {
+    subscribing_.setClock(std::move(clock));
+}
+
+void Subjects::serveParameters(executor::ParameterRequest request) {
+    reconfiguring_.serve(std::move(request));
+}
+
+void Subjects::noteParameterWritten(const std::string& key) { reconfiguring_.noteWritten(key); }
+
+void Subjects::show(executor::BridgeStatus& status) const {
+    status.publications = publishing_.open();
+    status.subscriptions = subscribing_.open();
+    status.follows_clock = subscribing_.followsClock();
+    if (status.problem.empty()) status.problem = publishing_.problem();
+    if (status.problem.empty()) status.problem = subscribing_.problem();
+    if (status.problem.empty()) status.problem = reconfiguring_.problem();
+}
+
+void Subjects::prepare(const executor::BridgeSettings& settings) { publishing_.prepare(settings); }
+
+Reconciled Subjects::reconcile(MasterLink& link, const executor::BridgeSettings& settings) {
+    open_ = true;
+    if (refusals_ == nullptr) refusals_ = std::make_unique<Refusals>();
+    if (link.takeNew()) reconfiguring_.forget();
+    ros::NodeHandle& handle = link.node().handle();
+    if (introspection_)
+        introspection_->open(handle, link.name().full(), claim_.of(link, settings.name_space));
+    if (!rosout_.isOpen()) rosout_.open(handle, link.name().full());
+    const Reconciled topics = publishing_.reconcile(handle, settings) &
+                              subscribing_.reconcile(handle, link.simulated().value_or(false));
+    ParallelCalls master = link.calls();
+    return topics & reconfiguring_.reconcile(handle, master, link.caller());
+}
+
+void Subjects::reconcileWithoutMaster(MasterLink& link) {
+    subscribing_.reconcileWithoutMaster(link.node().handle());
+}
+
+void Subjects::closeAll(MasterLink& link, MasterLink::Clock::time_point deadline) {
+    // Registrations matter more at a slow master.
+    constexpr auto kReserve = std::chrono::milliseconds(500);
+    if (!std::exchange(open_, false)) return;
+    link.hide();
+    if (introspection_) introspection_->close();
+    publishing_.closeAll();
+    subscribing_.closeAll();
+    ParallelCalls master = link.calls(true);
+    reconfiguring_.closeAll(master, link.caller(), deadline - kReserve);
+    rosout_.close();
+}
+
+}  // namespace rtcf::ros1

@@ -1,0 +1,103 @@
+#include "ros/roscpp/replacements.hpp"
+
+#include <dlfcn.h>
+#include <link.h>
+
+#include <cstring>
+#include <string_view>
+
+namespace rtcf::ros1 {
+
+namespace {
+
+// A library that is loaded, and what of it can only be read.
+struct Loaded {
+    const char* part;  // of its name
+    std::string file;
+    std::vector<std::string_view> constant;
+};
+
+int find(dl_phdr_info* info, std::size_t /*size*/, void* data) {
+    auto& wanted = *static_cast<Loaded*>(data);
+    if (info->dlpi_name == nullptr || std::strstr(info->dlpi_name, wanted.part) == nullptr)
+        return 0;
+    wanted.file = info->dlpi_name;
+    for (int i = 0; i < info->dlpi_phnum; ++i) {
+        const ElfW(Phdr) & segment = info->dlpi_phdr[i];
+        const bool constant = segment.p_type == PT_LOAD && (segment.p_flags & PF_W) == 0 &&
+                              (segment.p_flags & PF_R) != 0;
+        if (!constant) continue;
+        // NOLINTNEXTLINE(performance-no-int-to-ptr): where the loader has put it
+        const auto* begin = reinterpret_cast<const char*>(info->dlpi_addr + segment.p_vaddr);
+        wanted.constant.emplace_back(begin, segment.p_memsz);
+    }
+    return 1;
+}
+
+// The library has such a function, and who calls it by name gets ours.
+bool isReplaced(const char* name, const Loaded& library) {
+    void* const ours = dlsym(RTLD_DEFAULT, name);
+    Dl_info there{};
+    Dl_info here{};
+    if (ours == nullptr || dladdr(ours, &there) == 0 ||
+        dladdr(reinterpret_cast<void*>(&dependences), &here) == 0 ||
+        there.dli_fbase != here.dli_fbase)
+        return false;
+    void* const handle = dlopen(library.file.c_str(), RTLD_LAZY | RTLD_NOLOAD);
+    if (handle == nullptr) return false;
+    void* const theirs = dlsym(handle, name);
+    dlclose(handle);
+    return theirs != nullptr && theirs != ours;
+}
+
+}  // namespace
+
+const std::vector<Dependence>& dependences() {
+    constexpr const char* kRoscpp = "libroscpp.so";
+    constexpr const char* kRosconsole = "librosconsole";
+    constexpr const char* kLevels = "levels of loggers, ROS_* messages in the log";
+    constexpr auto kFunction = Dependence::Kind::Function;
+    static const std::vector<Dependence> list{
+        {kFunction,
+         "_ZN3ros6master7executeERKNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEERKN6XmlRpc"
+         "11XmlRpcValueERSA_SD_b",
+         kRoscpp, "calls to the ROS master that end in time, and registrations"},
+        {kFunction, "_ZN3ros9this_node12getNamespaceB5cxx11Ev", kRoscpp,
+         "names of components' topics and parameters outside a namespace"},
+        {kFunction, "_ZN3ros12TransportTCP12setKeepAliveEbjjj", kRoscpp,
+         "noticing within seconds that a cable was cut"},
+        {kFunction, "_ZN3ros22TransportPublisherLink12onRetryTimerERKNS_16SteadyTimerEventE",
+         kRoscpp, "connecting again within seconds after a cable was cut"},
+        {kFunction, "_ZN3ros7console4impl5printEPvNS0_6levels5LevelEPKcS6_S6_i", kRosconsole,
+         kLevels},
+        {kFunction, "_ZN3ros7console4impl12isEnabledForEPvNS0_6levels5LevelE", kRosconsole,
+         kLevels},
+        {kFunction, "_ZN3ros7console4impl17register_appenderEPNS0_11LogAppenderE", kRosconsole,
+         "telling of connections that were refused"},
+        // Refusals::log() looks for these; there is no other way to hear of a refusal.
+        {Dependence::Kind::Text, "error message in header", kRoscpp,
+         "telling that a peer refused a subscription"},
+        // So for " wants topic ", which compilers put into the code: it cannot be looked for.
+    };
+    return list;
+}
+
+std::vector<std::string> broken(const std::vector<Dependence>& list) {
+    std::vector<std::string> lines;
+    for (const Dependence& each : list) {
+        Loaded library{each.library, {}, {}};
+        dl_iterate_phdr(&find, &library);
+        bool works = false;
+        if (each.kind == Dependence::Kind::Function) works = isReplaced(each.name, library);
+        if (each.kind == Dependence::Kind::Text) {
+            for (const std::string_view constant : library.constant)
+                works = works || constant.find(each.name) != std::string_view::npos;
+        }
+        if (works) continue;
+        lines.push_back(std::string(each.library) + " is not as rtcf knows it (" + each.name +
+                        "): this does not work: " + each.use);
+    }
+    return lines;
+}
+
+}  // namespace rtcf::ros1

@@ -1,0 +1,133 @@
+"""Names at a master that several loops share, and what is left there when they go."""
+
+import json
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+import rosgraph
+import rtcf
+from daemon_process import Daemon, wait_for, with_ros
+from ros_processes import Master
+from rtcf.v1 import runner_pb2
+from two_machines import two_machines
+
+_SERVICE = "deactivate_rt_loop"
+
+
+def _start(stack: ExitStack, folder: Path, settings: str, **arguments: object) -> Daemon:
+    folder.mkdir()
+    daemon = Daemon(folder, settings, **arguments)  # type: ignore[arg-type]
+    daemon.start()
+    stack.callback(lambda: daemon.ended or daemon.end())
+    return daemon
+
+
+def _ros(daemon: Daemon) -> runner_pb2.RosStatus:
+    with rtcf.Client(daemon.socket) as client:
+        client.load(rtcf.component("rtcf_test", "Knobs", name="knobs")) if not list(
+            client.list_components()
+        ) else None
+        status: runner_pb2.RosStatus = client.get_status("rt_runner").runners[0].ros
+        return status
+
+
+def _connected(daemon: Daemon) -> runner_pb2.RosStatus:
+    return wait_for(  # type: ignore[no-any-return]
+        lambda: (ros := _ros(daemon)).connected and ros, "the node at its master"
+    )
+
+
+def _all_names(master_uri: str) -> list[list[object]]:
+    state: list[list[object]] = rosgraph.Master("/test", master_uri).getSystemState()
+    return state
+
+
+@pytest.fixture
+def stack() -> Iterator[ExitStack]:
+    """Give what ends all that a test has started."""
+    with ExitStack() as stack:
+        yield stack
+
+
+def test_two_daemons_of_one_machine_do_not_take_each_others_names(
+    stack: ExitStack, tmp_path: Path, master: Master
+) -> None:
+    settings = with_ros(master.uri, "")
+    one = _start(stack, tmp_path / "a", settings)
+    first = _connected(one).node
+    other = _start(stack, tmp_path / "b", settings)
+    second = _connected(other).node
+    assert first != second
+    wait_for(lambda: f"{second}/{_SERVICE}" in master.services(), "the other's services")
+    assert f"{first}/{_SERVICE}" in master.services()
+    # Neither was asked to go.
+    assert [_ros(daemon).problem for daemon in (one, other)] == ["", ""]
+    assert [_ros(daemon).connected for daemon in (one, other)] == [True, True]
+
+
+def test_a_namespace_that_is_taken_is_not_stolen(
+    stack: ExitStack, tmp_path: Path, master: Master
+) -> None:
+    settings = with_ros(master.uri, "") + "ns = '/shared'\n"
+    one = _start(stack, tmp_path / "a", settings)
+    wait_for(lambda: f"/shared/{_SERVICE}" in master.services(), "the services")
+    owner = _connected(one).node
+    other = _start(stack, tmp_path / "b", settings)
+    node = _connected(other).node
+    wait_for(lambda: f"{node}/{_SERVICE}" in master.services(), "the services elsewhere")
+    assert "/shared" in _ros(other).problem
+    assert owner in _ros(other).problem
+    for name, providers in rosgraph.Master("/test", master.uri).getSystemState()[2]:
+        if name == f"/shared/{_SERVICE}":
+            assert providers == [owner]
+
+
+def test_two_machines_at_one_master_stop_each_its_own_loop(tmp_path: Path) -> None:
+    with two_machines() as (left, right), ExitStack() as stack:
+        uri = left.start_master(tmp_path)
+        daemons = []
+        for machine in (left, right):
+            daemons.append(
+                _start(
+                    stack,
+                    tmp_path / machine.name,
+                    with_ros(uri, ""),
+                    wrapper=machine.enter,
+                    environment={"ROS_HOSTNAME": machine.address},
+                )
+            )
+            _connected(daemons[-1])
+            daemons[-1].ctl("start")
+        nodes = [_connected(daemon).node for daemon in daemons]
+        assert nodes[0].startswith("/rtcfd/left/")
+        assert nodes[1].startswith("/rtcfd/right/")
+        topics = left.run("env", f"ROS_MASTER_URI={uri}", "rostopic", "list").split()
+        assert {f"{node}/iteration_info" for node in nodes} <= set(topics)
+        call = ("rosservice", "call", f"{nodes[1]}/{_SERVICE}")
+        assert "True" in left.run("env", f"ROS_MASTER_URI={uri}", *call)
+        with rtcf.Client(daemons[0].socket) as client:
+            running = client.get_status("rt_runner").runners[0].state
+            assert running == runner_pb2.RUNNER_STATE_RUNNING
+        with rtcf.Client(daemons[1].socket) as client:
+            stopped = client.get_status("rt_runner").runners[0].state
+            assert stopped == runner_pb2.RUNNER_STATE_STOPPED
+
+
+def test_nothing_is_left_at_a_master_that_stays(
+    stack: ExitStack, tmp_path: Path, master: Master
+) -> None:
+    before = _all_names(master.uri)
+    names = rosgraph.Master("/test", master.uri).getParamNames()
+    for attempt in range(5):
+        daemon = _start(stack, tmp_path / str(attempt), with_ros(master.uri, ".*"))
+        with rtcf.Client(daemon.socket) as client:
+            for number in range(8):
+                client.load(rtcf.component("rtcf_test", "Knobs", name=f"knobs_{number}"))
+            client.start()
+        _connected(daemon)
+        # At once, as a launch that is interrupted: with half of it told or not.
+        daemon.press_ctrl_c()
+        assert _all_names(master.uri) == before, json.dumps(_all_names(master.uri))
+        assert rosgraph.Master("/test", master.uri).getParamNames() == names
