@@ -14,7 +14,6 @@ from ros_processes import Master
 from rtcf.v1 import runner_pb2
 from values import iteration
 
-LOOP = "rt_runner: loop"
 PEER = Path(__file__).with_name("introspection_peer.py")
 SERVICES = {
     "/rt_runner/activate_rt_loop",
@@ -37,6 +36,11 @@ def settings(master: Master) -> str:
 def _with_ros(master_uri: str, whitelist: str) -> str:
     """Return settings for a node whose services are where RTCF 2021 has them."""
     return with_ros(master_uri, whitelist) + "ns = '/rt_runner'\n"
+
+
+def _node(client: rtcf.Client) -> str:
+    """Return what the loop's health is reported of."""
+    return client.get_status("rt_runner").runners[0].ros.node.removeprefix("/")
 
 
 def _wait_for_services(master: Master) -> None:
@@ -153,7 +157,7 @@ def test_diagnostics_tell_the_health_of_loop_and_components(
     client.load(rtcf.component("rtcf_faults", "Throws", name="Bomb", parameters=["after:=2000"]))
     client.load(rtcf.component("rtcf_examples", "Mimo", name="Sum"))
     client.start()
-    node = client.get_status("rt_runner").runners[0].ros.node.removeprefix("/")
+    node = _node(client)
     peer = _peer(master, "diagnostics", f"{node}: loop", "2")
     statuses = [line.split("|") for line in _lines(peer)]
     # name, level, message, then key=value
@@ -178,8 +182,9 @@ def test_diagnostics_call_a_loop_that_cannot_keep_its_rate_an_error(
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=20000.0))
     client.load(rtcf.component("rtcf_faults", "Sleeps", name="slow", parameters=["after:=0"]))
     client.start()
-    statuses = [line.split("|") for line in _lines(_peer(master, "diagnostics", LOOP, "2"))]
-    loop = [each for each in statuses if each[0] == LOOP]
+    name = f"{_node(client)}: loop"
+    statuses = [line.split("|") for line in _lines(_peer(master, "diagnostics", name, "2"))]
+    loop = [each for each in statuses if each[0] == name]
     assert "Hz instead of 20000 Hz" in loop[-1][2]
 
 
@@ -187,12 +192,13 @@ def test_what_is_missing_for_real_time_is_a_warning_once(
     client: rtcf.Client, master: Master
 ) -> None:
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=10.0, lock_memory=False))
-    peer = _peer(master, "diagnostics", LOOP, "0")
+    name = f"{_node(client)}: loop"
+    peer = _peer(master, "diagnostics", name, "0")
     assert _lines(peer)  # it listens, and the loop is stopped
     client.start()
     wait_for(lambda: iteration(client) > 30, "three seconds")
-    statuses = [line.split("|") for line in _lines(_peer(master, "diagnostics", LOOP, "0"))]
-    loop = [each for each in statuses if each[0] == LOOP][-1]
+    statuses = [line.split("|") for line in _lines(_peer(master, "diagnostics", name, "0"))]
+    loop = [each for each in statuses if each[0] == name][-1]
     assert "not in real time: " in loop[2]
 
 

@@ -252,6 +252,9 @@ def test_of_a_component_that_is_loaded_a_given_value_wins_then_the_parameter_ser
         with rtcf.Client(daemon.socket) as client:
             client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0))
             wait_for(lambda: client.get_status("rt_runner").runners[0].ros.connected, "the node")
+            # What people have put there stays, of other tests too.
+            if master.parameter(_NAME) is not None:
+                master.run("rosparam", "delete", _NAME)
             if there is not None:
                 master.run("rosparam", "set", f"{_NAME}/rate", str(there))
             _load(client, *given)

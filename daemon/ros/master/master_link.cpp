@@ -194,9 +194,7 @@ bool MasterLink::chooseName(ParallelCalls& master) {
     std::vector<MasterAnswer> found = master.run(calls, kCallTimeout, Clock::now() + kCallTimeout);
     for (std::size_t i = 0; i < found.size(); ++i) {
         if (found[i].silent()) return false;
-        bool here = false;
-        // One of this machine that does not answer has died.
-        const bool taken = found[i] && (answers(found[i].text(), here) || !here);
+        const bool taken = found[i] && mayLive(found[i].text());
         if (taken && i + 1 < found.size()) continue;
         if (i != 0) {
             say_("another node named " + wanted_name_.full() +
@@ -250,8 +248,16 @@ MasterLink::Sight MasterLink::sight() {
 bool MasterLink::lives(const std::string& node) {
     std::vector<MasterAnswer> found = calls().run({{"lookupNode", texts({name().full(), node})}},
                                                   kCallTimeout, Clock::now() + kCallTimeout);
+    return found[0] && mayLive(found[0].text());
+}
+
+// One of this machine that does not answer has died, and what no URI leads to is none.
+bool MasterLink::mayLive(const std::string& node_uri) {
+    std::string host;
+    std::uint32_t port = 0;
+    if (!splitMasterUri(node_uri, host, port)) return false;
     bool here = false;
-    return found[0] && (answers(found[0].text(), here) || !here);
+    return answers(node_uri, here) || !here;
 }
 
 // @param here set if the node is on this machine

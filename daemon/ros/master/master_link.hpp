@@ -94,6 +94,7 @@ class MasterLink {
     Sight sight();
     bool takeShutdownRequest();
     bool answers(const std::string& node_uri, bool& here);
+    bool mayLive(const std::string& node_uri);
     void obeyShutdownRequest(const Sight& sight);
     bool nameIsTaken(const Sight& sight);
     std::string whyOff() const;

@@ -1,38 +1,39 @@
 #!/usr/bin/python3
-"""A ROS master to which the way is long: stands before a real one, and takes its time for a call.
+"""A ROS master to which the way is long: relays to a real one, and takes its time for a word.
 
 slow_master.py PORT REAL_PORT MILLISECONDS   the test ends it
 """
 
-import http.client
+import asyncio
 import sys
-import time
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 _PORT, _REAL_PORT, _MILLISECONDS = (int(word) for word in sys.argv[1:])
 
 
-class Way(BaseHTTPRequestHandler):
-    """Hands over what it is asked, later."""
-
-    protocol_version = "HTTP/1.1"
-
-    def do_POST(self) -> None:  # noqa: N802: the base class's name
-        """Answer one call."""
-        body = self.rfile.read(int(self.headers["Content-Length"]))
-        time.sleep(_MILLISECONDS / 1000)
-        real = http.client.HTTPConnection("127.0.0.1", _REAL_PORT)
-        real.request("POST", "/", body, {"Content-Type": "text/xml"})
-        answer = real.getresponse().read()
-        real.close()
-        self.send_response(200)
-        self.send_header("Content-Type", "text/xml")
-        self.send_header("Content-Length", str(len(answer)))
-        self.end_headers()
-        self.wfile.write(answer)
-
-    def log_message(self, *arguments: object) -> None:
-        """Say nothing."""
+async def _carry(
+    reader: asyncio.StreamReader, writer: asyncio.StreamWriter, delay_s: float
+) -> None:
+    while data := await reader.read(65536):
+        await asyncio.sleep(delay_s)
+        writer.write(data)
+    writer.close()
 
 
-ThreadingHTTPServer(("127.0.0.1", _PORT), Way).serve_forever()
+async def _relay(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    try:
+        answers, calls = await asyncio.open_connection("127.0.0.1", _REAL_PORT)
+        await asyncio.gather(
+            _carry(reader, calls, _MILLISECONDS / 1000), _carry(answers, writer, 0.0)
+        )
+    except OSError:  # one of both has gone, or is not there yet
+        pass
+    finally:
+        writer.close()
+
+
+async def _serve() -> None:
+    server = await asyncio.start_server(_relay, "127.0.0.1", _PORT)
+    await server.serve_forever()
+
+
+asyncio.run(_serve())
