@@ -1,23 +1,64 @@
-"""README's tour, run word for word."""
+"""What README's tour and the examples of manual pages tell a reader to type, word for word."""
 
-import re
-import shlex
+import subprocess
 from pathlib import Path
 
-from daemon_process import Daemon
+import pages
+import rtcf
+from daemon_process import BUILD_TREE, Daemon, clean_environment
+from rtcf.v1 import runner_pb2
+from values import state
 
-README = Path(__file__).parents[2] / "README.md"
+
+def type_in(daemon: Daemon, lines: list[list[str]]) -> None:
+    """Type commands of rtcfctl; each succeeds."""
+    for words in lines:
+        done = daemon.ctl(*words[1:])
+        assert done.returncode == 0, (words, done.stderr)
 
 
 def test_the_tour_goes_as_it_is_told(daemon: Daemon) -> None:
-    tour = README.read_text().partition("## A tour\n")[2].partition("\n## ")[0]
-    blocks = re.findall(r"^```sh\n(.*?)^```", tour, re.MULTILINE | re.DOTALL)
-    lines = [line for line in "".join(blocks).splitlines() if line.startswith("rtcfctl ")]
+    lines = pages.tour()
     assert len(lines) > 10
-    for line in lines:
-        done = daemon.ctl(*shlex.split(line)[1:])
-        assert done.returncode == 0, (line, done.stderr)
+    type_in(daemon, lines)
     saved = Path("/tmp/tour.yaml")
     assert "on_boot: start" in saved.read_text()
     saved.unlink()
     assert daemon.ctl("stop").returncode == 0
+
+
+def test_the_example_of_rtcfctl_runs(daemon: Daemon, client: rtcf.Client) -> None:
+    type_in(daemon, pages.commands("rtcfctl.1"))
+    assert client.get_order() == ["/H1", "/F1"]
+    assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
+
+
+def test_the_graph_of_the_example_is_applied(daemon: Daemon, client: rtcf.Client) -> None:
+    file = daemon.folder / "graph.yaml"
+    file.write_text(pages.example("rtcf-graph.5"))
+    type_in(daemon, [["rtcfctl", "apply", str(file)]])
+    assert client.get_order() == ["/A", "/B"]
+    assert state(client).settings.frequency_hz == 2000
+
+
+def test_the_settings_of_the_example_are_valid(tmp_path: Path) -> None:
+    file = tmp_path / "rtcfd.toml"
+    file.write_text(pages.example("rtcfd.toml.5"))
+    done = subprocess.run(
+        [BUILD_TREE / "bin" / "rtcfd", "--check-config", "--config", file,
+         "--graphs-dir", tmp_path],
+        env=clean_environment(), capture_output=True, text=True,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (0, "settings and graphs are valid\n"), done.stderr
+
+
+def test_the_program_of_the_example_runs(daemon: Daemon, client: rtcf.Client) -> None:
+    done = subprocess.run(
+        ["/usr/bin/python3", "-c", pages.example("rtcf-protocol.7")],
+        env=daemon.environment() | {"PYTHONPATH": str(BUILD_TREE / "python")},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    float(done.stdout)
+    assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING

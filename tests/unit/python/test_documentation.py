@@ -5,20 +5,13 @@ import shlex
 from pathlib import Path
 
 import pytest
+from pages import TREE, shell_lines
 from rtcfctl.main import parser
 
-TREE = Path(__file__).parents[3]
 PAGES = [TREE / "README.md", *sorted((TREE / "docs").glob("*.md"))]
 NAMES = [page.name for page in PAGES]
 CONTROL = (TREE / "debian" / "control").read_text()
 OURS = set(re.findall(r"^Package: (\S+)", CONTROL, re.MULTILINE))
-
-
-def shell_lines(page: Path) -> list[str]:
-    """Return the commands in a page's shell blocks, comments and continuations resolved."""
-    blocks = re.findall(r"^```sh\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
-    lines = "".join(blocks).replace("\\\n", " ").splitlines()
-    return [line for line in lines if line.strip() and not line.startswith("#")]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=NAMES)
@@ -48,7 +41,7 @@ def test_manual_pages_name_files_of_the_documentation_as_they_are_installed() ->
 
 @pytest.mark.parametrize("page", PAGES, ids=NAMES)
 def test_commands_in_pages_are_commands_of_rtcfctl(page: Path) -> None:
-    for line in shell_lines(page):
+    for line in shell_lines(page.read_text()):
         words = shlex.split(line, comments=True)
         if words[:1] == ["sudo"]:
             words = words[1:]
@@ -65,7 +58,7 @@ def test_commands_in_pages_are_commands_of_rtcfctl(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=NAMES)
 def test_our_packages_in_pages_exist(page: Path) -> None:
-    for line in shell_lines(page):
+    for line in shell_lines(page.read_text()):
         if " apt install " not in line:
             continue
         for word in re.findall(r"(?:build/deb/)?((?:lib|ros-|python3-)?rtcf[a-z-]*)", line):
