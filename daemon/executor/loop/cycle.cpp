@@ -112,7 +112,7 @@ template <bool Plain>
                 if (!Plain && !due(*next)) continue;
                 notes.enterComponent(next->slot);
                 next->component->update();
-                if (!Plain) commit(*next->component, *next->figures);
+                if (!Plain) commit(*next->component, *next->figures, OnBadOutput::End);
                 const std::int64_t after = readCycleCounter();
                 const std::int64_t duration = after - before;
                 before = after;
@@ -153,10 +153,12 @@ bool Cycle::due(const Step& step) const noexcept RTCF_NONBLOCKING {
 }
 
 // Lets readers see what a component has written to outputs that are kept from them until then.
-void Cycle::commit(Component& component, ComponentFigures& figures) noexcept RTCF_NONBLOCKING {
+void Cycle::commit(Component& component, ComponentFigures& figures, OnBadOutput may) noexcept
+    RTCF_NONBLOCKING {
     for (OutputBase* output : component.stagedOutputs()) {
         if (output->commit()) continue;
-        if (output->nonFinitePolicy() == OnNonFinite::Stop && !last_ && !faulted()) {
+        if (output->nonFinitePolicy() == OnNonFinite::Stop && may == OnBadOutput::End &&
+            !faulted()) {
             endLoop(LoopFault::Kind::NotFinite, &component, output->name().c_str());
             continue;
         }
@@ -178,7 +180,7 @@ bool Cycle::threw(const Step& step, const char* text) noexcept {
     step.figures->faults.taken_out.note(clock_.iteration, text);
     step.figures->faults.count.add(1);
     figures_.faults.add(1);
-    makeSafe(*step.component, *step.figures);
+    makeSafe(*step.component, *step.figures, OnBadOutput::End);
     return true;
 }
 
@@ -193,18 +195,17 @@ void Cycle::endLoop(LoopFault::Kind kind, const Component* component, const char
     std::strncpy(fault_.text.data(), text, fault_.text.size() - 1);
 }
 
-void Cycle::makeSafe(Component& component, ComponentFigures& figures) noexcept {
+void Cycle::makeSafe(Component& component, ComponentFigures& figures, OnBadOutput may) noexcept {
     {
         const HookNote note(notes_, component, Hook::Safe);
         component.safe();
     }
-    commit(component, figures);
+    commit(component, figures, may);
 }
 
 // In schedule order, so that a driver's safe() reads what the controller's has written.
 void Cycle::makeSafe(std::int64_t time_ns) noexcept {
     if (!active_) return;
-    last_ = true;
     clock_.time_ns = time_ns;
     clock_.stamp_ns = time_ns + stamp_offset_ns_.load(std::memory_order_relaxed);
     notes_.setIteration(clock_.iteration);
@@ -213,10 +214,9 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
     for (const Step& step : schedule_->steps) {
         // What was taken out has made safe then.
         if (step.optional && step.context->disabled) continue;
-        makeSafe(*step.component, *step.figures);
+        makeSafe(*step.component, *step.figures, OnBadOutput::GoOn);
     }
     for (Tap* tap : schedule_->taps) tap->push();
-    last_ = false;
     active_ = false;
 }
 
@@ -237,9 +237,9 @@ void Cycle::apply(Adoption& adoption) noexcept {
     }
     if (active_) {
         for (const Leaving& leaving : adoption.leaving) {
-            // What threw has made safe then.
+            // What threw has made safe then. The loop belongs to those that stay.
             if (!leaving.component->context().disabled)
-                makeSafe(*leaving.component, *leaving.figures);
+                makeSafe(*leaving.component, *leaving.figures, OnBadOutput::GoOn);
             for (const Latch& latch : leaving.latches) latch.copy();
             for (Tap* tap : leaving.taps) tap->push();
         }

@@ -108,9 +108,12 @@ class Cycle {
     std::int64_t update(const Step* next, const Step* end, std::int64_t before) noexcept;
     std::int64_t updateSelected(const Step* next, const Step* end, std::int64_t before) noexcept;
     bool due(const Step& step) const noexcept RTCF_NONBLOCKING;
-    void commit(Component& component, ComponentFigures& figures) noexcept RTCF_NONBLOCKING;
+    /// What an output that is declared Finite(OnNonFinite::Stop) may do if it is not.
+    enum class OnBadOutput { End, GoOn };
+    void commit(Component& component, ComponentFigures& figures, OnBadOutput may) noexcept
+        RTCF_NONBLOCKING;
     bool threw(const Step& step, const char* text) noexcept;
-    void makeSafe(Component& component, ComponentFigures& figures) noexcept;
+    void makeSafe(Component& component, ComponentFigures& figures, OnBadOutput may) noexcept;
     void noteSchedule() noexcept RTCF_NONBLOCKING;
 
     // What every cycle touches, in two cache lines: after a sleep, memory costs more than work.
@@ -121,7 +124,6 @@ class Cycle {
     std::uint64_t warmup_cycles_ = 0;
     bool exchanges_ = false;  // the schedule has feeds, latches or taps
     bool active_ = false;     // between begin() and the last cycle
-    bool last_ = false;       // in the last cycle
     // Shared.
     std::atomic<std::int64_t> stamp_offset_ns_{0};  // CLOCK_REALTIME minus CLOCK_MONOTONIC
     Boundary boundary_;

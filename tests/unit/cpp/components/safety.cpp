@@ -20,6 +20,7 @@ class Controller final : public rtcf::Component {
     rtcf::Output<double> effort{this, "effort"};
     rtcf::Output<double> other{this, "other"};
     rtcf::Output<double> checked{this, "checked", "", rtcf::Finite()};
+    rtcf::Output<double> vital{this, "vital", "", rtcf::Finite(rtcf::OnNonFinite::Stop)};
     rtcf::Parameter<bool> silent{this, "silent", false, rtcf::Doc("writes nothing in update()")};
     rtcf::Parameter<bool> wild{this, "wild", false, rtcf::Doc("makes safe by NaN")};
     rtcf::Parameter<std::int64_t> nan_from{this, "nan_from", -1, rtcf::Doc("update that begins")};
@@ -37,6 +38,7 @@ class Controller final : public rtcf::Component {
         }
         effort.write(5.0);
         other.write(5.0);
+        vital.write(5.0);
         const bool nan = nan_from >= 0 && count >= nan_from;
         checked.write(nan ? std::numeric_limits<double>::quiet_NaN() : 5.0);
     }
@@ -44,7 +46,9 @@ class Controller final : public rtcf::Component {
         note(*this, "safe");
         effort.write(0.0);
         other.write(0.0);
-        checked.write(wild ? std::numeric_limits<double>::quiet_NaN() : 0.0);
+        const double zero = wild ? std::numeric_limits<double>::quiet_NaN() : 0.0;
+        checked.write(zero);
+        vital.write(zero);
     }
     void takeOver(const rtcf::Predecessor& /*previous*/) noexcept override {
         note(*this, "takeOver");

@@ -17,7 +17,7 @@ class Safe : public RunnerFixture {
     static ComponentDefinition controller(const std::string& name,
                                           const std::string& wired = "effort") {
         ComponentDefinition result = definition("Controller", name);
-        for (const std::string port : {"effort", "other", "checked"})
+        for (const std::string port : {"effort", "other", "checked", "vital"})
             result.remaps.emplace_back(port, port == wired ? "command" : name + "_" + port);
         return result;
     }
@@ -44,6 +44,15 @@ class Safe : public RunnerFixture {
         })) {
         }
         return last;
+    }
+
+    bool toldNotFinite(const std::string& port) {
+        return eventually([&] {
+            const auto all = events();
+            return std::any_of(all.begin(), all.end(), [&](const RunnerEvent& event) {
+                return event.message.find("output " + port + " is not finite") != std::string::npos;
+            });
+        });
     }
 
     double applied(const std::string& name = "/D") { return value(name, "applied"); }
@@ -87,12 +96,26 @@ TEST_F(Safe, WhatIsNotFiniteIsHeldBackAndTold) {
     stop();
     EXPECT_EQ(applied(), 5.0);
     EXPECT_EQ(state(), RunnerState::Stopped);
-    EXPECT_TRUE(eventually([this] {
-        const auto all = events();
-        return std::any_of(all.begin(), all.end(), [](const RunnerEvent& event) {
-            return event.message.find("output checked is not finite") != std::string::npos;
-        });
-    }));
+    EXPECT_TRUE(toldNotFinite("checked"));
+}
+
+// Its outputs may end the loop that it is part of, not the one that it leaves.
+TEST_F(Safe, WhatALeavingComponentGetsWrongDoesNotEndTheLoop) {
+    ComponentDefinition wild = controller("C", "vital");
+    wild.parameters = {{"wild", true}};
+    load(wild);
+    load(driver());
+    start();
+    ASSERT_TRUE(runs());
+    replace("/C", wild);
+    ASSERT_TRUE(runs());
+    EXPECT_EQ(applied(), 5.0);
+    unload("/C");
+    ASSERT_TRUE(runs());
+    EXPECT_EQ(journal().count("/C safe"), 2U);
+    EXPECT_EQ(applied(), 5.0) << "the last finite one";
+    EXPECT_EQ(state(), RunnerState::Running);
+    EXPECT_TRUE(toldNotFinite("checked")) << "the first of its outputs that is not";
 }
 
 TEST_F(Safe, IsCalledOnTheCulpritToo) {
