@@ -27,17 +27,16 @@ Pair readBoth() {
 
 }  // namespace
 
-std::int64_t realtimeOffset() noexcept {
+std::int64_t realtimeOffset(ClockReading monotonic, ClockReading realtime) noexcept {
     std::int64_t best = 0;
     std::int64_t best_gap = INT64_MAX;
     for (int i = 0; i < 8; ++i) {
-        const std::int64_t before = monotonicNow();
-        timespec now{};
-        clock_gettime(CLOCK_REALTIME, &now);
-        const std::int64_t gap = monotonicNow() - before;
+        const std::int64_t before = monotonic();
+        const std::int64_t now = realtime();
+        const std::int64_t gap = monotonic() - before;
         if (gap >= best_gap) continue;
         best_gap = gap;
-        best = std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec - (before + gap / 2);
+        best = now - (before + gap / 2);
     }
     return best;
 }

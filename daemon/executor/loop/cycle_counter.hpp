@@ -21,9 +21,19 @@ inline std::int64_t monotonicNow() noexcept RTCF_NONBLOCKING {
     return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
 }
 
+/// CLOCK_REALTIME in ns; read in user space (vdso). Real-time safe.
+inline std::int64_t realtimeNow() noexcept RTCF_NONBLOCKING {
+    timespec now{};
+    clock_gettime(CLOCK_REALTIME, &now);
+    return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
+
+using ClockReading = std::int64_t (*)();
+
 /// CLOCK_REALTIME minus CLOCK_MONOTONIC, ns: of several readings the one that took least, as the
 /// reader may be preempted between the two clocks.
-std::int64_t realtimeOffset() noexcept;
+std::int64_t realtimeOffset(ClockReading monotonic = monotonicNow,
+                            ClockReading realtime = realtimeNow) noexcept;
 
 /// Ticks of the time stamp counter, or of the generic timer on arm64. Real-time safe.
 inline std::int64_t readCycleCounter() noexcept RTCF_NONBLOCKING {
