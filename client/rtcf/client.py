@@ -301,6 +301,29 @@ class Client:
         request = control_pb2.ResetStateRequest(runner=runner, component=component)
         return self._change(self._stub.ResetState, request, on_progress)
 
+    def set_state(
+        self,
+        component: str,
+        states: Iterable[graph_pb2.ParameterSetting],
+        runner: str = "",
+        on_progress: OnProgress | None = None,
+    ) -> control_pb2.ChangeResult:
+        """Set values of a component's declared state, of a loop that does not run."""
+        request = control_pb2.SetStateRequest(runner=runner, component=component, states=states)
+        return self._change(self._stub.SetState, request, on_progress)
+
+    def take_snapshot(self, runner: str = "") -> control_pb2.TakeSnapshotResponse:
+        """Copy all that a runner's next cycle depends on, of one cycle boundary."""
+        request = control_pb2.TakeSnapshotRequest(runner=runner)
+        return self._ask(self._stub.TakeSnapshot, request, CHANGE_TIMEOUT_S)  # type: ignore[no-any-return]
+
+    def restore_snapshot(
+        self, snapshot: bytes, runner: str = "", on_progress: OnProgress | None = None
+    ) -> control_pb2.ChangeResult:
+        """Go on from a snapshot, at one cycle boundary; a loop that does not run is paused."""
+        request = control_pb2.RestoreSnapshotRequest(runner=runner, snapshot=snapshot)
+        return self._change(self._stub.RestoreSnapshot, request, on_progress)
+
     def hold_runner(self, opening: control_pb2.OpenHold) -> Tenancy:
         """Take a runner for as long as the tenancy lasts; its messages are HoldRunnerResponse."""
         return Tenancy(self._stub.HoldRunner, control_pb2.HoldRunnerRequest, opening, self.socket)

@@ -24,6 +24,8 @@ _MODULES = {
     "replace": "component",
     "release": "component",
     "reset": "parameter",
+    "snapshot": "snapshot",
+    "restore": "snapshot",
     "list": "component",
     "info": "component",
     "order": "graph",

@@ -17,7 +17,9 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     setting = verbs.add_parser(
         "set", parents=[common], help="change parameters of a component, all at one cycle"
     )
-    setting.add_argument("component", metavar="NAME")
+    setting.add_argument(
+        "component", metavar="NAME", help="NAME.state: its state, of a loop that does not run"
+    )
     setting.add_argument("parameters", metavar="PARAMETER:=VALUE", nargs="+")
     setting.set_defaults(run=set_parameters)
 
@@ -45,7 +47,12 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 def set_parameters(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Change parameters."""
     parameters = [rtcf.parse_parameter(text) for text in args.parameters]
-    result = client.set_parameters(args.component, parameters, args.runner, output.progress)
+    # No name of a component has a dot in it.
+    component, dot, what = args.component.partition(".")
+    if dot and what != "state":
+        raise ValueError(f"{args.component}: a component's name, or {component}.state")
+    change = client.set_state if dot else client.set_parameters
+    result = change(component, parameters, args.runner, output.progress)
     output.changed(f"set {', '.join(args.parameters)} of {args.component}", result)
 
 

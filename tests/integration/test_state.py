@@ -48,3 +48,26 @@ def test_what_declares_no_state_cannot_be_reset(daemon: Daemon, client: rtcf.Cli
     assert done.returncode != 0
     assert "/plain declares no state" in done.stderr
     assert daemon.ctl("reset", "nobody").returncode != 0
+
+
+def test_state_is_set_while_the_loop_does_not_run(daemon: Daemon, client: rtcf.Client) -> None:
+    client.load(_wave())
+    client.step(10)
+    done = daemon.ctl("set", "wave.state", "phase:=0.75")
+    assert done.returncode == 0, done.stderr
+    assert _phase(daemon) == 0.75
+    client.step(1)
+    assert abs(_phase(daemon) - 0.751) < 1e-6
+    for words, why in (
+        (("wave.state", "phase:=much"), "state phase of /wave takes values of type double"),
+        (("wave.state", "fase:=1.0"), "/wave declares no state fase"),
+        (("wave.parameter", "rate:=1.0"), "wave.state"),
+        (("nobody.state", "phase:=1.0"), "nobody"),
+    ):
+        done = daemon.ctl("set", *words)
+        assert done.returncode != 0
+        assert why in done.stderr
+    client.start()
+    done = daemon.ctl("set", "wave.state", "phase:=0.5")
+    assert done.returncode == 1
+    assert "state is set while it does not" in done.stderr

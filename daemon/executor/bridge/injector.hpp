@@ -69,6 +69,16 @@ class Injector {
     /// The slot that inputs read. Loop side only.
     const SlotHeader* front() const noexcept { return slots_[front_].get(); }
 
+    /// Values adopted so far. Loop side only.
+    std::uint64_t sequence() const noexcept RTCF_NONBLOCKING { return sequence_; }
+    /// Makes an earlier value the front one, as the one of that number; `slot` gets the one before.
+    /// Loop side only; real-time safe. The inputs are then to be told as after adopt().
+    void restore(std::shared_ptr<SlotHeader>& slot, std::uint64_t sequence) noexcept
+        RTCF_NONBLOCKING {
+        slots_[front_].swap(slot);
+        sequence_ = sequence;
+    }
+
     /// Makes the newest delivered value the front, stamped with `clock`. Loop side only; real-time
     /// safe.
     /// @return true if there was a new one; the inputs are then to be told by InputBase::inject()

@@ -222,6 +222,7 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
 
 void Cycle::apply(Adoption& adoption) noexcept {
     const std::int64_t begin = readCycleCounter();
+    if (adoption.restoration != nullptr && !restore(*adoption.restoration)) return;
     for (const StateCopy& state : adoption.copies) state.copy();
     for (const Latch& latch : adoption.new_latches) latch.copy();
     const auto new_inputs =
@@ -259,6 +260,71 @@ void Cycle::apply(Adoption& adoption) noexcept {
             step.context->period_ns = adoption.period_ns * step.every;
     }
     figures_.adoption.add(readCycleCounter() - begin);
+}
+
+void Cycle::capture(Capture& capture) noexcept {
+    for (const StateCopy& state : capture.states) state.copy();
+    bool room = true;
+    for (Capture::Value& value : capture.values) room = value.take() && room;
+    for (Capture::Topic& topic : capture.topics) {
+        topic.value.from = topic.injector->front();
+        topic.sequence = topic.injector->sequence();
+        room = topic.value.take() && room;
+    }
+    for (Capture::Input& input : capture.inputs) input.reading = input.input->reading();
+    for (Capture::Turn& turn : capture.turns) {
+        turn.updated_ns = turn.context->updated_ns;
+        turn.elapsed_ns = turn.context->elapsed_ns;
+        turn.disabled = turn.context->disabled;
+    }
+    capture.clock = {clock_.iteration, clock_.time_ns, clock_.stamp_ns, clock_.elapsed_ns,
+                     total_elapsed_ns_};
+    capture.lacks_room = !room;
+}
+
+bool Cycle::restore(Restoration& restoration) noexcept {
+    for (const Restoration::Turn& turn : restoration.turns) {
+        if (!turn.context->disabled) continue;
+        restoration.taken_out = turn.context;
+        return false;
+    }
+    for (const StateCopy& state : restoration.states) state.copy();
+    for (const Restoration::Value& value : restoration.values)
+        value.type->copy(*value.to, *value.from);
+    const ClockImage& image = restoration.clock;
+    const std::int64_t later = restoration.sets_time ? 0 : clock_.time_ns - image.time_ns;
+    for (SlotHeader* header : restoration.headers) header->time_ns += later;
+    for (OutputBase* output : restoration.staged) output->discard();
+    for (Restoration::Topic& topic : restoration.topics) {
+        topic.slot->time_ns += later;
+        topic.injector->restore(topic.slot, topic.sequence);
+        for (Restoration::Input& reader : topic.readers) {
+            reader.reading.source = topic.injector->front();
+            if (reader.reading.current == nullptr) reader.reading.current = reader.reading.source;
+            reader.input->setReading(reader.reading);
+        }
+    }
+    for (Restoration::Input& input : restoration.inputs) {
+        InputBase::Reading& reading = input.reading;
+        if (reading.source == nullptr) reading.source = input.input->reading().source;
+        if (reading.current == nullptr) reading.current = reading.source;
+        input.input->setReading(reading);
+    }
+    for (const Restoration::Turn& turn : restoration.turns) {
+        turn.context->updated_ns = turn.updated_ns;
+        turn.context->elapsed_ns = turn.elapsed_ns;
+    }
+    clock_.iteration = image.iteration;
+    figures_.iteration.store(image.iteration, std::memory_order_relaxed);
+    total_elapsed_ns_ = image.total_elapsed_ns;
+    exchanged_at_ = UINT64_MAX;
+    if (restoration.sets_time) {
+        clock_.time_ns = image.time_ns;
+        clock_.stamp_ns = image.stamp_ns;
+        clock_.elapsed_ns = image.elapsed_ns;
+        setStampOffset(image.stamp_ns - image.time_ns);
+    }
+    return true;
 }
 
 void Cycle::noteSchedule() noexcept RTCF_NONBLOCKING {

@@ -74,6 +74,8 @@ class Cycle {
     }
     /// Makes a change.
     void apply(Adoption& adoption) noexcept;
+    /// Copies what the next cycle depends on.
+    void capture(Capture& capture) noexcept;
     /// One cycle. @param time_ns of the loop @param latency_ns of its wake-up
     void run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NONBLOCKING;
     /// The last cycle: safe() in place of update(). Once until the next begin().
@@ -115,6 +117,7 @@ class Cycle {
     bool threw(const Step& step, const char* text) noexcept;
     void makeSafe(Component& component, ComponentFigures& figures, OnBadOutput may) noexcept;
     void noteSchedule() noexcept RTCF_NONBLOCKING;
+    bool restore(Restoration& restoration) noexcept;
 
     // What every cycle touches, in two cache lines: after a sleep, memory costs more than work.
     // Owned by whoever runs cycles.

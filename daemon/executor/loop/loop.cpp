@@ -28,6 +28,18 @@ class AdoptionWork final : public BoundaryWork {
     Adoption& adoption_;
 };
 
+class CaptureWork final : public BoundaryWork {
+   public:
+    explicit CaptureWork(Capture& capture) : capture_(capture) {}
+    bool perform(Cycle& cycle) noexcept override {
+        cycle.capture(capture_);
+        return true;
+    }
+
+   private:
+    Capture& capture_;
+};
+
 // A bit at each boundary, so that no cycle pays for a large value and another.
 class ProbeWork final : public BoundaryWork {
    public:
@@ -131,6 +143,11 @@ bool Loop::perform(BoundaryWork& work, std::int64_t timeout_ns) {
 
 bool Loop::adopt(Adoption& adoption, std::int64_t timeout_ns) {
     AdoptionWork work(adoption);
+    return perform(work, timeout_ns);
+}
+
+bool Loop::capture(Capture& capture, std::int64_t timeout_ns) {
+    CaptureWork work(capture);
     return perform(work, timeout_ns);
 }
 

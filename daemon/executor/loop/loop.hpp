@@ -71,6 +71,9 @@ class Loop {
     /// Makes a change at the next boundary, or at once if the loop does not run.
     /// @return false if the loop reaches no boundary within `timeout_ns`; nothing has changed then
     bool adopt(Adoption& adoption, std::int64_t timeout_ns);
+    /// Copies what the next cycle depends on, at the next boundary, or at once if the loop does not
+    /// run. @return false if the loop reaches none within `timeout_ns`
+    bool capture(Capture& capture, std::int64_t timeout_ns);
     /// Takes over values from outside while the loop does not run.
     void adoptInjections();
     /// Copies port values at the next boundaries, see Probe. @return false if the loop reaches none
@@ -102,6 +105,8 @@ class Loop {
     bool stopRequested() const noexcept {
         return stops_.load(std::memory_order_acquire) != stops_known_;
     }
+    /// By real time or a device; not by a simulated clock. Graph thread.
+    bool inRealTime() const noexcept { return joinable() && simulation_ == nullptr; }
     /// A thread executes cycles.
     bool running() const noexcept { return running_.load(std::memory_order_acquire); }
     /// The thread has been started and not been joined yet.

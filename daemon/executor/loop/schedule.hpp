@@ -12,6 +12,7 @@
 #include "bridge/tap.hpp"
 #include "graph/state_copy.hpp"
 #include "loop/faults.hpp"
+#include "loop/image_work.hpp"
 #include "rtcf/component.hpp"
 #include "statistics/histogram.hpp"
 
@@ -146,6 +147,8 @@ struct Adoption {
     std::vector<Leaving> leaving;
     std::vector<StagedValue*> values;  ///< parameters, and what derives from them
     std::int64_t period_ns = 0;        ///< the loop's new period; 0 = stays
+    /// Of an earlier state, before anything else; if that refuses, nothing else is done either.
+    Restoration* restoration = nullptr;
 };
 
 }  // namespace rtcf::executor

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "graph/state_value.hpp"
 #include "refusal.hpp"
 #include "runner/runner.hpp"
 
@@ -77,6 +78,7 @@ std::vector<std::string> Runner::adopt(Change change, const Progress& progress) 
     adoption.hand_overs = change.hand_overs;
     adoption.copies = change.copies;
     adoption.period_ns = change.period_ns;
+    adoption.restoration = change.restoration;
     if (loop_.running() || state_ == RunnerState::Stepping) {
         for (const auto& instance : change.arriving) {
             progress("starting " + instance->fullName());
@@ -86,6 +88,11 @@ std::vector<std::string> Runner::adopt(Change change, const Progress& progress) 
     }
     progress("adopting the change");
     adoptAtBoundary(adoption);
+    if (change.restoration != nullptr && change.restoration->taken_out != nullptr) {
+        throw Refusal(RefusalKind::FailedPrecondition,
+                      fmt::format("{} was taken out after a fault: replace it first",
+                                  change.restoration->taken_out->full_name));
+    }
     plan->noteKept(adoption, *plan_);
     std::swap(plan_, plan);
     // It stands, whatever goes wrong from here on.
@@ -315,6 +322,38 @@ ChangeOutcome Runner::reset(const std::string& name) {
     Change change;
     change.graph = plan_->graph;
     change.copies = planReset(component);
+    adopt(std::move(change), [](const std::string&) {});
+    return outcome(name);
+}
+
+// A running loop is not disturbed from outside: what it remembers is its own.
+ChangeOutcome Runner::setStates(const std::string& name,
+                                const std::vector<std::pair<std::string, ParameterValue>>& batch) {
+    noticeEnd();
+    const auto& states = plan_->graph.get(name).instance->component().states();
+    if (loop_.joinable()) {
+        throw Refusal(
+            RefusalKind::FailedPrecondition,
+            fmt::format("the loop of {0} runs: state is set while it does not: rtcfctl -r "
+                        "{0} stop",
+                        name_));
+    }
+    std::vector<std::vector<std::byte>> values;
+    Change change;
+    for (const auto& [state_name, value] : batch) {
+        const auto found =
+            std::find_if(states.begin(), states.end(),
+                         [&](const StateDeclaration& state) { return state.name == state_name; });
+        if (found == states.end()) {
+            throw Refusal(
+                RefusalKind::NotFound,
+                fmt::format("{} declares no state {}: rtcfctl info {} lists what there is", name,
+                            state_name, name));
+        }
+        values.push_back(stateValue(name, *found, value));
+        change.copies.push_back({found->value, values.back().data(), found->size});
+    }
+    change.graph = plan_->graph;
     adopt(std::move(change), [](const std::string&) {});
     return outcome(name);
 }

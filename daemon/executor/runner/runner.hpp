@@ -24,6 +24,7 @@
 #include "graph/definition.hpp"
 #include "graph/difference.hpp"
 #include "graph/plan.hpp"
+#include "image/image.hpp"
 #include "logging/log.hpp"
 #include "loop/loop.hpp"
 #include "loop/simulated_clock.hpp"
@@ -54,6 +55,12 @@ struct ChangeOutcome {
     std::uint64_t cycles = 0;             ///< of step(): how many were run
     /// Of replace(): what the new component has of the old one's values.
     std::vector<std::pair<std::string, ParameterValue>> kept;
+};
+
+/// An image, and what it leaves out: one line each.
+struct ImageOutcome {
+    RunnerImage image;
+    std::vector<std::string> notes;
 };
 
 /// Something that happened without a request.
@@ -141,6 +148,19 @@ class Runner final : private RunnerView {
                                 const std::vector<std::pair<std::string, ParameterValue>>& batch);
     /// Takes a component's declared state back to its initial values, at one boundary.
     ChangeOutcome reset(const std::string& name);
+    /// The object itself; it is not to be touched while the loop runs.
+    const Component& component(const std::string& name) const {
+        return plan_->graph.get(name).instance->component();
+    }
+    /// Changes values of a component's declared state, numbers and bools, of a loop that does not
+    /// run.
+    ChangeOutcome setStates(const std::string& name,
+                            const std::vector<std::pair<std::string, ParameterValue>>& batch);
+    /// All that the next cycle depends on, of one boundary.
+    ImageOutcome takeImage();
+    /// Makes all of it what an image says, at one boundary: parameters, declared state, the values
+    /// of connections. A loop that does not run is paused, as after step().
+    ChangeOutcome restore(const RunnerImage& image, const Progress& progress);
     /// Values of a component's declared state, as text. Empty if the loop reaches no boundary in
     /// time.
     std::vector<std::string> states(const std::string& name);
@@ -172,6 +192,7 @@ class Runner final : private RunnerView {
         std::vector<StagedValue*> values;
         std::vector<HandOver> hand_overs;
         std::vector<StateCopy> copies;
+        Restoration* restoration = nullptr;
         std::vector<std::string> notes;  // of what is handed over
         std::int64_t period_ns = 0;
     };
@@ -209,6 +230,8 @@ class Runner final : private RunnerView {
     void tuneSpin();
     const GraphNode* nodeOf(const Component* component) const noexcept;
     void beginStepping(std::int64_t stamp_ns = 0);
+    void pause(const Progress& progress);
+    void requireSmall(std::size_t bytes, const char* what) const;
     void endStepping();
     ReplayOutcome beginReplay(const ReplayChunk& chunk, const Progress& progress);
     void renewComponents(const Progress& progress);

@@ -28,16 +28,19 @@ void Runner::beginStepping(std::int64_t stamp_ns) {
     }
 }
 
+// Has all that a step begins with.
+void Runner::pause(const Progress& progress) {
+    startAll(progress);
+    beginStepping();
+    setState(RunnerState::Stepping);
+    status_.clear();
+    publish();
+}
+
 ChangeOutcome Runner::step(std::uint64_t cycles, const Progress& progress) {
     constexpr std::uint64_t kChunk = 10000;  // cycles between reports
     requireNoLoop();
-    if (state_ != RunnerState::Stepping) {
-        startAll(progress);
-        beginStepping();
-        setState(RunnerState::Stepping);
-        status_.clear();
-        publish();
-    }
+    if (state_ != RunnerState::Stepping) pause(progress);
     std::uint64_t left = cycles;
     while (left > 0) {
         const std::uint64_t wanted = std::min(left, kChunk);

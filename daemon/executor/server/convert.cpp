@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include "server/image_file.hpp"
+#include "server/parameter_value.hpp"
+
 namespace rtcf::executor {
 
 namespace pb = ::rtcf::v1;
@@ -10,47 +13,12 @@ namespace {
 
 constexpr std::uint32_t kKilo = 1024;
 
-ParameterValue valueFrom(const pb::ParameterValue& value, const std::string& name) {
-    switch (value.kind_case()) {
-        case pb::ParameterValue::kBoolValue:
-            return value.bool_value();
-        case pb::ParameterValue::kIntValue:
-            return static_cast<std::int64_t>(value.int_value());
-        case pb::ParameterValue::kDoubleValue:
-            return value.double_value();
-        case pb::ParameterValue::kStringValue:
-            return value.string_value();
-        case pb::ParameterValue::KIND_NOT_SET:
-            break;
-    }
-    throw Refusal(RefusalKind::InvalidArgument, fmt::format("parameter {} has no value", name));
-}
-
-pb::ParameterValue valueTo(const ParameterValue& value) {
-    pb::ParameterValue message;
-    std::visit(
-        [&](const auto& held) {
-            using T = std::decay_t<decltype(held)>;
-            if constexpr (std::is_same_v<T, bool>) {
-                message.set_bool_value(held);
-            } else if constexpr (std::is_same_v<T, std::int64_t>) {
-                message.set_int_value(held);
-            } else if constexpr (std::is_same_v<T, double>) {
-                message.set_double_value(held);
-            } else {
-                message.set_string_value(held);
-            }
-        },
-        value);
-    return message;
-}
-
 pb::ParameterInfo parameterTo(const ParameterDeclaration& declaration,
                               const ParameterValue& value) {
     pb::ParameterInfo info;
     info.set_name(declaration.name);
-    *info.mutable_value() = valueTo(value);
-    *info.mutable_default_value() = valueTo(declaration.default_value);
+    *info.mutable_value() = parameterValueTo(value);
+    *info.mutable_default_value() = parameterValueTo(declaration.default_value);
     if (declaration.minimum) info.set_minimum(*declaration.minimum);
     if (declaration.maximum) info.set_maximum(*declaration.maximum);
     info.set_unit(declaration.unit);
@@ -81,7 +49,7 @@ pb::ComponentSpec specTo(const ComponentDefinition& definition) {
     for (const auto& [name, value] : definition.parameters) {
         auto* parameter = spec.add_parameters();
         parameter->set_name(name);
-        *parameter->mutable_value() = valueTo(value);
+        *parameter->mutable_value() = parameterValueTo(value);
     }
     spec.set_first(definition.first);
     spec.set_ignore(definition.ignore);
@@ -369,7 +337,8 @@ std::vector<std::pair<std::string, ParameterValue>> parametersFrom(
     std::vector<std::pair<std::string, ParameterValue>> parameters;
     for (const auto& setting : settings) {
         requireLength("parameter", setting.name());
-        parameters.emplace_back(setting.name(), valueFrom(setting.value(), setting.name()));
+        parameters.emplace_back(setting.name(),
+                                parameterValueFrom(setting.value(), setting.name()));
     }
     return parameters;
 }
@@ -461,9 +430,25 @@ pb::ChangeResult outcomeTo(const ChangeOutcome& outcome) {
     for (const auto& [name, value] : outcome.kept) {
         pb::ParameterSetting& setting = *result.add_kept();
         setting.set_name(name);
-        *setting.mutable_value() = valueTo(value);
+        *setting.mutable_value() = parameterValueTo(value);
     }
     return result;
+}
+
+v1::Snapshot snapshotTo(const ImageOutcome& outcome) {
+    constexpr std::size_t kLargest = 15 * 1024 * 1024;
+    v1::Snapshot message;
+    message.set_snapshot(imageToFile(outcome.image));
+    if (message.snapshot().size() > kLargest) {
+        throw Refusal(
+            RefusalKind::ResourceExhausted,
+            fmt::format("the snapshot of {} has {} bytes, at most {}: declare less state, "
+                        "or divide the graph among runners",
+                        outcome.image.runner, message.snapshot().size(), kLargest));
+    }
+    message.set_iteration(outcome.image.clock.iteration);
+    for (const std::string& line : outcome.notes) message.add_notes(line);
+    return message;
 }
 
 v1::LogRecord logTo(const LogEntry& entry) {

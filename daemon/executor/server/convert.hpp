@@ -34,6 +34,8 @@ AccessRules rulesFrom(const v1::AccessRules& message);
 /// @{
 v1::Error errorTo(RefusalKind kind, const std::string& message);
 ::rtcf::v1::ChangeResult outcomeTo(const ChangeOutcome& outcome);
+/// @throws Refusal if it is too large for the wire
+v1::Snapshot snapshotTo(const ImageOutcome& outcome);
 v1::LogRecord logTo(const LogEntry& entry);
 v1::ServiceCall callTo(std::uint64_t number, const OutsideCall& call);
 v1::DirectStop directStopTo(const DirectStopReport& report);

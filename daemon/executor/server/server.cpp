@@ -17,6 +17,7 @@
 
 #include "rtcf/version.hpp"
 #include "server/convert.hpp"
+#include "server/image_file.hpp"
 #include "server/listen.hpp"
 #include "statistics/thread_usage.hpp"
 
@@ -433,7 +434,8 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
     // Statistics are of one run of the loop, which has not begun yet.
     const bool begins = request.kind_case() == v1::Request::kStart ||
                         (request.kind_case() == v1::Request::kReplay && request.replay().begin()) ||
-                        (request.kind_case() == v1::Request::kStep &&
+                        ((request.kind_case() == v1::Request::kStep ||
+                          request.kind_case() == v1::Request::kRestoreSnapshot) &&
                          runner_->picture().state != RunnerState::Stepping);
     if (begins && !runner_->loop().running()) resetStatistics();
     // Steps take as long as they take; they report progress.
@@ -473,6 +475,8 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
             } else if (request.kind_case() == v1::Request::kReplay) {
                 *response.mutable_replay() =
                     replayTo(runner_->replay(replayFrom(request.replay()), progress));
+            } else if (request.kind_case() == v1::Request::kTakeSnapshot) {
+                *response.mutable_snapshot() = snapshotTo(runner_->takeImage());
             } else {
                 *response.mutable_change() = outcomeTo(change(request, progress));
             }
@@ -493,6 +497,7 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
 void Server::requireStopsKnown(const v1::Request& request) const {
     const bool runs = request.kind_case() == v1::Request::kStart ||
                       request.kind_case() == v1::Request::kStep ||
+                      request.kind_case() == v1::Request::kRestoreSnapshot ||
                       request.kind_case() == v1::Request::kReplay;
     const DirectStopReport report = direct_stop_->last();
     if (!runs || request.direct_stops() >= report.count) return;
@@ -557,8 +562,13 @@ ChangeOutcome Server::change(const v1::Request& request, const Runner::Progress&
             }
             return runner_->setBreaks(ports, request.set_breaks().broken());
         }
+        case v1::Request::kRestoreSnapshot:
+            return runner_->restore(imageFromFile(request.restore_snapshot().snapshot()), progress);
         case v1::Request::kResetState:
             return runner_->reset(fullNameOf(request.reset_state().component()));
+        case v1::Request::kSetState:
+            return runner_->setStates(fullNameOf(request.set_state().component()),
+                                      parametersFrom(request.set_state().states()));
         case v1::Request::kSetParameters:
             return runner_->setParameters(fullNameOf(request.set_parameters().component()),
                                           parametersFrom(request.set_parameters().parameters()));

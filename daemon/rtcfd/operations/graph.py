@@ -300,6 +300,21 @@ async def reset_state(
     return result
 
 
+async def set_state(
+    runner: RunnerCore, request: control_pb2.SetStateRequest, progress: Progress
+) -> control_pb2.ChangeResult:
+    """Set values of the state of one component, of a loop that does not run."""
+    name = absolute(request.component)
+
+    async def work() -> control_pb2.ChangeResult:
+        return (await runner.ask(wire.Request(set_state=request), progress)).change
+
+    result = await runner.change(f"a change of the state of {name}", work)
+    names = ", ".join(each.name for each in request.states)
+    runner.log.info("%s: state %s set by %s", name, names, caller.name())
+    return result
+
+
 async def _saved(runner: RunnerCore, result: control_pb2.ChangeResult) -> control_pb2.ChangeResult:
     result.notes.extend(await runner.save())
     return result

@@ -19,7 +19,7 @@ from rtcfd.common.names import absolute
 from rtcfd.common.refusals import InvalidArgument
 from rtcfd.common.status_codes import abort
 from rtcfd.executor.link import Progress
-from rtcfd.operations import graph, parameters
+from rtcfd.operations import graph, parameters, snapshots
 from rtcfd.operations.loop import stop
 from rtcfd.recovery import starting
 from rtcfd.runners.held_runners import Hold
@@ -288,6 +288,23 @@ class Control(control_pb2_grpc.ControlServicer):
         """Take a component's state back to its initial values."""
         runner = self._runners.get(request.runner)
         return lambda progress: graph.reset_state(runner, request, progress)
+
+    @_changing
+    def SetState(self, request: control_pb2.SetStateRequest) -> Any:
+        """Set values of a component's state."""
+        runner = self._runners.get(request.runner)
+        return lambda progress: graph.set_state(runner, request, progress)
+
+    @_answering
+    async def TakeSnapshot(self, request: control_pb2.TakeSnapshotRequest) -> Any:
+        """All that the next cycle depends on."""
+        return await snapshots.take(self._runners.get(request.runner))
+
+    @_changing
+    def RestoreSnapshot(self, request: control_pb2.RestoreSnapshotRequest) -> Any:
+        """Go on from a snapshot."""
+        runner = self._runners.get(request.runner)
+        return lambda progress: snapshots.restore(runner, request.snapshot, progress)
 
     @_holding
     def HoldRunner(self, request: control_pb2.OpenHold) -> Any:

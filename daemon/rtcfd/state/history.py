@@ -31,7 +31,7 @@ class Change:
     before: Value | None  # None: it was not there, or is not known
     value: Value
     who: str  # for people
-    how: str  # "set", "undo", "load", "replace", "apply", "dynamic_reconfigure"
+    how: str  # "set", "undo", "load", "replace", "apply", "restore", "dynamic_reconfigure"
     takes_back: int = 0  # the number of what it undoes; 0 = nothing
 
 

@@ -91,6 +91,22 @@ class InputBase {
     }
     /// The slot whose value the component has.
     const SlotHeader* current() const noexcept RTCF_NONBLOCKING { return current_; }
+    /// How far the component has read.
+    struct Reading {
+        const SlotHeader* source = nullptr;
+        const SlotHeader* current = nullptr;
+        std::uint64_t seen = 0;
+        bool kept_is_new = false;
+    };
+    Reading reading() const noexcept RTCF_NONBLOCKING {
+        return {source_, current_, seen_, identity_->kept_is_new};
+    }
+    void setReading(const Reading& reading) noexcept RTCF_NONBLOCKING {
+        source_ = reading.source;
+        current_ = reading.current;
+        seen_ = reading.seen;
+        identity_->kept_is_new = reading.kept_is_new;
+    }
     /// @}
 
    protected:
@@ -166,6 +182,8 @@ class OutputBase {
     }
     /// The slot that this output writes; inputs may keep it alive beyond the component.
     const std::shared_ptr<SlotHeader>& slot() const noexcept { return rest_->slot; }
+    /// What the component writes into: the slot, or the staged one. For the executor.
+    SlotHeader* written() const noexcept RTCF_NONBLOCKING { return raw_; }
     /// The clock that stamps what is written; for the executor.
     void setClock(const LoopClock& clock) noexcept { clock_ = &clock; }
 

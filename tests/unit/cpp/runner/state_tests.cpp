@@ -113,6 +113,35 @@ TEST_F(DeclaredState, ThatIsNotThereCannotBeReset) {
     EXPECT_NE(refusal([&] { onGraphThread([&] { return runner().reset("/C"); }); }), "");
 }
 
+TEST_F(DeclaredState, IsSetExactlyOrNotAtAll) {
+    loadVersion(1);
+    step(3);
+    const auto set = [&](const std::string& name, const ParameterValue& value) {
+        return refusal([&] {
+            onGraphThread(
+                [&] { return runner().setStates("/A", {{"old_name", 1.25}, {name, value}}); });
+        });
+    };
+    EXPECT_EQ(set("count", std::int64_t{41}), "");
+    EXPECT_EQ(state("count"), "41");
+    EXPECT_EQ(state("old_name"), "1.25");
+    EXPECT_EQ(set("dropped", false), "");
+    EXPECT_EQ(state("dropped"), "0");
+    EXPECT_EQ(set("gain", std::int64_t{2}), "");
+    EXPECT_EQ(state("gain"), "2");
+    onGraphThread([&] { return runner().setStates("/A", {{"old_name", 9.0}}); });
+    EXPECT_NE(set("count", std::int64_t{-1}).find("type uint64"), std::string::npos);
+    EXPECT_NE(set("count", 1.5).find("type uint64"), std::string::npos);
+    EXPECT_NE(set("dropped", std::int64_t{1}).find("type bool"), std::string::npos);
+    EXPECT_NE(set("delay", 1.0).find("only numbers and bools"), std::string::npos);
+    EXPECT_NE(set("none", 1.0).find("declares no state none"), std::string::npos);
+    EXPECT_EQ(state("old_name"), "9") << "all of a batch, or nothing";
+    step(1);
+    EXPECT_EQ(value("/A", "out"), 42.0);
+    start();
+    EXPECT_NE(set("gain", 1.0).find("state is set while it does not"), std::string::npos);
+}
+
 // A graph file that names a rebuilt library replaces too.
 TEST_F(DeclaredState, GoesOverInAnApplyToo) {
     loadVersion(1);

@@ -1,0 +1,412 @@
+// Snapshots of a runner: that a restored one goes on with the same bits, and what is refused.
+#include "image/image.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "server/image_file.hpp"
+#include "support/runner_fixture.hpp"
+
+namespace rtcf::test {
+namespace {
+
+using executor::imageFromFile;
+using executor::imageToFile;
+using executor::RunnerImage;
+
+constexpr std::uint64_t kMany = 10'000;  // cycles
+
+class Image : public RunnerFixture {
+   protected:
+    static ComponentDefinition chaos(const std::string& name, const std::string& a,
+                                     const std::string& b) {
+        ComponentDefinition result = definition("Chaos", name);
+        for (const char* port : {"x", "checked", "turned", "listed", "low", "high"})
+            result.remaps.emplace_back(port, "/" + name + "_" + port);
+        result.remaps.emplace_back("a", "/" + a);
+        result.remaps.emplace_back("b", "/" + b);
+        result.remaps.emplace_back("frame", "/" + a.substr(0, a.find('_')) + "_turned");
+        result.remaps.emplace_back("list", "/" + b.substr(0, b.find('_')) + "_listed");
+        return result;
+    }
+
+    // Four in a ring with loop breaks of both kinds, some of which skip cycles.
+    void loadRing() {
+        ComponentDefinition p = chaos("P", "S_x", "R_checked");
+        p.first = true;
+        load(p);
+        ComponentDefinition q = chaos("Q", "P_x", "P_checked");
+        q.every = 2;
+        load(q);
+        ComponentDefinition r = chaos("R", "Q_checked", "P_x");
+        r.breaks = {"b", "list"};
+        r.every = 4;
+        load(r);
+        load(chaos("S", "R_x", "Q_checked"));
+    }
+
+    RunnerImage take() {
+        return onGraphThread([&] { return runner().takeImage().image; });
+    }
+    ChangeOutcome restore(const RunnerImage& image) {
+        return onGraphThread([&] { return runner().restore(image, [](const std::string&) {}); });
+    }
+    // All that there is, but for when it was looked at.
+    static std::string bytesOf(RunnerImage image) {
+        image.taken_ns = 0;
+        return imageToFile(image);
+    }
+    std::string now() { return bytesOf(take()); }
+
+    void ask(std::uint64_t cycle) {
+        for (const char* name : {"/P", "/Q", "/R", "/S"})
+            setParameters(name, {{"ask", static_cast<std::int64_t>(cycle)}});
+    }
+    // What the components had made of everything up to a cycle that has been.
+    std::vector<double> digestsAt(std::uint64_t cycle) {
+        ask(cycle);
+        EXPECT_TRUE(runs(9));
+        std::vector<double> digests;
+        for (const char* name : {"/P", "/Q", "/R", "/S"}) {
+            digests.push_back(value(name, "low"));
+            digests.push_back(value(name, "high"));
+        }
+        ask(UINT64_MAX);
+        return digests;
+    }
+    bool reaches(std::uint64_t cycle) {
+        return eventually([&] { return iteration() >= cycle; });
+    }
+
+    // That it is refused, with these words, and changes nothing.
+    void expectRefused(const RunnerImage& image, const std::string& words) {
+        const std::string before = now();
+        const std::string text = refusal([&] { restore(image); });
+        EXPECT_NE(text.find(words), std::string::npos) << text;
+        EXPECT_EQ(now(), before);
+    }
+};
+
+TEST_F(Image, RestoredStepsGoOnWithTheSameBits) {
+    loadRing();
+    for (const char* name : {"/P", "/Q", "/R", "/S"}) setParameters(name, {{"timed", true}});
+    step(123);
+    const RunnerImage image = imageFromFile(imageToFile(take()));
+    const std::string begin = now();
+    step(kMany);
+    const std::string end = now();
+    EXPECT_NE(begin, end);
+    restore(image);
+    EXPECT_EQ(now(), begin);
+    step(kMany);
+    EXPECT_EQ(now(), end);
+}
+
+TEST_F(Image, RestoredLoopGoesOnWithTheSameBits) {
+    configure([](RunnerSettings& settings) {
+        settings.frequency_hz = 4000.0;
+        settings.loop.period_ns = 250'000;
+    });
+    loadRing();
+    start();
+    ASSERT_TRUE(runs());
+    const RunnerImage image = take();
+    const std::uint64_t last = image.clock.iteration + kMany;
+    ASSERT_TRUE(reaches(last + 1));
+    const auto first = digestsAt(last);
+    restore(image);
+    ASSERT_LT(iteration(), last);
+    ASSERT_TRUE(reaches(last + 1));
+    EXPECT_EQ(digestsAt(last), first);
+    EXPECT_NE(digestsAt(last - 1), first);
+    EXPECT_EQ(state(), RunnerState::Running);
+}
+
+TEST_F(Image, OfARunningLoopIsTheOneOfItsSteps) {
+    loadRing();
+    start();
+    ASSERT_TRUE(runs());
+    const RunnerImage image = take();
+    stop();
+    restore(image);
+    EXPECT_EQ(state(), RunnerState::Stepping);
+    EXPECT_EQ(now(), bytesOf(image));
+    step(kMany);
+    const std::string end = now();
+    restore(image);
+    step(kMany);
+    EXPECT_EQ(now(), end);
+}
+
+TEST_F(Image, GoesIntoAnotherRunnerWithTheSameGraphWhateverItsPast) {
+    loadRing();
+    step(100);
+    const RunnerImage image = take();
+    step(kMany);
+    const std::string end = now();
+    for (const char* name : {"/S", "/R", "/Q", "/P"}) unload(name);
+    stop();
+    // Other connections before, other phases, parameters and values.
+    load(chaos("S", "Q_checked", "Q_checked"));
+    ComponentDefinition r = chaos("R", "Q_checked", "P_x");
+    r.every = 4;
+    r.breaks = {"b", "list"};
+    load(r);
+    ComponentDefinition q = chaos("Q", "P_x", "P_checked");
+    q.every = 2;
+    load(q);
+    ComponentDefinition p = chaos("P", "S_x", "R_checked");
+    p.first = true;
+    p.parameters = {{"rate", 3.7}};
+    load(p);
+    step(17);
+    replace("/S", chaos("S", "R_x", "Q_checked"));
+    setParameters("/Q", {{"rate", 3.8}});
+    step(3);
+    restore(image);
+    step(kMany);
+    EXPECT_EQ(now(), end);
+}
+
+// What an input has of a writer that has gone, or that it does not read any more.
+TEST_F(Image, KeepsWhatInputsHaveOfEarlierWriters) {
+    load(chaos("P", "Q_x", "Q_x"));
+    setBreak("/P", "a", true);
+    setBreak("/P", "b", true);
+    setBreak("/P", "frame", true);
+    setBreak("/P", "list", true);
+    load(chaos("Q", "P_x", "P_checked"));
+    load(chaos("R", "Q_x", "P_x"));
+    step(50);
+    unload("/Q");
+    step(3);
+    ComponentDefinition late = chaos("Q", "P_x", "P_checked");
+    late.every = 7;
+    late.phase = 5;
+    load(late);  // P and R keep what the first Q wrote until this one writes
+    const RunnerImage with_kept = take();
+    step(kMany);
+    const std::string end = now();
+    restore(with_kept);
+    EXPECT_EQ(now(), bytesOf(with_kept));
+    step(kMany);
+    EXPECT_EQ(now(), end);
+    unload("/Q");
+    const RunnerImage with_left = take();
+    step(kMany);
+    const std::string alone = now();
+    restore(with_left);
+    step(kMany);
+    EXPECT_EQ(now(), alone);
+    replace("/R", chaos("R", "Q_x", "P_x"));
+    restore(with_left);
+    step(kMany);
+    EXPECT_EQ(now(), alone) << "also into inputs that never had a writer";
+}
+
+TEST_F(Image, HasTheLastValueFromOutside) {
+    configure([](RunnerSettings& settings) { settings.whitelist = "/outside"; });
+    ComponentDefinition p = chaos("P", "outside", "P_x");
+    p.first = true;
+    load(p);
+    const auto send = [&](double number) {
+        std::uint8_t bytes[sizeof number];
+        std::memcpy(bytes, &number, sizeof number);
+        bridge().injector("/outside")->deliver(bytes, sizeof bytes);
+    };
+    send(0.25);
+    step(3);
+    const RunnerImage image = take();
+    step(100);
+    const std::string end = now();
+    send(0.75);
+    step(5);
+    restore(image);
+    EXPECT_EQ(now(), bytesOf(image));
+    step(100);
+    EXPECT_EQ(now(), end);
+}
+
+TEST_F(Image, BringsParametersBack) {
+    loadRing();
+    setParameters("/P", {{"rate", 3.75}});
+    const RunnerImage image = take();
+    setParameters("/P", {{"rate", 3.99}});
+    setParameters("/S", {{"rate", 3.99}});
+    restore(image);
+    const auto rate = [&](const std::string& name) {
+        const auto snapshot = runner().snapshot();
+        for (const auto& parameter : snapshot->get(name).parameters) {
+            if (parameter.declaration.name == "rate") return std::get<double>(parameter.value);
+        }
+        return 0.0;
+    };
+    EXPECT_EQ(rate("/P"), 3.75);
+    EXPECT_EQ(rate("/S"), 3.9);
+}
+
+TEST_F(Image, ThatDoesNotFitIsRefusedWhole) {
+    loadRing();
+    step(50);
+    const RunnerImage image = take();
+    step(7);
+    const auto changed = [&](const std::function<void(RunnerImage&)>& change) {
+        RunnerImage other = image;
+        change(other);
+        return other;
+    };
+    const auto expect = [&](const std::string& words,
+                            const std::function<void(RunnerImage&)>& change) {
+        expectRefused(changed(change), words);
+    };
+    expect("component /P is not in it",
+           [](RunnerImage& other) { other.components.erase(other.components.begin()); });
+    expect("there is no component /X", [](RunnerImage& other) { other.components[0].name = "/X"; });
+    expect("a component is there twice",
+           [](RunnerImage& other) { other.components.push_back(other.components[0]); });
+    expect("/P was a Wave and is a Chaos",
+           [](RunnerImage& other) { other.components[0].type = "Wave"; });
+    expect("ran every 4 cycles and runs every 1",
+           [](RunnerImage& other) { other.components[0].every = 4; });
+    expect("state /P.value was int and is double", [](RunnerImage& other) {
+        other.components[0].states[0].type = "int";
+        ++other.components[0].states[0].identity;
+    });
+    expect("state /P.digest is not in it",
+           [](RunnerImage& other) { other.components[0].states[1].name = "other"; });
+    expect("there is no state /P.other",
+           [](RunnerImage& other) { other.components[0].states[1].name = "other"; });
+    expect("state /P.past was",
+           [](RunnerImage& other) { other.components[0].states[2].bytes.pop_back(); });
+    expect("output /P.x was float and is double",
+           [](RunnerImage& other) { other.components[0].outputs[0].type.name = "float"; });
+    expect("output /P.checked is",
+           [](RunnerImage& other) { other.components[0].outputs[1].staged.reset(); });
+    expect("the value of /P.x is none",
+           [](RunnerImage& other) { other.components[0].outputs[0].value.bytes += 'x'; });
+    expect("the value of /P.listed is none",
+           [](RunnerImage& other) { other.components[0].outputs[3].value.bytes = "\xff"; });
+    expect("input /P.a read /Q.x and reads /S.x",
+           [](RunnerImage& other) { other.components[0].inputs[0].source = "/Q.x"; });
+    expect("input /P.a read nothing",
+           [](RunnerImage& other) { other.components[0].inputs[0].source.clear(); });
+    expect("there is no parameter /P.gain",
+           [](RunnerImage& other) { other.components[0].parameters[0].first = "gain"; });
+    expect("above its maximum",
+           [](RunnerImage& other) { other.components[0].parameters[0].second = 5.0; });
+    expect("topic /t", [](RunnerImage& other) { other.topics.push_back({"/t", {}, 1, {}}); });
+    expect("taken at 500 Hz", [](RunnerImage& other) { other.period_ns = 2'000'000; });
+    expect("and 3 more", [](RunnerImage& other) {
+        for (auto& component : other.components) component.name += "x";
+    });
+    setBreak("/S", "a", true);
+    expectRefused(image, "input /S.a read /R.x and reads /R.x one cycle late");
+}
+
+TEST_F(Image, OfAnotherBuildFitsByNameAndType) {
+    const auto loadVersion = [&](int number) {
+        const std::string file = RTCF_UNIT_COMPONENTS "/stateful_" + std::to_string(number) + ".so";
+        onGraphThread([&] {
+            return runner().load(definition("Stateful", "A"), file, [](const std::string&) {});
+        });
+    };
+    loadVersion(1);
+    step(10);
+    const RunnerImage image = take();
+    unload("/A");
+    loadVersion(2);
+    const std::string text = refusal([&] { restore(image); });
+    for (const char* words :
+         {"state /A.fresh is not in it", "state /A.gain was float and is double",
+          "there is no state /A.old_name"})
+        EXPECT_NE(text.find(words), std::string::npos) << text;
+    unload("/A");
+    loadVersion(1);
+    restore(image);
+    step(1);
+    EXPECT_EQ(value("/A", "out"), 11.0);
+}
+
+TEST_F(Image, ThatACycleHasNoTimeForIsRefusedWithTheBound) {
+    load(definition("Camera", "C"));
+    const RunnerImage image = take();
+    start();
+    ASSERT_TRUE(runs());
+    for (const auto& work :
+         std::vector<std::function<void()>>{[&] { take(); }, [&] { restore(image); }}) {
+        const std::string text = refusal(work);
+        EXPECT_NE(text.find("touches 10"), std::string::npos) << text;
+        EXPECT_NE(text.find("at most 131072 at 1000 Hz"), std::string::npos) << text;
+    }
+    EXPECT_EQ(state(), RunnerState::Running);
+    stop();
+    restore(image);
+}
+
+TEST_F(Image, LargerThanReservedIsRefusedInTheCycle) {
+    loadRing();
+    RunnerImage image = take();
+    image.components[0].outputs[3].value.bytes =
+        std::string(8, '\0') + '\x9' + std::string(3, '\0') + std::string(72, '\1');
+    start();
+    ASSERT_TRUE(runs());
+    const std::string text = refusal([&] { restore(image); });
+    EXPECT_NE(text.find("the value of /P.listed has 84 bytes, its component has reserved 44"),
+              std::string::npos)
+        << text;
+    stop();
+    restore(image);
+}
+
+TEST_F(Image, OfWhatWasTakenOutIsRefused) {
+    loadRing();
+    const RunnerImage before = take();
+    ComponentDefinition throwing = definition("Controller", "C");
+    throwing.optional = true;
+    throwing.parameters = {{"throws_at", std::int64_t{3}}};
+    load(throwing);
+    const RunnerImage sound = take();
+    step(10);
+    EXPECT_NE(refusal([&] { take(); }).find("/C was taken out after a fault"), std::string::npos);
+    EXPECT_NE(refusal([&] { restore(sound); }).find("/C was taken out after a fault"),
+              std::string::npos);
+    unload("/C");
+    restore(before);
+}
+
+TEST_F(Image, FileThatIsNotAsItWasWrittenIsRefused) {
+    loadRing();
+    step(5);
+    const std::string file = imageToFile(take());
+    const auto told = [&](const std::string& bytes) {
+        return refusal([&] { imageFromFile(bytes); });
+    };
+    EXPECT_EQ(told(file), "");
+    for (const std::string& none : {std::string(), std::string("RTCF"), std::string(100, 'x')})
+        EXPECT_NE(told(none).find("that is no snapshot"), std::string::npos);
+    std::string newer = file;
+    newer[8] = 2;
+    EXPECT_NE(told(newer).find("is of format 2, this rtcf reads format 1"), std::string::npos);
+    for (std::size_t at = 12; at < file.size(); at += 1 + at / 97) {
+        std::string damaged = file;
+        damaged[at] = static_cast<char>(damaged[at] ^ 0x10);
+        EXPECT_NE(told(damaged).find("is damaged"), std::string::npos) << at;
+    }
+    EXPECT_NE(told(file.substr(0, file.size() - 1)).find("is damaged"), std::string::npos);
+    EXPECT_NE(told(file + "x").find("is damaged"), std::string::npos);
+}
+
+TEST_F(Image, SaysWhatDeclaresNoState) {
+    load(definition("Controller", "C"));
+    const auto notes = onGraphThread([&] { return runner().takeImage().notes; });
+    ASSERT_EQ(notes.size(), 1U);
+    EXPECT_NE(notes[0].find("declare no state"), std::string::npos);
+    EXPECT_NE(notes[0].find("/C"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace rtcf::test
