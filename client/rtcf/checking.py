@@ -33,6 +33,7 @@ class Checked:
     library: str
     violations: list[Violation] = field(default_factory=list)
     not_finite: list[str] = field(default_factory=list)  # outputs that carried NaN or infinity
+    undeclared: list[str] = field(default_factory=list)  # members that change and are no State
     ended: str = ""  # how the component ended its process, or did not end; empty = in order
     log: list[str] = field(default_factory=list)  # what else was said
 
@@ -74,6 +75,9 @@ def check(
     found.log = [line for line in lines if line.startswith("/checked: ")]
     found.not_finite = [
         line.removeprefix("not finite: /") for line in lines if line.startswith("not finite: /")
+    ]
+    found.undeclared = [
+        line.removeprefix("undeclared: ") for line in lines if line.startswith("undeclared: ")
     ]
     found.ended = watched.hang or (_why(status, lines, watched.stage) if status else "")
     return found

@@ -58,6 +58,7 @@ def run(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
                 "cycles": args.cycles,
                 "violations": [_plain(each) for each in found.violations],
                 "not_finite": found.not_finite,
+                "undeclared": found.undeclared,
                 "ended": found.ended,
                 "log": found.log,
             }
@@ -69,6 +70,12 @@ def run(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
             print(line, file=sys.stderr)
         for port in found.not_finite:
             output.line(f"{name}: output {port} carried NaN or infinity", "yellow")
+        for member in found.undeclared:
+            print(
+                f"{name}: note: a member changes that is not declared ({member}): as an "
+                "rtcf::State it would be kept by replace and snapshot",
+                file=sys.stderr,
+            )
     unsafe = (
         f"{len(found.violations)} calls that are not safe in real time" if found.violations else ""
     )

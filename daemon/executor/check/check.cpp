@@ -7,10 +7,12 @@
 #include <exception>
 #include <future>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 
 #include "bridge/bridge.hpp"
+#include "check/undeclared_members.hpp"
 #include "faults/crash_handler.hpp"
 #include "faults/flight_recorder.hpp"
 #include "graph/definition.hpp"
@@ -105,11 +107,15 @@ void run(const CheckRequest& request, Runner& runner, ValueSource& values) {
     // A report is made inside the cycle, and finding its source lines may take seconds.
     settings.stall_timeout_ns = kStallTimeout;
     runner.configure(settings);
-    runner.load(definitionOf(request), request.library, say);
+    const std::string name = runner.load(definitionOf(request), request.library, say).component;
+    // From the first cycle on, which start() comes before.
+    std::optional<UndeclaredMembers> members;
     for (std::uint64_t done = 0; done < request.cycles; done += kCyclesPerValue) {
         values.exchange();
         say(fmt::format("updating, from cycle {} on", done));
         runner.step(std::min(kCyclesPerValue, request.cycles - done), silent);
+        if (!members) members.emplace(runner.component(name));
+        members->look();
         if (runner.loop().fault().kind != LoopFault::Kind::None) {
             throw Refusal(RefusalKind::FailedPrecondition, runner.picture().status);
         }
@@ -119,6 +125,9 @@ void run(const CheckRequest& request, Runner& runner, ValueSource& values) {
     values.exchange();
     for (const std::string& topic : values.notFinite())
         fmt::print(stderr, "not finite: {}\n", topic);
+    if (!members) return;
+    for (const std::string& member : members->found())
+        fmt::print(stderr, "undeclared: {}\n", member);
 }
 
 }  // namespace
