@@ -212,18 +212,18 @@ Wiring wire(const Graph& graph, const MappingFilter& filter, const std::string& 
 }
 
 std::vector<std::string> remarks(const Graph& graph, const Wiring& wiring,
-                                 const MappingFilter& filter, const std::string& component) {
+                                 const MappingFilter& filter,
+                                 const std::set<std::string>& components) {
+    std::vector<bool> ours;
+    for (const GraphNode& node : graph.nodes())
+        ours.push_back(components.count(node.instance->fullName()) != 0);
+    const auto is_ours = [&](const auto& port) { return ours[port.node]; };
     std::vector<std::string> lines;
     for (const auto& [name, plan] : wiring.connections) {
-        const auto ours = [&](std::size_t node) {
-            return graph.nodes()[node].instance->fullName() == component;
-        };
         std::vector<Writer> writers = plan.others;
         if (plan.writer) writers.insert(writers.begin(), *plan.writer);
-        const bool written = std::any_of(writers.begin(), writers.end(),
-                                         [&](const Writer& writer) { return ours(writer.node); });
-        const bool read = std::any_of(plan.readers.begin(), plan.readers.end(),
-                                      [&](const Reader& reader) { return ours(reader.node); });
+        const bool written = std::any_of(writers.begin(), writers.end(), is_ours);
+        const bool read = std::any_of(plan.readers.begin(), plan.readers.end(), is_ours);
         if (written && plan.published && writers.size() > 1) {
             std::string names;
             for (const Writer& writer : writers) {

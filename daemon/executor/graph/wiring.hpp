@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -57,8 +58,10 @@ struct Wiring {
 /// @throws Refusal for two types of one name, for two writers of one that is read, and for a loop
 Wiring wire(const Graph& graph, const MappingFilter& filter, const std::string& loading);
 
-/// What a component's ports make of the topics that is not refused and may surprise: one line each.
+/// What the ports of some components, by their full names, make of the topics that is not refused
+/// and may surprise: one line each.
 std::vector<std::string> remarks(const Graph& graph, const Wiring& wiring,
-                                 const MappingFilter& filter, const std::string& component);
+                                 const MappingFilter& filter,
+                                 const std::set<std::string>& components);
 
 }  // namespace rtcf::executor

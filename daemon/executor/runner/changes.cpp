@@ -179,12 +179,12 @@ ChangeOutcome Runner::outcomeOf(const Instance& arrived) const {
     }
     result.kept = arrived.keptParameters();
     for (const std::string& line : arrived.lostParameters()) result.notes.push_back(line);
-    addRemarks(result, arrived.fullName());
+    addRemarks(result, {arrived.fullName()});
     return result;
 }
 
-void Runner::addRemarks(ChangeOutcome& outcome, const std::string& component) const {
-    for (std::string& line : remarks(plan_->graph, plan_->wiring, filter(), component))
+void Runner::addRemarks(ChangeOutcome& outcome, const std::set<std::string>& components) const {
+    for (std::string& line : remarks(plan_->graph, plan_->wiring, filter(), components))
         outcome.notes.push_back(std::move(line));
 }
 
@@ -260,10 +260,12 @@ ChangeOutcome Runner::apply(const std::vector<WantedComponent>& wanted, bool dry
     ChangeOutcome result = outcome();
     result.notes = std::move(notes);
     result.differences = std::move(differences);
+    std::set<std::string> changed;
     for (Difference& difference : result.differences) {
         difference.wanted = nullptr;
-        if (!dry_run) addRemarks(result, difference.component);
+        changed.insert(difference.component);
     }
+    if (!dry_run) addRemarks(result, changed);
     return result;
 }
 

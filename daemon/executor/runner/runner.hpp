@@ -252,7 +252,7 @@ class Runner final : private RunnerView {
     void stopAll() noexcept;
     ChangeOutcome outcome(std::string component = {}) const;
     ChangeOutcome outcomeOf(const Instance& arrived) const;
-    void addRemarks(ChangeOutcome& outcome, const std::string& component) const;
+    void addRemarks(ChangeOutcome& outcome, const std::set<std::string>& components) const;
     RealtimeProblems lockAndStart();
     LoopSettings loopSettings() const;
     bool wantsSimulation(const Progress& progress);

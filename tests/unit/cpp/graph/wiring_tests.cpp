@@ -74,12 +74,12 @@ TEST_F(WiringTest, TwoWritersOfWhatIsReadAreRefusedByName) {
 TEST_F(WiringTest, SeveralMayWriteWhatNoInputReadsAndOfATopicThatIsSaid) {
     const Graph graph = graphOf(
         {mimo("A", {{"out1", "x"}, {"out2", "a2"}}), mimo("B", {{"out1", "b1"}, {"out2", "x"}})});
-    EXPECT_TRUE(remarks(graph, wire(graph, {}, {}), {}, "/B").empty());
+    EXPECT_TRUE(remarks(graph, wire(graph, {}, {}), {}, {"/B"}).empty());
     const MappingFilter filter{NamePattern("whitelist", "/x"), {}};
     const Wiring wiring = wire(graph, filter, {});
     EXPECT_EQ(wiring.connections.at("/x").others.size(), 1U);
     EXPECT_EQ(
-        remarks(graph, wiring, filter, "/B"),
+        remarks(graph, wiring, filter, {"/B"}),
         (std::vector<std::string>{"topic /x has 2 writers in this runner: /A.out1, /B.out2"}));
 }
 
