@@ -64,8 +64,8 @@ int main(int argc, char** argv) try {
         std::map<std::string, std::vector<double>> found;
         for (std::size_t round = 0; round < rounds; ++round) {
             rtcf::executor::Adoption values;
-            values.values =
-                wave->stageParameters({{"amplitude", 1.0 + static_cast<double>(round)}});
+            values.values = wave->stageParameters(
+                {{"amplitude", 1.0 + 0.01 * static_cast<double>(round % 100)}});
             flushCaches();
             found["set"].push_back(
                 adoptionOf(graph, [&] { graph.loop().adopt(values, 1'000'000'000); }));
