@@ -1,7 +1,7 @@
 #!/usr/bin/python3 -I
 """Evaluates a loop's recorded cycles, as Fig. 2 of the paper does: two histograms and numbers.
 
-rosbag record /rt_runner/cycles
+rosbag record -e '.*/rt_runner/cycles'
 rosrun rtcf evaluate_performance_rosbag BAG FREQUENCY
 """
 
@@ -64,7 +64,8 @@ def _choose(bag: Path, topic: str, found: dict[str, str]) -> str:
         return topic
     if not found:
         raise Unusable(
-            f"{bag} has no topic of type {_OF}: record it with `rosbag record /rt_runner/cycles`"
+            f"{bag} has no topic of type {_OF}: record it with `rosbag record -e "
+            "'.*/rt_runner/cycles'`"
         )
     # Of a loop whose both topics were recorded, the one that tells more.
     better = {name.rpartition("/")[0] for name, kind in found.items() if kind.endswith("/Cycle")}
