@@ -1,12 +1,13 @@
 """`rtcfctl load|unload|replace|release|list|info`."""
 
 import argparse
+import sys
 from typing import Any
 
 import rtcf
 from rtcf.v1 import graph_pb2
 
-from rtcfctl import words
+from rtcfctl import python_source, words
 from rtcfctl.output import Output
 from rtcfctl.plain import enumerator
 
@@ -22,6 +23,11 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     _component_options(loading)
     loading.add_argument(
         "--wait", action="store_true", help="for a ROS master, if the component needs one"
+    )
+    loading.add_argument(
+        "--watch",
+        action="store_true",
+        help="of a Python source: put it into the loop anew whenever it is saved, until Ctrl-C",
     )
     loading.set_defaults(run=load)
 
@@ -60,8 +66,26 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 
 def load(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Load a component."""
-    result = client.load(_spec(args), args.runner, output.progress, wait=args.wait)
+    if args.watch and not python_source.is_one(args.package):
+        raise ValueError("--watch is for a Python source: rtcfctl load FILE.py COMPONENT --watch")
+    result = client.load(_spec(args, output), args.runner, output.progress, wait=args.wait)
     output.changed(f"loaded {result.component}", result)
+    if args.watch:
+        sys.stdout.flush()
+        _watch(client, args, output, result.component)
+
+
+def _watch(client: rtcf.Client, args: argparse.Namespace, output: Output, name: str) -> None:
+    for _ in python_source.saved(args.package):
+        try:
+            spec = _spec(args, output)
+            result = client.replace(name, spec, args.runner, output.progress)
+        except (rtcf.RefusedError, python_source.NotCompiledError) as error:
+            # What runs goes on; the next time may be better.
+            output.line(f"rtcfctl: {error}", to=sys.stderr)
+        else:
+            output.changed(f"replaced {name} by {args.package} as it is now", result)
+            sys.stdout.flush()
 
 
 def unload(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
@@ -76,7 +100,7 @@ def replace(client: rtcf.Client, args: argparse.Namespace, output: Output) -> No
         raise ValueError("replace: name PKG COMPONENT, or --rebuilt")
     result = client.replace(
         args.old,
-        _spec(args),
+        _spec(args, output),
         args.runner,
         output.progress,
         reset_parameters=args.reset_parameters,
@@ -209,7 +233,9 @@ def left_out(found: graph_pb2.ComponentInfo) -> bool:
 
 def _component_options(to: argparse.ArgumentParser, needed: bool = True) -> None:
     maybe: dict[str, Any] = {} if needed else {"nargs": "?", "default": ""}
-    to.add_argument("package", metavar="PKG", **maybe)
+    to.add_argument(
+        "package", metavar="PKG", help="a package, or FILE.py, which is compiled", **maybe
+    )
     to.add_argument("type", metavar="COMPONENT", help="a component type of the package", **maybe)
     to.add_argument("--name", default="", help="its name (default: the type's)")
     to.add_argument("--ns", default="", help="its namespace (default: /)")
@@ -242,9 +268,12 @@ def _component_options(to: argparse.ArgumentParser, needed: bool = True) -> None
     )
 
 
-def _spec(args: argparse.Namespace) -> graph_pb2.ComponentSpec:
+def _spec(args: argparse.Namespace, output: Output) -> graph_pb2.ComponentSpec:
+    package = args.package
+    if python_source.is_one(package):
+        package = python_source.compiled(package, args.build_tree, output.progress)
     return rtcf.component(
-        args.package,
+        package,
         args.type,
         name=args.name,
         ns=args.ns,

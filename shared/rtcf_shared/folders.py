@@ -33,6 +33,12 @@ def component_folders(extra: Sequence[Path], build_tree: Path | None) -> list[Pa
     return list(dict.fromkeys(Path(os.path.abspath(folder)) for folder in folders))
 
 
+def compiled_folder() -> Path:
+    """Return where `rtcfctl load FILE.py` puts libraries; a user's private daemons look there."""
+    cache = os.environ.get("XDG_CACHE_HOME", "")
+    return (Path(cache) if cache.startswith("/") else Path.home() / ".cache") / "rtcf-components"
+
+
 def packages(folders: Sequence[Path]) -> dict[str, list[Path]]:
     """Return the libraries of each package, in the order in which they count."""
     found: dict[str, list[Path]] = {}

@@ -12,27 +12,33 @@ from rtcf.v1 import graph_pb2, runner_pb2
 from values import state
 
 SOURCE = Path(__file__).parents[1] / "components" / "python" / "controllers.py"
-COMPILE_DEADLINE_S = 600.0
+RTCF_DIR = BUILD_TREE / "cmake" / "rtcf"
+PROJECT = """\
+cmake_minimum_required(VERSION 3.25)
+project(controllers LANGUAGES CXX)
+find_package(rtcf REQUIRED)
+rtcf_add_python_components(controllers PACKAGE py SOURCES {source})
+"""
+COMPILE_DEADLINE_S = 900.0
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Compile the components once."""
-    folder = tmp_path_factory.mktemp("lib")
-    done = subprocess.run(
-        [
-            str(BUILD_TREE / "bin" / "rtcf-compile"),
-            str(SOURCE),
-            *("-o", str(folder / "py" / "controllers.so")),
-        ],
-        env=clean_environment(),
-        capture_output=True,
-        text=True,
-        timeout=COMPILE_DEADLINE_S,
-        check=False,
-    )
-    assert (done.returncode, done.stderr) == (0, "")
-    return folder
+    """Build the components once, as anyone's project does; return the folder of packages."""
+    project = tmp_path_factory.mktemp("project")
+    (project / "CMakeLists.txt").write_text(PROJECT.format(source=SOURCE))
+    for arguments in (["-S", ".", "-B", "build", f"-Drtcf_DIR={RTCF_DIR}"], ["--build", "build"]):
+        done = subprocess.run(
+            ["cmake", *arguments],
+            cwd=project,
+            env=clean_environment(),
+            capture_output=True,
+            text=True,
+            timeout=COMPILE_DEADLINE_S,
+            check=False,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+    return project / "build" / "lib" / "rtcf"
 
 
 @pytest.fixture

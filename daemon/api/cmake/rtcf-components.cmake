@@ -11,6 +11,20 @@
 # `rtcfctl check` and crash reports need its lines.
 include(GNUInstallDirs)
 
+# Sets where the libraries of a package are built, and where they are installed.
+function(rtcf_places package folder destination)
+  if(CATKIN_DEVEL_PREFIX)
+    set(${folder} ${CATKIN_DEVEL_PREFIX}/lib/rtcf-components/${package} PARENT_SCOPE)
+  else()
+    set(${folder} ${CMAKE_BINARY_DIR}/lib/rtcf/${package} PARENT_SCOPE)
+  endif()
+  if(CMAKE_INSTALL_LIBDIR MATCHES "^lib/.")
+    set(${destination} ${CMAKE_INSTALL_LIBDIR}/rtcf/${package} PARENT_SCOPE)
+  else()
+    set(${destination} lib/rtcf-components/${package} PARENT_SCOPE)
+  endif()
+endfunction()
+
 function(rtcf_add_components target)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "PACKAGE" "SOURCES;LINK")
   if(NOT arg_PACKAGE OR NOT arg_SOURCES)
@@ -19,16 +33,7 @@ function(rtcf_add_components target)
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "rtcf_add_components(${target}): unknown arguments ${arg_UNPARSED_ARGUMENTS}")
   endif()
-  if(CATKIN_DEVEL_PREFIX)
-    set(folder ${CATKIN_DEVEL_PREFIX}/lib/rtcf-components/${arg_PACKAGE})
-  else()
-    set(folder ${CMAKE_BINARY_DIR}/lib/rtcf/${arg_PACKAGE})
-  endif()
-  if(CMAKE_INSTALL_LIBDIR MATCHES "^lib/.")
-    set(destination ${CMAKE_INSTALL_LIBDIR}/rtcf/${arg_PACKAGE})
-  else()
-    set(destination lib/rtcf-components/${arg_PACKAGE})
-  endif()
+  rtcf_places(${arg_PACKAGE} folder destination)
 
   add_library(${target} MODULE ${arg_SOURCES})
   # Not by target_link_libraries, whose two signatures do not mix: its caller may use either.
@@ -63,4 +68,46 @@ function(rtcf_add_components target)
     target_link_options(${target} PRIVATE -Wl,--no-undefined)
   endif()
   install(TARGETS ${target} LIBRARY DESTINATION ${destination} COMPONENT ${arg_PACKAGE})
+endfunction()
+
+# rtcf_add_python_components(<target> PACKAGE <package> SOURCES <file.py>... [DEPENDS <file>...])
+#
+# The same for components written in Python, which rtcf-compile (package rtcf-python) makes machine
+# code of. DEPENDS: other files that the sources import or read.
+function(rtcf_add_python_components target)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "PACKAGE" "SOURCES;DEPENDS")
+  if(NOT arg_PACKAGE OR NOT arg_SOURCES)
+    message(FATAL_ERROR "rtcf_add_python_components(${target}): PACKAGE and SOURCES are required")
+  endif()
+  if(arg_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "rtcf_add_python_components(${target}): unknown arguments ${arg_UNPARSED_ARGUMENTS}")
+  endif()
+  # That of a build tree first.
+  find_program(RTCF_COMPILE rtcf-compile HINTS ${rtcf_DIR}/../../bin)
+  if(NOT RTCF_COMPILE)
+    message(FATAL_ERROR "rtcf_add_python_components(${target}): no rtcf-compile: sudo apt install rtcf-python")
+  endif()
+  rtcf_places(${arg_PACKAGE} folder destination)
+  set(library ${folder}/${target}.so)
+  set(compiled)
+  foreach(source IN LISTS arg_SOURCES)
+    cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
+    list(APPEND compiled ${source})
+  endforeach()
+  get_target_property(includes rtcf::rtcf INTERFACE_INCLUDE_DIRECTORIES)
+  get_target_property(eigen Eigen3::Eigen INTERFACE_INCLUDE_DIRECTORIES)
+  list(APPEND includes ${eigen})
+  list(REMOVE_DUPLICATES includes)
+  list(REMOVE_ITEM includes /usr/include)
+  list(TRANSFORM includes PREPEND "-isystem ")
+  list(JOIN includes " " flags)
+  add_custom_command(
+    OUTPUT ${library}
+    COMMAND ${CMAKE_COMMAND} -E env "CXX=${CMAKE_CXX_COMPILER}" "RTCF_CXXFLAGS=${flags}"
+            ${RTCF_COMPILE} ${compiled} -o ${library}
+    DEPENDS ${compiled} ${arg_DEPENDS} ${RTCF_COMPILE}
+    COMMENT "Compiling Python components ${target}"
+    VERBATIM)
+  add_custom_target(${target} ALL DEPENDS ${library})
+  install(FILES ${library} DESTINATION ${destination} COMPONENT ${arg_PACKAGE})
 endfunction()

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rtcf.v1 import runner_pb2
-from rtcf_shared.folders import component_folders
+from rtcf_shared.folders import compiled_folder, component_folders
 
 from rtcfd import VERSION
 from rtcfd.access.rights import Access
@@ -79,7 +79,8 @@ def parse(
         state_dir=_absolute(state_dir) if state_dir else None,
         executor=_absolute(args.executor or file.executor or paths.executor(build_tree)),
         graphs_dir=_absolute(graphs_dir) if graphs_dir else None,
-        folders=_folders([*args.path, *file.path], build_tree),
+        folders=_folders([*args.path, *file.path], build_tree)
+        + ([Folder(compiled_folder(), named=True)] if args.foreground else []),
         access=file.access,
         limits=file.limits,
         defaults=runner_settings.merged(
@@ -120,7 +121,8 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
             """
         )
         + folders
-        + "\n(<prefix>/lib/rtcf-components of each prefix in CMAKE_PREFIX_PATH is among them.)",
+        + "\n(<prefix>/lib/rtcf-components of each prefix in CMAKE_PREFIX_PATH is among them;\n"
+        "with --foreground, at last what `rtcfctl load FILE.py` has compiled for you.)",
     )
     parser.add_argument("--version", action="version", version=f"rtcfd {VERSION}")
     parser.add_argument(

@@ -1,0 +1,91 @@
+"""A Python source in the place of a package: compiled, and kept for the next time."""
+
+import hashlib
+import importlib.util
+import re
+import shutil
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import rtcf
+from rtcf_shared.folders import compiled_folder
+
+_LOOK_S = 0.2
+
+
+class NotCompiledError(rtcf.RtcfError):
+    """A source that cannot be compiled; the text is one line."""
+
+
+def is_one(package: str) -> bool:
+    """Tell whether what stands in the place of a package is a Python source."""
+    return package.endswith(".py")
+
+
+def compiled(source: str, build_tree: Path | None, progress: Callable[[str], None]) -> str:
+    """Return the package of a source, which private daemons find; compile it if it is new."""
+    file = Path(source).resolve()
+    if not file.is_file():
+        raise NotCompiledError(f"{source}: no such file")
+    place = hashlib.sha256(str(file).encode()).hexdigest()[:8]
+    package = f"{re.sub(r'[^A-Za-z0-9_]', '_', file.stem)}_{place}"
+    library = compiled_folder() / package / f"{file.stem}.so"
+    # Beside the package, not in it: only libraries belong there.
+    known = compiled_folder() / f".{package}"
+    print_of_it = fingerprint(file)
+    if library.is_file() and known.is_file() and known.read_text() == print_of_it:
+        return package
+    progress(f"compiling {source}")
+    done = subprocess.run(
+        [_compiler(build_tree), source, "-o", str(library)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode != 0:
+        said = done.stderr.strip() or f"rtcf-compile ended with status {done.returncode}"
+        raise NotCompiledError(said.removeprefix("rtcf-compile: "))
+    # rtcfd takes libraries only where others cannot write, whatever our umask is.
+    for each in (library, library.parent, library.parents[1]):
+        each.chmod(0o755)
+    known.write_text(print_of_it)
+    return package
+
+
+def saved(source: str) -> Iterator[None]:
+    """Yield whenever a source, or a Python file beside it, has been saved with other content."""
+    file = Path(source).resolve()
+    last = fingerprint(file)
+    while True:
+        time.sleep(_LOOK_S)
+        now = fingerprint(file)
+        if now != last:
+            last = now
+            yield
+
+
+def fingerprint(source: Path) -> str:
+    """Return what a library of it depends on, as a hash: files beside it, and the compiler's."""
+    digest = hashlib.sha256(rtcf.__version__.encode())
+    compiler = importlib.util.find_spec("rtcf_compile")
+    folders = [source.parent]
+    if compiler is not None and compiler.origin is not None:
+        folders.append(Path(compiler.origin).parent)
+    for folder in folders:
+        for file in sorted(folder.glob("*.py")):
+            try:
+                content = file.read_bytes()
+            except OSError:
+                continue  # just being saved
+            digest.update(f"{file.name} {len(content)}\n".encode() + content)
+    return digest.hexdigest()
+
+
+def _compiler(build_tree: Path | None) -> str:
+    own = build_tree / "bin" / "rtcf-compile" if build_tree else Path("/usr/bin/rtcf-compile")
+    found = str(own) if own.is_file() else shutil.which("rtcf-compile")
+    if found is None:
+        raise NotCompiledError("no rtcf-compile to compile it: sudo apt install rtcf-python")
+    return found
