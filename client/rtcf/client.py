@@ -10,6 +10,8 @@ import grpc
 from rtcf_shared.errors import RtcfError
 
 from rtcf import direct_stop, failures
+from rtcf.errors import RefusedError
+from rtcf.replay_call import ReplayCall
 from rtcf.tenancy import Tenancy
 from rtcf.v1 import control_pb2, control_pb2_grpc, graph_pb2, runner_pb2
 
@@ -80,38 +82,50 @@ class Client:
 
     def reload(self) -> list[str]:
         """Make rtcfd read its settings and graphs.d again; return a line for each change."""
-        response = self._ask(self._stub.Reload, control_pb2.ReloadRequest(), CHANGE_TIMEOUT_S)
-        return list(response.notes)
+        response = self._change(self._stub.Reload, control_pb2.ReloadRequest(), None)
+        return list(response.result.notes)
+
+    def list_runners(self) -> list[runner_pb2.RunnerStatus]:
+        """Return the status of all runners by name, however many there are."""
+        return self._pages(self._stub.ListRunners, control_pb2.ListRunnersRequest(), "runners")
 
     def add_runner(
-        self, runner: str, settings: runner_pb2.RunnerSettings | None = None
+        self,
+        runner: str,
+        settings: runner_pb2.RunnerSettings | None = None,
+        on_progress: OnProgress | None = None,
     ) -> runner_pb2.RunnerStatus:
         """Add a runner and start its executor; what `settings` leave open takes its default."""
         request = control_pb2.AddRunnerRequest(runner=runner, settings=settings)
-        return self._ask(self._stub.AddRunner, request, CHANGE_TIMEOUT_S).status  # type: ignore[no-any-return]
+        return self._change(self._stub.AddRunner, request, on_progress).runner  # type: ignore[no-any-return]
 
     def set_runner(
-        self, settings: runner_pb2.RunnerSettings, runner: str = ""
+        self,
+        settings: runner_pb2.RunnerSettings,
+        runner: str = "",
+        on_progress: OnProgress | None = None,
     ) -> runner_pb2.RunnerStatus:
         """Change settings; what `settings` leave open stays."""
         request = control_pb2.SetRunnerRequest(runner=runner, settings=settings)
-        return self._ask(self._stub.SetRunner, request, CHANGE_TIMEOUT_S).status  # type: ignore[no-any-return]
+        return self._change(self._stub.SetRunner, request, on_progress).runner  # type: ignore[no-any-return]
 
-    def remove_runner(self, runner: str) -> None:
+    def remove_runner(self, runner: str, on_progress: OnProgress | None = None) -> None:
         """Stop a runner's loop, end its executor and forget it."""
         request = control_pb2.RemoveRunnerRequest(runner=runner)
-        self._ask(self._stub.RemoveRunner, request, CHANGE_TIMEOUT_S)
+        self._change(self._stub.RemoveRunner, request, on_progress)
 
-    def restart_runner(self, runner: str = "") -> runner_pb2.RunnerStatus:
+    def restart_runner(
+        self, runner: str, on_progress: OnProgress | None = None
+    ) -> runner_pb2.RunnerStatus:
         """Begin anew with a fresh executor and the same graph, not started."""
         request = control_pb2.RestartRunnerRequest(runner=runner)
-        return self._ask(self._stub.RestartRunner, request, CHANGE_TIMEOUT_S).status  # type: ignore[no-any-return]
+        return self._change(self._stub.RestartRunner, request, on_progress).runner  # type: ignore[no-any-return]
 
     def start(
         self, runner: str = "", on_progress: OnProgress | None = None
     ) -> control_pb2.ChangeResult:
         """Start the loop; one that runs is left alone."""
-        return self._change(self._stub.Start, control_pb2.StartRequest(runner=runner), on_progress)
+        return self._changed(self._stub.Start, control_pb2.StartRequest(runner=runner), on_progress)
 
     def stop(
         self, runner: str = "", on_progress: OnProgress | None = None
@@ -125,7 +139,7 @@ class Client:
 
         request = control_pb2.StopRequest(runner=runner)
         return direct_stop.where_rtcfd_does_not(
-            lambda heard: self._change(self._stub.Stop, request, heard, patient=False),
+            lambda heard: self._changed(self._stub.Stop, request, heard, patient=False),
             runner or DEFAULT_RUNNER,
             self.socket,
             on_progress,
@@ -149,7 +163,7 @@ class Client:
         for runner in runners:
             request = control_pb2.StopRequest(runner=runner)
             try:
-                self._change(self._stub.Stop, request, None, timeout_s=direct_stop.TIMEOUT_S)
+                self._changed(self._stub.Stop, request, None, timeout_s=direct_stop.TIMEOUT_S)
             except RtcfError as error:
                 stopped.setdefault(runner, direct_stop.Stopped(runner, error))
             else:
@@ -165,11 +179,11 @@ class Client:
         as long as the cycles take.
         """
         request = control_pb2.StepRequest(runner=runner, cycles=cycles)
-        return self._change(self._stub.Step, request, on_progress, timeout_s=None)
+        return self._changed(self._stub.Step, request, on_progress, timeout_s=None)
 
-    def replay(self, request: control_pb2.ReplayRequest) -> control_pb2.ReplayResponse:
-        """Run a piece of a recording through a loop; see rtcf.replay for whole ones."""
-        return self._ask(self._stub.Replay, request, None)  # type: ignore[no-any-return]
+    def replay(self) -> ReplayCall:
+        """Open a replay, which lasts as long as the call; see rtcf.replay for whole recordings."""
+        return ReplayCall(self._stub.Replay, self.socket)
 
     def load(
         self,
@@ -185,8 +199,8 @@ class Client:
         """
         request = control_pb2.LoadRequest(runner=runner, component=component, wait=wait)
         if not wait:
-            return self._change(self._stub.Load, request, on_progress)
-        return self._change(self._stub.Load, request, on_progress, timeout_s=None)
+            return self._changed(self._stub.Load, request, on_progress)
+        return self._changed(self._stub.Load, request, on_progress, timeout_s=None)
 
     def unload(
         self,
@@ -196,7 +210,7 @@ class Client:
     ) -> control_pb2.ChangeResult:
         """Unload components, all at one cycle boundary."""
         request = control_pb2.UnloadRequest(runner=runner, components=components)
-        return self._change(self._stub.Unload, request, on_progress)
+        return self._changed(self._stub.Unload, request, on_progress)
 
     def replace(
         self,
@@ -218,7 +232,7 @@ class Client:
             replacement=replacement,
             reset_parameters=reset_parameters,
         )
-        return self._change(self._stub.Replace, request, on_progress)
+        return self._changed(self._stub.Replace, request, on_progress)
 
     def apply(
         self,
@@ -242,7 +256,7 @@ class Client:
             dry_run=dry_run,
             rebuilt=rebuilt,
         )
-        return self._change(self._stub.Apply, request, on_progress)
+        return self._changed(self._stub.Apply, request, on_progress)
 
     def release(
         self,
@@ -252,7 +266,7 @@ class Client:
     ) -> control_pb2.ChangeResult:
         """Load components again that were left out of the loop after a fault."""
         request = control_pb2.ReleaseRequest(runner=runner, components=components)
-        return self._change(self._stub.Release, request, on_progress)
+        return self._changed(self._stub.Release, request, on_progress)
 
     def set_breaks(
         self,
@@ -263,7 +277,7 @@ class Client:
     ) -> control_pb2.ChangeResult:
         """Set (or remove) loop breaks on inputs, all at one cycle boundary."""
         request = control_pb2.SetBreaksRequest(runner=runner, ports=ports, broken=broken)
-        return self._change(self._stub.SetBreaks, request, on_progress)
+        return self._changed(self._stub.SetBreaks, request, on_progress)
 
     def set_parameters(
         self,
@@ -276,14 +290,14 @@ class Client:
         request = control_pb2.SetParametersRequest(
             runner=runner, component=component, parameters=parameters
         )
-        return self._change(self._stub.SetParameters, request, on_progress)
+        return self._changed(self._stub.SetParameters, request, on_progress)
 
     def undo_parameters(
         self, component: str, runner: str = "", on_progress: OnProgress | None = None
     ) -> control_pb2.ChangeResult:
         """Take back what was changed last of a component's parameters; again, what was before."""
         request = control_pb2.UndoParametersRequest(runner=runner, component=component)
-        return self._change(self._stub.UndoParameters, request, on_progress)
+        return self._changed(self._stub.UndoParameters, request, on_progress)
 
     def get_history(
         self, component: str = "", parameter: str = "", runner: str = "", most: int = 0
@@ -299,7 +313,7 @@ class Client:
     ) -> control_pb2.ChangeResult:
         """Take a component's declared state back to its initial values, at one cycle boundary."""
         request = control_pb2.ResetStateRequest(runner=runner, component=component)
-        return self._change(self._stub.ResetState, request, on_progress)
+        return self._changed(self._stub.ResetState, request, on_progress)
 
     def set_state(
         self,
@@ -310,7 +324,7 @@ class Client:
     ) -> control_pb2.ChangeResult:
         """Set values of a component's declared state, of a loop that does not run."""
         request = control_pb2.SetStateRequest(runner=runner, component=component, states=states)
-        return self._change(self._stub.SetState, request, on_progress)
+        return self._changed(self._stub.SetState, request, on_progress)
 
     def take_snapshot(self, runner: str = "") -> control_pb2.TakeSnapshotResponse:
         """Copy all that a runner's next cycle depends on, of one cycle boundary."""
@@ -322,7 +336,7 @@ class Client:
     ) -> control_pb2.ChangeResult:
         """Go on from a snapshot, at one cycle boundary; a loop that does not run is paused."""
         request = control_pb2.RestoreSnapshotRequest(runner=runner, snapshot=snapshot)
-        return self._change(self._stub.RestoreSnapshot, request, on_progress)
+        return self._changed(self._stub.RestoreSnapshot, request, on_progress)
 
     def hold_runner(self, opening: control_pb2.OpenHold) -> Tenancy:
         """Take a runner for as long as the tenancy lasts; its messages are HoldRunnerResponse."""
@@ -338,33 +352,40 @@ class Client:
     def list_components(self, runner: str = "") -> list[graph_pb2.ComponentInfo]:
         """Return all components in order of the schedule, without values; then those left out."""
         request = control_pb2.ListComponentsRequest(runner=runner)
-        return list(self._ask(self._stub.ListComponents, request).components)
+        return self._pages(self._stub.ListComponents, request, "components")
 
     def get_component(self, component: str, runner: str = "") -> graph_pb2.ComponentInfo:
         """Return one component with the values of its ports and parameters."""
         request = control_pb2.GetComponentRequest(runner=runner, component=component)
-        return self._ask(self._stub.GetComponent, request)  # type: ignore[no-any-return]
+        return self._ask(self._stub.GetComponent, request).component  # type: ignore[no-any-return]
 
     def get_order(self, runner: str = "") -> list[str]:
         """Return the full names of the components in order of the schedule."""
         request = control_pb2.GetOrderRequest(runner=runner)
-        return list(self._ask(self._stub.GetOrder, request).components)
+        return self._pages(self._stub.GetOrder, request, "components")
 
     def list_connections(self, runner: str = "") -> list[graph_pb2.Connection]:
         """Return all connections by name."""
         request = control_pb2.ListConnectionsRequest(runner=runner)
-        return list(self._ask(self._stub.ListConnections, request).connections)
+        return self._pages(self._stub.ListConnections, request, "connections")
 
     def list_types(self, package: str = "") -> control_pb2.ListTypesResponse:
         """Return the component types of a package, or of all, and what does not load."""
         request = control_pb2.ListTypesRequest(package=package)
         # Each library that rtcfd does not know yet is described in a process of its own.
-        return self._ask(self._stub.ListTypes, request, CHANGE_TIMEOUT_S)  # type: ignore[no-any-return]
+        found = control_pb2.ListTypesResponse()
+        while True:
+            response = self._ask(self._stub.ListTypes, request, CHANGE_TIMEOUT_S)
+            found.types.extend(response.types)
+            found.problems.extend(response.problems)
+            if not response.next_page_token:
+                return found
+            request.page_token = response.next_page_token
 
     def get_statistics(self, runner: str = "") -> runner_pb2.RunnerStatistics:
         """Return the figures of a runner's loop and of its components."""
         request = control_pb2.GetStatisticsRequest(runner=runner)
-        return self._ask(self._stub.GetStatistics, request)  # type: ignore[no-any-return]
+        return self._ask(self._stub.GetStatistics, request).statistics  # type: ignore[no-any-return]
 
     def watch_statistics(
         self, runner: str = "", interval_s: float = 1.0
@@ -374,13 +395,31 @@ class Client:
             runner=runner, interval_ms=round(interval_s * 1000)
         )
         try:
-            yield from self._stub.WatchStatistics(request)
+            for response in self._stub.WatchStatistics(request):
+                yield response.statistics
         except grpc.RpcError as error:
             raise failures.from_grpc(error, self.socket) from None
 
     def reset_statistics(self, runner: str = "") -> None:
         """Begin the figures anew."""
         self._ask(self._stub.ResetStatistics, control_pb2.ResetStatisticsRequest(runner=runner))
+
+    def _pages(self, method: Any, request: Any, field: str) -> list[Any]:
+        """Return a whole list; one that changes between two pages is asked for again."""
+        found: list[Any] = []
+        while True:
+            try:
+                response = self._ask(method, request)
+            except RefusedError as refused:
+                if refused.reason != "LIST_CHANGED":
+                    raise
+                found.clear()
+                request.page_token = ""
+                continue
+            found.extend(getattr(response, field))
+            request.page_token = response.next_page_token
+            if not request.page_token:
+                return found
 
     def _ask(self, method: Any, request: Any, timeout_s: float | None = QUERY_TIMEOUT_S) -> Any:
         until = time.monotonic() + _CROWDED_S
@@ -399,7 +438,7 @@ class Client:
         time.sleep(_RETRY_S)
         return True
 
-    def _change(
+    def _changed(
         self,
         method: Any,
         request: Any,
@@ -408,6 +447,19 @@ class Client:
         *,
         patient: bool = True,
     ) -> control_pb2.ChangeResult:
+        last = self._change(method, request, on_progress, timeout_s, patient=patient)
+        return last.result  # type: ignore[no-any-return]
+
+    def _change(
+        self,
+        method: Any,
+        request: Any,
+        on_progress: OnProgress | None,
+        timeout_s: float | None = CHANGE_TIMEOUT_S,
+        *,
+        patient: bool = True,
+    ) -> Any:
+        """Follow a long call; return its last message."""
         until = time.monotonic() + (_CROWDED_S if patient else 0.0)
         while True:
             try:
@@ -419,13 +471,11 @@ class Client:
     @staticmethod
     def _change_once(
         method: Any, request: Any, on_progress: OnProgress | None, timeout_s: float | None
-    ) -> control_pb2.ChangeResult:
-        result = control_pb2.ChangeResult()
+    ) -> Any:
+        last: Any = None
         # A rtcfd that was stopped may come to it after somebody has ended the loop elsewhere.
         asked = (("rtcf-asked-ns", str(time.monotonic_ns())),)
-        for response in method(request, timeout=timeout_s, metadata=asked):
-            if response.WhichOneof("kind") == "result":
-                result = response.result
-            elif on_progress is not None:
-                on_progress(response.progress)
-        return result
+        for last in method(request, timeout=timeout_s, metadata=asked):
+            if on_progress is not None and last.WhichOneof("kind") == "progress":
+                on_progress(last.progress)
+        return last

@@ -14,6 +14,7 @@ from typing import Any
 from rtcf_shared.errors import RtcfError
 
 from rtcf.client import Client
+from rtcf.replay_call import ReplayCall
 from rtcf.v1 import control_pb2
 
 # Of one request; far below what a frame takes.
@@ -54,7 +55,7 @@ def replay(
     """
     if output is not None and output.resolve() == recording.resolve():
         raise RecordingError(f"{output} is the recording itself: write to another file")
-    with _reader(recording) as bag:
+    with _reader(recording) as bag, client.replay() as call:
         topics = [
             control_pb2.RecordedTopic(topic=each.topic, type=each.datatype, md5=each.md5sum)
             for each in bag._get_connections()
@@ -64,40 +65,33 @@ def replay(
         if first is None:
             raise RecordingError(f"{recording} holds no message")
         start_ns = int(first.timestamp.to_nsec())
-        request = control_pb2.ReplayRequest(
-            runner=runner, begin=True, start_ns=start_ns, topics=topics
+        begun = call.run(
+            control_pb2.ReplayRequest(runner=runner, begin=True, start_ns=start_ns, topics=topics)
         )
-        begun = client.replay(request)
-        session = _Session(client, runner, {each.topic for each in begun.inputs})
+        session = _Session(call, {each.topic for each in begun.inputs})
         session.summary.start_ns = session.summary.end_ns = start_ns
         recorded = {each.topic for each in topics}
         session.summary.unread = sorted(recorded - session.inputs)
         session.summary.missing = sorted(session.inputs - recorded)
-        try:
-            with _Writer(output, begun.written) as writer:
-                session.take(first, writer)
-                for message in messages:
-                    session.take(message, writer)
-                    if on_progress is not None and session.due:
-                        seconds = (session.summary.end_ns - start_ns) / 1e9
-                        on_progress(f"{seconds:.1f} s, {session.summary.cycles} cycles")
-                session.run(writer, end=True)
-        except BaseException:
-            with contextlib.suppress(RtcfError):
-                client.stop(runner)
-            raise
+        with _Writer(output, begun.written) as writer:
+            session.take(first, writer)
+            for message in messages:
+                session.take(message, writer)
+                if on_progress is not None and session.due:
+                    seconds = (session.summary.end_ns - start_ns) / 1e9
+                    on_progress(f"{seconds:.1f} s, {session.summary.cycles} cycles")
+            session.run(writer, end=True)
         return session.summary
 
 
 class _Session:
     """A replay that is under way."""
 
-    def __init__(self, client: Client, runner: str, inputs: set[str]) -> None:
+    def __init__(self, call: ReplayCall, inputs: set[str]) -> None:
         self.inputs = inputs
         self.summary = Summary()
         self.due = False  # cycles have just been run
-        self._client = client
-        self._runner = runner
+        self._call = call
         self._waiting: list[control_pb2.RecordedMessage] = []
         self._bytes = 0
 
@@ -121,12 +115,9 @@ class _Session:
         """Run all cycles up to the last message's time."""
         more = True
         while more:
-            response = self._client.replay(
+            response = self._call.run(
                 control_pb2.ReplayRequest(
-                    runner=self._runner,
-                    messages=self._waiting,
-                    until_ns=self.summary.end_ns,
-                    end=end,
+                    messages=self._waiting, until_ns=self.summary.end_ns, end=end
                 )
             )
             del self._waiting[: response.consumed]

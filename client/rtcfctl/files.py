@@ -79,7 +79,7 @@ def _apply(
 def _chosen(graphs: list[rtcf.Graph], args: argparse.Namespace) -> list[rtcf.Graph]:
     """Return the graphs of the runner that --runner names, or all."""
     if len(graphs) == 1 and (args.runner or not graphs[0].runner):
-        graphs[0].runner = args.runner or "rt_runner"
+        graphs[0].runner = args.runner
     if not args.runner:
         return graphs
     found = [graph for graph in graphs if graph.runner == args.runner]
@@ -99,10 +99,11 @@ def _print(
     sentence: str,
 ) -> None:
     if not output.for_people:
-        output.data({graph.runner: result for graph, result in zip(graphs, results, strict=True)})
+        names = [graph.runner or "rt_runner" for graph in graphs]
+        output.data(dict(zip(names, results, strict=True)))
         return
     rows = [
-        (graph.runner, each) for graph, result in zip(graphs, results, strict=True)
+        (graph.runner or "rt_runner", each) for graph, result in zip(graphs, results, strict=True)
         for each in result.differences
     ]  # fmt: skip
     if rows:

@@ -9,7 +9,6 @@ import rtcf
 from rtcfctl.output import Output
 
 # How such a note begins.
-_DEGRADED = "degraded real time: "
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
@@ -34,12 +33,7 @@ def start(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None
     """Start the loop."""
     result = client.start(args.runner, output.progress)
     if output.for_people:
-        lacks = [note for note in result.notes if note.startswith(_DEGRADED)]
-        output.alarm(
-            args.runner or "rt_runner", [note.removeprefix(_DEGRADED) for note in lacks], sys.stderr
-        )
-        for note in lacks:
-            result.notes.remove(note)
+        output.alarm(args.runner or "rt_runner", result.degraded, sys.stderr)
     output.changed("started", result)
 
 

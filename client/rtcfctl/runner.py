@@ -51,7 +51,7 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     again = actions.add_parser(
         "restart", parents=[common], help="a fresh executor with the same graph, not started"
     )
-    again.add_argument("name", metavar="NAME", nargs="?", default="")
+    again.add_argument("name", metavar="NAME")
     again.set_defaults(run=restart_runner)
 
     remove = actions.add_parser("remove", parents=[common], help="stop a runner and forget it")
@@ -70,7 +70,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 def add_runner(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Add a runner."""
-    status = client.add_runner(args.name, settings_of(args))
+    status = client.add_runner(args.name, settings_of(args), output.progress)
     _changed(output, f"runner {status.runner} added", status)
 
 
@@ -79,19 +79,19 @@ def set_runner(client: rtcf.Client, args: argparse.Namespace, output: Output) ->
     settings = settings_of(args)
     if not settings.ListFields():
         raise ValueError("runner set: no setting named; see `rtcfctl runner set --help`")
-    status = client.set_runner(settings, args.name or args.runner)
+    status = client.set_runner(settings, args.name or args.runner, output.progress)
     _changed(output, f"runner {status.runner} set", status)
 
 
 def restart_runner(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Restart a runner's executor."""
-    status = client.restart_runner(args.name or args.runner)
+    status = client.restart_runner(args.name, output.progress)
     _changed(output, f"runner {status.runner} restarted", status)
 
 
 def remove_runner(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Remove a runner."""
-    client.remove_runner(args.name)
+    client.remove_runner(args.name, output.progress)
     if output.for_people:
         print(f"runner {args.name} removed")
     else:

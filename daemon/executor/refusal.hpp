@@ -8,14 +8,45 @@
 
 namespace rtcf::executor {
 
+/// What programs switch on: server/convert.cpp makes a reason and a code of each.
 enum class RefusalKind {
-    InvalidArgument,
-    NotFound,
+    InvalidArgument,  ///< a value is out of range or of the wrong type
+    RequestMalformed,
+    NameMissing,
+    NameInvalid,
+    TextTooLong,
+    ExpressionInvalid,
+    ComponentTwice,
+    RatesConflict,
+    RecordingInvalid,
+
+    NotFound,  ///< a component
+    PortNotFound,
+    ParameterNotFound,
+    TypeNotFound,
+
     AlreadyExists,
+
     FailedPrecondition,
-    Unavailable,
+    TypesDiffer,
+    ConnectionsFormLoop,
+    TwoWriters,
+    TwoPacers,
+    LibraryRefused,
+    HookFailed,
     NoMaster,
-    ResourceExhausted
+    NoRealtime,
+    NoState,
+    LoopRuns,
+    LoopFailed,
+    LoopStopped,
+    ReplayRuns,
+    NoReplay,
+
+    Unavailable,  ///< the loop reaches no boundary, or a hook does not return
+
+    ResourceExhausted,
+    StateTooLarge
 };
 
 class Refusal : public std::runtime_error {

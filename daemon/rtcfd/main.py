@@ -272,7 +272,9 @@ def _reload(socket: Path) -> int:
     try:
         with grpc.insecure_channel(f"unix:{socket}") as channel:
             daemon = control_pb2_grpc.ControlStub(channel)  # type: ignore[no-untyped-call]
-            response = daemon.Reload(control_pb2.ReloadRequest())
+            response = control_pb2.ReloadResult()
+            for message in daemon.Reload(control_pb2.ReloadRequest()):
+                response = message.result
             for line in response.notes:
                 if line not in response.refused:
                     print(line)

@@ -100,7 +100,7 @@ class _Reader:
             if key == "remaps":
                 for port, (_, target) in self._mapping(value, key).items():
                     to = self._text(target, f"remaps.{port}")
-                    spec.remaps.append(graph_pb2.Remap(**{"from": port, "to": to}))
+                    spec.remaps.append(graph_pb2.Remap(source=port, target=to))
             elif key == "parameters":
                 for name, (_, content) in self._mapping(value, key).items():
                     parsed = self._value(content, f"parameters.{name}")

@@ -90,7 +90,7 @@ def _component(spec: graph_pb2.ComponentSpec) -> dict[str, Any]:
         result["ns"] = spec.ns
     result |= {"package": spec.package, "type": spec.type}
     if spec.remaps:
-        result["remaps"] = {getattr(remap, "from"): remap.to for remap in spec.remaps}
+        result["remaps"] = {remap.source: remap.target for remap in spec.remaps}
     if spec.parameters:
         result["parameters"] = {
             setting.name: getattr(setting.value, setting.value.WhichOneof("kind"))

@@ -62,7 +62,7 @@ def parse_remap(text: str) -> graph_pb2.Remap:
     source, target = _split(text, "a remap is from:=to")
     if not target:
         raise ValueError(f'"{text}": a remap is from:=to')
-    return graph_pb2.Remap(**{"from": source, "to": target})
+    return graph_pb2.Remap(source=source, target=target)
 
 
 def parse_parameter(text: str) -> graph_pb2.ParameterSetting:

@@ -79,7 +79,7 @@ def test_no_loop_is_adopted_and_each_advice_makes_an_order(
         specs = gather(nodes, edges)
         generation = client.get_status("rt_runner").runners[0].generation
         with pytest.raises(rtcf.RefusedError) as refused:
-            client.apply(specs)
+            client.apply(specs, "rt_runner")
         line = str(refused.value)
         check_loop(line, edges)
         assert client.get_order() == []
@@ -90,9 +90,9 @@ def test_no_loop_is_adopted_and_each_advice_makes_an_order(
             for name in shlex.split(command):
                 component, port = name.split(".")
                 specs[int(component[1:])].breaks.append(port)
-            client.apply(specs)
+            client.apply(specs, "rt_runner")
             assert sorted(client.get_order()) == [f"/n{node}" for node in range(nodes)]
-            client.apply([])
+            client.apply([], "rt_runner")
             for spec in specs:
                 del spec.breaks[:]
 

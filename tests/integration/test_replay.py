@@ -9,7 +9,8 @@ import pytest
 import rosbag
 import rospy
 import rtcf
-from daemon_process import Daemon
+from daemon_process import Daemon, wait_for
+from rtcf import refusals
 from rtcf.v1 import control_pb2, runner_pb2
 from std_msgs.msg import Float64, String
 
@@ -132,13 +133,50 @@ def test_a_bag_that_cannot_be_replayed_is_refused_in_one_line(
 
 
 def test_a_graph_is_not_changed_while_it_replays(daemon: Daemon) -> None:
-    with rtcf.Client(daemon.socket) as client:
-        client.replay(control_pb2.ReplayRequest(begin=True, start_ns=START_NS))
-        begun = client.replay(control_pb2.ReplayRequest(until_ns=START_NS + 9 * PERIOD_NS))
+    with rtcf.Client(daemon.socket) as client, client.replay() as replay:
+        replay.run(control_pb2.ReplayRequest(begin=True, start_ns=START_NS))
+        begun = replay.run(control_pb2.ReplayRequest(until_ns=START_NS + 9 * PERIOD_NS))
         assert begun.cycles == 10
         with pytest.raises(rtcf.RefusedError, match="a replay of rt_runner is under way"):
             client.unload(["H1"])
         client.stop()
         with pytest.raises(rtcf.RefusedError, match="no replay of rt_runner is under way"):
-            client.replay(control_pb2.ReplayRequest(until_ns=START_NS + 20 * PERIOD_NS))
+            replay.run(control_pb2.ReplayRequest(until_ns=START_NS + 20 * PERIOD_NS))
         client.unload(["H1"])
+
+
+def test_a_replay_ends_with_its_client(daemon: Daemon) -> None:
+    with rtcf.Client(daemon.socket) as client:
+        with client.replay() as replay:
+            replay.run(control_pb2.ReplayRequest(begin=True, start_ns=START_NS))
+            with pytest.raises(refusals.ReplayRunsError):
+                client.unload(["H1"])
+        wait_for(lambda: _unloads(client, "H1"), "the end of the replay")
+
+
+def test_who_leaves_a_replay_that_somebody_stopped_ends_no_other_loop(daemon: Daemon) -> None:
+    with rtcf.Client(daemon.socket) as client:
+        with client.replay() as replay:
+            replay.run(control_pb2.ReplayRequest(begin=True, start_ns=START_NS))
+            client.stop()
+            client.start()
+        client.set_breaks([rtcf.parse_port("H1.in1")], True)  # in its turn, behind what follows
+        assert client.get_status().runners[0].state == runner_pb2.RUNNER_STATE_RUNNING
+
+
+def test_a_replay_begins_once_and_first(daemon: Daemon) -> None:
+    with rtcf.Client(daemon.socket) as client:
+        with client.replay() as replay, pytest.raises(refusals.RequestMalformedError):
+            replay.run(control_pb2.ReplayRequest(until_ns=START_NS))
+        with client.replay() as replay:
+            replay.run(control_pb2.ReplayRequest(begin=True, start_ns=START_NS))
+            with pytest.raises(refusals.RequestMalformedError):
+                replay.run(control_pb2.ReplayRequest(begin=True, start_ns=START_NS))
+
+
+def _unloads(client: rtcf.Client, component: str) -> bool:
+    try:
+        client.unload([component])
+    except refusals.ReplayRunsError:
+        return False
+    return True

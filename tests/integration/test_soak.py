@@ -102,8 +102,8 @@ class GraphMachine(stateful.RuleBasedStateMachine):
     def begin(self) -> None:
         # Hypothesis runs what failed once more.
         self.client.stop()
-        self.client.apply([])
-        self.client.apply([_steady()])
+        self.client.apply([], "rt_runner")
+        self.client.apply([_steady()], "rt_runner")
         self._start()
 
     def _there(self, pick: int) -> str:

@@ -182,7 +182,7 @@ class LauncherNode:
             optional=self._parameters.optional,
         )
         for source, target in self._given.remaps:
-            spec.remaps.add(**{"from": source, "to": target})
+            spec.remaps.add(source=source, target=target)
         if type_name in offered:
             values, rest, slips = component_parameters.settings(self._parameters.others, declared)
             spec.parameters.extend(values)
@@ -234,8 +234,8 @@ class LauncherNode:
                 self._reconnect(event.error)
                 continue
             kind = event.WhichOneof("kind")
-            if kind == "progress" and event.progress.startswith("waiting"):
-                self._screen.warn(event.progress)
+            if kind == "waiting":
+                self._screen.warn(event.waiting)
             elif kind == "loaded":
                 self._say_loaded(event.loaded)
             elif kind == "logs":

@@ -265,9 +265,8 @@ class RunnerNode:
             result = self._client.start(self._runner)
         except rtcf.RefusedError as refusal:
             raise Ending(Code.REFUSED, f"the loop does not start: {refusal}") from None
-        for note in result.notes:
-            if not note.startswith("degraded"):  # said when it runs
-                self._screen.warn(note)
+        for note in result.notes:  # what is missing for real time is said when it runs
+            self._screen.warn(note)
 
     def _reconnect(self, error: rtcf.RtcfError) -> None:
         if isinstance(error, rtcf.RefusedError):

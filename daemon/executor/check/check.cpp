@@ -117,7 +117,7 @@ void run(const CheckRequest& request, Runner& runner, ValueSource& values) {
         if (!members) members.emplace(runner.component(name));
         members->look();
         if (runner.loop().fault().kind != LoopFault::Kind::None) {
-            throw Refusal(RefusalKind::FailedPrecondition, runner.picture().status);
+            throw Refusal(RefusalKind::LoopFailed, runner.picture().status);
         }
     }
     say("stopping");

@@ -76,7 +76,7 @@ std::uint32_t FlightRecorder::addSlot(const std::string& name) {
     } else if (next_ < kSlots) {
         ++next_;
     } else {
-        throw Refusal(RefusalKind::FailedPrecondition,
+        throw Refusal(RefusalKind::ResourceExhausted,
                       fmt::format("{}: a runner holds at most {} components; add another runner",
                                   name, kSlots - 1));
     }

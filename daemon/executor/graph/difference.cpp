@@ -72,7 +72,7 @@ std::vector<Difference> compare(const Graph& graph, const std::vector<WantedComp
     std::set<std::string> names;
     for (const WantedComponent& component : wanted) {
         if (names.insert(component.definition.fullName()).second) continue;
-        throw Refusal(RefusalKind::InvalidArgument,
+        throw Refusal(RefusalKind::ComponentTwice,
                       fmt::format("{} stands twice in the graph", component.definition.fullName()));
     }
     std::vector<Difference> differences;

@@ -70,8 +70,9 @@ void Graph::setBreak(const std::string& full_name, const std::string& port, bool
         for (const InputBase* input : node.instance->component().inputs()) {
             names += (names.empty() ? "" : ", ") + input->name();
         }
-        throw Refusal(RefusalKind::NotFound, fmt::format("{} has no input {}; it has {}", full_name,
-                                                         port, names.empty() ? "none" : names));
+        throw Refusal(RefusalKind::PortNotFound,
+                      fmt::format("{} has no input {}; it has {}", full_name, port,
+                                  names.empty() ? "none" : names));
     }
     if (broken) {
         node.breaks.insert(port);

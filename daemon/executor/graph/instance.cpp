@@ -17,7 +17,7 @@ const ComponentRecord& findRecord(const Library& library, const ComponentDefinit
     std::string names;
     for (const ComponentRecord* record : library.types())
         names += (names.empty() ? "" : ", ") + std::string(record->type);
-    throw Refusal(RefusalKind::NotFound,
+    throw Refusal(RefusalKind::TypeNotFound,
                   fmt::format("{} has no component type {}; it has {}", library.path(),
                               definition.type, names.empty() ? "none" : names));
 }
@@ -140,7 +140,7 @@ void Instance::setFirstParameters() {
 // A failing hook's own words, or its exception's, in one line.
 void Instance::callHook(Hook hook, const std::function<bool()>& call) {
     HookNote note(recorder_, slot(), hook, gate_, context_.full_name);
-    RefusalKind kind = RefusalKind::FailedPrecondition;
+    RefusalKind kind = RefusalKind::HookFailed;
     std::string why;
     try {
         const bool passed = call();
@@ -212,7 +212,7 @@ void Instance::freezePorts() {
     }
     for (const std::string& port : definition_.breaks) {
         if (findInput(port) != nullptr) continue;
-        throw Refusal(RefusalKind::NotFound,
+        throw Refusal(RefusalKind::PortNotFound,
                       fmt::format("{} has no input {} to break", context_.full_name, port));
     }
 }
@@ -279,7 +279,7 @@ std::vector<StagedValue*> Instance::stageParameters(
                                             return parameter->declaration().name == name;
                                         });
         if (found == declared.end()) {
-            throw Refusal(RefusalKind::NotFound,
+            throw Refusal(RefusalKind::ParameterNotFound,
                           fmt::format("{} has no parameter {}; it has {}", context_.full_name, name,
                                       parameterNames(*component_)));
         }

@@ -52,7 +52,7 @@ NamePattern::NamePattern(const std::string& what, const std::string& expression)
     try {
         regex_.emplace(expression, kSyntax);
     } catch (const std::regex_error& error) {
-        throw Refusal(RefusalKind::InvalidArgument,
+        throw Refusal(RefusalKind::ExpressionInvalid,
                       fmt::format("{}: bad regular expression '{}': {}", what, expression,
                                   reason(error.code(), expression)));
     }
@@ -62,7 +62,7 @@ bool NamePattern::matches(const std::string& name) const {
     try {
         return regex_ && std::regex_match(name, *regex_);
     } catch (const std::regex_error& error) {
-        throw Refusal(RefusalKind::InvalidArgument,
+        throw Refusal(RefusalKind::ExpressionInvalid,
                       fmt::format("a regular expression takes too long on '{}': {}", name,
                                   reason(error.code())));
     }

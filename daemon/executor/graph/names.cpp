@@ -31,7 +31,7 @@ std::string cleaned(const std::string& name) {
 void requireLength(const char* what, const std::string& text, std::size_t longest) {
     if (text.size() <= longest) return;
     constexpr std::size_t kShown = 40;
-    throw Refusal(RefusalKind::InvalidArgument,
+    throw Refusal(RefusalKind::TextTooLong,
                   fmt::format("{} '{}…' has {} characters: at most {} are allowed", what,
                               text.substr(0, kShown), text.size(), longest));
 }
@@ -53,7 +53,7 @@ std::string canonicalNamespace(const std::string& ns) {
     const std::string absolute = cleaned(ns[0] == '/' ? ns : "/" + ns);
     if (!isGraphName(absolute)) {
         throw Refusal(
-            RefusalKind::InvalidArgument,
+            RefusalKind::NameInvalid,
             "namespace '" + ns + "' is not a legal ROS name: letters, digits, _ and / only");
     }
     return absolute;
@@ -84,7 +84,7 @@ std::string mappedName(const std::string& port, const std::string& ns, const std
 std::string fullNameOf(const std::string& given) {
     requireLength("component name", given);
     if (!isGraphName(given) || given[0] == '~') {
-        throw Refusal(RefusalKind::InvalidArgument, "'" + given + "' is not a component's name");
+        throw Refusal(RefusalKind::NameInvalid, "'" + given + "' is not a component's name");
     }
     return cleaned(given[0] == '/' ? given : "/" + given);
 }

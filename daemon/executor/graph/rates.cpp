@@ -48,7 +48,7 @@ void requireHarmonic(const Graph& graph, const std::string& loading) {
             }
             const std::uint32_t every = blamed->definition().every;
             throw Refusal(
-                RefusalKind::InvalidArgument,
+                RefusalKind::RatesConflict,
                 fmt::format("{} runs {}, which does not go with {} {}: one must divide the other; "
                             "try --every {}",
                             blamed->fullName(), suffix(every), other->fullName(),

@@ -29,7 +29,7 @@ std::string describe(const TypeInfo& type, const TypeInfo& other) {
                               const TypeInfo& present_type, const std::string& added,
                               const TypeInfo& added_type) {
     throw Refusal(
-        RefusalKind::FailedPrecondition,
+        RefusalKind::TypesDiffer,
         fmt::format("types differ on {}: {} is {}, {} is {}; remap one of them to another name",
                     name, present, describe(present_type, added_type), added,
                     describe(added_type, present_type)));
@@ -133,7 +133,7 @@ std::string breakCommand(const Graph& graph, const std::vector<Edge>& cut,
     }
     if (result.cuts.size() > kListedCuts) advice += ", or elsewhere in the loop";
     throw Refusal(
-        RefusalKind::FailedPrecondition,
+        RefusalKind::ConnectionsFormLoop,
         fmt::format("the connections form a loop: {}; let one input read the previous cycle: {}",
                     loop, advice));
 }
@@ -163,7 +163,7 @@ void requireOneWriter(const Graph& graph, const std::string& name, const Connect
     const Writer& other = plan.others.front();
     const std::string& port = other.output->name();
     throw Refusal(
-        RefusalKind::FailedPrecondition,
+        RefusalKind::TwoWriters,
         fmt::format("{} has two writers and a reader: {} and {} write what {} reads; remap one of "
                     "them, e.g. --remap {}:=~{}",
                     name, portName(graph, plan.writer->node, plan.writer->output->name()),
@@ -182,7 +182,7 @@ void requireOneSource(const Graph& graph) {
         if (node.instance->source() == nullptr) continue;
         if (present != nullptr) {
             throw Refusal(
-                RefusalKind::FailedPrecondition,
+                RefusalKind::TwoPacers,
                 fmt::format("{} and {} both pace the loop: put one of them into another runner",
                             present->fullName(), node.instance->fullName()));
         }

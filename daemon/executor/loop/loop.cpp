@@ -65,7 +65,7 @@ Loop::~Loop() {
 void Loop::reset(const LoopSettings& settings, std::uint64_t stops_known) {
     stops_known_ = stops_known;
     if (stopRequested()) {
-        throw Refusal(RefusalKind::FailedPrecondition,
+        throw Refusal(RefusalKind::LoopStopped,
                       "the loop is not started: a stop was asked for after the start");
     }
     cycle_.begin(settings.period_ns, settings.warmup_cycles);
@@ -96,7 +96,7 @@ RealtimeProblems Loop::start(const LoopSettings& settings, std::uint64_t stops_k
         joinable_.store(false, std::memory_order_release);
         idle_guard_.reset();
         leaveCpu();
-        throw Refusal(RefusalKind::FailedPrecondition,
+        throw Refusal(RefusalKind::NoRealtime,
                       fmt::format("no real-time thread: {} (CPU {}, priority {})",
                                   std::strerror(error), realtime.cpu, realtime.priority));
     }

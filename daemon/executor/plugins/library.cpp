@@ -38,7 +38,7 @@ class FileDescriptor {
 };
 
 [[noreturn]] void refuse(const std::string& path, const std::string& why) {
-    throw Refusal(RefusalKind::FailedPrecondition, fmt::format("library {}: {}", path, why));
+    throw Refusal(RefusalKind::LibraryRefused, fmt::format("library {}: {}", path, why));
 }
 
 std::string systemError() { return std::strerror(errno); }

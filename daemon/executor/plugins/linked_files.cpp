@@ -85,7 +85,7 @@ class LinkCheck {
     }
 
     [[noreturn]] void refuse(const std::string& why) const {
-        throw Refusal(RefusalKind::FailedPrecondition,
+        throw Refusal(RefusalKind::LibraryRefused,
                       fmt::format("library {}: {}: build it without", library_, why));
     }
 

@@ -76,7 +76,7 @@ class Walk {
 
    private:
     [[noreturn]] void refuse(const std::string& why) const {
-        throw Refusal(RefusalKind::FailedPrecondition, fmt::format("{}: {}", subject_, why));
+        throw Refusal(RefusalKind::LibraryRefused, fmt::format("{}: {}", subject_, why));
     }
 
     // Links have been resolved: one that is met now was put there since.

@@ -46,7 +46,7 @@ std::shared_ptr<Instance> Runner::makeInstance(ComponentDefinition definition,
 
 void Runner::requireNoReplay() const {
     if (!replay_) return;
-    throw Refusal(RefusalKind::FailedPrecondition,
+    throw Refusal(RefusalKind::ReplayRuns,
                   fmt::format("a replay of {0} is under way: wait for its end, or stop it: "
                               "rtcfctl -r {0} stop",
                               name_));
@@ -124,7 +124,7 @@ void Runner::handOver(Change& change, const Instance& previous, const Instance& 
         for (const StateCopy& state : other.states) bytes += state.size;
     }
     if (bytes > kLargestState) {
-        throw Refusal(RefusalKind::ResourceExhausted,
+        throw Refusal(RefusalKind::StateTooLarge,
                       fmt::format("{} bytes of state are to be handed over at once, {} at most: "
                                   "replace fewer components at a time",
                                   bytes, kLargestState));
@@ -189,8 +189,7 @@ void Runner::addRemarks(ChangeOutcome& outcome, const std::set<std::string>& com
 }
 
 ChangeOutcome Runner::unload(const std::vector<std::string>& names, const Progress& progress) {
-    if (names.empty())
-        throw Refusal(RefusalKind::InvalidArgument, "no component to unload is named");
+    if (names.empty()) throw Refusal(RefusalKind::NameMissing, "no component to unload is named");
     Change change;
     change.graph = plan_->graph;
     for (const std::string& name : names) {
@@ -307,7 +306,7 @@ void Runner::addDifference(Change& change, const Difference& difference, const P
 
 ChangeOutcome Runner::setBreaks(const std::vector<std::pair<std::string, std::string>>& ports,
                                 bool broken) {
-    if (ports.empty()) throw Refusal(RefusalKind::InvalidArgument, "no input is named");
+    if (ports.empty()) throw Refusal(RefusalKind::NameMissing, "no input is named");
     Change change;
     change.graph = plan_->graph;
     for (const auto& [component, port] : ports) change.graph.setBreak(component, port, broken);
@@ -318,7 +317,7 @@ ChangeOutcome Runner::setBreaks(const std::vector<std::pair<std::string, std::st
 ChangeOutcome Runner::reset(const std::string& name) {
     const Component& component = plan_->graph.get(name).instance->component();
     if (component.states().empty()) {
-        throw Refusal(RefusalKind::FailedPrecondition,
+        throw Refusal(RefusalKind::NoState,
                       fmt::format("{} declares no state (rtcf::State) that could be reset", name));
     }
     Change change;

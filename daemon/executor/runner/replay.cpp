@@ -24,7 +24,7 @@ void Replay::check(const BridgeTable& table, const std::vector<RecordedTopic>& t
             if (recorded.topic != injector->topic() || recorded.md5 == injector->type().ros_md5)
                 continue;
             throw Refusal(
-                RefusalKind::InvalidArgument,
+                RefusalKind::RecordingInvalid,
                 fmt::format("{} is recorded as {} (MD5 {}), its reader takes {} (MD5 {}): replay "
                             "without that topic, or remap the input",
                             recorded.topic, recorded.type, recorded.md5, injector->type().ros_type,
@@ -73,7 +73,7 @@ void Replay::inject(const RecordedMessage& message) {
     if (found->second->deliver(reinterpret_cast<const std::uint8_t*>(message.bytes.data()),
                                static_cast<std::uint32_t>(message.bytes.size())))
         return;
-    throw Refusal(RefusalKind::InvalidArgument,
+    throw Refusal(RefusalKind::RecordingInvalid,
                   fmt::format("a message of {} at {:.9f} s is none of type {}: is the recording "
                               "damaged?",
                               message.topic, static_cast<double>(message.time_ns) / 1e9,

@@ -48,9 +48,10 @@ struct NumberedState {
 /// What came of a change.
 struct ChangeOutcome {
     std::uint64_t generation = 0;
-    std::vector<std::string> order;  ///< full names
-    std::string component;           ///< full name of the one the change was about; may be empty
-    std::vector<std::string> notes;  ///< one line each
+    std::vector<std::string> order;     ///< full names
+    std::string component;              ///< full name of the one the change was about; may be empty
+    std::vector<std::string> notes;     ///< one line each
+    std::vector<std::string> degraded;  ///< of start(): what is missing for real time
     std::vector<Difference> differences;  ///< of apply()
     std::uint64_t cycles = 0;             ///< of step(): how many were run
     /// Of replace(): what the new component has of the old one's values.

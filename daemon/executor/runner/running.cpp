@@ -67,8 +67,7 @@ ChangeOutcome Runner::start(const Progress& progress) {
         tell({RunnerEvent::Kind::Degraded, "degraded real time: " + problem, {}, 0});
     }
     ChangeOutcome result = outcome();
-    for (const std::string& problem : degraded_)
-        result.notes.push_back("degraded real time: " + problem);
+    result.degraded = degraded_;
     return result;
 }
 
@@ -76,7 +75,7 @@ ChangeOutcome Runner::start(const Progress& progress) {
 void Runner::requireNoStop() const {
     if (loop_.stops() == job_stops_) return;
     throw Refusal(
-        RefusalKind::FailedPrecondition,
+        RefusalKind::LoopStopped,
         fmt::format("the loop of {} is not started: a stop was asked for after the start", name_));
 }
 
@@ -90,7 +89,7 @@ RealtimeProblems Runner::lockAndStart() {
         if (!problem.essential) continue;
         lacks_realtime_ = true;
         if (!settings_.realtime_required) continue;
-        throw Refusal(RefusalKind::FailedPrecondition,
+        throw Refusal(RefusalKind::NoRealtime,
                       fmt::format("no real time: {}; or let it run degraded: rtcfctl runner set {} "
                                   "--realtime preferred",
                                   problem.text, name_));

@@ -13,7 +13,7 @@ void Runner::requireNoLoop() {
     noticeEnd();
     if (!loop_.joinable()) return;
     throw Refusal(
-        RefusalKind::FailedPrecondition,
+        RefusalKind::LoopRuns,
         fmt::format("the loop of {0} runs in real time: stop it first: rtcfctl -r {0} stop",
                     name_));
 }
@@ -62,7 +62,7 @@ ReplayOutcome Runner::replay(const ReplayChunk& chunk, const Progress& progress)
     if (chunk.begin) {
         outcome = beginReplay(chunk, progress);
     } else if (!replay_) {
-        throw Refusal(RefusalKind::FailedPrecondition,
+        throw Refusal(RefusalKind::NoReplay,
                       fmt::format("no replay of {} is under way: it was stopped", name_));
     } else {
         try {
@@ -76,7 +76,7 @@ ReplayOutcome Runner::replay(const ReplayChunk& chunk, const Progress& progress)
     note({});
     const bool ended = loop_.fault().kind != LoopFault::Kind::None || loop_.stopRequested();
     if ((chunk.end && !outcome.more) || ended) endStepping();
-    if (ended) throw Refusal(RefusalKind::FailedPrecondition, status_);
+    if (ended) throw Refusal(RefusalKind::LoopFailed, status_);
     return outcome;
 }
 

@@ -43,8 +43,8 @@ pb::ComponentSpec specTo(const ComponentDefinition& definition) {
     spec.set_type(definition.type);
     for (const auto& [from, to] : definition.remaps) {
         auto* remap = spec.add_remaps();
-        remap->set_from(from);
-        remap->set_to(to);
+        remap->set_source(from);
+        remap->set_target(to);
     }
     for (const auto& [name, value] : definition.parameters) {
         auto* parameter = spec.add_parameters();
@@ -151,7 +151,7 @@ ComponentDefinition definitionFrom(const pb::ComponentSpec& spec) {
     requireLength("package", spec.package());
     requireLength("type", spec.type());
     if (!isBaseName(definition.name)) {
-        throw Refusal(RefusalKind::InvalidArgument,
+        throw Refusal(RefusalKind::NameInvalid,
                       fmt::format("'{}' is not a legal component name: a letter, then letters, "
                                   "digits and _; give the "
                                   "namespace by --ns",
@@ -162,14 +162,14 @@ ComponentDefinition definitionFrom(const pb::ComponentSpec& spec) {
     definition.package = spec.package();
     definition.type = spec.type();
     for (const auto& remap : spec.remaps()) {
-        for (const std::string& name : {remap.from(), remap.to()}) {
+        for (const std::string& name : {remap.source(), remap.target()}) {
             requireLength("remap", name);
             if (isGraphName(name)) continue;
-            throw Refusal(RefusalKind::InvalidArgument,
-                          fmt::format("remap {}:={}: '{}' is not a legal ROS name", remap.from(),
-                                      remap.to(), name));
+            throw Refusal(RefusalKind::NameInvalid,
+                          fmt::format("remap {}:={}: '{}' is not a legal ROS name", remap.source(),
+                                      remap.target(), name));
         }
-        definition.remaps.emplace_back(remap.from(), remap.to());
+        definition.remaps.emplace_back(remap.source(), remap.target());
     }
     definition.parameters = parametersFrom(spec.parameters());
     definition.first = spec.first();
@@ -351,7 +351,7 @@ ReplayChunk replayFrom(const pb::ReplayRequest& request) {
         chunk.topics.push_back({topic.topic(), topic.type(), topic.md5(), {}});
     for (const pb::RecordedMessage& message : request.messages()) {
         if (!chunk.messages.empty() && message.time_ns() < chunk.messages.back().time_ns) {
-            throw Refusal(RefusalKind::InvalidArgument,
+            throw Refusal(RefusalKind::RecordingInvalid,
                           fmt::format("a message of {} is before the one that precedes it: "
                                       "messages of a replay come in order of time",
                                       message.topic()));
@@ -385,31 +385,85 @@ pb::ReplayResponse replayTo(ReplayOutcome outcome) {
     return response;
 }
 
+namespace {
+
+std::pair<v1::Error::Code, pb::Reason> codeAndReason(RefusalKind kind) {
+    switch (kind) {
+        case RefusalKind::RequestMalformed:
+            return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_REQUEST_MALFORMED};
+        case RefusalKind::InvalidArgument:
+            return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_VALUE_INVALID};
+        case RefusalKind::NameMissing:
+            return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_NAME_MISSING};
+        case RefusalKind::NameInvalid:
+            return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_NAME_INVALID};
+        case RefusalKind::TextTooLong:
+            return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_TEXT_TOO_LONG};
+        case RefusalKind::ExpressionInvalid:
+            return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_EXPRESSION_INVALID};
+        case RefusalKind::ComponentTwice:
+            return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_COMPONENT_TWICE};
+        case RefusalKind::RatesConflict:
+            return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_RATES_CONFLICT};
+        case RefusalKind::RecordingInvalid:
+            return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_RECORDING_INVALID};
+        case RefusalKind::NotFound:
+            return {v1::Error::CODE_NOT_FOUND, pb::REASON_COMPONENT_NOT_FOUND};
+        case RefusalKind::PortNotFound:
+            return {v1::Error::CODE_NOT_FOUND, pb::REASON_PORT_NOT_FOUND};
+        case RefusalKind::ParameterNotFound:
+            return {v1::Error::CODE_NOT_FOUND, pb::REASON_PARAMETER_NOT_FOUND};
+        case RefusalKind::TypeNotFound:
+            return {v1::Error::CODE_NOT_FOUND, pb::REASON_TYPE_NOT_FOUND};
+        case RefusalKind::AlreadyExists:
+            return {v1::Error::CODE_ALREADY_EXISTS, pb::REASON_COMPONENT_EXISTS};
+        case RefusalKind::FailedPrecondition:
+            return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_COMPONENT_REFUSED};
+        case RefusalKind::TypesDiffer:
+            return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_TYPES_DIFFER};
+        case RefusalKind::ConnectionsFormLoop:
+            return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_CONNECTIONS_FORM_LOOP};
+        case RefusalKind::TwoWriters:
+            return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_TWO_WRITERS};
+        case RefusalKind::TwoPacers:
+            return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_TWO_PACERS};
+        case RefusalKind::LibraryRefused:
+            return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_LIBRARY_REFUSED};
+        case RefusalKind::HookFailed:
+            return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_HOOK_FAILED};
+        case RefusalKind::NoMaster:
+            return {v1::Error::CODE_NO_MASTER, pb::REASON_NO_MASTER};
+        case RefusalKind::NoRealtime:
+            return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_NO_REALTIME};
+        case RefusalKind::NoState:
+            return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_NO_STATE};
+        case RefusalKind::LoopRuns:
+            return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_LOOP_RUNS};
+        case RefusalKind::LoopFailed:
+            return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_LOOP_FAILED};
+        case RefusalKind::LoopStopped:
+            return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_LOOP_STOPPED};
+        case RefusalKind::ReplayRuns:
+            return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_REPLAY_RUNS};
+        case RefusalKind::NoReplay:
+            return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_NO_REPLAY};
+        case RefusalKind::Unavailable:
+            return {v1::Error::CODE_UNAVAILABLE, pb::REASON_LOOP_STUCK};
+        case RefusalKind::ResourceExhausted:
+            return {v1::Error::CODE_RESOURCE_EXHAUSTED, pb::REASON_LIMIT_REACHED};
+        case RefusalKind::StateTooLarge:
+            return {v1::Error::CODE_RESOURCE_EXHAUSTED, pb::REASON_STATE_TOO_LARGE};
+    }
+    return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_COMPONENT_REFUSED};
+}
+
+}  // namespace
+
 v1::Error errorTo(RefusalKind kind, const std::string& message) {
     v1::Error error;
-    switch (kind) {
-        case RefusalKind::InvalidArgument:
-            error.set_code(v1::Error::CODE_INVALID_ARGUMENT);
-            break;
-        case RefusalKind::NotFound:
-            error.set_code(v1::Error::CODE_NOT_FOUND);
-            break;
-        case RefusalKind::AlreadyExists:
-            error.set_code(v1::Error::CODE_ALREADY_EXISTS);
-            break;
-        case RefusalKind::FailedPrecondition:
-            error.set_code(v1::Error::CODE_FAILED_PRECONDITION);
-            break;
-        case RefusalKind::Unavailable:
-            error.set_code(v1::Error::CODE_UNAVAILABLE);
-            break;
-        case RefusalKind::NoMaster:
-            error.set_code(v1::Error::CODE_NO_MASTER);
-            break;
-        case RefusalKind::ResourceExhausted:
-            error.set_code(v1::Error::CODE_RESOURCE_EXHAUSTED);
-            break;
-    }
+    const auto [code, reason] = codeAndReason(kind);
+    error.set_code(code);
+    error.set_reason(reason);
     error.set_message(message);
     return error;
 }
@@ -420,6 +474,7 @@ pb::ChangeResult outcomeTo(const ChangeOutcome& outcome) {
     for (const std::string& name : outcome.order) result.add_order(name);
     result.set_component(outcome.component);
     for (const std::string& line : outcome.notes) result.add_notes(line);
+    for (const std::string& line : outcome.degraded) result.add_degraded(line);
     for (const Difference& difference : outcome.differences) {
         pb::Difference& message = *result.add_differences();
         message.set_kind(differenceKindTo(difference.kind));

@@ -501,7 +501,7 @@ void Server::requireStopsKnown(const v1::Request& request) const {
                       request.kind_case() == v1::Request::kReplay;
     const DirectStopReport report = direct_stop_->last();
     if (!runs || request.direct_stops() >= report.count) return;
-    throw Refusal(RefusalKind::FailedPrecondition,
+    throw Refusal(RefusalKind::LoopStopped,
                   fmt::format("runner {} was stopped at its executor by user {} after this was "
                               "asked for: ask again",
                               runner_->name(), report.user));
@@ -573,7 +573,7 @@ ChangeOutcome Server::change(const v1::Request& request, const Runner::Progress&
             return runner_->setParameters(fullNameOf(request.set_parameters().component()),
                                           parametersFrom(request.set_parameters().parameters()));
         default:
-            throw Refusal(RefusalKind::InvalidArgument,
+            throw Refusal(RefusalKind::RequestMalformed,
                           "a request of unknown kind: is rtcfd newer than its executor?");
     }
 }

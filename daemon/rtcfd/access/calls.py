@@ -50,6 +50,7 @@ UNKNOWN = Call(Level.ADMIN)
 
 CALLS = {
     "GetStatus": Call(Level.OBSERVE),
+    "ListRunners": Call(Level.OBSERVE),
     "ListComponents": Call(Level.OBSERVE),
     "GetComponent": Call(Level.OBSERVE),
     "GetOrder": Call(Level.OBSERVE),
@@ -58,6 +59,7 @@ CALLS = {
     "GetStatistics": Call(Level.OBSERVE),
     "WatchStatistics": Call(Level.OBSERVE),
     "GetHistory": Call(Level.OBSERVE),
+    "WatchEvents": Call(Level.OBSERVE),
     "SetParameters": Call(Level.TUNE, _LISTS),
     "UndoParameters": Call(Level.TUNE),
     "Start": Call(Level.OPERATE),

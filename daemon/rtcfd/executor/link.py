@@ -195,4 +195,4 @@ def _refusal(error: wire.Error) -> refusals.Refusal:
     kind, reason = _REFUSALS.get(
         error.code, (refusals.FailedPrecondition, errors_pb2.REASON_COMPONENT_REFUSED)
     )
-    return kind(error.message, reason)
+    return kind(error.message, error.reason or reason)

@@ -205,9 +205,12 @@ async def apply(
         rebuilt = await asyncio.to_thread(runner.code.changed)
         for load in apply.components:
             load.anew = request.rebuilt and full_name(load.component) in rebuilt
-        if changes and not request.dry_run:
+        if not request.dry_run and (changes or not request.runner):
             # So that a graph that is refused changes no settings, for however short a time.
-            await runner.ask(wire.Request(apply=apply), progress)
+            would = (await runner.ask(wire.Request(apply=apply), progress)).change
+            if not request.runner:
+                _require_no_unload(runner, would)
+        if changes and not request.dry_run:
             await runner.ask(wire.Request(configure=request.settings))
         apply.dry_run = request.dry_run
         try:
@@ -238,6 +241,20 @@ async def apply(
         runner.log.info("graph of %d components applied: %d differed",
                         len(request.components), len(result.differences))  # fmt: skip
     return result
+
+
+def _require_no_unload(runner: RunnerCore, would: control_pb2.ChangeResult) -> None:
+    """Refuse a change that takes components out of a runner that it does not name."""
+    kind = control_pb2.Difference.KIND_UNLOAD
+    leaving = [each.component for each in would.differences if each.kind == kind]
+    if leaving:
+        raise InvalidArgument(
+            f"this graph would unload {listing(leaving)} from runner {runner.name}, which it does "
+            "not name: name the runner, in the file or by --runner",
+            errors_pb2.REASON_NAME_MISSING,
+            runner=runner.name,
+            field="runner",
+        )
 
 
 def left_out(runner: RunnerCore) -> list[graph_pb2.ComponentInfo]:

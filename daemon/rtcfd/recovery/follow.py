@@ -93,4 +93,4 @@ def _difference(
 
 
 def _pairs(spec: graph_pb2.ComponentSpec) -> list[tuple[str, str]]:
-    return sorted((getattr(remap, "from"), remap.to) for remap in spec.remaps)
+    return sorted((remap.source, remap.target) for remap in spec.remaps)

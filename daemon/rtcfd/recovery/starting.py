@@ -4,6 +4,8 @@ first.
 Functions on a RunnerCore.  All that waits here is withdrawn by a stop.
 """
 
+from collections.abc import Callable
+
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2
 
@@ -43,16 +45,23 @@ async def step(runner: RunnerCore, cycles: int, progress: Progress) -> control_p
 
 
 async def replay(
-    runner: RunnerCore, request: control_pb2.ReplayRequest
+    runner: RunnerCore,
+    request: control_pb2.ReplayRequest,
+    on_done: Callable[[], None] = lambda: None,
 ) -> control_pb2.ReplayResponse:
-    """Run a piece of a recording through the loop; takes as long as its cycles take."""
+    """Run a piece of a recording through the loop; takes as long as its cycles take.
+
+    `on_done` is called when that was not refused, also if nobody waits any more.
+    """
     asked = asked_now(runner)
 
     async def work() -> control_pb2.ReplayResponse:
         if request.begin:
             await _need_executor(runner, lambda _: None)
         require_no_stop(runner, asked)
-        return (await runner.ask(wire.Request(replay=request))).replay
+        response = (await runner.ask(wire.Request(replay=request))).replay
+        on_done()
+        return response
 
     return await runner.change("a replay", work, timeout_s=None, runs_cycles=True)
 

@@ -42,7 +42,7 @@ class Lease:
             result = self._leases.attach(self._request, self._outbox)
         elif self._request.wait:
             result = await graph.when_master(
-                lambda: self._leases.open(self._request, self._outbox), self._outbox.progress
+                lambda: self._leases.open(self._request, self._outbox), self._outbox.waiting
             )
         else:
             result = await self._leases.open(self._request, self._outbox)
@@ -83,7 +83,7 @@ class Leases:
         note = library.note(spec)
         name = full_name(spec)
         if leaving := self._leaving.get(name):
-            outbox.progress(f"waiting for {name} of before to leave")
+            outbox.waiting(f"waiting for {name} of before to leave")
             await asyncio.wait({leaving})
 
         async def work() -> control_pb2.ChangeResult:

@@ -39,6 +39,10 @@ class Outbox:
         """Say what is being done."""
         self.say(progress=line)
 
+    def waiting(self, line: str) -> None:
+        """Say what is waited for."""
+        self.say(waiting=line)
+
     def report(self, report: control_pb2.HoldReport) -> None:
         """Send a report, in the place of one that is still on its way."""
         self._report = report

@@ -35,7 +35,8 @@ async def serve(runner: RunnerCore, call: wire.ServiceCall) -> wire.ServiceAnswe
         runner.log.info("a ROS service asks for: %s", kind)
         result = await _change(runner, call)
         answer.success = True
-        answer.message = "; ".join(result.notes)
+        lacks = [f"degraded real time: {line}" for line in result.degraded]
+        answer.message = "; ".join([*result.notes, *lacks])
     except Refusal as refusal:
         answer.message = bounded(refusal)
         runner.log.warning("refused to a ROS service: %s", answer.message)

@@ -4,18 +4,18 @@ No logic: names and values are checked by what is called.
 """
 
 import asyncio
-import functools
 import os
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator
 from typing import Any, Protocol
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, control_pb2_grpc, errors_pb2, graph_pb2, runner_pb2
+from rtcf_shared.naming import listing
 
 from rtcfd import VERSION
 from rtcfd.catalog.catalog import Catalog
-from rtcfd.common.names import absolute
+from rtcfd.common.names import DEFAULT_RUNNER, absolute
 from rtcfd.common.refusals import InvalidArgument
 from rtcfd.common.status_codes import abort
 from rtcfd.executor.link import Progress
@@ -27,117 +27,14 @@ from rtcfd.runners.leases import Lease
 from rtcfd.runners.outbox import Outbox
 from rtcfd.runners.runner import Runner
 from rtcfd.runners.runners import Runners
+from rtcfd.service.answers import answering, changing, holding, lasting
+from rtcfd.service.pages import page
+from rtcfd.service.replay import Replay
 
 _WATCH_MS = 1000
 _SHORTEST_WATCH_MS = 100
 
-Changes = AsyncIterator[control_pb2.ChangeResponse]
-
-
-def _answering(method: Callable[..., Awaitable[Any]]) -> Any:
-    """Turn a refusal of a unary method into a status."""
-
-    @functools.wraps(method)
-    async def wrapper(self: "Control", request: Any, context: Any) -> Any:
-        try:
-            return await method(self, request)
-        except Exception as error:
-            await abort(context, error, request)
-
-    return wrapper
-
-
-def _changing(
-    method: Callable[..., Callable[[Progress], Awaitable[control_pb2.ChangeResult]]],
-) -> Any:
-    """Stream what a change does, then its result; or turn its refusal into a status."""
-
-    @functools.wraps(method)
-    async def wrapper(self: "Control", request: Any, context: Any) -> Changes:
-        lines: asyncio.Queue[str | None] = asyncio.Queue()
-        task: asyncio.Future[control_pb2.ChangeResult] | None = None
-        try:
-            change = method(self, request)
-            task = asyncio.ensure_future(change(lines.put_nowait))
-            task.add_done_callback(lambda _: lines.put_nowait(None))
-            while (line := await lines.get()) is not None:
-                yield control_pb2.ChangeResponse(progress=line)
-            yield control_pb2.ChangeResponse(result=task.result())
-        except Exception as error:
-            await abort(context, error, request)
-        finally:
-            if task is not None:
-                task.cancel()  # one that has begun goes on: see operations/operations.py
-
-    return wrapper
-
-
-class _Tenancy(Protocol):
-    """What a call holds for as long as it lasts: a runner, or a component."""
-
-    async def open(self) -> None:
-        """Take it."""
-
-    async def end(self) -> None:
-        """Give it back, at the caller's word."""
-
-    def lost(self) -> None:
-        """The caller has left without a word."""
-
-
-def _holding(method: Callable[..., tuple[Outbox, _Tenancy]]) -> Any:
-    """Serve a call that holds something: its first message opens, `end` or its death ends it."""
-
-    @functools.wraps(method)
-    async def wrapper(self: "Control", requests: Any, context: Any) -> AsyncIterator[Any]:
-        tasks: list[asyncio.Future[None]] = []
-        tenancy: _Tenancy | None = None
-        opening_request: Any = None
-        messages = aiter(requests)
-        try:
-            first = await anext(messages, None)
-            if first is None or first.WhichOneof("kind") != "open":
-                raise InvalidArgument(
-                    "the first message of such a call is `open`",
-                    errors_pb2.REASON_REQUEST_MALFORMED,
-                )
-            opening_request = first.open
-            outbox, tenancy = method(self, opening_request)
-            opening = asyncio.ensure_future(_open(tenancy, outbox))
-            tasks = [opening, asyncio.ensure_future(_listen(messages, opening, tenancy, outbox))]
-            async for response in outbox:
-                yield response
-        except Exception as error:
-            await abort(context, error, opening_request)
-        finally:
-            if tenancy is not None and not outbox.ended:
-                tenancy.lost()
-            for task in tasks:
-                task.cancel()
-
-    return wrapper
-
-
-async def _open(tenancy: _Tenancy, outbox: Outbox) -> None:
-    try:
-        await tenancy.open()
-    except Exception as error:
-        outbox.refuse(error)
-
-
-async def _listen(
-    messages: AsyncIterator[Any], opening: "asyncio.Future[None]", tenancy: _Tenancy, outbox: Outbox
-) -> None:
-    """Wait for the caller's `end`.  A stream that just ends says nothing: the connection counts."""
-    async for message in messages:
-        if message.WhichOneof("kind") == "end":
-            await asyncio.wait({opening})
-            try:
-                await tenancy.end()
-            except Exception as error:
-                outbox.refuse(error)
-            outbox.end(control_pb2.LeaseEnded.WHY_ASKED)
-            return
+_STATUS = 4096  # bytes of a runner's status, about
 
 
 class Daemon(Protocol):
@@ -163,7 +60,7 @@ class Control(control_pb2_grpc.ControlServicer):
         self._daemon = daemon
         self._begin_ns = time.monotonic_ns()
 
-    @_answering
+    @answering
     async def GetStatus(self, request: control_pb2.GetStatusRequest) -> Any:
         """All runners, or one."""
         chosen = [self._runners.get(request.runner)] if request.runner else self._runners.all()
@@ -175,150 +72,193 @@ class Control(control_pb2_grpc.ControlServicer):
             notes=self._daemon.notes(),
         )
 
-    @_answering
-    async def Reload(self, request: control_pb2.ReloadRequest) -> Any:
+    @answering
+    async def ListRunners(self, request: control_pb2.ListRunnersRequest) -> Any:
+        """All runners, in pages."""
+        chosen, token = page(self._runners.all(), request, lambda each: str(each.name), _STATUS)
+        runners = await asyncio.gather(*(runner.status() for runner in chosen))
+        return control_pb2.ListRunnersResponse(runners=runners, next_page_token=token)
+
+    @lasting(control_pb2.ReloadResponse, "result")
+    def Reload(self, request: control_pb2.ReloadRequest) -> Any:
         """Read the settings and graphs.d again."""
-        notes = await self._daemon.reload()
-        return control_pb2.ReloadResponse(notes=notes, refused=self._daemon.refused)
 
-    @_answering
-    async def AddRunner(self, request: control_pb2.AddRunnerRequest) -> Any:
+        async def work(progress: Progress) -> control_pb2.ReloadResult:
+            progress("reading the settings")
+            notes = await self._daemon.reload()
+            return control_pb2.ReloadResult(notes=notes, refused=self._daemon.refused)
+
+        return work
+
+    @lasting(control_pb2.RunnerResponse, "runner")
+    def AddRunner(self, request: control_pb2.AddRunnerRequest) -> Any:
         """A new runner, its executor started."""
-        runner = await self._runners.add(request.runner, request.settings)
-        return control_pb2.RunnerResponse(status=await runner.status())
 
-    @_answering
-    async def SetRunner(self, request: control_pb2.SetRunnerRequest) -> Any:
+        async def work(progress: Progress) -> runner_pb2.RunnerStatus:
+            progress(f"starting the executor of {request.runner or DEFAULT_RUNNER}")
+            runner = await self._runners.add(request.runner, request.settings)
+            return await runner.status()
+
+        return work
+
+    @lasting(control_pb2.RunnerResponse, "runner")
+    def SetRunner(self, request: control_pb2.SetRunnerRequest) -> Any:
         """Other settings."""
         runner = self._runners.get(request.runner)
-        await runner.set(request.settings)
-        return control_pb2.RunnerResponse(status=await runner.status())
 
-    @_answering
-    async def RemoveRunner(self, request: control_pb2.RemoveRunnerRequest) -> Any:
+        async def work(progress: Progress) -> runner_pb2.RunnerStatus:
+            progress(f"changing settings of {runner.name}")
+            await runner.set(request.settings)
+            return await runner.status()
+
+        return work
+
+    @lasting(control_pb2.RemoveRunnerResponse, "result")
+    def RemoveRunner(self, request: control_pb2.RemoveRunnerRequest) -> Any:
         """One runner less."""
-        await self._runners.remove(request.runner)
-        return control_pb2.RemoveRunnerResponse()
+        runner = self._named(request.runner, "RemoveRunner")
 
-    @_answering
-    async def RestartRunner(self, request: control_pb2.RestartRunnerRequest) -> Any:
+        async def work(progress: Progress) -> control_pb2.RemoveRunnerResult:
+            progress(f"ending the executor of {runner.name}")
+            await self._runners.remove(runner.name)
+            return control_pb2.RemoveRunnerResult(runner=runner.name)
+
+        return work
+
+    @lasting(control_pb2.RunnerResponse, "runner")
+    def RestartRunner(self, request: control_pb2.RestartRunnerRequest) -> Any:
         """A fresh executor."""
-        runner = self._runners.get(request.runner)
-        await runner.restart()
-        return control_pb2.RunnerResponse(status=await runner.status())
+        runner = self._named(request.runner, "RestartRunner")
 
-    @_changing
+        async def work(progress: Progress) -> runner_pb2.RunnerStatus:
+            progress(f"ending the executor of {runner.name}")
+            await runner.restart()
+            return await runner.status()
+
+        return work
+
+    @changing
     def Start(self, request: control_pb2.StartRequest) -> Any:
         """Start the loop."""
         runner = self._runners.get(request.runner)
         return lambda progress: starting.start(runner, progress)
 
-    @_changing
+    @changing
     def Stop(self, request: control_pb2.StopRequest) -> Any:
         """Stop the loop."""
         runner = self._runners.get(request.runner)
         return lambda progress: stop(runner, progress)
 
-    @_changing
+    @changing
     def Step(self, request: control_pb2.StepRequest) -> Any:
         """Run cycles on a simulated clock."""
         runner = self._runners.get(request.runner)
         return lambda progress: starting.step(runner, request.cycles, progress)
 
-    @_answering
-    async def Replay(self, request: control_pb2.ReplayRequest) -> Any:
-        """Run a piece of a recording."""
-        return await starting.replay(self._runners.get(request.runner), request)
+    async def Replay(
+        self, requests: AsyncIterator[control_pb2.ReplayRequest], context: Any
+    ) -> AsyncIterator[control_pb2.ReplayResponse]:
+        """Run a recording, for as long as its caller is there."""
+        replay = Replay(self._runners)
+        try:
+            async for request in requests:
+                yield await replay.take(request)
+            await replay.end()
+        except Exception as error:
+            await replay.end()
+            await abort(context, error)
+        finally:
+            replay.lost()
 
-    @_changing
+    @changing
     def Load(self, request: control_pb2.LoadRequest) -> Any:
         """Load a component."""
         runner = self._runners.get(request.runner)
         load = graph.load_when_master if request.wait else graph.load
         return lambda progress: load(runner, request.component, progress)
 
-    @_changing
+    @changing
     def Unload(self, request: control_pb2.UnloadRequest) -> Any:
         """Unload components."""
         runner = self._runners.get(request.runner)
         return lambda progress: graph.unload(runner, list(request.components), progress)
 
-    @_changing
+    @changing
     def Replace(self, request: control_pb2.ReplaceRequest) -> Any:
         """Replace a component."""
         runner = self._runners.get(request.runner)
         return lambda progress: graph.replace(runner, request, progress)
 
-    @_changing
+    @changing
     def Apply(self, request: control_pb2.ApplyRequest) -> Any:
         """Make the graph what the request says."""
         return lambda progress: self._runners.apply(request, progress)
 
-    @_changing
+    @changing
     def Release(self, request: control_pb2.ReleaseRequest) -> Any:
         """Load components again."""
         runner = self._runners.get(request.runner)
         return lambda progress: graph.release(runner, list(request.components), progress)
 
-    @_changing
+    @changing
     def SetBreaks(self, request: control_pb2.SetBreaksRequest) -> Any:
         """Set or remove loop breaks."""
         runner = self._runners.get(request.runner)
         return lambda progress: graph.set_breaks(runner, request, progress)
 
-    @_changing
+    @changing
     def SetParameters(self, request: control_pb2.SetParametersRequest) -> Any:
         """Change parameters."""
         runner = self._runners.get(request.runner)
         return lambda progress: parameters.set_parameters(runner, request, progress)
 
-    @_changing
+    @changing
     def UndoParameters(self, request: control_pb2.UndoParametersRequest) -> Any:
         """Take back what was changed last."""
         runner = self._runners.get(request.runner)
         return lambda progress: parameters.undo(runner, request, progress)
 
-    @_answering
+    @answering
     async def GetHistory(self, request: control_pb2.GetHistoryRequest) -> Any:
         """Who set what when."""
         return parameters.history(self._runners.get(request.runner), request)
 
-    @_changing
+    @changing
     def ResetState(self, request: control_pb2.ResetStateRequest) -> Any:
         """Take a component's state back to its initial values."""
         runner = self._runners.get(request.runner)
         return lambda progress: graph.reset_state(runner, request, progress)
 
-    @_changing
+    @changing
     def SetState(self, request: control_pb2.SetStateRequest) -> Any:
         """Set values of a component's state."""
         runner = self._runners.get(request.runner)
         return lambda progress: graph.set_state(runner, request, progress)
 
-    @_answering
+    @answering
     async def TakeSnapshot(self, request: control_pb2.TakeSnapshotRequest) -> Any:
         """All that the next cycle depends on."""
         return await snapshots.take(self._runners.get(request.runner))
 
-    @_changing
+    @changing
     def RestoreSnapshot(self, request: control_pb2.RestoreSnapshotRequest) -> Any:
         """Go on from a snapshot."""
         runner = self._runners.get(request.runner)
         return lambda progress: snapshots.restore(runner, request.snapshot, progress)
 
-    @_holding
+    @holding
     def HoldRunner(self, request: control_pb2.OpenHold) -> Any:
         """A runner, for as long as the call lasts."""
         outbox = Outbox(control_pb2.HoldRunnerResponse)
         return outbox, Hold(self._runners, request, outbox)
 
-    @_holding
+    @holding
     def LeaseComponent(self, request: control_pb2.OpenLease) -> Any:
         """A component, for as long as the call lasts."""
         outbox = Outbox(control_pb2.LeaseComponentResponse)
         return outbox, Lease(self._runners.get(request.runner).leases, request, outbox)
 
-    @_answering
+    @answering
     async def ListComponents(self, request: control_pb2.ListComponentsRequest) -> Any:
         """All components, in order of the schedule; then those that are left out."""
         components = await self._components(request.runner)
@@ -328,9 +268,10 @@ class Control(control_pb2_grpc.ControlServicer):
         for info in found:
             info.library_changed = info.full_name in rebuilt
             _add_holder(runner, info)
-        return control_pb2.ListComponentsResponse(components=found)
+        chosen, token = page(found, request, lambda each: str(each.full_name))
+        return control_pb2.ListComponentsResponse(components=chosen, next_page_token=token)
 
-    @_answering
+    @answering
     async def GetComponent(self, request: control_pb2.GetComponentRequest) -> Any:
         """One component, with values."""
         name = absolute(request.component)
@@ -338,58 +279,75 @@ class Control(control_pb2_grpc.ControlServicer):
         runner = self._runners.get(request.runner)
         for info in graph.left_out(runner):
             if info.full_name == name:
-                return _add_holder(runner, info)
+                return control_pb2.GetComponentResponse(component=_add_holder(runner, info))
         found = await runner.query(wire.Request(get_component=query))
         rebuilt = await asyncio.to_thread(runner.code.changed)
         found.component.library_changed = name in rebuilt
-        return _add_holder(runner, found.component)
+        return control_pb2.GetComponentResponse(component=_add_holder(runner, found.component))
 
-    @_answering
+    @answering
     async def GetOrder(self, request: control_pb2.GetOrderRequest) -> Any:
         """The schedule."""
         components = await self._components(request.runner)
-        return control_pb2.GetOrderResponse(
-            components=[component.full_name for component in components]
-        )
+        names = [str(component.full_name) for component in components]
+        chosen, token = page(names, request, str)
+        return control_pb2.GetOrderResponse(components=chosen, next_page_token=token)
 
-    @_answering
+    @answering
     async def ListConnections(self, request: control_pb2.ListConnectionsRequest) -> Any:
         """All connections, by name."""
         query = wire.Request(list_connections=wire.ListConnections())
         response = await self._runners.get(request.runner).query(query)
         found = sorted(response.connections.connections, key=lambda each: str(each.name))
-        return control_pb2.ListConnectionsResponse(connections=found)
+        chosen, token = page(found, request, lambda each: str(each.name))
+        return control_pb2.ListConnectionsResponse(connections=chosen, next_page_token=token)
 
-    @_answering
+    @answering
     async def ListTypes(self, request: control_pb2.ListTypesRequest) -> Any:
         """What can be loaded."""
         types, problems = await self._catalog.types(request.package)
-        return control_pb2.ListTypesResponse(types=types, problems=problems)
+        chosen, token = page(types, request, lambda each: f"{each.package}/{each.type}")
+        return control_pb2.ListTypesResponse(
+            types=chosen, problems=[] if request.page_token else problems, next_page_token=token
+        )
 
-    @_answering
+    @answering
     async def GetStatistics(self, request: control_pb2.GetStatisticsRequest) -> Any:
         """The figures."""
-        return await self._statistics(request.runner)
+        statistics = await self._statistics(request.runner)
+        return control_pb2.GetStatisticsResponse(statistics=statistics)
 
     async def WatchStatistics(
         self, request: control_pb2.WatchStatisticsRequest, context: Any
-    ) -> AsyncIterator[runner_pb2.RunnerStatistics]:
+    ) -> AsyncIterator[control_pb2.WatchStatisticsResponse]:
         """The figures, again and again."""
         interval_s = max(request.interval_ms or _WATCH_MS, _SHORTEST_WATCH_MS) / 1000
         try:
             while True:
-                yield await self._statistics(request.runner)
+                statistics = await self._statistics(request.runner)
+                yield control_pb2.WatchStatisticsResponse(statistics=statistics)
                 await asyncio.sleep(interval_s)
         except Exception as error:
             await abort(context, error, request)
 
-    @_answering
+    @answering
     async def ResetStatistics(self, request: control_pb2.ResetStatisticsRequest) -> Any:
         """New figures."""
         runner = self._runners.get(request.runner)
         await runner.settle()
         await runner.begin_figures(reset=True)
         return control_pb2.ResetStatisticsResponse()
+
+    def _named(self, name: str, call: str) -> Runner:
+        """Return a runner that a call which destroys something must name."""
+        if not name:
+            raise InvalidArgument(
+                f"{call} takes the name of a runner: the default one is not meant unless it is "
+                f"named (runners: {listing(each.name for each in self._runners.all())})",
+                errors_pb2.REASON_NAME_MISSING,
+                field="runner",
+            )
+        return self._runners.get(name)
 
     async def _statistics(self, name: str) -> runner_pb2.RunnerStatistics:
         runner = self._runners.get(name)

@@ -39,13 +39,13 @@ def run(setting: Setting) -> Result:
         by_rtcfctl = median_cost(_load_by_rtcfctl(daemon, i) for i in range(_CALLS))
         by_client = median_cost(_load_by_client(daemon, i) for i in range(_CALLS))
         client.stop()
-        client.apply([])
+        client.apply([], "rt_runner")
         every = functools.partial(_load_all, client, chain(_LONG_CHAIN))
         long_chain = cost_of(every, daemon.servers)
         graphs = []
         for _ in range(_ROUNDS):
-            client.apply([])
-            graphs.append(cost_of(lambda: client.apply(chain(_GRAPH)), daemon.servers))
+            client.apply([], "rt_runner")
+            graphs.append(cost_of(lambda: client.apply(chain(_GRAPH), "rt_runner"), daemon.servers))
         graph = median_cost(graphs)
         further = [functools.partial(client.load, chain(1, _GRAPH + i)[0]) for i in range(_CALLS)]
         client.start()

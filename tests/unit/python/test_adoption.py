@@ -188,7 +188,7 @@ def test_an_executor_of_a_foreign_protocol_is_left_running_and_can_be_replaced(
         assert is_alive(pid)
         client.stop()
         assert is_alive(pid)
-        client.restart_runner()
+        client.restart_runner("rt_runner")
         assert client.get_order() == ["/a"]
         status = client.get_status().runners[0]
         assert status.pid != pid

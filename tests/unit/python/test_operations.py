@@ -212,7 +212,7 @@ def test_a_start_during_a_restart_waits_for_the_executor_to_be_gone(
 ) -> None:
     before = service.executor_pid()
     with held.back("gone"):
-        restarting = Call(service, lambda c: c.restart_runner())
+        restarting = Call(service, lambda c: c.restart_runner("rt_runner"))
         wait_for(lambda: "being restarted" in status(service).status, "the restart")
         starting = Call(service, lambda c: c.start())
     assert (restarting.end(), starting.end()) == ("", "")

@@ -251,8 +251,8 @@ TEST_F(ServerTest, NamesAndExpressionsThatAreTooLongAreRefusedShortly) {
     const std::string long_name(2000, 'a');
     Request remapped = load("Recorder", "B");
     auto& remap = *remapped.mutable_load()->mutable_component()->add_remaps();
-    remap.set_from("in");
-    remap.set_to(long_name);
+    remap.set_source("in");
+    remap.set_target(long_name);
     Request ignoring = load("Recorder", "B");
     ignoring.mutable_load()->mutable_component()->set_ignore(long_name);
     Request whitelist;
@@ -279,8 +279,8 @@ TEST_F(ServerTest, QueriesAreAnsweredWhileAHookBlocks) {
     journal().gate_open = false;
     Request blocking = load("Blocker", "B");
     auto& remap = *blocking.mutable_load()->mutable_component()->add_remaps();
-    remap.set_from("out");
-    remap.set_to("B_out");
+    remap.set_source("out");
+    remap.set_target("B_out");
     const std::uint64_t loading = client.send(blocking);
     ASSERT_TRUE(eventually([] { return journal().count("/B configure") == 1; }));
     Request list;
@@ -452,7 +452,7 @@ TEST_F(ServerTest, CallFromOutsideIsAnsweredByTheDaemonThatCameLast) {
     Asking asking(server_, load);
     const executor::v1::ServiceCall call = nextCall(client);
     EXPECT_EQ(call.load().type(), "Ticker");
-    EXPECT_EQ(call.load().remaps(0).to(), "there");
+    EXPECT_EQ(call.load().remaps(0).target(), "there");
     EXPECT_TRUE(call.load().first());
     Request answer;
     answer.mutable_service_answer()->set_call(call.call());

@@ -1,0 +1,46 @@
+"""A replay that is under way: one request, one answer, for as long as the call lasts."""
+
+from queue import SimpleQueue
+from types import TracebackType
+from typing import Any
+
+import grpc
+
+from rtcf import failures
+from rtcf.v1 import control_pb2
+
+
+class ReplayCall:
+    """Made by Client.replay; used by one thread.  Closing it before its end ends the replay."""
+
+    def __init__(self, method: Any, socket: str) -> None:
+        self._socket = socket
+        self._requests: SimpleQueue[control_pb2.ReplayRequest | None] = SimpleQueue()
+        self._call = method(iter(self._requests.get, None))
+
+    def __enter__(self) -> "ReplayCall":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def run(self, request: control_pb2.ReplayRequest) -> control_pb2.ReplayResponse:
+        """Run one piece of the recording; takes as long as its cycles take.
+
+        Raises RefusedError, which ends the replay, or DaemonUnreachableError.
+        """
+        self._requests.put(request)
+        try:
+            return next(self._call)  # type: ignore[no-any-return]
+        except grpc.RpcError as error:
+            raise failures.from_grpc(error, self._socket) from None
+
+    def close(self) -> None:
+        """End the call; one that was not ended by `end` is ended by rtcfd."""
+        self._requests.put(None)
+        self._call.cancel()
