@@ -11,6 +11,7 @@ from rtcf_shared.errors import RtcfError
 
 from rtcf import direct_stop, failures
 from rtcf.errors import RefusedError
+from rtcf.events import EventStream, Place
 from rtcf.replay_call import ReplayCall
 from rtcf.tenancy import Tenancy
 from rtcf.v1 import control_pb2, control_pb2_grpc, graph_pb2, runner_pb2
@@ -399,6 +400,20 @@ class Client:
                 yield response.statistics
         except grpc.RpcError as error:
             raise failures.from_grpc(error, self.socket) from None
+
+    def watch_events(
+        self,
+        runners: Iterable[str] = (),
+        after: Place | None = None,
+        *,
+        until_now: bool = False,
+    ) -> EventStream:
+        """Watch what happens to some runners, or all, and to rtcfd itself.
+
+        Begins behind `after`, the `place` of a stream of before; Place() is where what rtcfd keeps
+        begins, None is now.  With `until_now` it ends with what has happened so far.
+        """
+        return EventStream(self._stub.WatchEvents, self.socket, runners, after, until_now)
 
     def reset_statistics(self, runner: str = "") -> None:
         """Begin the figures anew."""

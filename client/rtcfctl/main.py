@@ -39,6 +39,7 @@ _MODULES = {
     "undo": "parameter",
     "types": "types",
     "stats": "stats",
+    "events": "events",
     "check": "check",
     "doctor": "doctor",
 }

@@ -40,6 +40,16 @@ class Output:
 
             print(json.dumps(document, indent=2, ensure_ascii=False))
 
+    def record(self, value: Any) -> None:
+        """Print one of many documents: JSON on a line of its own, or a YAML document."""
+        if self._kind == "yaml":
+            print("---")
+            self.data(value)
+        else:
+            import json
+
+            print(json.dumps(_plain(value), ensure_ascii=False))
+
     def line(self, text: str, style: str = "", to: TextIO | None = None) -> None:
         """Print a line for people; `style` is of words like "bold red"."""
         stream = to or sys.stdout

@@ -107,7 +107,7 @@ class Daemon:
         }
         self._left_over: list[str] = []  # runners of executors that outlived another rtcfd
         self._leaving = False  # loops go on after our end
-        control = Control(self._runners, catalog, self._reloads)
+        control = Control(self._runners, catalog, self._reloads, shared.events)
         for server in self._servers.values():
             control_pb2_grpc.add_ControlServicer_to_server(control, server)  # type: ignore[no-untyped-call]
 
@@ -146,6 +146,7 @@ class Daemon:
             await server.start()
         await self._clients.serve(listener)
         log.info("rtcfd %s serves %s", VERSION, self._endpoint.path)
+        self._shared.events.add(control_pb2.Event.KIND_DAEMON, f"rtcfd {VERSION} serves")
         self._notify.starting()
         starting = asyncio.create_task(self._start())
         ending = asyncio.create_task(end.wait())

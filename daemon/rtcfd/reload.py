@@ -159,6 +159,9 @@ class Reloads:
         lines += await self._apply([given for given in graphs if given.changed])
         self._leave_note()
         log.info("settings and graphs read again: %s", "; ".join(lines) or "nothing has changed")
+        self._shared.events.add(
+            control_pb2.Event.KIND_DAEMON, "; ".join(["settings read again", *lines])
+        )
         return lines
 
     def _leave_note(self) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import control_pb2
 
 from rtcfd.common.budget import Budget
 from rtcfd.common.limits import Limits
@@ -34,6 +35,16 @@ _EVENT_LEVELS: dict[int, int] = {
 }
 
 
+# As those who watch are told of them.
+_KINDS: dict[int, "control_pb2.Event.Kind"] = {
+    wire.Event.KIND_LOOP_ENDED: control_pb2.Event.KIND_LOOP_FAULT,
+    wire.Event.KIND_DEGRADED: control_pb2.Event.KIND_DEGRADED,
+    wire.Event.KIND_ROS: control_pb2.Event.KIND_ROS,
+    wire.Event.KIND_COMPONENT_FAILED: control_pb2.Event.KIND_COMPONENT_FAULT,
+    wire.Event.KIND_OVERRUNS: control_pb2.Event.KIND_OVERRUNS,
+    wire.Event.KIND_CLOCK: control_pb2.Event.KIND_CLOCK,
+}
+
 _REPORT_S = 1.0  # from the first record that is dropped to the line that says how many were
 
 
@@ -45,6 +56,9 @@ class Audience(Protocol):
 
     def late(self, message: str) -> None:
         """Cycles ended late."""
+
+    def told(self, kind: "control_pb2.Event.Kind", event: wire.Event) -> None:
+        """Something has happened, which has been seen to."""
 
     def component_failed(self, component: str, reason: str) -> None:
         """A component has failed; the loop goes on."""
@@ -145,6 +159,8 @@ class Events:
             self._audience.component_failed(event.component, event.message)
         elif event.kind == wire.Event.KIND_OVERRUNS:
             self._audience.late(event.message)
+        if (kind := _KINDS.get(event.kind)) is not None:
+            self._audience.told(kind, event)
 
 
 def logger_of(runner: str) -> "logging.LoggerAdapter[logging.Logger]":

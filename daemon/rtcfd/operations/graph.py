@@ -22,6 +22,7 @@ from rtcfd.operations import parameters
 from rtcfd.operations.runner_core import RunnerCore
 from rtcfd.state.desired import replacement
 
+_Event = control_pb2.Event
 _MASTER_POLL_S = 0.5
 
 
@@ -40,6 +41,7 @@ async def load(
         runner.left_out.pop(result.component, None)
         runner.desired.put(result.component, spec)
         parameters.note(runner, result.component, spec.parameters, {}, acting, "load")
+        runner.happened(_Event.KIND_GRAPH, f"{result.component} loaded ({what})", result.component)
         return await _saved(runner, result)
 
     what = f"{spec.package}/{spec.type}"
@@ -99,6 +101,8 @@ async def unload(
         for name in full_names:
             runner.left_out.pop(name, None)
         runner.desired.drop(full_names)
+        one = full_names[0] if len(full_names) == 1 else ""
+        runner.happened(_Event.KIND_GRAPH, f"{what} unloaded", one)
         return await _saved(runner, result)
 
     what = ", ".join(full_names)
@@ -142,6 +146,9 @@ async def replace(
         runner.left_out.pop(old, None)
         runner.desired.drop([old])
         runner.desired.put(result.component, spec)
+        runner.happened(
+            _Event.KIND_GRAPH, f"{old} replaced by {result.component} ({what})", result.component
+        )
         return await _saved(runner, result)
 
     what = f"{package}/{type_name}"
@@ -182,6 +189,8 @@ async def release(
         for name in full_names:
             runner.left_out.pop(name, None)
             runner.desired.quarantined.pop(name, None)
+        one = full_names[0] if len(full_names) == 1 else ""
+        runner.happened(_Event.KIND_GRAPH, f"{what} released", one)
         return await _saved(runner, result)
 
     result = await runner.change(f"the release of {what}", work)
@@ -234,6 +243,10 @@ async def apply(
         runner.desired.become(request.components)
         runner.left_out.clear()
         runner.desired.choose(request.settings)
+        count, differed = len(request.components), len(result.differences)
+        runner.happened(
+            _Event.KIND_GRAPH, f"graph of {count} components applied: {differed} differed"
+        )
         return await _saved(runner, result)
 
     result = await runner.change("the application of a graph", work)
@@ -278,11 +291,13 @@ async def set_breaks(
     async def work() -> control_pb2.ChangeResult:
         result = (await runner.ask(wire.Request(set_breaks=request), progress)).change
         runner.desired.set_breaks(request.ports, request.broken)
+        runner.happened(_Event.KIND_GRAPH, what)
         return await _saved(runner, result)
 
-    result = await runner.change("a change of loop breaks", work)
     ports = ", ".join(f"{absolute(port.component)}.{port.port}" for port in request.ports)
-    runner.log.info("%s: loop break %s", ports, "set" if request.broken else "removed")
+    what = f"{ports}: loop break {'set' if request.broken else 'removed'}"
+    result = await runner.change("a change of loop breaks", work)
+    runner.log.info("%s", what)
     return result
 
 
@@ -310,7 +325,9 @@ async def reset_state(
     name = absolute(request.component)
 
     async def work() -> control_pb2.ChangeResult:
-        return (await runner.ask(wire.Request(reset_state=request), progress)).change
+        result = (await runner.ask(wire.Request(reset_state=request), progress)).change
+        runner.happened(_Event.KIND_PARAMETERS, f"{name}: state reset", name)
+        return result
 
     result = await runner.change(f"a reset of {name}", work)
     runner.log.info("%s: state reset", name)

@@ -7,11 +7,12 @@ waits any more.  On rtcfd's one thread.
 """
 
 import asyncio
+import contextvars
 import logging
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Coroutine
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 from rtcf.v1 import errors_pb2
@@ -28,6 +29,8 @@ class _Operation(Generic[Result]):
     work: Callable[[], Awaitable[Result]]
     done: "asyncio.Future[Result]"
     runs_cycles: bool = False
+    # Of its caller, in whose name it is done when its turn comes.
+    context: contextvars.Context = field(default_factory=contextvars.copy_context)
 
 
 class Operations:
@@ -128,7 +131,7 @@ class Operations:
     def _next(self) -> None:
         if self._current is None and self._queue:
             self._current, self._since = self._queue.popleft(), time.monotonic()
-            self._spawn(self._do(self._current))
+            self._spawn(self._do(self._current), self._current.context)
 
     async def _do(self, operation: _Operation[Any]) -> None:
         try:
@@ -152,8 +155,10 @@ class Operations:
         operation.done.cancel()
         return True
 
-    def _spawn(self, work: Coroutine[Any, Any, None]) -> "asyncio.Task[None]":
-        task = asyncio.create_task(work)
+    def _spawn(
+        self, work: Coroutine[Any, Any, None], context: contextvars.Context | None = None
+    ) -> "asyncio.Task[None]":
+        task = asyncio.create_task(work, context=context)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         return task

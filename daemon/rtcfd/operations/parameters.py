@@ -132,11 +132,15 @@ def note(
     if quiet:
         return
     words = ", ".join(f"{each.name} = {_word(each.value)}" for each in settings)
+    what = "taken back" if takes_back else "set"
+    runner.happened(
+        control_pb2.Event.KIND_PARAMETERS, f"{component}: {words} {what}", component, user=who
+    )
     runner.log.logger.info(
         "%s: %s %s by %s",
         component,
         words,
-        "taken back" if takes_back else "set",
+        what,
         who if how == "set" or takes_back else f"{who}, {how}",
         extra={"runner": runner.name, "peer": None if acting is None else acting.peer},
     )

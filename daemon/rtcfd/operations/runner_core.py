@@ -12,9 +12,12 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import errors_pb2, runner_pb2
+from rtcf.v1 import control_pb2, errors_pb2, runner_pb2
+from rtcf_shared.enums import word
 
+from rtcfd.access import caller
 from rtcfd.catalog.catalog import Catalog
+from rtcfd.common.event_log import EventLog
 from rtcfd.common.limits import Limits
 from rtcfd.common.refusals import Refusal, Unavailable
 from rtcfd.executor.command import ExecutorCommand
@@ -50,6 +53,7 @@ class Surroundings:
     on_change: Callable[[], None]  # what summary() says may have changed
     # Answers what ROS peers ask of a runner.
     serve_ros: Callable[["RunnerCore", wire.ServiceCall], Awaitable[wire.ServiceAnswer]]
+    events: EventLog = field(default_factory=EventLog)
     limits: Limits = field(default_factory=Limits)
     rules: wire.AccessRules = field(default_factory=wire.AccessRules)  # for executors
     name_of: Callable[[int], Awaitable[str]] = _number  # of a user, for people
@@ -78,6 +82,7 @@ class RunnerCore(ABC):
         self._settled = asyncio.Event()  # not set while an executor is being started
         self._saving = asyncio.Lock()
         self._forgotten = False
+        self._told = (self.state, "")  # state and holder, as those who watch know them
 
     # -- what a runner adds ---------------------------------------------------
 
@@ -96,6 +101,36 @@ class RunnerCore(ABC):
     def tell(self) -> None:
         """After any change: tell who wants to know."""
         self.shared.on_change()
+        holder = self.desired.hold.holder if self.desired.hold else ""
+        before, self._told = self._told, (self.state, holder)
+        if holder != before[1]:
+            what = f"held by {holder}" if holder else f"given back by {before[1]}"
+            self.happened(control_pb2.Event.KIND_RUNNER_SETTINGS, what)
+        if self.state != before[0]:
+            why = self.loop.fault or self.loop.held or (self.trouble if not self.up else "")
+            text = word(runner_pb2.RunnerState.DESCRIPTOR, self.state) + (why and f": {why}")
+            self.happened(control_pb2.Event.KIND_RUNNER_STATE, text)
+
+    def happened(
+        self,
+        kind: "control_pb2.Event.Kind",
+        message: str,
+        component: str = "",
+        iteration: int = 0,
+        user: str = "",
+    ) -> None:
+        """Tell those who watch events; `user` is who did it, if not the caller of now."""
+        acting = caller.current()
+        self.shared.events.add(
+            kind,
+            message,
+            self.name,
+            self.state,
+            component=component,
+            iteration=iteration,
+            user=user or (acting.peer.user if acting else ""),
+            holder=self.desired.hold.holder if self.desired.hold else "",
+        )
 
     # -- what is known ----------------------------------------------------------
 
@@ -103,6 +138,17 @@ class RunnerCore(ABC):
     def up(self) -> bool:
         """Tell whether there is an executor."""
         return self._executor is not None
+
+    @property
+    def state(self) -> "runner_pb2.RunnerState":
+        """What is known without asking the executor: not whether it is stuck, or stepping."""
+        if not self.up:
+            return runner_pb2.RUNNER_STATE_DOWN
+        if self.loop.running:
+            return runner_pb2.RUNNER_STATE_RUNNING
+        if self.loop.fault or self.loop.held:
+            return runner_pb2.RUNNER_STATE_FAULTED
+        return runner_pb2.RUNNER_STATE_STOPPED
 
     @property
     def executor(self) -> Executor | None:

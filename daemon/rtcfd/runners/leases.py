@@ -115,6 +115,11 @@ class Leases:
                 runner.desired.put(name, spec)
                 holder = request.holder or "a lease"
                 parameters.note(runner, name, spec.parameters, {}, None, "launch", holder)
+                runner.happened(
+                    control_pb2.Event.KIND_GRAPH,
+                    f"{name} loaded ({what}) for {request.holder or 'a lease'}",
+                    name,
+                )
             except BaseException:
                 self._outboxes.pop(name, None)
                 # Left to the next rtcfd, the executor may load it yet: then it is still leased.

@@ -140,6 +140,7 @@ class Runner(RunnerCore):
             verdict,
             extra={"runner": self.name, "component": verdict.culprit},
         )
+        self.happened(control_pb2.Event.KIND_EXECUTOR_FAULT, died, verdict.culprit)
         self.shared.on_change()
         if ours and verdict.orderly:
             self.trouble += f"; `rtcfctl -r {self.name} start` brings it back with its components"
@@ -166,6 +167,10 @@ class Runner(RunnerCore):
     def component_failed(self, component: str, reason: str) -> None:
         """A component was taken out of the loop, which goes on."""
         self.leases.failed(component, reason)
+
+    def told(self, kind: "control_pb2.Event.Kind", event: wire.Event) -> None:
+        """The executor tells of something, which has been seen to."""
+        self.happened(kind, event.message, event.component, event.iteration)
 
     def late(self, message: str) -> None:
         """Cycles ended late: find out how many."""
@@ -232,6 +237,11 @@ class Runner(RunnerCore):
         self.loop.stopped_at_ns = stop.at_ns
         self.loop.stop()
         self.loop.told(False)
+        self.happened(
+            control_pb2.Event.KIND_RUNNER_STATE,
+            f"stopped at its executor by user {stop.uid} (pid {stop.pid})",
+            user=f"#{stop.uid}",
+        )
         self.operations.withdraw(
             "the loop was stopped at its executor", errors_pb2.REASON_LOOP_STOPPED, only_cycles=True
         )
@@ -290,6 +300,7 @@ class Runner(RunnerCore):
             if self.up:
                 await self.ask(wire.Request(configure=change))
             self.desired.choose(change)
+            self.happened(control_pb2.Event.KIND_RUNNER_SETTINGS, "settings changed")
             await self.save()
             self.log.info("settings changed")
 

@@ -141,6 +141,7 @@ class Runners:
         if on_added is not None:
             on_added(runner)
         self._runners[name] = runner
+        runner.happened(control_pb2.Event.KIND_RUNNER_ADDED, "runner added")
         try:
             await runner.bring_up()
         except BaseException:
@@ -204,6 +205,7 @@ class Runners:
         # Not before: its executor must be gone when another takes the name.
         if self._runners.get(runner.name) is runner:
             del self._runners[runner.name]
+        runner.happened(control_pb2.Event.KIND_RUNNER_REMOVED, "runner removed")
         runner.log.info("runner removed")
         self._shared.on_change()
 

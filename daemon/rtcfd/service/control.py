@@ -15,6 +15,7 @@ from rtcf_shared.naming import listing
 
 from rtcfd import VERSION
 from rtcfd.catalog.catalog import Catalog
+from rtcfd.common.event_log import EventLog
 from rtcfd.common.names import DEFAULT_RUNNER, absolute
 from rtcfd.common.refusals import InvalidArgument
 from rtcfd.common.status_codes import abort
@@ -30,6 +31,7 @@ from rtcfd.runners.runners import Runners
 from rtcfd.service.answers import answering, changing, holding, lasting
 from rtcfd.service.pages import page
 from rtcfd.service.replay import Replay
+from rtcfd.service.watching import watch
 
 _WATCH_MS = 1000
 _SHORTEST_WATCH_MS = 100
@@ -54,7 +56,10 @@ class Daemon(Protocol):
 class Control(control_pb2_grpc.ControlServicer):
     """Serves one connection or many; owned by the daemon."""
 
-    def __init__(self, runners: Runners, catalog: Catalog, daemon: Daemon) -> None:
+    def __init__(
+        self, runners: Runners, catalog: Catalog, daemon: Daemon, events: EventLog
+    ) -> None:
+        self._events = events
         self._runners = runners
         self._catalog = catalog
         self._daemon = daemon
@@ -327,6 +332,16 @@ class Control(control_pb2_grpc.ControlServicer):
                 statistics = await self._statistics(request.runner)
                 yield control_pb2.WatchStatisticsResponse(statistics=statistics)
                 await asyncio.sleep(interval_s)
+        except Exception as error:
+            await abort(context, error, request)
+
+    async def WatchEvents(
+        self, request: control_pb2.WatchEventsRequest, context: Any
+    ) -> AsyncIterator[control_pb2.WatchEventsResponse]:
+        """What happens."""
+        try:
+            async for response in watch(self._events, request):
+                yield response
         except Exception as error:
             await abort(context, error, request)
 

@@ -21,6 +21,7 @@ from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 from rtcfd.catalog.catalog import Catalog, Folder
 from rtcfd.catalog.describe import Describer
 from rtcfd.common import runner_settings
+from rtcfd.common.event_log import EventLog
 from rtcfd.executor import executor
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.link import Link
@@ -152,7 +153,7 @@ class Rtcfd:
                 serve_ros=no_ros,
             )
         )
-        self.control = Control(self.runners, catalog, self)
+        self.control = Control(self.runners, catalog, self, EventLog())
 
     @property
     def refused(self) -> list[str]:

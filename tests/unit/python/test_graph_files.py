@@ -152,7 +152,11 @@ def test_apply_shows_the_difference_and_changes_once(
     assert client.get_order() == ["/gone"]
     assert client.get_status().runners[0].settings.frequency_hz == 1000.0
 
-    assert daemon.ctl("apply", file).stdout.endswith("applied\n")
+    unnamed = daemon.ctl("apply", file)
+    assert unnamed.returncode == 1
+    assert "would unload /gone from runner rt_runner, which it does not name" in unnamed.stderr
+    assert client.get_order() == ["/gone"]
+    assert daemon.ctl("-r", "rt_runner", "apply", file).stdout.endswith("applied\n")
     assert client.get_order() == ["/a", "/b"]
     assert client.get_status().runners[0].settings.frequency_hz == 500.0
     assert [each["name"] for each in daemon.saved()["components"]] == ["a", "b"]
@@ -164,7 +168,7 @@ def test_a_graph_that_is_refused_changes_nothing(
 ) -> None:
     client.load(rtcf.component("demo", "Fine", name="kept"))
     text = "settings: {frequency_hz: 500}\ncomponents: [{package: demo, type: Refused}]\n"
-    done = daemon.ctl("apply", write(tmp_path, text))
+    done = daemon.ctl("-r", "rt_runner", "apply", write(tmp_path, text))
     assert (done.returncode, done.stderr) == (1, "rtcfctl: Refused.configure failed\n")
     assert client.get_order() == ["/kept"]
     assert client.get_status().runners[0].settings.frequency_hz == 1000.0

@@ -1,0 +1,56 @@
+"""`rtcfctl events`: what has happened, and what happens."""
+
+import argparse
+import sys
+import time
+from typing import Any
+
+import rtcf
+from rtcf.events import Lost, Place
+from rtcf.v1 import control_pb2
+
+from rtcfctl.output import Output
+from rtcfctl.plain import enumerator
+
+_STYLES = {
+    control_pb2.Event.KIND_LOOP_FAULT: "bold red",
+    control_pb2.Event.KIND_EXECUTOR_FAULT: "bold red",
+    control_pb2.Event.KIND_COMPONENT_FAULT: "red",
+    control_pb2.Event.KIND_DEGRADED: "yellow",
+    control_pb2.Event.KIND_OVERRUNS: "yellow",
+}
+
+
+def register(verbs: Any, common: argparse.ArgumentParser) -> None:
+    """Add the verb."""
+    verb = verbs.add_parser(
+        "events", parents=[common], help="what has happened: states, faults, changes"
+    )
+    verb.add_argument("-f", "--follow", action="store_true", help="go on until Ctrl-C")
+    verb.set_defaults(run=show)
+
+
+def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Print events; for machines a document each."""
+    runners = [args.runner] if args.runner else []
+    with client.watch_events(runners, Place(), until_now=not args.follow) as events:
+        for event in events:
+            if output.for_people:
+                _print(event, output)
+            else:
+                output.record({"lost": event.count} if isinstance(event, Lost) else event)
+            sys.stdout.flush()
+
+
+def _print(event: control_pb2.Event | Lost, output: Output) -> None:
+    if isinstance(event, Lost):
+        output.line(f"{event.count} events of before are not kept", "yellow")
+    else:
+        output.line(_line(event), _STYLES.get(event.kind, ""))
+
+
+def _line(event: control_pb2.Event) -> str:
+    stamp = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(event.time_ns / 1e9))
+    subject = event.runner or "rtcfd"
+    who = f" (by {event.user})" if event.user else ""
+    return f"{stamp} {subject} {enumerator(event, 'kind')}: {event.message}{who}"

@@ -1,0 +1,103 @@
+"""What watchers of a real rtcfd hear: in order, from a number on, faults and deaths too."""
+
+import json
+import os
+import signal
+from collections.abc import Callable
+
+import pytest
+import rtcf
+from daemon_process import Daemon, wait_for
+from fig_1 import mimo
+from rtcf.events import EventStream, Lost, Place
+from rtcf.v1 import control_pb2, runner_pb2
+
+Event = control_pb2.Event
+
+
+def until(
+    stream: EventStream, condition: Callable[[control_pb2.Event], bool]
+) -> list[control_pb2.Event]:
+    """Return what comes up to an event; the daemon's end would end the wait."""
+    found = []
+    for event in stream:
+        assert not isinstance(event, Lost)
+        found.append(event)
+        if condition(event):
+            return found
+    raise AssertionError(f"the stream ended: {found}")
+
+
+def test_changes_and_states_come_in_order_with_who_made_them(client: rtcf.Client) -> None:
+    with client.watch_events(["rt_runner"]) as events:
+        client.load(mimo("A", {}))
+        client.start()
+        client.set_breaks([rtcf.parse_port("A.in1")], True)
+        client.stop()
+        heard = until(events, lambda e: e.kind == Event.KIND_RUNNER_STATE
+                      and e.state == runner_pb2.RUNNER_STATE_STOPPED)  # fmt: skip
+    assert [(each.kind, each.state) for each in heard if each.kind != Event.KIND_DEGRADED] == [
+        (Event.KIND_GRAPH, runner_pb2.RUNNER_STATE_STOPPED),
+        (Event.KIND_RUNNER_STATE, runner_pb2.RUNNER_STATE_RUNNING),
+        (Event.KIND_GRAPH, runner_pb2.RUNNER_STATE_RUNNING),
+        (Event.KIND_RUNNER_STATE, runner_pb2.RUNNER_STATE_STOPPED),
+    ]
+    numbers = [each.sequence for each in heard]
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+    assert heard[0].component == "/A"
+    assert heard[0].user == "root" or os.geteuid() != 0
+
+
+def test_who_comes_back_misses_nothing(client: rtcf.Client) -> None:
+    with client.watch_events() as events:
+        place = events.place
+    client.load(mimo("A", {}))
+    client.unload(["A"])
+    with client.watch_events(after=place, until_now=True) as events:
+        said = [each.message for each in events if isinstance(each, Event)]
+    assert said == ["/A loaded (rtcf_examples/Mimo)", "/A unloaded"]
+
+
+def test_a_dead_executor_is_an_event(daemon: Daemon, client: rtcf.Client) -> None:
+    pid = client.get_status().runners[0].pid
+    with client.watch_events() as events:
+        os.kill(pid, signal.SIGKILL)
+        heard = until(events, lambda e: e.kind == Event.KIND_EXECUTOR_FAULT)
+    assert "killed" in heard[-1].message.lower() or "SIGKILL" in heard[-1].message
+    assert heard[-1].runner == "rt_runner"
+    wait_for(lambda: client.get_status().runners[0].pid not in (0, pid), "a new executor")
+
+
+def test_rtcfctl_prints_them_for_people_and_machines(daemon: Daemon, client: rtcf.Client) -> None:
+    client.load(mimo("A", {}))
+    lines = daemon.ctl("events").stdout.splitlines()
+    assert "rtcfd daemon: rtcfd" in lines[0]
+    assert "rt_runner graph: /A loaded (rtcf_examples/Mimo)" in lines[-1]
+    documents = [
+        json.loads(line) for line in daemon.ctl("events", "-o", "json").stdout.splitlines()
+    ]
+    assert [each["sequence"] for each in documents] == list(range(1, len(documents) + 1))
+    assert documents[-1]["kind"] == "graph"
+    assert documents[-1]["component"] == "/A"
+    other = daemon.ctl("-r", "nobody", "events", "-o", "json").stdout.splitlines()
+    assert {json.loads(line)["kind"] for line in other} == {"daemon"}
+
+
+def test_a_place_of_before_a_restart_of_rtcfd_begins_anew(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    with client.watch_events(after=Place("another log", 7), until_now=True) as events:
+        first = next(iter(events))
+    assert isinstance(first, Event)
+    assert (first.sequence, first.kind) == (1, Event.KIND_DAEMON)
+
+
+@pytest.mark.parametrize("runner", ["rt_runner", "other"])
+def test_only_the_runners_that_are_asked_for_are_told_of(client: rtcf.Client, runner: str) -> None:
+    client.add_runner("other")
+    with client.watch_events([runner]) as events:
+        client.load(mimo("A", {}), "rt_runner")
+        client.load(mimo("A", {}), "other")
+        client.unload(["A"], runner)
+        heard = until(events, lambda e: e.message.endswith("unloaded"))
+    assert {each.runner for each in heard} == {runner}
