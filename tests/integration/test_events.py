@@ -36,7 +36,8 @@ def test_changes_and_states_come_in_order_with_who_made_them(client: rtcf.Client
         client.stop()
         heard = until(events, lambda e: e.kind == Event.KIND_RUNNER_STATE
                       and e.state == runner_pb2.RUNNER_STATE_STOPPED)  # fmt: skip
-    assert [(each.kind, each.state) for each in heard if each.kind != Event.KIND_DEGRADED] == [
+    asked = (Event.KIND_GRAPH, Event.KIND_RUNNER_STATE)  # a busy machine has others to tell
+    assert [(each.kind, each.state) for each in heard if each.kind in asked] == [
         (Event.KIND_GRAPH, runner_pb2.RUNNER_STATE_STOPPED),
         (Event.KIND_RUNNER_STATE, runner_pb2.RUNNER_STATE_RUNNING),
         (Event.KIND_GRAPH, runner_pb2.RUNNER_STATE_RUNNING),

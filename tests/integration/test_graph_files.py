@@ -33,7 +33,7 @@ def file(tmp_path: Path) -> Path:
 
 def changes(daemon: Daemon, *arguments: str) -> set[tuple[str, str]]:
     """Apply, and return what was changed and where."""
-    done = daemon.ctl("apply", *arguments, "-o", "yaml")
+    done = daemon.ctl("-r", "rt_runner", "apply", *arguments, "-o", "yaml")
     assert done.returncode == 0, done.stderr
     differences = yaml.safe_load(done.stdout)["rt_runner"]["differences"]
     return {(each["kind"], each["component"]) for each in differences}

@@ -1,5 +1,9 @@
 """Refusals of a real rtcfd as programs see them: reason, domain and what it is about."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import grpc
 import pytest
 import rtcf
@@ -7,6 +11,8 @@ from daemon_process import Daemon
 from fig_1 import mimo
 from rtcf import refusals
 from rtcf.v1 import control_pb2, control_pb2_grpc, errors_pb2
+
+TREE = Path(__file__).resolve().parents[2]
 
 
 def test_a_program_learns_the_reason_and_the_name_that_was_meant(client: rtcf.Client) -> None:
@@ -40,3 +46,21 @@ def test_any_grpc_client_finds_google_rpc_error_info(daemon: Daemon) -> None:
     info = errors_pb2.ErrorInfo.FromString(detail.value)
     assert (info.reason, info.domain) == ("NAME_MISSING", "rtcf")
     assert info.metadata["field"] == "components"
+
+
+def test_the_client_of_the_protocols_page_works(daemon: Daemon) -> None:
+    page = (TREE / "docs" / "api.md").read_text(encoding="utf-8")
+    code = page.partition("```python\n")[2].partition("```")[0]
+    assert 20 < len(code.splitlines()) <= 36
+    done = subprocess.run(
+        [sys.executable, "-", str(daemon.socket)],
+        input=code,
+        capture_output=True,
+        text=True,
+        env={"PYTHONPATH": str(TREE / "build" / "python")},
+        check=False,
+    )
+    assert done.stderr == ""
+    lines = done.stdout.splitlines()
+    assert lines.count("done: /H1") == 2
+    assert lines[-1].startswith("COMPONENT_EXISTS {")

@@ -2,6 +2,7 @@
 
 import keyword
 import re
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -25,7 +26,7 @@ DIMENSIONS = re.compile(
 UNITS = ("_ns", "_us", "_ms", "_s", "_hz", "_kb")
 # Answers of calls that tell nothing but that it is done.
 STREAMED = {"Add", "Set", "Remove", "Restart", "Start", "Stop", "Step", "Load", "Unload", "Replace",
-            "Apply", "Release", "Reload", "Replay", "Hold", "Lease", "Watch"}  # fmt: skip
+            "Apply", "Release", "Undo", "Reload", "Replay", "Hold", "Lease", "Watch"}  # fmt: skip
 
 
 def messages() -> Iterator[Descriptor]:
@@ -94,3 +95,10 @@ def test_lists_come_in_pages(method: object) -> None:
         assert {"page_size", "page_token"} <= fields
         answer = {each.name for each in method.output_type.fields}  # type: ignore[attr-defined]
         assert "next_page_token" in answer
+
+
+def test_the_page_says_what_the_comments_say() -> None:
+    done = subprocess.run(
+        [TREE / "tools" / "api-docs", "--check"], capture_output=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
