@@ -1,6 +1,6 @@
 """Watching events: from a number on, or from now on, for one caller."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 
 from rtcf.v1 import control_pb2
 
@@ -11,7 +11,7 @@ _BATCH = 200
 
 async def watch(
     log: EventLog, request: control_pb2.WatchEventsRequest
-) -> AsyncIterator[control_pb2.WatchEventsResponse]:
+) -> AsyncGenerator[control_pb2.WatchEventsResponse, None]:
     """Yield where the caller stands, then what happens; without end unless asked for."""
     number = log.last
     if request.HasField("after"):
