@@ -26,7 +26,8 @@ DIMENSIONS = re.compile(
 UNITS = ("_ns", "_us", "_ms", "_s", "_hz", "_kb")
 # Answers of calls that tell nothing but that it is done.
 STREAMED = {"Add", "Set", "Remove", "Restart", "Start", "Stop", "Step", "Load", "Unload", "Replace",
-            "Apply", "Release", "Undo", "Reload", "Replay", "Hold", "Lease", "Watch"}  # fmt: skip
+            "Restore", "Apply", "Release", "Undo", "Reload", "Replay", "Hold", "Lease",
+            "Watch"}  # fmt: skip
 
 
 def messages() -> Iterator[Descriptor]:
