@@ -220,12 +220,15 @@ void Instance::freezePorts() {
 void Instance::start() {
     if (started_) return;
     callHook(Hook::Start, [this] { return component_->start(); });
+    for (MailboxBase* mailbox : component_->mailboxes()) mailbox->open();
     started_ = true;
 }
 
 void Instance::stop() noexcept {
     if (!started_) return;
     started_ = false;
+    // Who waits in a callback is answered first: stop() may wait for the callback.
+    for (MailboxBase* mailbox : component_->mailboxes()) mailbox->close();
     callLastHook(Hook::Stop, [this] { component_->stop(); });
 }
 

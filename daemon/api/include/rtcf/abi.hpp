@@ -29,7 +29,8 @@ struct AbiProbe {
              offsetof(Component, rest_), sizeof(Source), sizeof(Component::Rest)});
         using Rest = Component::Rest;
         add({offsetof(Rest, frozen), offsetof(Rest, inputs), offsetof(Rest, outputs),
-             offsetof(Rest, parameters), offsetof(Rest, derived), offsetof(Rest, states),
+             offsetof(Rest, parameters), offsetof(Rest, derived), offsetof(Rest, mailboxes),
+             sizeof(MailboxBase), offsetof(MailboxBase, open_), offsetof(Rest, states),
              offsetof(Rest, staged_outputs), offsetof(Rest, failure)});
         using Context = ComponentContext;
         add({sizeof(Context), offsetof(Context, full_name), offsetof(Context, name),

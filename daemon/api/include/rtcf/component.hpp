@@ -19,6 +19,7 @@
 
 #include "rtcf/derived.hpp"
 #include "rtcf/logging.hpp"
+#include "rtcf/mailbox.hpp"
 #include "rtcf/node_gate.hpp"
 #include "rtcf/parameter.hpp"
 #include "rtcf/port.hpp"
@@ -144,6 +145,7 @@ class Component {
     const std::vector<OutputBase*>& outputs() const noexcept { return rest_->outputs; }
     const std::vector<ParameterBase*>& parameters() const noexcept { return rest_->parameters; }
     const std::vector<DerivedBase*>& derived() const noexcept { return rest_->derived; }
+    const std::vector<MailboxBase*>& mailboxes() const noexcept { return rest_->mailboxes; }
     const std::vector<StateDeclaration>& states() const noexcept { return rest_->states; }
     /// Outputs whose values nobody reads before the executor has let them pass.
     const std::vector<OutputBase*>& stagedOutputs() const noexcept { return rest_->staged_outputs; }
@@ -164,6 +166,7 @@ class Component {
     void declare(OutputBase* output) { declareIn(rest_->outputs, output, output->name(), "port"); }
     void declare(StateDeclaration state);
     void declare(DerivedBase* derived) { rest_->derived.push_back(derived); }
+    void declare(MailboxBase* mailbox) { rest_->mailboxes.push_back(mailbox); }
     void declareFinite(OutputBase* output) { rest_->staged_outputs.push_back(output); }
     void declare(ParameterBase* parameter) {
         declareIn(rest_->parameters, parameter, parameter->declaration().name, "parameter");
@@ -171,10 +174,20 @@ class Component {
     /// @}
 
    protected:
-    /// Says why a hook fails: `return fail("no reply from {}", device);`. @return false
+    /// Says why a hook fails: `return fail("no reply from {}", device);`. A text without arguments
+    /// is taken as it is. RTCF_FAIL(this, …) has its format checked when compiled. Not real-time.
+    /// @return false, for the hook to return
     template <typename... Arguments>
-    bool fail(std::string_view text, const Arguments&... arguments) {
-        rest_->failure = fmt::vformat(text, fmt::make_format_args(arguments...));
+    [[nodiscard]] bool fail(std::string_view text, const Arguments&... arguments) {
+        if constexpr (sizeof...(arguments) == 0) {
+            rest_->failure = text;
+        } else {
+            try {
+                rest_->failure = fmt::vformat(text, fmt::make_format_args(arguments...));
+            } catch (const fmt::format_error&) {
+                rest_->failure = text;  // better than a complaint about the complaint
+            }
+        }
         return false;
     }
 
@@ -199,6 +212,7 @@ class Component {
         std::vector<OutputBase*> outputs;
         std::vector<ParameterBase*> parameters;
         std::vector<DerivedBase*> derived;
+        std::vector<MailboxBase*> mailboxes;
         std::vector<StateDeclaration> states;
         std::vector<OutputBase*> staged_outputs;
         std::string failure;
@@ -312,6 +326,8 @@ inline OutputBase::OutputBase(Component* owner, std::string name, std::string un
 
 inline DerivedBase::DerivedBase(Component* owner) { owner->declare(this); }
 
+inline MailboxBase::MailboxBase(Component* owner) { owner->declare(this); }
+
 inline ParameterBase::ParameterBase(Component* owner, ParameterDeclaration declaration)
     : declaration_(std::move(declaration)) {
     ParameterValue initial = declaration_.default_value;
@@ -373,6 +389,12 @@ class Source : public Component {
 };
 
 }  // namespace rtcf
+
+/// Component::fail() with its format checked when compiled: `return RTCF_FAIL(this, "no reply from
+/// {}", device);`, in a hook. Not real-time. @return false
+#define RTCF_FAIL(self, text, ...)                                                   \
+    (false ? ::rtcf::detail::formatCheck(FMT_STRING(text), ##__VA_ARGS__) : (void)0, \
+     (self)->fail(text, ##__VA_ARGS__))
 
 #include "rtcf/abi.hpp"
 #include "rtcf/device_io.hpp"

@@ -130,6 +130,12 @@ const T& logLoad(const T& value) noexcept {
     return value;
 }
 
+/// Checks a format at compile time; never called.
+template <typename Format, typename... Arguments>
+void formatCheck(const Format& format, const Arguments&... arguments) {
+    (void)fmt::formatted_size(format, arguments...);
+}
+
 /// Checks a call's format at compile time, with the arguments as they are stored; never called.
 template <typename Format, typename... Arguments>
 void logCheck(const Format& format, const Arguments&... arguments) {

@@ -52,6 +52,7 @@ class Bench {
         component_->freeze();
     }
     ~Bench() {
+        for (MailboxBase* mailbox : component_->mailboxes()) mailbox->close();
         if (started_) component_->stop();
         component_->cleanup();
     }
@@ -94,7 +95,10 @@ class Bench {
 
     /// Runs cycles, the first after start().
     void cycle(std::uint64_t cycles = 1) {
-        if (!started_) require(component_->start(), "start");
+        if (!started_) {
+            require(component_->start(), "start");
+            for (MailboxBase* mailbox : component_->mailboxes()) mailbox->open();
+        }
         for (started_ = true; cycles > 0; --cycles) {
             component_->update();
             for (OutputBase* output : component_->stagedOutputs()) {

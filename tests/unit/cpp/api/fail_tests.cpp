@@ -1,0 +1,48 @@
+// What a hook says when it fails.
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <string>
+
+#include "rtcf/component.hpp"
+#include "rtcf/test.hpp"
+
+namespace rtcf::test {
+namespace {
+
+class Failing final : public Component {
+    Parameter<int> how{this, "how", 0};
+    bool configure() override {
+        switch (how.value()) {
+            case 0:
+                return true;
+            case 1:
+                return fail("nothing {but} a brace");
+            case 2:
+                return fail("two {} of {}", 1);
+            default:
+                return RTCF_FAIL(this, "no reply from {} in {:.1f} s", "drive", 0.25);
+        }
+    }
+    void update() override {}
+};
+
+TEST(Fail, SaysWhatItWasTold) {
+    const auto refusal = [](int how) -> std::string {
+        try {
+            const Bench bench("Failing", {{"how", std::int64_t{how}}});
+        } catch (const std::runtime_error& error) {
+            return error.what();
+        }
+        return {};
+    };
+    EXPECT_EQ(refusal(0), "");
+    EXPECT_EQ(refusal(1), "configure failed: nothing {but} a brace");
+    EXPECT_EQ(refusal(2), "configure failed: two {} of {}") << "rather than of the format alone";
+    EXPECT_EQ(refusal(3), "configure failed: no reply from drive in 0.2 s");
+}
+
+}  // namespace
+}  // namespace rtcf::test
+
+RTCF_COMPONENT_NAMED(rtcf::test::Failing, "Failing", "Fails in configure()", Failing)

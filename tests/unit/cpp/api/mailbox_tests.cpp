@@ -1,0 +1,203 @@
+// Mailboxes: callers in threads of their own, update() by hand. No time is asserted: where a caller
+// is to be in a call, the test waits for its request.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <future>
+#include <random>
+#include <thread>
+#include <vector>
+
+#include "rtcf/component.hpp"
+#include "rtcf/test.hpp"
+#include "support/eventually.hpp"
+
+namespace rtcf::test {
+namespace {
+
+using std::chrono::hours;
+using std::chrono::milliseconds;
+using std::chrono::nanoseconds;
+
+class Idle : public Component {
+    void update() override {}
+};
+
+using Box = Mailbox<int, int>;
+
+struct Asked {
+    MailStatus status;
+    int reply;
+};
+
+std::future<Asked> ask(Box& box, int request, nanoseconds timeout = hours(1)) {
+    return std::async(std::launch::async, [&box, request, timeout] {
+        int reply = -1;
+        const MailStatus status = box.call(request, reply, timeout);
+        return Asked{status, reply};
+    });
+}
+
+// What update() does in some cycle.
+bool finds(Box& box) {
+    return eventually([&] { return box.request() != nullptr; });
+}
+
+TEST(Mailbox, BringsARequestInAndAReplyOut) {
+    Idle idle;
+    Box box(&idle);
+    box.open();
+    EXPECT_EQ(box.request(), nullptr);
+    auto asked = ask(box, 7);
+    ASSERT_TRUE(finds(box));
+    for (int cycle = 0; cycle < 100; ++cycle) {
+        ASSERT_NE(box.request(), nullptr) << "it is there until it is answered";
+        EXPECT_EQ(*box.request(), 7);
+    }
+    box.reply(14);
+    EXPECT_EQ(box.request(), nullptr);
+    const Asked found = asked.get();
+    EXPECT_EQ(found.status, MailStatus::Answered);
+    EXPECT_EQ(found.reply, 14);
+}
+
+TEST(Mailbox, WithoutALoopTheAnswerIsImmediate) {
+    Idle idle;
+    Box box(&idle);
+    EXPECT_EQ(ask(box, 1).get().status, MailStatus::Ended);
+    box.open();
+    box.close();
+    EXPECT_EQ(ask(box, 1).get().status, MailStatus::Ended);
+}
+
+TEST(Mailbox, WhoIsNotAnsweredInTimeIsTold) {
+    Idle idle;
+    Box box(&idle);
+    box.open();
+    EXPECT_EQ(ask(box, 1, milliseconds(1)).get().status, MailStatus::TimedOut);
+    EXPECT_EQ(ask(box, 1, nanoseconds(-1)).get().status, MailStatus::TimedOut);
+    EXPECT_EQ(box.request(), nullptr) << "it has been given up";
+    box.reply(5);
+    auto next = ask(box, 2);
+    ASSERT_TRUE(finds(box));
+    EXPECT_EQ(*box.request(), 2);
+    box.reply(6);
+    EXPECT_EQ(next.get().reply, 6) << "not the late answer to another request";
+}
+
+TEST(Mailbox, AReplyToNobodyIsNone) {
+    Idle idle;
+    Box box(&idle);
+    box.open();
+    box.reply(5);
+    auto asked = ask(box, 1);
+    ASSERT_TRUE(finds(box));
+    box.reply(6);
+    EXPECT_EQ(asked.get().reply, 6);
+}
+
+TEST(Mailbox, TheEndOfTheLoopAnswersAllWhoWait) {
+    Idle idle;
+    Box box(&idle);
+    for (int run = 0; run < 3; ++run) {
+        box.open();
+        std::vector<std::future<Asked>> waiting;
+        for (int i = 0; i < 4; ++i) waiting.push_back(ask(box, i));
+        ASSERT_TRUE(finds(box));
+        box.close();
+        for (auto& each : waiting) EXPECT_EQ(each.get().status, MailStatus::Ended);
+    }
+}
+
+TEST(Mailbox, ANewLoopKnowsNothingOfTheOneBefore) {
+    Idle idle;
+    Box box(&idle);
+    box.open();
+    auto before = ask(box, 1);
+    ASSERT_TRUE(finds(box));
+    box.close();
+    box.open();
+    auto after = ask(box, 2);
+    EXPECT_EQ(before.get().status, MailStatus::Ended);
+    ASSERT_TRUE(finds(box));
+    EXPECT_EQ(*box.request(), 2);
+    box.reply(3);
+    EXPECT_EQ(after.get().reply, 3);
+}
+
+TEST(Mailbox, ItsEndLetsCallersGo) {
+    Idle idle;
+    auto box = std::make_unique<Box>(&idle);
+    box->open();
+    auto asked = ask(*box, 1);
+    ASSERT_TRUE(finds(*box));
+    box.reset();
+    EXPECT_EQ(asked.get().status, MailStatus::Ended);
+}
+
+// Many callers, some of whom give up, while the loop ends and begins: each answer belongs to its
+// request.
+TEST(Mailbox, AnswersAreOfTheirRequests) {
+    Idle idle;
+    Mailbox<std::vector<int>, std::vector<int>> box(&idle);
+    box.open();
+    std::atomic<int> answered{0};
+    std::atomic<int> left{4};
+    std::vector<std::thread> callers;
+    for (unsigned caller = 0; caller < 4; ++caller) {
+        callers.emplace_back([&, caller] {
+            std::mt19937 random(caller);  // NOLINT(cert-msc32-c,cert-msc51-cpp)
+            for (int i = 0; i < 200; ++i) {
+                const auto size = static_cast<std::size_t>(random() % 50);
+                const std::vector<int> request(size, static_cast<int>(caller) * 1000 + i);
+                std::vector<int> reply;
+                const auto timeout =
+                    random() % 4 == 0 ? nanoseconds(random() % 100'000) : nanoseconds(hours(1));
+                if (box.call(request, reply, timeout) != MailStatus::Answered) continue;
+                EXPECT_EQ(reply, request);
+                ++answered;
+            }
+            --left;
+        });
+    }
+    std::mt19937 random(99);  // NOLINT(cert-msc32-c,cert-msc51-cpp)
+    while (left > 0) {
+        if (const auto* request = box.request(); request != nullptr && random() % 3 != 0)
+            box.reply(std::vector<int>(*request));
+        if (random() % 500 == 0) {
+            box.close();
+            box.open();
+        }
+        std::this_thread::yield();
+    }
+    for (std::thread& each : callers) each.join();
+    EXPECT_GT(answered, 0);
+}
+
+class Doubling final : public Component {
+   public:
+    Mailbox<int, int> box{this};
+
+   private:
+    void update() override {
+        if (const int* request = box.request()) box.reply(2 * *request);
+    }
+};
+
+TEST(Bench, OpensMailboxesWhileTheLoopRuns) {
+    Bench doubling("Doubling");
+    Box& box = static_cast<Doubling&>(doubling.component()).box;
+    EXPECT_EQ(ask(box, 1).get().status, MailStatus::Ended);
+    doubling.cycle();
+    auto asked = ask(box, 21);
+    EXPECT_TRUE(eventually([&] {
+        doubling.cycle();
+        return asked.wait_for(nanoseconds(0)) == std::future_status::ready;
+    }));
+    EXPECT_EQ(asked.get().reply, 42);
+}
+
+}  // namespace
+}  // namespace rtcf::test
+
+RTCF_COMPONENT_NAMED(rtcf::test::Doubling, "Doubling", "Doubles a request", Doubling)
