@@ -124,15 +124,6 @@ void requireNoLazyThreadLocals(const std::string& path, int file) {
         "memory at hand from the start");
 }
 
-// As above, of what it brings along.
-void requireNoLazyThreadLocals(const std::string& path, const std::string& linked, int file) {
-    if (!ElfFile(file).lazy_thread_locals) return;
-    refuse(path, fmt::format("links against {}, which has thread_local variables that are "
-                             "allocated in the cycle that first uses them: do without it, or build "
-                             "it with -ftls-model=initial-exec",
-                             linked));
-}
-
 }  // namespace
 
 Library::Library(const std::string& path, int file) : path_(path) {
@@ -196,7 +187,6 @@ void LibraryStore::requireTrustedFinds(const std::string& path) {
         if (linked_.count(linked) != 0) continue;
         const FileDescriptor trusted(openTrusted(
             linked, owners_, fmt::format("library {}, which links against {}", path, linked)));
-        requireNoLazyThreadLocals(path, linked, trusted.get());
         linked_.insert(linked);
     }
 }

@@ -87,22 +87,6 @@ TEST(Library, WithThreadLocalsThatAllocateInTheCycleIsRefused) {
     EXPECT_EQ(refusalOf(kFolder + "thread_local_static.so"), "");
 }
 
-// Also the second time, when what it links against is there already.
-TEST(Library, ThatLinksAgainstThreadLocalsIsRefused) {
-    LibraryStore store;
-    for (int i = 0; i < 2; ++i) {
-        std::string text;
-        try {
-            store.open(kFolder + "thread_local_linked.so");
-        } catch (const Refusal& refused) {
-            text = refused.what();
-        }
-        EXPECT_NE(text.find("thread_local_linked.so: links against"), std::string::npos) << text;
-        EXPECT_NE(text.find("libthread_local_dependency.so"), std::string::npos) << text;
-        EXPECT_NE(text.find("-ftls-model=initial-exec"), std::string::npos) << text;
-    }
-}
-
 TEST(Library, ThatIsNoLibraryIsRefused) {
     const std::string text = refusalOf("/etc/passwd");
     EXPECT_NE(text.find("does not load"), std::string::npos) << text;
