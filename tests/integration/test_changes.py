@@ -132,7 +132,7 @@ def test_a_replacement_keeps_the_parameters_that_it_does_not_name(
     # They are of the saved graph, too.
     saved = daemon.ctl("save").stdout
     assert "count: 4" in saved and "rate: 2.5" in saved and "label: theirs" in saved
-    assert daemon.ctl("runner", "restart").returncode == 0
+    assert daemon.ctl("runner", "restart", "rt_runner").returncode == 0
     assert _values(client, "knobs")["count"] == 4
 
 

@@ -15,7 +15,7 @@ CHANGES = (
     ("runner", "add", "other"),
     ("runner", "set", "--frequency", "10"),
     ("runner", "remove", "rt_runner"),
-    ("runner", "restart"),
+    ("runner", "restart", "rt_runner"),
     ("stats", "--reset"),
 )
 QUERIES = (("status",), ("list",), ("order",), ("info", "M"), ("connections",), ("stats",),

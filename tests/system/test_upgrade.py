@@ -73,7 +73,7 @@ def test_an_upgrade_leaves_the_loop_alone_until_the_restart(service: Service, hi
     service.ctl("load", "rtcf_examples", "Identity", "--name", "newer")
     runs_on(service, before, service.pid)
 
-    service.ctl("runner", "restart")
+    service.ctl("runner", "restart", "rt_runner")
     after = service.status()
     assert after["pid"] != before["pid"]
     assert (after["state"], after["components"]) == ("stopped", 2)

@@ -52,7 +52,7 @@ class Executor:
         self.pid = process.pid
         self.expected = False  # its end was asked for
         self.ended = asyncio.Event()  # set after on_end
-        self.verdict = ""  # on its end, if nobody asked for that; set by on_end
+        self.verdict = ""  # on its end, or why it was asked for
         self.version = ""  # of rtcf
         self.foreign = ""  # why nothing but stop and its end can be asked of it
         self._protocol = 0

@@ -229,7 +229,7 @@ class RunnerCore(ABC):
         """Stop its loop in order and end it, whatever it is busy with; `trouble` says why."""
         executor, self._executor = self._executor, None
         if executor is not None:
-            self.trouble = trouble
+            self.trouble = executor.verdict = trouble
             async with self._changing_executor:
                 await executor.shut_down()
         self.loop.gone()

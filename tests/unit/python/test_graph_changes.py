@@ -168,7 +168,7 @@ def test_replacement_inherits_what_is_empty(daemon: DaemonUnderTest, client: rtc
     assert result.component == "/arm/x"
     spec = client.get_component("/arm/x").spec
     assert (spec.type, spec.first, list(spec.breaks)) == ("Logs", True, ["in2"])
-    assert [(each.to) for each in spec.remaps] == ["/a"]
+    assert [each.target for each in spec.remaps] == ["/a"]
     assert not spec.parameters
     assert list(saved(daemon)) == ["/arm/x"]
 

@@ -92,9 +92,8 @@ def ask_and_leave(
     """Ctrl-C on a client: once `until` is true, or its call is surely queued."""
     before = daemon.log().count("its caller left")
     with daemon.client() as client:
-        stub = client._stub
-        streams = method in ("Start", "Stop", "Apply")
-        call = getattr(stub, method)(request) if streams else getattr(stub, method).future(request)
+        ask = getattr(client._stub, method)
+        call = ask.future(request) if hasattr(ask, "future") else ask(request)
         # Calls of one connection are taken in their order.
         client.get_status()
         if until is not None:

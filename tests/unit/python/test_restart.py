@@ -161,7 +161,7 @@ def test_holders_have_not_died_and_come_back(service: DaemonUnderTest) -> None:
 def test_a_fresh_executor_frees_a_runner_whose_change_hangs(service: DaemonUnderTest) -> None:
     pid = service.executor_pid()
     slow = SlowLoad(service, service.folder / "never")
-    done = service.ctl("runner", "restart")
+    done = service.ctl("runner", "restart", "rt_runner")
     assert done.stdout.startswith("runner rt_runner restarted"), done.stderr
     (refusal,) = slow.outcome()
     assert refusal == "runner rt_runner: its executor is being restarted"
