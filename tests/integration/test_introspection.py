@@ -40,7 +40,7 @@ def _with_ros(master_uri: str, whitelist: str) -> str:
 
 def _node(client: rtcf.Client) -> str:
     """Return what the loop's health is reported of."""
-    return client.get_status("rt_runner").runners[0].ros.node.removeprefix("/")
+    return str(client.get_status("rt_runner").runners[0].ros.node).removeprefix("/")
 
 
 def _wait_for_services(master: Master) -> None:

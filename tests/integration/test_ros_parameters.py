@@ -301,7 +301,11 @@ def test_a_text_that_xml_cannot_carry_stays_off_the_parameter_server(
     before = master.parameter(f"{_NAME}/label")
     daemon.ctl("set", _NAME, "label:=a\x01b")
     wait_for(lambda: values(client)["label"] == "a\x01b", "the value")
-    ros = lambda: client.get_status("rt_runner").runners[0].ros  # noqa: E731
+
+    def ros() -> runner_pb2.RosStatus:
+        found: runner_pb2.RosStatus = client.get_status("rt_runner").runners[0].ros
+        return found
+
     wait_for(lambda: f"{_NAME}/label" in ros().problem, "the status to say so")
     assert ros().connected
     assert master.parameter(f"{_NAME}/label") == before

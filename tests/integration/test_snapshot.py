@@ -115,7 +115,7 @@ def _chaos(rate: float = 3.9) -> Any:
 
 def _rate(client: rtcf.Client) -> float:
     found = {each.name: each.value for each in client.get_component("chaos").parameters}
-    return found["rate"].double_value
+    return float(found["rate"].double_value)
 
 
 def test_commands_take_and_restore_in_a_running_loop(
