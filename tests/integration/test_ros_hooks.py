@@ -103,7 +103,7 @@ def test_a_lease_waits_for_a_master_if_told_to(
     _, client, master = lonely
     lease = client.lease_component(control_pb2.OpenLease(component=user(), wait=True))
     messages = iter(lease)
-    said = next(each.progress for each in messages if "waiting for a ROS" in each.progress)
+    said = next(each.waiting for each in messages if "waiting for a ROS" in each.waiting)
     assert master.uri in said
     assert list(client.list_components()) == []
     master.start()
