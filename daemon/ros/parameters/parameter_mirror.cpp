@@ -97,6 +97,7 @@ std::string ParameterMirror::problem() const {
 
 void ParameterMirror::forget() {
     known_.clear();
+    owed_.clear();
     const std::lock_guard lock(pending_->mutex);
     pending_->followed.clear();
     pending_->written.clear();
@@ -253,6 +254,7 @@ bool ParameterMirror::write(ParallelCalls& master, const Caller& caller,
             arguments[2] = toXmlRpc(parameter.value);
             calls.push_back({"setParam", arguments});
             writing.push_back({&known, &parameter});
+            known.ours.insert(name);  // also if its answer does not come
         }
     }
     {
@@ -268,7 +270,6 @@ bool ParameterMirror::write(ParallelCalls& master, const Caller& caller,
         // Of one that is refused there is no use in asking again either.
         const std::string& name = writing[i].parameter->declaration.name;
         writing[i].known->values[name] = writing[i].parameter->value;
-        writing[i].known->ours.insert(name);
     }
     return result == Reconciled::Done;
 }
@@ -276,7 +277,7 @@ bool ParameterMirror::write(ParallelCalls& master, const Caller& caller,
 void ParameterMirror::leave(ParallelCalls& master, const Caller& caller,
                             const std::set<std::string>& components,
                             std::chrono::steady_clock::time_point deadline) {
-    std::vector<MasterCall> calls;
+    std::vector<MasterCall> calls = std::exchange(owed_, {});
     for (const std::string& component : components) {
         {
             const std::lock_guard lock(pending_->mutex);
@@ -297,7 +298,10 @@ void ParameterMirror::leave(ParallelCalls& master, const Caller& caller,
         }
         known_.erase(known);
     }
-    master.run(calls, kEach, deadline);
+    const std::vector<MasterAnswer> answers = master.run(calls, kEach, deadline);
+    for (std::size_t i = 0; i < answers.size(); ++i) {
+        if (answers[i].silent()) owed_.push_back(std::move(calls[i]));
+    }
 }
 
 void ParameterMirror::leaveAll(ParallelCalls& master, const Caller& caller,

@@ -85,6 +85,7 @@ class ParameterMirror {
     executor::ParameterRequest request_;
     bool follows_ = true;
     std::map<std::string, Known> known_;  // by component
+    std::vector<MasterCall> owed_;        // of components that left, not answered yet
     std::shared_ptr<Pending> pending_ = std::make_shared<Pending>();
 };
 
