@@ -92,10 +92,10 @@ def test_any_graph_goes_on_with_the_same_bits(
 ) -> None:
     """What inputs have of an earlier graph is part of it."""
     shared.stop()
-    shared.apply([])
-    shared.apply(before)
+    shared.apply([], "rt_runner")
+    shared.apply(before, "rt_runner")
     shared.step(1 + warm_up)
-    shared.apply(graph)
+    shared.apply(graph, "rt_runner")
     if late:
         shared.step(late)
     taken = shared.take_snapshot().snapshot

@@ -188,7 +188,9 @@ class GraphMachine(stateful.RuleBasedStateMachine):
         self._change(
             "apply",
             lambda: model.applied(self.graph, wanted),
-            lambda: self.client.apply([_steady(), *(mixer.spec() for mixer in wanted)]),
+            lambda: self.client.apply(
+                [_steady(), *(mixer.spec() for mixer in wanted)], "rt_runner"
+            ),
         )
 
     @stateful.precondition(lambda self: len(self.graph) > 2)
