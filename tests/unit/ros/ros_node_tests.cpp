@@ -96,7 +96,7 @@ TEST_F(RosNodeTest, RegistersAgainWithARestartedMaster) {
     EXPECT_NE(flow(source, *old_listener), "");
     startMaster();
     EXPECT_TRUE(eventually([&] { return rosNode().status().connected; }));
-    EXPECT_TRUE(reported("registered again"));
+    EXPECT_TRUE(eventually([&] { return reported("registered again"); }));
     const auto listener = listen("/out");
     const auto sender = send("/in", 7.0);
     EXPECT_NE(flow(source, *listener), "");
@@ -194,7 +194,7 @@ TEST_F(RosNodeTest, ARefusedConnectionShowsInTheStatus) {
     EXPECT_TRUE(eventually([&] {
         return rosNode().status().problem.find("std_msgs/Int32") != std::string::npos;
     })) << rosNode().status().problem;
-    EXPECT_TRUE(reported("/out"));
+    EXPECT_TRUE(eventually([&] { return reported("/out"); }));
 }
 
 TEST_F(RosNodeTest, GivesWayToANodeOfItsNameAndComesBack) {
@@ -209,7 +209,7 @@ TEST_F(RosNodeTest, GivesWayToANodeOfItsNameAndComesBack) {
         return rosNode().status().problem.find("another node named") != std::string::npos;
     }));
     EXPECT_TRUE(eventually([&] { return rosNode().status().publications == 0; }));
-    EXPECT_TRUE(reported("another node named"));
+    EXPECT_TRUE(eventually([&] { return reported("another node named"); }));
     // It ends without a word to the master, which still knows it.
     twin.reset();
     EXPECT_TRUE(eventually([&] { return rosNode().status().connected; }));
@@ -257,7 +257,7 @@ TEST_F(RosNodeTest, TakesNoNameFromANodeThatHasIt) {
     startNode();
     ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
     EXPECT_EQ(rosNode().status().node, name + "_2");
-    EXPECT_TRUE(reported("this one is " + name + "_2"));
+    EXPECT_TRUE(eventually([&] { return reported("this one is " + name + "_2"); }));
     EXPECT_NE(run({"rosnode", "ping", "-c1", name}).find("reply"), std::string::npos);
 }
 
