@@ -3,13 +3,13 @@
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator
-from types import TracebackType
 from typing import Any
 
 import grpc
 from rtcf_shared.errors import RtcfError
 
 from rtcf import direct_stop, failures
+from rtcf.closing import Closing
 from rtcf.errors import RefusedError
 from rtcf.events import EventStream, Place
 from rtcf.replay_call import ReplayCall
@@ -46,7 +46,7 @@ def default_socket() -> str:
     return os.environ.get("RTCF_SOCKET") or DEFAULT_SOCKET
 
 
-class Client:
+class Client(Closing):
     """A connection to rtcfd; opened with the first call, thread-safe.
 
     `runner` in the methods names one; empty is rt_runner.  All methods raise
@@ -58,17 +58,6 @@ class Client:
         self.socket = os.path.abspath(socket if socket is not None else default_socket())
         self._channel = grpc.insecure_channel(f"unix:{self.socket}", options=_OPTIONS)
         self._stub: Any = control_pb2_grpc.ControlStub(self._channel)  # type: ignore[no-untyped-call]
-
-    def __enter__(self) -> "Client":
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """End the connection."""

@@ -2,12 +2,12 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any
 
 import grpc
 
 from rtcf import failures
+from rtcf.closing import Closing
 from rtcf.v1 import control_pb2
 
 
@@ -29,7 +29,7 @@ class Lost:
     count: int
 
 
-class EventStream:
+class EventStream(Closing):
     """An iterator over Event and Lost; made by Client.watch_events, used by one thread.
 
     Raises RefusedError, and DaemonUnreachableError if the connection is lost: go on from
@@ -52,17 +52,6 @@ class EventStream:
         self._call = method(request)
         self._waiting: list[control_pb2.Event | Lost] = []
         self._fetch()  # from here on nothing is missed
-
-    def __enter__(self) -> "EventStream":
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def __iter__(self) -> Iterator[control_pb2.Event | Lost]:
         while True:

@@ -1,33 +1,22 @@
 """A replay that is under way: one request, one answer, for as long as the call lasts."""
 
 from queue import SimpleQueue
-from types import TracebackType
 from typing import Any
 
 import grpc
 
 from rtcf import failures
+from rtcf.closing import Closing
 from rtcf.v1 import control_pb2
 
 
-class ReplayCall:
+class ReplayCall(Closing):
     """Made by Client.replay; used by one thread.  Closing it before its end ends the replay."""
 
     def __init__(self, method: Any, socket: str) -> None:
         self._socket = socket
         self._requests: SimpleQueue[control_pb2.ReplayRequest | None] = SimpleQueue()
         self._call = method(iter(self._requests.get, None))
-
-    def __enter__(self) -> "ReplayCall":
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def run(self, request: control_pb2.ReplayRequest) -> control_pb2.ReplayResponse:
         """Run one piece of the recording; takes as long as its cycles take.
