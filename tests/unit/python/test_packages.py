@@ -1,0 +1,60 @@
+"""What our packages depend on: what they run, and nothing of the size of a compiler besides."""
+
+import re
+
+import pytest
+from pages import TREE
+
+# With what is run of each.
+COMPILERS = {
+    "librtcf-dev": {"cmake", "g++"},  # components are built with them
+    "rtcf-python": {"g++"},  # rtcf-compile calls it
+}
+_COMPILER = re.compile(
+    r"cmake|make|ninja-build|g\+\+.*|gcc.*|cpp.*|build-essential|lld.*|rustc|ccache"
+    r"|(lib)?(clang|llvm)[-0-9.a-z]*|protobuf-compiler.*"
+)
+
+
+def _names(text: str) -> list[str]:
+    """Return the packages of a field, alternatives one by one."""
+    return [
+        re.split(r"[\s(<:\[]", each.strip())[0] for each in re.split(r"[,|]", text) if each.strip()
+    ]
+
+
+def _paragraphs() -> list[dict[str, str]]:
+    text = (TREE / "debian" / "control").read_text()
+    return [
+        dict(re.findall(r"^(\S+):((?:.*\n)(?: .*\n)*)", f"{paragraph}\n", re.MULTILINE))
+        for paragraph in text.split("\n\n")
+    ]
+
+
+SOURCE, *BINARIES = _paragraphs()
+
+
+@pytest.mark.parametrize("package", BINARIES, ids=lambda each: each["Package"].strip())
+def test_a_package_pulls_no_compiler_that_it_does_not_run(package: dict[str, str]) -> None:
+    name = package["Package"].strip()
+    pulled = [*_names(package["Depends"]), *_names(package.get("Recommends", ""))]
+    assert pulled
+    compilers = {each for each in pulled if _COMPILER.fullmatch(each)}
+    assert compilers == COMPILERS.get(name, set())
+
+
+def test_the_checker_needs_no_more_than_an_executor_and_a_symbolizer() -> None:
+    (checker,) = (each for each in BINARIES if each["Package"].strip() == "rtcf-check")
+    assert _names(checker["Depends"]) == [
+        "binutils", "rtcfctl", "rtcfd", "${misc", "${shlibs",
+    ]  # fmt: skip
+    assert "Recommends" not in checker
+    # addr2line is binutils'.
+    assert '"addr2line"' in (TREE / "client" / "rtcf" / "checking.py").read_text()
+
+
+@pytest.mark.parametrize("paragraph", [SOURCE, *BINARIES])
+@pytest.mark.parametrize("field", ["Build-Depends", "Depends", "Recommends", "Suggests"])
+def test_nothing_is_named_twice(paragraph: dict[str, str], field: str) -> None:
+    names = [each for each in _names(paragraph.get(field, "")) if not each.startswith("$")]
+    assert len(names) == len(set(names)), sorted(names)
