@@ -4,6 +4,7 @@ peer.py record TOPIC       prints each std_msgs/Float64 it receives, exactly (he
 peer.py latch TOPIC VALUE  publishes one std_msgs/Float64, latched
 peer.py text TOPIC SIZE    publishes one std_msgs/String of so many characters, latched
 peer.py sizes TOPIC        prints the length in characters of each std_msgs/String it receives
+peer.py numbers TOPIC       prints each std_msgs/Int32 it receives
 peer.py count TOPIC         prints 0 for each std_msgs/Int64 it receives
 peer.py rosout NODE        prints each record that NODE publishes on /rosout, as JSON
 peer.py any TOPIC...       receives messages of any type of all these topics
@@ -26,7 +27,7 @@ import dynamic_reconfigure.client
 import rosgraph.impl.graph
 import rospy
 from rosgraph_msgs.msg import Log
-from std_msgs.msg import Float64, Int64, String
+from std_msgs.msg import Float64, Int32, Int64, String
 
 _POLL_S = 0.01
 
@@ -110,6 +111,8 @@ def main() -> None:
     rospy.init_node("peer", anonymous=True)
     if action == "record":
         _stay(rospy.Subscriber(topic, Float64, _print, tcp_nodelay=True))
+    elif action == "numbers":
+        _stay(rospy.Subscriber(topic, Int32, _print, tcp_nodelay=True))
     elif action == "sizes":
         _stay(rospy.Subscriber(topic, String, _print_size, tcp_nodelay=True))
     elif action == "count":

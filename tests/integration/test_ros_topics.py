@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 import rtcf
 from daemon_process import Daemon, wait_for, with_ros
-from ros_processes import Master
+from holding_master import HoldingMaster
+from ros_processes import Master, Node
 from rtcf.v1 import runner_pb2
 from values import iteration, port_value
 
@@ -217,3 +218,47 @@ def test_twenty_topics_at_2_khz_lose_nothing_in_the_executor(
     assert client.get_statistics().tap_dropped == 0
     client.stop()
     subscribers.end()
+
+
+def test_topics_flow_while_the_master_is_told_of_others_that_go(
+    tmp_path: Path, master: Master
+) -> None:
+    way = HoldingMaster(master.port)
+    daemon = Daemon(tmp_path, with_ros(way.uri, "/stays/.*|/goes/.*"))
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0))
+            client.load(rtcf.component("rtcf_test", "Counter", name="counter", ns="/stays"))
+            client.start()
+            listener = master.node("numbers", "/stays/out")
+            listener.wait_for_values(1)
+            # The node waits a second for an answer: if the machine is too busy for a look in
+            # that time, there is a next time. Where topics wait as well, no look finds them flow.
+            assert any(_flows_during_an_unload(client, master, way, listener) for _ in range(10))
+            listener.end()
+    finally:
+        way.close()
+        daemon.end()
+
+
+def _flows_during_an_unload(
+    client: rtcf.Client, master: Master, way: HoldingMaster, listener: Node
+) -> bool:
+    client.load(rtcf.component("rtcf_test", "Counter", name="counter", ns="/goes"))
+    wait_for(lambda: "/goes/out" in master.topics()[0], "the topic")
+    way.hold()
+    client.unload(["/goes/counter"])
+    wait_for(lambda: way.holding, "the withdrawal")
+    # Its number is that of the cycle in which it is written: what is newer has passed since.
+    begin = iteration(client)
+
+    def flows() -> bool:
+        # In this order: it is there, and the withdrawal is not answered yet.
+        return listener.values()[-1] > begin and way.holding
+
+    wait_for(lambda: flows() or not way.holding, "a value, or the end of the wait for the master")
+    seen = flows()
+    way.let_go()
+    wait_for(lambda: "/goes/out" not in master.topics()[0], "the end of the topic")
+    return seen

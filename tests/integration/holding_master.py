@@ -1,0 +1,66 @@
+"""A way to a ROS master on which calls of one kind stand still for as long as a test likes."""
+
+import select
+import socket
+import threading
+from contextlib import suppress
+
+
+class HoldingMaster:
+    """Relays to a real master; withdrawals of publishers wait between `hold` and `let_go`."""
+
+    def __init__(self, master_port: int) -> None:
+        self._real = ("localhost", master_port)
+        self._listener = socket.create_server(("localhost", 0))
+        self.uri = f"http://localhost:{self._listener.getsockname()[1]}"
+        self._open = threading.Event()
+        self._open.set()
+        self._held: set[socket.socket] = set()
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def hold(self) -> None:
+        """Let withdrawals wait from here on."""
+        self._open.clear()
+
+    def let_go(self) -> None:
+        """Let them reach the master."""
+        self._open.set()
+
+    @property
+    def holding(self) -> bool:
+        """Whether somebody is waiting now for the answer to a withdrawal."""
+        return bool(self._held)
+
+    def close(self) -> None:
+        """Take no more calls."""
+        self._open.set()
+        self._listener.close()
+
+    def _accept(self) -> None:
+        with suppress(OSError):
+            while True:
+                caller, _ = self._listener.accept()
+                threading.Thread(target=self._relay, args=(caller,), daemon=True).start()
+
+    def _relay(self, caller: socket.socket) -> None:
+        waiting = b""
+        with suppress(OSError), caller, socket.create_connection(self._real) as real:
+            while True:
+                if waiting and self._open.is_set():
+                    real.sendall(waiting)
+                    waiting = b""
+                readable, _, _ = select.select([caller, real], [], [], 0.01)
+                if caller in readable:
+                    if not (call := caller.recv(65536)):
+                        break
+                    if b"unregisterPublisher" in call:
+                        waiting = call
+                        self._held.add(caller)
+                    else:
+                        real.sendall(call)
+                if real in readable:
+                    if not (answer := real.recv(65536)):
+                        break
+                    self._held.discard(caller)
+                    caller.sendall(answer)
+        self._held.discard(caller)
