@@ -34,7 +34,7 @@ def _paragraphs() -> list[dict[str, str]]:
 SOURCE, *BINARIES = _paragraphs()
 
 
-@pytest.mark.parametrize("package", BINARIES, ids=lambda each: each["Package"].strip())
+@pytest.mark.parametrize("package", BINARIES, ids=[each["Package"].strip() for each in BINARIES])
 def test_a_package_pulls_no_compiler_that_it_does_not_run(package: dict[str, str]) -> None:
     name = package["Package"].strip()
     pulled = [*_names(package["Depends"]), *_names(package.get("Recommends", ""))]
