@@ -6,9 +6,8 @@ from typing import Any
 
 import rtcf
 
+from rtcfctl import words
 from rtcfctl.output import Output
-
-# How such a note begins.
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
@@ -65,7 +64,7 @@ def step(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         raise ValueError(f"step {args.cycles}: name at least 1 cycle")
     result = client.step(args.cycles, args.runner, output.progress)
     if result.cycles < args.cycles:
-        output.changed(f"stepped {result.cycles} of {args.cycles} cycles", result)
+        output.changed(f"stepped {result.cycles} of {words.counted(args.cycles, 'cycle')}", result)
         status = client.get_status(args.runner or "rt_runner").runners[0]
         raise rtcf.RtcfError(f"step ended early: {status.status or 'the loop was stopped'}")
-    output.changed(f"stepped {result.cycles} cycles", result)
+    output.changed(f"stepped {words.counted(result.cycles, 'cycle')}", result)

@@ -8,7 +8,7 @@ import rtcf
 from rtcf.v1 import runner_pb2
 
 from rtcfctl.output import Output
-from rtcfctl.words import amount, microseconds
+from rtcfctl.words import amount, counted, microseconds
 
 _FIGURES = ("min_ns", "mean_ns", "p50_ns", "p99_ns", "p999_ns", "max_ns")
 _SHORTEST_WATCH_S = 0.1
@@ -67,7 +67,8 @@ def _print(found: runner_pb2.RunnerStatistics, output: Output) -> None:
         rows.append(_row("adoption of a change", found.adoption))
     output.table((f"{found.runner} (µs)", *_COLUMNS), rows, right=_COLUMNS)
     output.line(
-        f"{found.iterations} cycles, {found.overruns} overruns, {found.missed} missed",
+        f"{counted(found.iterations, 'cycle')}, {counted(found.overruns, 'overrun')}, "
+        f"{found.missed} missed",
         "bold red" if found.overruns or found.missed else "",
     )
     output.line(
@@ -82,10 +83,10 @@ def _print(found: runner_pb2.RunnerStatistics, output: Output) -> None:
     )
     for count, cause in causes:
         if count:
-            output.line(f"{count} of {found.overruns} overruns {cause}", "yellow")
-    for count, what in ((found.log_dropped, "log records"), (found.tap_dropped, "mapped values")):
+            output.line(f"{count} of {counted(found.overruns, 'overrun')} {cause}", "yellow")
+    for count, what in ((found.log_dropped, "log record"), (found.tap_dropped, "mapped value")):
         if count:
-            output.line(f"{count} {what} lost in full rings", "yellow")
+            output.line(f"{counted(count, what)} lost in full rings", "yellow")
     output.line("")
     output.table(
         ("component (µs)", *_COLUMNS, "overruns"),
@@ -94,7 +95,7 @@ def _print(found: runner_pb2.RunnerStatistics, output: Output) -> None:
     )
     for each in found.components:
         if each.faults:
-            output.line(f"{each.component}: {each.faults} faults", "bold red")
+            output.line(f"{each.component}: {counted(each.faults, 'fault')}", "bold red")
     devices = [each for each in found.components if each.device_calls]
     if devices:
         columns = ("calls", "mean")

@@ -8,6 +8,7 @@ from rtcf.v1 import runner_pb2
 
 from rtcfctl.output import Output
 from rtcfctl.plain import enumerator
+from rtcfctl.words import counted
 
 STYLES = {
     runner_pb2.RUNNER_STATE_RUNNING: "green",
@@ -77,7 +78,8 @@ def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
         output.line(f"{runner.runner}: {runner.status}", "yellow")
     if runner.faults:
         output.line(
-            f"{runner.runner}: {runner.faults} faults of components since its loop began: "
+            f"{runner.runner}: {counted(runner.faults, 'fault')} of components since its loop "
+            "began: "
             "`rtcfctl list` shows whose",
             "yellow",
         )
@@ -108,9 +110,9 @@ def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
             "`rtcfctl runner set --largest-message`",
             "yellow",
         )
-    for count, what in ((runner.log_dropped, "log records"), (runner.tap_dropped, "mapped values")):
+    for count, what in ((runner.log_dropped, "log record"), (runner.tap_dropped, "mapped value")):
         if count:
-            output.line(f"{runner.runner}: {count} {what} lost in full rings", "yellow")
+            output.line(f"{runner.runner}: {counted(count, what)} lost in full rings", "yellow")
 
 
 def _cpu(runner: runner_pb2.RunnerStatus) -> str:

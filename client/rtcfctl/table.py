@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 Cell = tuple[str, str]  # text, style
 _WIDE_GAP, _NARROW_GAP = 2, 1
 _LEAST = 6  # characters that are left of a column that is folded
+_LEAST_OF_HEADING = 14  # of a column whose heading is longer than that
 
 
 def format_table(
@@ -40,7 +41,7 @@ def format_table(
 def _fold(widths: list[int], texts: Sequence[int], room: int, names: Sequence[str]) -> None:
     """Make columns of text narrower until all fits, or none can be any more."""
     while sum(widths) > room:
-        able = [i for i in texts if widths[i] > max(_LEAST, len(names[i]))]
+        able = [i for i in texts if widths[i] > max(_LEAST, min(len(names[i]), _LEAST_OF_HEADING))]
         if not able:
             return
         widest = max(able, key=lambda i: widths[i])

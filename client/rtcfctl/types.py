@@ -26,7 +26,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         return
     if args.long:
         for each in response.types:
-            output.line(f"{each.package}/{each.type}  {each.doc}", "bold")
+            output.line(f"{each.package}/{each.type}  {each.doc}".rstrip(), "bold")
             print_ports(list(each.ports), output)
             if each.parameters:
                 print_parameters(list(each.parameters), output)

@@ -37,8 +37,14 @@ def amount(unit: str) -> Callable[[str], float]:
 
 
 def microseconds(nanoseconds: float) -> str:
-    """Return a duration in µs, without the unit."""
-    return f"{nanoseconds / 1e3:.2f}"
+    """Return a duration in µs, without the unit; of a long one the digits that matter."""
+    size = abs(nanoseconds)
+    return f"{nanoseconds / 1e3:.{2 if size < 1e6 else 1 if size < 1e7 else 0}f}"
+
+
+def counted(count: int, what: str) -> str:
+    """Return "1 overrun", "2 overruns"."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def value(found: graph_pb2.ParameterValue) -> str:

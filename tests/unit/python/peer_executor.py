@@ -13,6 +13,8 @@ A file named <kind of request> in the folder PEER_HELD delays the answers to req
 that kind until it is gone; `serve` delays the executor's start, `gone` its end. With `brief`
 there, a loop ends by a fault right after the answer to its start.
 
+PEER_PORT is the name of each component's input.
+
 A parameter `die` that is set lets it die as if in the component's update:
 "SIGSEGV" and so on with a note in the flight recorder, "stall" likewise,
 "exit" and "SIGKILL" without.  The loop counts its cycles by the wall clock.
@@ -47,12 +49,29 @@ def describe(library: Path, package: str) -> int:
     description = wire.LibraryDescription(
         problem=contents.get("problem", ""),
         types=[
-            graph_pb2.ComponentType(package=package, type=name)
+            graph_pb2.ComponentType(package=package, type=name, ports=declared().ports)
             for name in contents.get("types", {})
         ],
     )
     sys.stdout.buffer.write(description.SerializeToString())
     return 1 if description.problem else 0
+
+
+def declared() -> graph_pb2.ComponentInfo:
+    """Return what each component here has."""
+    info = graph_pb2.ComponentInfo()
+    json_format.Parse(
+        """{"state": "COMPONENT_STATE_CONFIGURED", "ports": [
+        {"name": "in1", "direction": "DIRECTION_INPUT", "mapped_name": "/a[1]",
+         "type": "std_msgs/Float64", "value": "1.5", "age_ns": "2500000"},
+        {"name": "out1", "direction": "DIRECTION_OUTPUT", "mapped_name": "/b",
+         "type": "double"}],
+        "parameters": [{"name": "kp", "type": "double", "value": {"double_value": 1.0},
+         "default_value": {"double_value": 1.0}, "minimum": 0.0, "doc": "gain"}]}""",
+        info,
+    )
+    info.ports[0].name = os.environ.get("PEER_PORT", "in1")
+    return info
 
 
 def is_held(kind: str) -> bool:
@@ -72,6 +91,12 @@ class Refused(Exception):
 
 
 class Peer:
+    # Of a component: as many cycles as a day has at 10 kHz, the longest of a tenth of a second.
+    SLOW = runner_pb2.Distribution(
+        count=864_000_000, min_ns=123_456.0, mean_ns=1_234_567.0, p50_ns=1_234_567.0,
+        p99_ns=9_999_999.0, p999_ns=12_345_678.0, max_ns=123_456_789.0,
+    )  # fmt: skip
+
     def __init__(self, runner: str) -> None:
         self.runner = runner
         self.settings = runner_pb2.RunnerSettings()
@@ -304,15 +329,7 @@ class Peer:
         return wire.Response(component=self.info(request.component, 0))
 
     def info(self, name: str, position: int) -> graph_pb2.ComponentInfo:
-        text = """{"state": "COMPONENT_STATE_CONFIGURED", "ports": [
-            {"name": "in1", "direction": "DIRECTION_INPUT", "mapped_name": "/a[1]",
-             "type": "std_msgs/Float64", "value": "1.5", "age_ns": "2500000"},
-            {"name": "out1", "direction": "DIRECTION_OUTPUT", "mapped_name": "/b",
-             "type": "double"}],
-            "parameters": [{"name": "kp", "type": "double", "value": {"double_value": 1.0},
-             "default_value": {"double_value": 1.0}, "minimum": 0.0, "doc": "gain"}]}"""
-        info = graph_pb2.ComponentInfo()
-        json_format.Parse(text, info)
+        info = declared()
         info.full_name = name
         info.position = position
         info.spec.CopyFrom(self.components[name])
@@ -326,7 +343,12 @@ class Peer:
         names = sorted(self.components, reverse=True)
         return wire.Response(
             connections=wire.ListConnectionsResult(
-                connections=[graph_pb2.Connection(name=f"{name}_out") for name in names]
+                connections=[
+                    graph_pb2.Connection(
+                        name=f"{name}_out", writer=graph_pb2.Endpoint(component=name, port="out1")
+                    )
+                    for name in names
+                ]
             )
         )
 
@@ -334,7 +356,14 @@ class Peer:
         figures = runner_pb2.Distribution(count=10, min_ns=1000.0, mean_ns=1500.0, max_ns=2e3)
         return wire.Response(
             statistics=runner_pb2.RunnerStatistics(
-                iterations=10, duration=figures, latency=figures, overruns=1
+                iterations=10,
+                duration=figures,
+                latency=figures,
+                overruns=1,
+                components=[
+                    runner_pb2.ComponentStatistics(component=name, duration=self.SLOW, overruns=10)
+                    for name in self.components
+                ],
             )
         )
 

@@ -41,6 +41,8 @@ def test_text_is_folded_and_figures_are_not() -> None:
 def test_values_have_the_digits_that_matter() -> None:
     assert words.port_value("data: 0.30000000000000004") == "0.3"
     assert words.port_value("{x: 1.23456789012, y: -2e-07}") == "{x: 1.23457, y: -2e-07}"
+    durations = (-1_500.0, 999_000.0, 1_234_567.0, 123_456_789.0)
+    assert [*map(words.microseconds, durations)] == ["-1.50", "999.00", "1234.6", "123457"]
     chosen = graph_pb2.ParameterValue(double_value=0.1 + 0.2)
     assert words.value(chosen) == "0.3"
     assert words.value(graph_pb2.ParameterValue(double_value=12345678.9)) == "12345678.9"
