@@ -1,8 +1,8 @@
 """Protobuf messages as plain dicts, lists, numbers and strings, for JSON and YAML.
 
 Other than in protobuf's own JSON, integers are numbers, all fields are there,
-an enumerator is its short name ("running"), the value of a parameter or of a
-port is that value itself, and what has no value is null.
+an enumerator is its short name ("running"), the value of a parameter, of a port
+or of state is that value itself, and what has no value is null.
 """
 
 import math
@@ -12,7 +12,8 @@ from google.protobuf.descriptor import FieldDescriptor
 from rtcf_shared.enums import word
 
 _VALUE_MESSAGE = "rtcf.v1.ParameterValue"
-_PORT_MESSAGE = "rtcf.v1.PortInfo"
+# Fields whose values travel as text.
+_TEXTS = {"rtcf.v1.PortInfo": ("value",), "rtcf.v1.StateInfo": ("initial", "value")}
 
 
 def plain(message: Any) -> Any:
@@ -21,8 +22,13 @@ def plain(message: Any) -> Any:
         kind = message.WhichOneof("kind")
         return None if kind is None else _number(getattr(message, kind))
     result = {field.name: _field(message, field) for field in message.DESCRIPTOR.fields}
-    if message.DESCRIPTOR.full_name == _PORT_MESSAGE and result["value"] is not None:
-        result["value"] = _of_yaml(result["value"])
+    for name in _TEXTS.get(message.DESCRIPTOR.full_name, ()):
+        if result[name]:
+            from rtcfctl.value_text import parse
+
+            result[name] = parse(result[name])
+        else:
+            result[name] = None
     return result
 
 
@@ -47,16 +53,6 @@ def _single(field: FieldDescriptor, value: Any) -> Any:
     if field.enum_type is not None:
         return word(field.enum_type, value)
     return _number(value)
-
-
-def _of_yaml(text: str) -> Any:
-    """Return a port's value, which travels as text, as the numbers and fields that it has."""
-    import yaml
-
-    try:
-        return yaml.safe_load(text)
-    except yaml.YAMLError:  # it was cut
-        return text
 
 
 def _number(value: Any) -> Any:

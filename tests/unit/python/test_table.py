@@ -1,5 +1,8 @@
 """Tables that rtcfctl prints: they fit the terminal, and no figure is cut."""
 
+import json
+
+import pytest
 from rtcf.v1 import graph_pb2
 from rtcfctl import words
 from rtcfctl.plain import plain
@@ -49,9 +52,27 @@ def test_values_have_the_digits_that_matter() -> None:
     assert words.value(graph_pb2.ParameterValue(int_value=12345678901)) == "12345678901"
 
 
-def test_values_of_ports_are_numbers_and_objects_for_machines() -> None:
-    port = graph_pb2.PortInfo(name="out", value="{x: 1.5, y: [1, 2]}")
-    assert plain(port)["value"] == {"x": 1.5, "y": [1, 2]}
-    assert plain(graph_pb2.PortInfo(value="2.5"))["value"] == 2.5
-    assert plain(graph_pb2.PortInfo(value="{x: 1, ..."))["value"] == "{x: 1, ..."
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("2.5", 2.5),
+        ("data: 1e-07", {"data": 1e-07}),
+        ("{x: 1.5, y: [1, -2E+5], z: {on: true}}", {"x": 1.5, "y": [1, -2e5], "z": {"on": True}}),
+        ("{a: 12:30, b: 2026-11-22, c: no, d: 0x10, e: 010}",
+         {"a": "12:30", "b": "2026-11-22", "c": "no", "d": "0x10", "e": 10}),
+        (r'data: "5 \x0a \"x\""', {"data": '5 \n "x"'}),
+        ("[1; 2; 3]", [1, 2, 3]),
+        ("{m: [1, 2; 3, 4e-9]}", {"m": [[1, 2], [3, 4e-9]]}),
+        ("[nan; -inf]", ["nan", "-inf"]),
+        ("{x: 1, ...", "{x: 1, ..."),
+    ],
+)  # fmt: skip
+def test_values_of_ports_are_numbers_and_objects_for_machines(text: str, value: object) -> None:
+    assert plain(graph_pb2.PortInfo(name="out", value=text))["value"] == value
+    json.dumps(value, allow_nan=False)
+
+
+def test_state_is_numbers_too_and_no_value_is_null() -> None:
+    state = plain(graph_pb2.StateInfo(type="double[2]", initial="[0, 1e-05]"))
+    assert (state["initial"], state["value"]) == ([0, 1e-05], None)
     assert plain(graph_pb2.PortInfo())["value"] is None
