@@ -77,7 +77,11 @@ def test_real_time_that_is_required_is_refused_with_what_is_missing(
         # What had been started is stopped again; and the advice is true.
         wait_for(lambda: "hook stop" in daemon.log(), "the stop hook")
         assert daemon.ctl("runner", "set", "--realtime", "preferred").returncode == 0
-        assert daemon.ctl("start").returncode == 0
+        started = daemon.ctl("start")
+        assert (started.returncode, started.stdout) == (0, "started\n")
+        loud, *reasons = started.stderr.splitlines()
+        assert loud == "!! rt_runner IS NOT REAL TIME:"
+        assert any(each.startswith(f"!!   {lack.problem}") for each in reasons)
 
 
 @pytest.mark.parametrize("lack", LACKS.values(), ids=LACKS)
@@ -96,7 +100,8 @@ def test_real_time_that_is_preferred_runs_degraded_and_says_so_first(
         for word in lack.remedies:
             assert word in line
         assert lack.problem in daemon.ctl("status").stdout
-        wait_for(lambda: f"degraded real time: {lack.problem}" in daemon.log(), "the log")
+        said = f" ERROR   rt_runner: degraded real time: {lack.problem}"
+        wait_for(lambda: said in daemon.log(), "the log")
 
 
 def test_a_full_bucket_does_not_stop_a_loop_that_runs_degraded(tmp_path: Path) -> None:

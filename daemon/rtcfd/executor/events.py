@@ -27,7 +27,8 @@ _LEVELS: dict[int, int] = {
 }
 _EVENT_LEVELS: dict[int, int] = {
     wire.Event.KIND_LOOP_ENDED: logging.ERROR,
-    wire.Event.KIND_DEGRADED: logging.WARNING,
+    # As loud as a refusal would be: who starts rtcfd in a terminal is to see it.
+    wire.Event.KIND_DEGRADED: logging.ERROR,
     wire.Event.KIND_ROS: logging.INFO,
     wire.Event.KIND_COMPONENT_FAILED: logging.WARNING,
     wire.Event.KIND_OVERRUNS: logging.WARNING,
