@@ -10,7 +10,7 @@ from rtcf_shared.errors import RtcfError
 
 from rtcf import direct_stop, failures
 from rtcf.closing import Closing
-from rtcf.errors import RefusedError
+from rtcf.errors import DaemonUnreachableError, RefusedError
 from rtcf.events import EventStream, Place
 from rtcf.replay_call import ReplayCall
 from rtcf.tenancy import Tenancy
@@ -22,6 +22,7 @@ QUERY_TIMEOUT_S = 20.0
 CHANGE_TIMEOUT_S = 120.0
 _CROWDED_S = 15.0  # for a place in the queue at the door
 _RETRY_S = 0.05
+_LONGEST_PATH = 107  # unix(7)
 DEFAULT_RUNNER = "rt_runner"
 
 _OPTIONS = (
@@ -50,12 +51,18 @@ class Client(Closing):
     """A connection to rtcfd; opened with the first call, thread-safe.
 
     `runner` in the methods names one; empty is rt_runner.  All methods raise
-    RefusedError, DaemonUnreachableError or RtcfError.  `on_progress` is called
-    with a line for each step of a long call.
+    RefusedError, DaemonUnreachableError (the constructor too, of a path that no
+    socket can have) or RtcfError.  `on_progress` is called with a line for each
+    step of a long call.
     """
 
     def __init__(self, socket: str | os.PathLike[str] | None = None) -> None:
         self.socket = os.path.abspath(socket if socket is not None else default_socket())
+        if len(os.fsencode(self.socket)) > _LONGEST_PATH:
+            raise DaemonUnreachableError(
+                f"{self.socket} is longer than the {_LONGEST_PATH} characters of a unix socket's "
+                "path"
+            )
         self._channel = grpc.insecure_channel(f"unix:{self.socket}", options=_OPTIONS)
         self._stub: Any = control_pb2_grpc.ControlStub(self._channel)  # type: ignore[no-untyped-call]
 

@@ -89,6 +89,16 @@ def test_no_daemon_is_exit_code_3(stopped_daemon: DaemonUnderTest) -> None:
     assert done.stderr.count("\n") == 1
 
 
+def test_a_socket_whose_path_no_socket_can_have_is_said_in_a_line() -> None:
+    path = f"/tmp/{'x' * 120}"
+    done = subprocess.run(
+        [str(BUILD_TREE / "bin" / "rtcfctl"), "--socket", path, "status"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    said = f"rtcfctl: {path} is longer than the 107 characters of a unix socket's path\n"
+    assert (done.returncode, done.stdout, done.stderr) == (3, "", said)
+
+
 @pytest.mark.skipif(os.geteuid() != 0, reason="takes root to become somebody else")
 @pytest.mark.parametrize(
     ("mode", "group", "advice"),
