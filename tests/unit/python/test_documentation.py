@@ -5,10 +5,10 @@ import shlex
 from pathlib import Path
 
 import pytest
+from documentation_commands import ELSEWHERE, PAGES
 from pages import TREE, shell_lines
 from rtcfctl.main import parser
 
-PAGES = [TREE / "README.md", *sorted((TREE / "docs").glob("*.md"))]
 NAMES = [page.name for page in PAGES]
 CONTROL = (TREE / "debian" / "control").read_text()
 OURS = set(re.findall(r"^Package: (\S+)", CONTROL, re.MULTILINE))
@@ -63,3 +63,11 @@ def test_our_packages_in_pages_exist(page: Path) -> None:
             continue
         for word in re.findall(r"(?:build/deb/)?((?:lib|ros-|python3-)?rtcf[a-z-]*)", line):
             assert word.rstrip("_") in OURS, f"{page.name}: {word}"
+
+
+@pytest.mark.parametrize(("page", "begin"), [(p, b) for p in ELSEWHERE for b in ELSEWHERE[p]])
+def test_what_is_typed_elsewhere_is_in_its_page(page: str, begin: str) -> None:
+    (file,) = (each for each in PAGES if each.name == page)
+    assert any(line.startswith(begin) for line in shell_lines(file.read_text()))
+    for test in re.findall(r"tests/\S+\.py", ELSEWHERE[page][begin]):
+        assert (TREE / test).exists(), test

@@ -1,0 +1,159 @@
+"""What the pages in docs/ tell a reader to type, word for word, in a build tree."""
+
+import os
+import re
+import signal
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import fig_1
+import pytest
+import rosbag
+import rospy
+import rtcf
+from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for
+from documentation_commands import pages_typed, typed
+from pages import TREE
+from std_msgs.msg import Float64
+
+_COMPILE_DEADLINE_S = 900.0
+_BAG_S = 1_700_000_000
+
+
+def _nothing(_: Daemon, __: rtcf.Client) -> None:
+    """Have what the page needs: an empty graph."""
+
+
+def _wave_that_was_tuned(_: Daemon, client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_examples", "Wave", name="wave", parameters=["amplitude:=1.5"]))
+    client.set_parameters("wave", [rtcf.parse_parameter("amplitude:=2.5")])
+
+
+def _graph_of_a_file(name: str) -> Callable[[Daemon, rtcf.Client], None]:
+    def prepare(daemon: Daemon, client: rtcf.Client) -> None:
+        fig_1.load(client)
+        assert daemon.ctl("save", str(daemon.folder / name)).returncode == 0
+        client.unload(fig_1.ORDER)
+
+    return prepare
+
+
+def _loop_with_a_bag(daemon: Daemon, client: rtcf.Client) -> None:
+    fig_1.load(client)
+    assert daemon.ctl("runner", "set", "--whitelist", fig_1.WHITELIST).returncode == 0
+    with rosbag.Bag(str(daemon.folder / "run.bag"), "w") as bag:
+        bag.write("/G2_R2", Float64(0.5), rospy.Time(_BAG_S))
+        bag.write("/G2_R2", Float64(1.5), rospy.Time(_BAG_S + 1))
+
+
+# What a page takes for granted.
+PREPARE: dict[str, Callable[[Daemon, rtcf.Client], None]] = {
+    "boot.md": _nothing,
+    "graph-files.md": _graph_of_a_file("arm.yaml"),
+    "graph.md": _nothing,
+    "performance.md": _graph_of_a_file("fig1.yaml"),
+    "ros.md": _nothing,
+    "security.md": _wave_that_was_tuned,
+    "simulation.md": _loop_with_a_bag,
+}
+BY_THEMSELVES = {
+    "README.md",  # test_readme.py
+    "components.md",
+    "python-components.md",
+}
+
+
+def test_each_page_is_typed() -> None:
+    assert {*PREPARE, *BY_THEMSELVES} == set(pages_typed())
+
+
+@pytest.mark.parametrize("page", PREPARE)
+def test_the_commands_of_a_page_succeed(page: str, daemon: Daemon, client: rtcf.Client) -> None:
+    PREPARE[page](daemon, client)
+    for line in typed(page):
+        _type(line, daemon.folder, daemon.environment())
+
+
+def _type(line: str, folder: Path, environment: dict[str, str]) -> None:
+    """Type a line in a folder, which is /tmp too."""
+    done = subprocess.run(
+        ["bash", "-c", line.replace("/tmp/", f"{folder}/")],
+        cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+        timeout=_COMPILE_DEADLINE_S, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
+
+
+@contextmanager
+def _left_running(
+    line: str, folder: Path, environment: dict[str, str], until: str
+) -> Iterator[None]:
+    """Type a line that goes on until Ctrl-C; it is under way once it has said `until`."""
+    said = folder / f"said by {line.split()[0]}"
+    with (
+        said.open("wb") as to,
+        subprocess.Popen(
+            ["bash", "-c", "exec " + line.replace("/tmp/", f"{folder}/")],
+            cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=to, stderr=to,
+            # Where tests run in the background Ctrl-C is ignored.
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        ) as process,
+    ):  # fmt: skip
+        try:
+            wait_for(
+                lambda: until in said.read_text() or process.poll() is not None,
+                line, _COMPILE_DEADLINE_S,
+            )  # fmt: skip
+            assert process.poll() is None, said.read_text()
+            yield
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait()
+
+
+def _block(page: str, language: str, holding: str) -> str:
+    """Return the block of a page that has a text in it."""
+    text = (TREE / "docs" / page).read_text()
+    blocks = re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    (found,) = (str(block) for block in blocks if holding in block)
+    return found
+
+
+def _environment(folder: Path) -> dict[str, str]:
+    return clean_environment() | {
+        "PATH": f"{BUILD_TREE / 'bin'}:{os.environ['PATH']}",
+        "RTCF_SOCKET": str(folder / "rtcf.sock"),
+        "XDG_CACHE_HOME": str(folder / "cache"),
+        # In place of librtcf-dev.
+        "rtcf_DIR": str(BUILD_TREE / "cmake" / "rtcf"),
+    }
+
+
+def test_the_component_of_the_page_is_built_and_loaded(tmp_path: Path) -> None:
+    (tmp_path / "src").mkdir()
+    (tmp_path / "src" / "pi.cpp").write_text(_block("components.md", "cpp", "class Pi "))
+    (tmp_path / "CMakeLists.txt").write_text(_block("components.md", "cmake", "project("))
+    environment = _environment(tmp_path)
+    build, daemon, load = typed("components.md")
+    _type(build, tmp_path, environment)
+    with _left_running(daemon, tmp_path, environment, "ready;"):
+        _type(load, tmp_path, environment)
+        with rtcf.Client(tmp_path / "rtcf.sock") as client:
+            (kp,) = (p for p in client.get_component("arm_pi").parameters if p.name == "kp")
+    assert kp.value.double_value == 4.0
+
+
+def test_the_component_in_python_of_the_page_is_compiled_and_loaded(tmp_path: Path) -> None:
+    (tmp_path / "observer.py").write_text(_block("python-components.md", "python", "class Obs"))
+    environment = _environment(tmp_path)
+    compile_, daemon, watch, verify = typed("python-components.md")
+    (tmp_path / "lib" / "motor").mkdir(parents=True)
+    _type(compile_, tmp_path, environment)
+    with _left_running(daemon, tmp_path, environment, "ready;"):
+        _type("rtcfctl --socket /tmp/rtcf.sock load motor Observer", tmp_path, environment)
+        _type("rtcfctl unload Observer", tmp_path, environment)
+        with _left_running(watch, tmp_path, environment, "loaded /Observer"):
+            pass
+    _type(verify, tmp_path, environment)
