@@ -9,7 +9,7 @@ from rtcf_shared.enums import choices
 from rtcf_shared.quantities import ROS, RUNNER
 
 from rtcfctl.output import Output
-from rtcfctl.status import print_runners
+from rtcfctl.status import print_runners, shared_cpus
 from rtcfctl.words import amount
 
 # Fields of RunnerSettings whose values are words.
@@ -64,6 +64,8 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     runners = list(client.get_status(args.runner).runners)
     if output.for_people:
         print_runners(runners, output)
+        for line in shared_cpus(runners):
+            output.line(line, "yellow")
     else:
         output.data(runners)
 
@@ -127,7 +129,7 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
     switch = argparse.BooleanOptionalAction
     add_quantity(to, "--frequency", "frequency_hz", "cycles a second, e.g. 2kHz")
     to.add_argument("--cpu", type=int, metavar="N", help="CPU of the loop; -1: the last free one")
-    add_quantity(to, "--priority", "priority", "of SCHED_FIFO")
+    add_quantity(to, "--priority", "priority", "of SCHED_FIFO; the default is that at 1 kHz")
     add_quantity(to, "--spin", "spin_us", "busy wait before each deadline, e.g. 30us")
     to.add_argument(
         "--spin-auto", action=switch, help="choose --spin from the observed wake-up latency"

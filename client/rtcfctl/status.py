@@ -44,6 +44,8 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         if runner.late:
             output.line(f"!! {runner.runner} IS LATE: {runner.late}", "bold red")
     print_runners(list(response.runners), output)
+    for line in shared_cpus(list(response.runners)):
+        output.line(line, "yellow")
     for runner in response.runners:
         _details(runner, output)
 
@@ -70,6 +72,27 @@ def print_runners(runners: list[runner_pb2.RunnerStatus], output: Output) -> Non
         ),
         right=numbers,
     )
+
+
+def shared_cpus(runners: list[runner_pb2.RunnerStatus]) -> list[str]:
+    """Return a line for each CPU that has several loops."""
+    lines: dict[int, str] = {}
+    for runner in runners:
+        if not runner.shares_cpu_with:
+            continue
+        loops = {each.runner: each.priority for each in runner.shares_cpu_with}
+        loops[runner.runner] = runner.settings.priority
+        order = sorted(loops, key=lambda name: (-loops[name], name))
+        names = ", ".join(f"{name} (priority {loops[name]})" for name in order)
+        if len(set(loops.values())) == len(loops):
+            says = "each runs before those after it"
+        else:
+            says = (
+                "those of equal priority delay each other: "
+                "`rtcfctl runner set NAME --cpu N` or `--priority N` parts them"
+            )
+        lines[runner.loop_cpu] = f"CPU {runner.loop_cpu} has several loops, {names}: {says}"
+    return [lines[cpu] for cpu in sorted(lines)]
 
 
 def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:

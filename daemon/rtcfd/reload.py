@@ -74,7 +74,10 @@ class Reloads:
         adopted = set(running)
         if adopted and (left := handover.read(self._command_folder)):
             self._left = left
-            self._shared.defaults = runner_settings.merged(self._given.defaults, left.defaults)
+            before = runner_settings.merged(self._given.defaults, left.defaults)
+            if not left.defaults.HasField("priority"):
+                before.ClearField("priority")
+            self._shared.defaults = before
             self._graphs = BootGraphs(self._given.graphs_dir, left.graphs)
         graphs, self._graph_problems = self._graphs.read()
         found = {state.runner: state for state in states}

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import rtcf
 from bystander import Bystander
-from daemon_process import wait_for
+from daemon_process import Daemon, wait_for
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 from values import iteration
 
@@ -64,6 +64,36 @@ def test_starting_changing_and_crashing_one_does_not_touch_another(client: rtcf.
     assert min(abs(each.sleeps_off) for each in busy) < CHANGES
     quietest = min(each.shootdowns for each in quiet)
     assert min(each.shootdowns for each in busy) < quietest + CHANGES
+
+
+def test_loops_that_share_a_cpu_are_named_and_the_faster_one_has_the_higher_priority(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    cpu = min(os.sched_getaffinity(0))
+    for name, frequency_hz in (("slow", 100.0), ("fast", 400.0)):
+        client.add_runner(name, runner_pb2.RunnerSettings(frequency_hz=frequency_hz, cpu=cpu))
+    client.start("slow")
+    (slow,) = client.get_status("slow").runners
+    thread = slow.realtime_tid
+    before = os.sched_getparam(thread).sched_priority
+    client.start("fast")
+    (slow,) = client.get_status("slow").runners
+    assert [each.runner for each in slow.shares_cpu_with] == ["fast"]
+    (fast,) = client.get_status("fast").runners
+    assert fast.settings.priority == slow.settings.priority + 4
+    if not any("SCHED_FIFO" in line for line in fast.degraded):
+        assert os.sched_getparam(fast.realtime_tid).sched_priority == fast.settings.priority
+    for command in (("status",), ("runner", "list")):
+        said = daemon.ctl(*command).stdout
+        line = f"CPU {cpu} has several loops, fast (priority {fast.settings.priority}), slow"
+        assert line in said
+    # The one that was there first has noticed nothing.
+    assert slow.realtime_tid == thread
+    assert os.sched_getparam(thread).sched_priority == before
+    client.stop("fast")
+    assert "has several loops" not in daemon.ctl("status").stdout
+    for name in ("slow", "fast"):
+        client.remove_runner(name)
 
 
 def life_of_a_runner(client: rtcf.Client, name: str, cpu: int) -> None:

@@ -23,6 +23,7 @@ _DOUBLE = FieldDescriptor.CPPTYPE_DOUBLE
 # Of the units in names of settings.
 _SUFFIXES = {"Hz": "hz", "µs": "us", "ms": "ms", "s": "s", "KiB": "kb"}
 LAST_CPU = -1  # the last one that is allowed
+_LEVELS_PER_OCTAVE = 2  # of SCHED_FIFO: 53 at 0.1 Hz, 91 at 50 kHz
 ORPHAN_TIMEOUT_S = quantities.RUNNER["orphan_timeout_s"].default
 # A private rtcfd takes its executors with it, however it ends.
 PRIVATE_ORPHAN_TIMEOUT_S = 2.0
@@ -34,7 +35,8 @@ def defaults(
     orphan_timeout_s: float = ORPHAN_TIMEOUT_S,
     peers: "runner_pb2.Right" = runner_pb2.RIGHT_OBSERVE,
 ) -> runner_pb2.RunnerSettings:
-    """Return complete settings; ROS_MASTER_URI of our environment is part of them."""
+    """Return settings, complete but for the priority; ROS_MASTER_URI of our environment is part
+    of them."""
     result = runner_pb2.RunnerSettings(
         cpu=LAST_CPU,
         realtime=realtime,
@@ -62,9 +64,30 @@ def defaults(
     ]  # fmt: skip
     for message, known in tables:
         for field, quantity in known.items():
+            if field == "priority":
+                continue  # see completed()
             whole = message.DESCRIPTOR.fields_by_name[field].cpp_type != _DOUBLE
             setattr(message, field, int(quantity.default) if whole else quantity.default)
     result.orphan_timeout_s = orphan_timeout_s
+    return result
+
+
+def completed(settings: runner_pb2.RunnerSettings) -> runner_pb2.RunnerSettings:
+    """Return settings with the priority that goes with their frequency, if it is not among them.
+
+    The faster of two loops on one CPU has the higher priority: no other order of fixed priorities
+    meets deadlines that this one misses (rate-monotonic: C. L. Liu and J. W. Layland, "Scheduling
+    Algorithms for Multiprogramming in a Hard-Real-Time Environment", Journal of the ACM 20, 1973).
+    It depends on the loop alone, so that what others do changes nothing under it.
+    """
+    if settings.HasField("priority"):
+        return settings
+    known = quantities.RUNNER["priority"]
+    octaves = math.log2(settings.frequency_hz / quantities.RUNNER["frequency_hz"].default)
+    wanted = round(known.default + _LEVELS_PER_OCTAVE * octaves)
+    result = runner_pb2.RunnerSettings()
+    result.CopyFrom(settings)
+    result.priority = int(min(max(wanted, known.low), known.high))
     return result
 
 

@@ -220,7 +220,8 @@ async def apply(
             if not request.runner:
                 _require_no_unload(runner, would)
         if changes and not request.dry_run:
-            await runner.ask(wire.Request(configure=request.settings))
+            effect = runner.desired.effect(request.settings, runner.defaults)
+            await runner.ask(wire.Request(configure=effect))
         apply.dry_run = request.dry_run
         try:
             result = (await runner.ask(wire.Request(apply=apply), progress)).change

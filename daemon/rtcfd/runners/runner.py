@@ -298,7 +298,8 @@ class Runner(RunnerCore):
 
         async def work() -> None:
             if self.up:
-                await self.ask(wire.Request(configure=change))
+                effect = self.desired.effect(change, self.defaults)
+                await self.ask(wire.Request(configure=effect))
             self.desired.choose(change)
             self.happened(control_pb2.Event.KIND_RUNNER_SETTINGS, "settings changed")
             await self.save()

@@ -1,6 +1,7 @@
 """What a runner is doing, whatever state it is in.  A function on a RunnerCore."""
 
 import asyncio
+from collections.abc import Sequence
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import runner_pb2
@@ -12,6 +13,15 @@ from rtcfd.operations.runner_core import RunnerCore
 
 _TIMEOUT_S = 2.0
 _WORTH_SAYING_S = 2.0  # a change that takes longer shows
+
+
+def note_shared_cpus(statuses: Sequence[runner_pb2.RunnerStatus]) -> None:
+    """Note in each status whose loops run on the same CPU."""
+    pinned = [status for status in statuses if status.HasField("loop_cpu")]
+    for status in pinned:
+        for other in pinned:
+            if other.loop_cpu == status.loop_cpu and other.runner != status.runner:
+                status.shares_cpu_with.add(runner=other.runner, priority=other.settings.priority)
 
 
 async def status_of(runner: RunnerCore) -> runner_pb2.RunnerStatus:

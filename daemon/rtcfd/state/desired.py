@@ -66,7 +66,19 @@ class Desired:
 
     def complete(self, defaults: runner_pb2.RunnerSettings) -> runner_pb2.RunnerSettings:
         """Return all settings."""
-        return runner_settings.merged(defaults, self.chosen)
+        return runner_settings.completed(runner_settings.merged(defaults, self.chosen))
+
+    def effect(
+        self, change: runner_pb2.RunnerSettings, defaults: runner_pb2.RunnerSettings
+    ) -> runner_pb2.RunnerSettings:
+        """Return a change of settings with the defaults that follow from it."""
+        chosen = runner_settings.merged(self.chosen, change)
+        after = runner_settings.completed(runner_settings.merged(defaults, chosen))
+        result = runner_pb2.RunnerSettings()
+        result.CopyFrom(change)
+        if after.priority != self.complete(defaults).priority:
+            result.priority = after.priority
+        return result
 
     def choose(self, change: runner_pb2.RunnerSettings) -> None:
         """Note settings that were accepted."""

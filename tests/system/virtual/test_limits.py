@@ -25,7 +25,7 @@ def test_a_loop_has_what_real_time_takes_and_no_more(loop: Loop) -> None:
     told = loop.told()
     assert list(told.degraded) == []
     assert os.sched_getscheduler(told.realtime_tid) == os.SCHED_FIFO
-    assert os.sched_getparam(told.realtime_tid).sched_priority == 80
+    assert os.sched_getparam(told.realtime_tid).sched_priority == 82  # by its frequency
     assert os.sched_getscheduler(told.pid) == os.SCHED_OTHER
     assert limits(told.pid)["Max locked memory"] == "unlimited"
     assert limits(told.pid)["Max realtime priority"] == "99"

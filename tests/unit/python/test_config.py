@@ -21,7 +21,8 @@ def written(tmp_path: Path, text: str) -> Path:
 
 
 def test_every_setting_has_a_default() -> None:
-    complete = runner_settings.defaults(runner_pb2.REALTIME_REQUIRED)
+    defaults = runner_settings.defaults(runner_pb2.REALTIME_REQUIRED)
+    complete = runner_settings.completed(defaults)
     messages: list[Any] = [complete, complete.ros]
     for message in messages:
         for field in message.DESCRIPTOR.fields:
@@ -146,7 +147,7 @@ def test_every_line_of_the_shipped_file_is_a_setting_that_is_accepted(tmp_path: 
     file = written(tmp_path, "\n".join(lines))
     found = settings_file.read(file)
     defaults = runner_settings.defaults(runner_pb2.REALTIME_REQUIRED)
-    assert runner_settings.differences(defaults, found.runner) == []
+    assert runner_settings.differences(runner_settings.completed(defaults), found.runner) == []
     assert (found.access, found.limits) == (Access(), Limits())
     known = {field.name for field in [*runner_pb2.RunnerSettings.DESCRIPTOR.fields,
                                       *runner_pb2.RosSettings.DESCRIPTOR.fields]}  # fmt: skip

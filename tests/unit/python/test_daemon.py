@@ -108,7 +108,7 @@ def test_an_executor_that_does_not_answer_is_stuck(
 def test_runners_come_and_go(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
     added = client.add_runner("arm", runner_pb2.RunnerSettings(frequency_hz=2000.0))
     assert added.settings.frequency_hz == 2000.0
-    assert added.settings.priority == 80
+    assert added.settings.priority == 82  # by its frequency
     client.load(rtcf.component("demo", "Fine"), "arm")
     assert client.get_order("arm") == ["/Fine"]
     assert client.get_order() == []

@@ -95,6 +95,23 @@ def test_defaults_that_have_changed_meanwhile_are_followed_and_what_was_chosen_s
     assert "changed while rtcfd was away: rt_runner: frequency_hz 1000 -> 500" in service.log()
 
 
+def test_a_priority_that_is_set_meanwhile_takes_the_place_of_the_one_by_the_frequency(
+    service: DaemonUnderTest,
+) -> None:
+    with service.client() as client:
+        assert client.get_status().runners[0].settings.priority == 80
+    assert service.end(signal.SIGUSR1) == 0
+    service.settings.write_text("[runner]\npriority = 60\n")
+    service.start_service()
+    with service.client() as client:
+        status = client.get_status().runners[0]
+        assert (status.state, status.settings.priority) == (RUNNING, 60)
+        assert not status.chosen.HasField("priority")
+        # And what was chosen for a runner alone wins over the file.
+        client.set_runner(runner_pb2.RunnerSettings(priority=70, frequency_hz=4000.0))
+        assert client.get_status().runners[0].settings.priority == 70
+
+
 def test_graphs_that_have_changed_meanwhile_are_applied_and_others_are_not(
     stopped_daemon: DaemonUnderTest,
 ) -> None:

@@ -1,0 +1,93 @@
+"""Priorities that nobody chose: by the frequency, so that the faster of two loops runs first."""
+
+import itertools
+from typing import Any
+
+import pytest
+from rtcf.v1 import runner_pb2
+from rtcf_shared.quantities import RUNNER
+from rtcfctl.status import shared_cpus
+from rtcfd.common import runner_settings
+from rtcfd.runners.status import note_shared_cpus
+from rtcfd.state.desired import Desired
+
+DEFAULTS = runner_settings.defaults(runner_pb2.REALTIME_PREFERRED)
+LOW, HIGH = int(RUNNER["priority"].low), int(RUNNER["priority"].high)
+
+
+def priority(**chosen: Any) -> int:
+    desired = Desired("arm")
+    desired.choose(runner_pb2.RunnerSettings(**chosen))
+    return int(desired.complete(DEFAULTS).priority)
+
+
+@pytest.mark.parametrize(
+    ("frequency_hz", "expected"),
+    [(1000, 80), (2000, 82), (500, 78), (1400, 81), (0.1, 53), (50000, 91)],
+)
+def test_it_goes_by_the_frequency(frequency_hz: float, expected: int) -> None:
+    assert priority(frequency_hz=frequency_hz) == expected
+
+
+def test_a_faster_loop_never_has_a_lower_one() -> None:
+    found = [priority(frequency_hz=0.1 * 1.2**step) for step in range(72)]
+    assert all(slower <= faster for slower, faster in itertools.pairwise(found))
+    assert all(found[step] < found[step + 4] for step in range(68)), "one that is twice as fast"
+    assert LOW <= found[0] <= found[-1] <= HIGH
+
+
+def test_what_people_gave_wins() -> None:
+    assert priority(frequency_hz=50.0, priority=80) == 80
+    file = runner_settings.merged(DEFAULTS, runner_pb2.RunnerSettings(priority=33))
+    desired = Desired("arm")
+    desired.choose(runner_pb2.RunnerSettings(frequency_hz=8000.0))
+    assert desired.complete(file).priority == 33
+
+
+def test_a_change_of_the_frequency_brings_its_priority_and_no_other_change_does() -> None:
+    desired = Desired("arm")
+    faster = runner_pb2.RunnerSettings(frequency_hz=4000.0)
+    assert desired.effect(faster, DEFAULTS) == runner_pb2.RunnerSettings(
+        frequency_hz=4000.0, priority=84
+    )
+    assert faster == runner_pb2.RunnerSettings(frequency_hz=4000.0), "what is saved"
+    spin = runner_pb2.RunnerSettings(spin_us=3)
+    assert desired.effect(spin, DEFAULTS) == spin
+    desired.choose(runner_pb2.RunnerSettings(priority=20))
+    assert desired.effect(faster, DEFAULTS) == faster
+
+
+def status(name: str, cpu: int | None, priority: int) -> runner_pb2.RunnerStatus:
+    found = runner_pb2.RunnerStatus(runner=name)
+    found.settings.priority = priority
+    if cpu is not None:
+        found.loop_cpu = cpu
+    return found
+
+
+def test_loops_that_share_a_cpu_are_named() -> None:
+    statuses = [
+        status("arm", 3, 80),
+        status("leg", 3, 82),
+        status("alone", 2, 80),
+        status("stopped", None, 80),
+        status("left", 1, 80),
+        status("right", 1, 80),
+        status("slow", 1, 60),
+    ]
+    note_shared_cpus(statuses)
+    assert [(each.runner, each.priority) for each in statuses[0].shares_cpu_with] == [("leg", 82)]
+    assert not statuses[2].shares_cpu_with
+    assert not statuses[3].shares_cpu_with
+    one, two = shared_cpus(statuses)
+    assert one == (
+        "CPU 1 has several loops, left (priority 80), right (priority 80), slow (priority 60): "
+        "those of equal priority delay each other: "
+        "`rtcfctl runner set NAME --cpu N` or `--priority N` parts them"
+    )
+    assert two == (
+        "CPU 3 has several loops, leg (priority 82), arm (priority 80): "
+        "each runs before those after it"
+    )
+    # Of one that is looked at alone the others are known too.
+    assert shared_cpus([statuses[0]]) == [two]
