@@ -38,6 +38,20 @@ def _asleep(socket: str) -> bool:
     return asked.returncode != 0
 
 
+def _declared(client: rtcf.Client, package: str, type_name: str, source: str) -> Iterator[str]:
+    """Yield the parameters, ports or inputs of a type that is being loaded."""
+    for each in client.list_types(package).types:
+        if each.type != type_name:
+            continue
+        if source == "NAME:=VALUE":
+            yield from (f"{parameter.name}:=" for parameter in each.parameters)
+        elif source == "FROM:=TO":
+            yield from (f"{port.name}:=" for port in each.ports)
+        else:
+            inputs = (p for p in each.ports if p.direction == graph_pb2.DIRECTION_INPUT)
+            yield from (str(port.name) for port in inputs)
+
+
 class _Line:
     """What the words before the one that is completed mean."""
 
@@ -117,6 +131,8 @@ class _Line:
         elif source == "COMPONENT" and self._given:
             types = client.list_types(self._given[-1]).types
             yield from (str(each.type) for each in types)
+        elif source in ("NAME:=VALUE", "FROM:=TO", "PORT") and len(self._given) > 1:
+            yield from _declared(client, *self._given[-2:], source)
         elif source == "COMPONENT.PORT":
             for component in client.list_components(runner):
                 name = component.full_name.removeprefix("/")

@@ -49,7 +49,9 @@ def describe(library: Path, package: str) -> int:
     description = wire.LibraryDescription(
         problem=contents.get("problem", ""),
         types=[
-            graph_pb2.ComponentType(package=package, type=name, ports=declared().ports)
+            graph_pb2.ComponentType(
+                package=package, type=name, ports=declared().ports, parameters=declared().parameters
+            )
             for name in contents.get("types", {})
         ],
     )
