@@ -52,7 +52,7 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> int:
     if args.seconds and status is not None:
         latency = _measure(client, host, status, loop.cpu, args.seconds, output)
     findings.append(_judge(latency))
-    return _print(findings, latency.figures, output)
+    return report(findings, latency.figures, output)
 
 
 def _status(client: rtcf.Client, runner: str) -> tuple[runner_pb2.RunnerStatus | None, str]:
@@ -198,7 +198,8 @@ def verdict(findings: list[Finding]) -> tuple[Grade, str]:
     return Grade.GOOD, "this machine is fit for real time"
 
 
-def _print(findings: list[Finding], latency: runner_pb2.Distribution | None, output: Output) -> int:
+def report(findings: list[Finding], latency: runner_pb2.Distribution | None, output: Output) -> int:
+    """Print all that was found, and what it means; return that as an exit code."""
     grade, sentence = verdict(findings)
     if not output.for_people:
         document: dict[str, Any] = {

@@ -7,6 +7,8 @@ import pytest
 from daemon_under_test import DaemonUnderTest, wait_for
 from rtcf.diagnosis import Finding, Grade, Host, Loop, cpus, diagnose
 from rtcf.v1 import runner_pb2
+from rtcfctl import doctor
+from rtcfctl.output import Output
 
 PID = 42
 CPU = "/sys/devices/system/cpu"
@@ -139,6 +141,19 @@ def test_it_measures_and_judges_for_real_and_leaves_nothing_behind(
         assert [each.runner for each in client.get_status().runners] == ["rt_runner"]
 
 
+@pytest.mark.parametrize(
+    ("grades", "code"),
+    [
+        ([Grade.GOOD, Grade.UNKNOWN], 0),
+        ([Grade.WARNING, Grade.GOOD], 4),
+        ([Grade.BAD, Grade.WARNING], 5),
+    ],
+)
+def test_the_worst_that_was_found_is_the_exit_code(grades: list[Grade], code: int) -> None:
+    found = [Finding(f"topic {at}", grade, "so", "otherwise") for at, grade in enumerate(grades)]
+    assert [doctor.report(found, None, Output(kind)) for kind in ("table", "json")] == [code, code]
+
+
 def test_without_rtcfd_it_looks_all_the_same(tmp_path: Path, daemon: DaemonUnderTest) -> None:
     done = daemon.ctl("--socket", str(tmp_path / "none"), "doctor")
     assert done.returncode == 5
@@ -160,13 +175,13 @@ def test_no_loop_is_put_beside_one_that_runs(daemon: DaemonUnderTest) -> None:
 
 
 def test_it_leaves_nothing_behind_when_it_is_ended(daemon: DaemonUnderTest) -> None:
-    doctor = daemon.ctl_process("doctor", "--seconds", "3000")
+    process = daemon.ctl_process("doctor", "--seconds", "3000")
 
     def runners() -> list[str]:
         return [each.runner for each in client.get_status().runners]
 
     with daemon.client() as client:
-        wait_for(lambda: f"doctor_{doctor.pid}" in runners(), "its loop")
-        doctor.terminate()
-        doctor.communicate()
+        wait_for(lambda: f"doctor_{process.pid}" in runners(), "its loop")
+        process.terminate()
+        process.communicate()
         wait_for(lambda: runners() == ["rt_runner"], "the end of its loop")

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import rtcf
 import yaml
-from daemon_under_test import BUILD_TREE, DaemonUnderTest
+from daemon_under_test import BUILD_TREE, DaemonUnderTest, wait_for
 from rtcf.v1 import runner_pb2
 from rtcfctl.main import parser, verb_of
 from rtcfctl.plain import plain
@@ -71,6 +71,25 @@ def test_refusal_is_one_line_and_exit_code_1(daemon: DaemonUnderTest) -> None:
     done = daemon.ctl("load", "demo", "Refused")
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == "rtcfctl: Refused.configure failed\n"
+
+
+def test_ctrl_c_is_exit_code_1_and_what_had_begun_goes_on(
+    daemon: DaemonUnderTest, client: rtcf.Client, tmp_path: Path
+) -> None:
+    go_on = tmp_path / "go on"
+    with subprocess.Popen(
+        [str(BUILD_TREE / "bin" / "rtcfctl"), "-v", "load", "demo", "Slow",
+         "--param", f"until:={go_on}"],
+        env={**os.environ, "RTCF_SOCKET": str(daemon.socket)}, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        assert process.stderr is not None
+        assert any("configuring Slow" in line for line in process.stderr)
+        process.send_signal(signal.SIGINT)
+        said = process.stderr.read()
+        assert process.wait() == 1
+    assert said == "rtcfctl: interrupted; a change that had begun goes on\n"
+    go_on.touch()
+    wait_for(lambda: client.get_order() == ["/Slow"], "the component")
 
 
 @pytest.mark.parametrize(
