@@ -119,3 +119,19 @@ def test_a_full_bucket_does_not_stop_a_loop_that_runs_degraded(tmp_path: Path) -
         lines = [line for line in daemon.log().splitlines() if "ended late" in line]
         assert len(lines) < 10, "one line for many overruns"
         assert any("most of them in /Sleeps" in line for line in lines)
+
+
+def test_a_loop_that_keeps_being_late_is_shouted_with_its_cause(tmp_path: Path) -> None:
+    with running(tmp_path, NO_FIFO, "preferred") as daemon, rtcf.Client(daemon.socket) as client:
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=20000.0))
+        client.load(rtcf.component("rtcf_faults", "Sleeps", parameters=["after:=0"]))
+        client.start()
+
+        # It is told each 10 s; the second time tells that it goes on.
+        def late() -> str:
+            said = daemon.ctl("status").stdout.splitlines()
+            return next((each for each in said if "IS LATE" in each), "")
+
+        line = wait_for(late, "the alarm")
+        assert line.startswith("!! rt_runner IS LATE: ")
+        assert "most of them in /Sleeps" in line

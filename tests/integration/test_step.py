@@ -1,6 +1,8 @@
 """Stepping: cycles without real time, on a simulated clock, with the same values every time."""
 
 import itertools
+import re
+import subprocess
 from pathlib import Path
 
 import fig_1
@@ -97,3 +99,19 @@ def test_a_long_step_says_how_far_it_is_and_can_be_stopped(client: rtcf.Client) 
     client.step(10**9, on_progress=stop_soon)
     assert any("of 1000000000 cycles" in line for line in lines)
     assert 0 < iteration(client) < 10**9
+
+
+def test_a_step_that_was_stopped_says_how_far_it_came(daemon: Daemon, client: rtcf.Client) -> None:
+    fig_1.load(client)
+    with subprocess.Popen(
+        ["rtcfctl", "-v", "step", str(10**9)],
+        env=daemon.environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        assert process.stderr is not None and process.stdout is not None
+        assert any("of 1000000000 cycles" in line for line in process.stderr)
+        client.stop()
+        said = process.stdout.read()
+        ended = process.stderr.read()
+        assert process.wait() == 1
+    assert re.fullmatch(r"stepped [1-9]\d* of 1000000000 cycles\n", said)
+    assert ended.splitlines()[-1] == "rtcfctl: step ended early: the loop was stopped"
