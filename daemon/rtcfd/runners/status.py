@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Sequence
+from typing import Protocol
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import runner_pb2
@@ -9,10 +10,49 @@ from rtcf.v1 import runner_pb2
 from rtcfd import VERSION
 from rtcfd.common import runner_settings
 from rtcfd.common.refusals import Refusal
+from rtcfd.common.tasks import looked_at
 from rtcfd.operations.runner_core import RunnerCore
 
 _TIMEOUT_S = 2.0
 _WORTH_SAYING_S = 2.0  # a change that takes longer shows
+_NEIGHBOURS_S = 0.5  # for what is asked of others
+
+
+class _Told(Protocol):
+    """Who tells what it is doing: a runner."""
+
+    @property
+    def name(self) -> str:
+        """By which it is asked for."""
+
+    async def status(self) -> runner_pb2.RunnerStatus:
+        """Return what it is doing."""
+
+
+async def statuses_of(
+    chosen: Sequence[_Told], everybody: Sequence[_Told]
+) -> list[runner_pb2.RunnerStatus]:
+    """Return the statuses of those chosen, each with the loops that share its CPU.
+
+    Of `everybody`, one that is stuck is left out of the neighbours: it holds up no other's status.
+    """
+    names = {each.name for each in chosen}
+    mine = [asyncio.create_task(each.status()) for each in chosen]
+    others = [
+        looked_at(asyncio.create_task(each.status()), "a neighbour's status")
+        for each in everybody
+        if each.name not in names
+    ]
+    try:
+        statuses = await asyncio.gather(*mine)
+        if others:
+            await asyncio.wait(others, timeout=_NEIGHBOURS_S)
+        known = [each.result() for each in others if each.done() and not each.exception()]
+    finally:
+        for each in (*mine, *others):
+            each.cancel()
+    note_shared_cpus([*statuses, *known])
+    return statuses
 
 
 def note_shared_cpus(statuses: Sequence[runner_pb2.RunnerStatus]) -> None:

@@ -6,7 +6,7 @@ No logic: names and values are checked by what is called.
 import asyncio
 import os
 import time
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator
 from typing import Any, Protocol
 
 from rtcf.executor.v1 import executor_pb2 as wire
@@ -28,7 +28,7 @@ from rtcfd.runners.leases import Lease
 from rtcfd.runners.outbox import Outbox
 from rtcfd.runners.runner import Runner
 from rtcfd.runners.runners import Runners
-from rtcfd.runners.status import note_shared_cpus
+from rtcfd.runners.status import statuses_of
 from rtcfd.service.answers import answering, changing, holding, lasting
 from rtcfd.service.pages import page
 from rtcfd.service.replay import Replay
@@ -74,7 +74,7 @@ class Control(control_pb2_grpc.ControlServicer):
             version=VERSION,
             pid=os.getpid(),
             uptime_ns=time.monotonic_ns() - self._begin_ns,
-            runners=await self._statuses(chosen),
+            runners=await statuses_of(chosen, self._runners.all()),
             notes=self._daemon.notes(),
         )
 
@@ -82,15 +82,8 @@ class Control(control_pb2_grpc.ControlServicer):
     async def ListRunners(self, request: control_pb2.ListRunnersRequest) -> Any:
         """All runners, in pages."""
         chosen, token = page(self._runners.all(), request, lambda each: str(each.name), _STATUS)
-        runners = await self._statuses(chosen)
+        runners = await statuses_of(chosen, self._runners.all())
         return control_pb2.ListRunnersResponse(runners=runners, next_page_token=token)
-
-    async def _statuses(self, chosen: Sequence[Runner]) -> list[runner_pb2.RunnerStatus]:
-        # Of all: whose loops share a CPU.
-        statuses = await asyncio.gather(*(runner.status() for runner in self._runners.all()))
-        note_shared_cpus(statuses)
-        names = {runner.name for runner in chosen}
-        return [status for status in statuses if status.runner in names]
 
     @lasting(control_pb2.ReloadResponse, "result")
     def Reload(self, request: control_pb2.ReloadRequest) -> Any:

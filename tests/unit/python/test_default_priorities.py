@@ -1,5 +1,6 @@
 """Priorities that nobody chose: by the frequency, so that the faster of two loops runs first."""
 
+import asyncio
 import itertools
 from typing import Any
 
@@ -8,7 +9,7 @@ from rtcf.v1 import runner_pb2
 from rtcf_shared.quantities import RUNNER
 from rtcfctl.status import shared_cpus
 from rtcfd.common import runner_settings
-from rtcfd.runners.status import note_shared_cpus
+from rtcfd.runners.status import note_shared_cpus, statuses_of
 from rtcfd.state.desired import Desired
 
 DEFAULTS = runner_settings.defaults(runner_pb2.REALTIME_PREFERRED)
@@ -91,3 +92,29 @@ def test_loops_that_share_a_cpu_are_named() -> None:
     )
     # Of one that is looked at alone the others are known too.
     assert shared_cpus([statuses[0]]) == [two]
+
+
+class Told:
+    """A runner that tells what it was told, or is stuck."""
+
+    def __init__(self, name: str, found: runner_pb2.RunnerStatus | None) -> None:
+        self.name = name
+        self._found = found
+
+    async def status(self) -> runner_pb2.RunnerStatus:
+        if self._found is None:
+            await asyncio.get_running_loop().create_future()
+        assert self._found is not None
+        return self._found
+
+
+def test_a_runner_that_is_stuck_holds_up_no_other_status() -> None:
+    arm, leg = Told("arm", status("arm", 3, 80)), Told("leg", status("leg", 3, 82))
+    stuck = Told("stuck", None)
+
+    async def ask() -> list[runner_pb2.RunnerStatus]:
+        return await statuses_of([arm], [arm, leg, stuck])
+
+    (found,) = asyncio.run(ask())
+    assert found.runner == "arm"
+    assert [each.runner for each in found.shares_cpu_with] == ["leg"]
