@@ -118,6 +118,9 @@ def test_two_machines_at_one_master_stop_each_its_own_loop(tmp_path: Path) -> No
 def test_nothing_is_left_at_a_master_that_stays(
     stack: ExitStack, tmp_path: Path, master: Master
 ) -> None:
+    # What roscore itself has registered comes after the master.
+    wait_for(lambda: "/rosout/set_logger_level" in master.services(), "all of rosout")
+    wait_for(lambda: "/rosout" in master.topics()[1], "all of rosout")
     before = _all_names(master.uri)
     names = rosgraph.Master("/test", master.uri).getParamNames()
     for attempt in range(5):
