@@ -66,13 +66,17 @@ class _Wrong(InvalidArgument):
 def read(file: Path) -> Config:
     """Read a configuration file; a Refusal names the file, the line and what is wrong there."""
     try:
-        text = file.read_text(encoding="utf-8")
+        text = file.read_text(encoding="utf-8-sig")  # some editors write a byte order mark
         document = tomllib.loads(text)
     except OSError as error:
         raise InvalidArgument(
             f"cannot read {file}: {error.strerror}", errors_pb2.REASON_SETTINGS_FILE_INVALID
         ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError:
+        raise InvalidArgument(
+            f"{file}: it is not UTF-8 text", errors_pb2.REASON_SETTINGS_FILE_INVALID
+        ) from None
+    except tomllib.TOMLDecodeError as error:
         raise InvalidArgument(f"{file}: {error}", errors_pb2.REASON_SETTINGS_FILE_INVALID) from None
     config = Config(text=text)
     try:

@@ -95,6 +95,20 @@ def test_a_bad_file_is_refused_by_name(tmp_path: Path, text: str, said: str) -> 
     assert str(file) in str(refused.value)
 
 
+def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "rtcfd.toml"
+    file.write_bytes("[runner]".encode("utf-16"))
+    with pytest.raises(Refusal) as refused:
+        settings_file.read(file)
+    assert str(refused.value) == f"{file}: it is not UTF-8 text"
+
+
+def test_a_byte_order_mark_is_passed_over(tmp_path: Path) -> None:
+    file = tmp_path / "rtcfd.toml"
+    file.write_bytes("[runner]\nspin_us = 7\n".encode("utf-8-sig"))
+    assert settings_file.read(file).runner.spin_us == 7
+
+
 def test_a_cpu_that_is_not_there_is_refused() -> None:
     with pytest.raises(Refusal, match="CPU 4096"):
         runner_settings.check(runner_pb2.RunnerSettings(cpu=4096))
