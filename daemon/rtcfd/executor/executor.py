@@ -5,6 +5,7 @@ restarts: a new start is a new object.
 """
 
 import asyncio
+import contextvars
 import logging
 import os
 import signal
@@ -267,7 +268,8 @@ class Executor:
             self._on_unasked(wire.Response(direct_stop=hello.direct_stop))
 
     def _begin_to_watch(self) -> None:
-        watching = asyncio.create_task(self._watch())
+        # In nobody's name: its end is no deed of whose call started it.
+        watching = asyncio.create_task(self._watch(), context=contextvars.Context())
         self._watching = looked_at(watching, f"the watch over {self._peer}")
 
     async def _watch(self) -> None:

@@ -5,6 +5,7 @@ by id.  A link that ends fails all requests that wait for it.
 """
 
 import asyncio
+import contextvars
 import os
 import socket
 import struct
@@ -81,7 +82,9 @@ class Link:
         )
         # Of the process that listens, by the kernel's word.
         self.peer_pid, self.peer_uid, _ = _CREDENTIALS.unpack(credentials)
-        self._reading = looked_at(asyncio.create_task(self._read(reader)), f"the link to {peer}")
+        # In nobody's name: what an executor says is not said by whose call connected to it.
+        reading = asyncio.create_task(self._read(reader), context=contextvars.Context())
+        self._reading = looked_at(reading, f"the link to {peer}")
 
     @classmethod
     async def connect(cls, peer: str, path: Path, on_unasked: Unasked) -> "Link":

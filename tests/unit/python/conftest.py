@@ -1,11 +1,13 @@
 """A rtcfd for a test that asks for one."""
 
-from collections.abc import Iterator
+import json
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 import rtcf
 from daemon_under_test import DaemonUnderTest
+from rtcfd_in_process import Machine, Rtcfd
 
 
 @pytest.fixture
@@ -37,3 +39,20 @@ def daemon(stopped_daemon: DaemonUnderTest) -> DaemonUnderTest:
 def client(daemon: DaemonUnderTest) -> Iterator[rtcf.Client]:
     with daemon.client() as client:
         yield client
+
+
+@pytest.fixture
+def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
+    """The executors of a rtcfd in the process of the test."""
+    machine = Machine()
+    machine.install(monkeypatch)
+    return machine
+
+
+@pytest.fixture
+def rtcfd(tmp_path: Path, machine: Machine) -> Callable[[], Rtcfd]:
+    """Makes a rtcfd in the process of the test: each is the next life of one."""
+    library = tmp_path / "lib" / "demo" / "main.so"
+    library.parent.mkdir(parents=True)
+    library.write_text(json.dumps({"types": {"Fine": "fine"}}))
+    return lambda: Rtcfd(tmp_path, tmp_path / "lib", machine)

@@ -10,7 +10,7 @@ import contextlib
 import json
 import logging
 import signal
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,9 @@ import grpc
 from peer_executor import Peer
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+from rtcfd.access import caller
+from rtcfd.access.calls import Level
+from rtcfd.access.peer import Peer as Who
 from rtcfd.catalog.catalog import Catalog, Folder
 from rtcfd.catalog.describe import Describer
 from rtcfd.common import runner_settings
@@ -32,6 +35,8 @@ from rtcfd.runners.runners import Runners
 from rtcfd.service.control import Control
 from rtcfd.state.desired import Desired
 from rtcfd.state.store import Store
+
+_DEADLINE_S = 20.0
 
 
 class Machine:
@@ -228,6 +233,26 @@ class _Descriptions(Describer):
         )
 
 
+async def until(condition: Callable[[], Any], what: str) -> Any:
+    """Return the condition's result when it is true; fail after the deadline."""
+    loop = asyncio.get_running_loop()
+    deadline = loop.time() + _DEADLINE_S
+    while not (result := condition()):
+        assert loop.time() < deadline, f"waited {_DEADLINE_S:g} s for {what}"
+        await asyncio.sleep(0.001)
+    return result
+
+
+async def called_by(user: str, work: Coroutine[Any, Any, Any]) -> None:
+    """Make a call in the name of a user."""
+
+    async def call() -> None:
+        caller.enter(caller.Caller(Who(1, 1000, user, frozenset()), Level.ADMIN))
+        await work
+
+    await asyncio.create_task(call())
+
+
 def spec(name: str) -> graph_pb2.ComponentSpec:
     return graph_pb2.ComponentSpec(package="demo", type="Fine", name=name)
 
@@ -237,4 +262,4 @@ def quiet() -> None:
     logging.disable(logging.CRITICAL)
 
 
-__all__ = ["Machine", "Refused", "Rtcfd", "control_pb2", "quiet", "spec"]
+__all__ = ["Machine", "Refused", "Rtcfd", "called_by", "control_pb2", "quiet", "spec", "until"]

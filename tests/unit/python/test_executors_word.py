@@ -1,11 +1,20 @@
 """What rtcfd takes an executor's word for: who it is, and who has changed what."""
 
+import asyncio
 import os
 import signal
+import time
+from collections.abc import Callable
 
 import pytest
 import rtcf
 from daemon_under_test import DaemonUnderTest, wait_for
+from peer_executor import Peer
+from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import control_pb2
+from rtcfd.access.calls import Level
+from rtcfd.runners import ros_services
+from rtcfd_in_process import Rtcfd, called_by, spec, until
 
 
 def test_a_stranger_at_an_executors_socket_is_not_taken_for_it(
@@ -52,3 +61,81 @@ def test_who_has_set_a_parameter_to_what_is_in_the_log(daemon: DaemonUnderTest) 
         client.load(rtcf.component("demo", "Fine", name="x"))
         client.set_parameters("x", [rtcf.parse_parameter("kp:=2.5")])
     wait_for(lambda: "/x: kp = 2.5 set by root" in daemon.log(), "the log")
+
+
+async def started_by_alice(rtcfd: Rtcfd) -> Peer:
+    """Return an executor that a call of alice has started, and that ROS peers may do all with."""
+    rtcfd.runners._shared.serve_ros = ros_services.serve
+    await rtcfd.start()
+    restart = control_pb2.RestartRunnerRequest(runner="rt_runner")
+    await called_by("alice", rtcfd.call("RestartRunner", restart))
+    rtcfd.runners.get("rt_runner").desired.chosen.ros.peers = Level.ADMIN.right
+    peer = rtcfd.peer("rt_runner")
+    assert peer is not None
+    return peer
+
+
+async def ros_calls(peer: Peer, call: wire.ServiceCall) -> wire.ServiceAnswer:
+    """Call a service of the executor's node."""
+    answered: asyncio.Future[wire.ServiceAnswer] = asyncio.get_running_loop().create_future()
+
+    async def service_answer(answer: wire.ServiceAnswer, _: int) -> wire.Response:
+        answered.set_result(answer)
+        return wire.Response(done=wire.Done())
+
+    peer.service_answer = service_answer  # type: ignore[attr-defined]
+    peer.send(wire.Response(service_call=call))
+    return await answered
+
+
+def test_a_fault_is_not_in_the_name_of_who_started_the_executor(
+    rtcfd: Callable[[], Rtcfd],
+) -> None:
+    async def play() -> None:
+        daemon = rtcfd()
+        peer = await started_by_alice(daemon)
+        events = daemon.runners._shared.events
+        begin = events.last
+        event = wire.Event(kind=wire.Event.KIND_LOOP_ENDED, message="Pid.update threw")
+        peer.send(wire.Response(event=event))
+
+        def told() -> list[control_pb2.Event]:
+            return [each for each in events.after(begin, 100)[0] if each.message == event.message]
+
+        for found in await until(told, "the event"):
+            assert not found.user
+        await daemon.runners.close(in_order=True)
+
+    asyncio.run(play())
+
+
+def test_ros_starts_a_loop_after_a_stop_that_was_later_than_the_start_of_its_executor(
+    rtcfd: Callable[[], Rtcfd],
+) -> None:
+    async def play() -> None:
+        daemon = rtcfd()
+        peer = await started_by_alice(daemon)
+        stop = wire.DirectStop(count=1, at_ns=time.monotonic_ns(), uid=0, pid=1)
+        peer.send(wire.Response(direct_stop=stop))
+        answer = await ros_calls(peer, wire.ServiceCall(call=1, start=wire.Start()))
+        assert answer.success, answer.message
+        await daemon.runners.close(in_order=True)
+
+    asyncio.run(play())
+
+
+def test_what_ros_loads_is_not_in_the_name_of_who_started_the_executor(
+    rtcfd: Callable[[], Rtcfd],
+) -> None:
+    async def play() -> None:
+        daemon = rtcfd()
+        peer = await started_by_alice(daemon)
+        component = spec("x")
+        component.parameters.append(rtcf.parse_parameter("kp:=7.0"))
+        answer = await ros_calls(peer, wire.ServiceCall(call=1, load=component))
+        assert answer.success, answer.message
+        (change,) = daemon.runners.get("rt_runner").desired.history.of("/x")
+        assert change.who == "rtcfd"
+        await daemon.runners.close(in_order=True)
+
+    asyncio.run(play())
