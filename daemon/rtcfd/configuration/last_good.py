@@ -5,16 +5,17 @@ at a start, the copy in the state folder is taken in its place.
 """
 
 import logging
-import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from rtcfd.common import durable
 from rtcfd.common.refusals import Refusal
 from rtcfd.configuration import settings_file
 
 log = logging.getLogger(__name__)
 
 _NAME = "rtcfd.toml.last-good"
+_NONE = "# Nothing was set.\n"
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class Settings:
         try:
             return Settings(settings_file.read(file), _copy=copy)
         except Refusal as refusal:
-            if not last_good or copy is None or not copy.exists():
+            if not last_good or copy is None or not _is_there(copy):
                 raise
             return Settings(
                 settings_file.read(copy), f"{refusal}; the last good settings are taken instead"
@@ -47,11 +48,18 @@ class Settings:
         """Make a copy of settings that were good."""
         if self._copy is None or self.problem:
             return
-        new = self._copy.with_name(f"{_NAME}.new")
+        data = (self.found.text or _NONE).encode()
         try:
-            if self._copy.exists() and self._copy.read_text(encoding="utf-8") == self.found.text:
-                return
-            new.write_text(self.found.text, encoding="utf-8")
-            os.replace(new, self._copy)
+            if not self._copy.exists() or self._copy.read_bytes() != data:
+                durable.replace(self._copy, data)
         except OSError as error:
             log.warning("no copy of the settings at %s: %s", self._copy, error.strerror)
+
+
+def _is_there(copy: Path) -> bool:
+    """Tell whether there is a copy; an empty one is what a file system left of it, and would
+    grant everybody everything."""
+    try:
+        return copy.stat().st_size > 0
+    except OSError:
+        return False

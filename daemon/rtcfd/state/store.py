@@ -7,7 +7,6 @@ never overwritten.  One of an older rtcfd is upgraded, and kept beside: a way ba
 import dataclasses
 import json
 import logging
-import os
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any
 from google.protobuf import json_format
 from rtcf.v1 import graph_pb2, runner_pb2
 
+from rtcfd.common import durable
 from rtcfd.common.names import check_base_name, full_name
 from rtcfd.common.refusals import Refusal
 from rtcfd.state import history
@@ -134,20 +134,12 @@ class Store:
             return
         if not running:
             mark.unlink(missing_ok=True)
-        file = self._folder / f"{runner}{_SUFFIX}"
-        temporary = self._folder / f".{runner}{_SUFFIX}.new"
-        try:
-            with temporary.open("wb") as out:
-                out.write(text)
-                out.flush()
-                os.fsync(out.fileno())
-            temporary.replace(file)
-        except OSError:
-            temporary.unlink(missing_ok=True)
-            raise
+            # At once: the rest may find no room, and the state before says that it runs.
+            durable.sync_folder(self._folder)
+        durable.replace(self._folder / f"{runner}{_SUFFIX}", text)
         if running:
             mark.touch(mode=0o640)
-        self._sync_folder(self._folder)
+            durable.sync_folder(self._folder)
 
     def save_history(self, runner: str, changes: Sequence[Change], anew: bool) -> None:
         """Write what History.to_write() gave; raises OSError.  May run on any thread.
@@ -182,16 +174,7 @@ class Store:
         (self._folder / f"{runner}{_SUFFIX}").unlink(missing_ok=True)
         (self._folder / f"{runner}{_MARK}").unlink(missing_ok=True)
         (self._folder / f"{runner}{_HISTORY}").unlink(missing_ok=True)
-        self._sync_folder(self._folder)
-
-    @staticmethod
-    def _sync_folder(folder: Path) -> None:
-        # Without this a rename may be undone by a power cut (fsync(2), NOTES).
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        durable.sync_folder(self._folder)
 
     def _set_aside(self, file: Path, why: str, reason: str) -> None:
         aside = file.with_name(f"{file.stem}.{why}-{time.strftime('%Y%m%dT%H%M%S')}")

@@ -1,9 +1,14 @@
 """Settings and graphs of the service: checked, reloaded, and what stands in for bad ones."""
 
 import logging
+import os
 import subprocess
+from pathlib import Path
 
+import pytest
 from daemon_under_test import BUILD_TREE, DaemonUnderTest
+from rtcfd.common.refusals import Refusal
+from rtcfd.configuration.last_good import Settings
 from rtcfd.journal import standing_alone
 
 GOOD = "[runner]\nfrequency_hz = 250.0\n"
@@ -41,6 +46,40 @@ def test_a_start_with_bad_settings_takes_the_last_good_ones_and_says_so(
     with daemon.client() as client:
         status = client.get_status()
     assert (status.runners[0].settings.frequency_hz, list(status.notes)) == (500.0, [])
+
+
+def test_the_last_good_settings_are_on_disk_before_they_have_their_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = tmp_path / "rtcfd.toml"
+    settings.write_text(GOOD)
+    state = tmp_path / "state"
+    state.mkdir()
+    copy = state / "rtcfd.toml.last-good"
+    synced: list[tuple[str, bool]] = []  # what, and whether the copy has its name by then
+
+    def fsync(descriptor: int) -> None:
+        file = Path(os.readlink(f"/proc/self/fd/{descriptor}"))
+        synced.append((str(file.relative_to(tmp_path)), copy.exists()))
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    Settings.read(settings, state, last_good=True).keep()
+    assert synced == [("state/.rtcfd.toml.last-good.new", False), ("state", True)]
+    assert [file.name for file in state.iterdir()] == [copy.name]
+
+
+def test_an_empty_copy_grants_nobody_anything(tmp_path: Path) -> None:
+    settings = tmp_path / "rtcfd.toml"
+    copy = tmp_path / "rtcfd.toml.last-good"
+    settings.write_text(BAD)
+    copy.touch()
+    with pytest.raises(Refusal, match="frequency_hz must be a number"):
+        Settings.read(settings, tmp_path, last_good=True)
+    # A file in which nothing is set has a copy too, which is none of those.
+    settings.write_text("")
+    Settings.read(settings, tmp_path, last_good=True).keep()
+    settings.write_text(BAD)
+    assert "frequency_hz" in Settings.read(settings, tmp_path, last_good=True).problem
 
 
 def test_a_reload_fails_when_a_graph_is_refused(stopped_daemon: DaemonUnderTest) -> None:
