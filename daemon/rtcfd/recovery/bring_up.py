@@ -31,7 +31,7 @@ _WORDS = {
 async def bring_up(runner: RunnerCore, only_left_over: bool = False, boot: bool = False) -> bool:
     """Adopt the executor that is there, or start one (unless `only_left_over`), and load the
     components; held, or at `boot` as `on_boot` says.  Tell whether there is one."""
-    asked = runner.loop.stops
+    asked, stopped_at_ns = runner.loop.stops, runner.loop.stopped_at_ns
     adopted = await runner.take_executor(only_left_over)
     if adopted is None:
         return False
@@ -40,15 +40,21 @@ async def bring_up(runner: RunnerCore, only_left_over: bool = False, boot: bool 
         runner.loop.told(runner.loop.wanted)  # as far as can be known
         return True
     await runner.limit()
-    await (_follow(runner) if adopted else _restore(runner))
+    if adopted:
+        # A stop that it tells of when it is taken is older than what its loop does from then on.
+        told = runner.loop.stopped_at_ns != stopped_at_ns
+        await _follow(runner, asked + told)
+    else:
+        await _restore(runner)
     if boot:
         await _start_at_boot(runner, asked)
     runner.tell()
     return True
 
 
-async def _follow(runner: RunnerCore) -> None:
-    """Make the desired state that of an executor that was adopted.
+async def _follow(runner: RunnerCore, asked: int) -> None:
+    """Make the desired state that of an executor that was adopted; `asked`: the number of stops
+    that are older than what its loop does.
 
     What its loop lacks is loaded if it does not run: then the rtcfd before this
     one died while it restored it.
@@ -56,7 +62,8 @@ async def _follow(runner: RunnerCore) -> None:
     await _settle(runner)
     was_running = runner.loop.wanted
     request = wire.Request(get_status=wire.GetStatus())
-    status = (await runner.ask(request, None, lambda answer: _told(runner, answer.status))).status
+    answer = await runner.ask(request, None, lambda answer: _told(runner, answer.status, asked))
+    status = answer.status
     listed = await runner.ask(wire.Request(list_components=wire.ListComponents()))
     await runner.begin_figures(reset=False)
     runner.log.info(
@@ -81,9 +88,9 @@ async def _follow(runner: RunnerCore) -> None:
     runner.adopted()
 
 
-def _told(runner: RunnerCore, status: runner_pb2.RunnerStatus) -> None:
-    """Note what a loop does that another rtcfd started."""
-    runner.loop.told(status.state == runner_pb2.RUNNER_STATE_RUNNING, runner.loop.stops)
+def _told(runner: RunnerCore, status: runner_pb2.RunnerStatus, asked: int) -> None:
+    """Note what a loop does that another rtcfd started; it is not wanted for that after a stop."""
+    runner.loop.told(status.state == runner_pb2.RUNNER_STATE_RUNNING, asked)
 
 
 def _follow_leased(runner: RunnerCore, found: Iterable[graph_pb2.ComponentInfo]) -> bool:

@@ -1,20 +1,26 @@
 """Executors outlive rtcfd: a new one adopts them."""
 
+import asyncio
 import json
 import os
 import signal
 import socket
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import rtcf
 from daemon_under_test import DaemonUnderTest, wait_for
-from rtcf.v1 import graph_pb2, runner_pb2
+from peer_executor import Peer
+from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 from rtcfd import VERSION
 from rtcfd.common.runner_settings import defaults
 from rtcfd.executor.link import PROTOCOL
 from rtcfd.recovery.follow import follow_components, follow_settings
 from rtcfd.state.desired import Desired
+from rtcfd_in_process import Rtcfd, SlowPeer, until
 
 LONG = runner_pb2.RunnerSettings(orphan_timeout_s=60.0)
 
@@ -269,3 +275,64 @@ def test_what_a_restore_did_not_get_to_stays_desired() -> None:
     lines, left_out = follow_components(desired, [], restored=False)
     assert lines == ["/a is not in its loop"]
     assert left_out == {"/a": "its executor does not have it"}
+
+
+def test_a_stop_that_comes_while_a_loop_is_adopted_is_kept(
+    rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def play() -> None:
+        first, second = rtcfd(), rtcfd()
+        await first.start()
+        await first.call("Start", control_pb2.StartRequest())
+        await first.runners.leave()
+        calls: list[asyncio.Task[None]] = []
+        adopted = asyncio.Event()
+
+        async def answer(peer: SlowPeer, request: wire.Request) -> None:
+            kind = request.WhichOneof("kind")
+            if kind == "stop":  # it takes until a boundary
+                await adopted.wait()
+            elif kind == "get_status" and not calls:
+                stop = second.call("Stop", control_pb2.StopRequest())
+                calls.append(asyncio.create_task(stop))
+                runner = second.runners.get("rt_runner")
+                await until(lambda: runner.loop.stops, "the stop")
+            await Peer.answer(peer, request)
+
+        monkeypatch.setattr(SlowPeer, "answer", answer)
+        await second.start()
+        adopted.set()
+        await asyncio.gather(*calls)
+        await second.call("SetRunner", control_pb2.SetRunnerRequest())  # it saves
+        saved = second.saved("rt_runner")
+        assert saved is not None and saved["running"] is False
+        assert not second.runners.get("rt_runner").loop.wanted
+        await second.runners.close(in_order=False)
+
+    asyncio.run(play())
+
+
+def test_a_loop_that_was_started_after_a_stop_at_its_executor_is_wanted(
+    rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stop = wire.DirectStop(count=1, at_ns=time.monotonic_ns(), uid=0, pid=1)
+    hello = Peer.hello
+
+    async def hello_with_stop(peer: Peer, request: wire.Hello, id_: int) -> wire.Response:
+        response = await hello(peer, request, id_)
+        response.hello.direct_stop.CopyFrom(stop)
+        return response
+
+    async def play() -> None:
+        first, second = rtcfd(), rtcfd()
+        await first.start()
+        await first.call("Start", control_pb2.StartRequest())
+        await first.runners.leave()
+        monkeypatch.setattr(Peer, "hello", hello_with_stop)
+        await second.start()
+        saved = second.saved("rt_runner")
+        assert saved is not None and saved["running"] is True
+        assert second.runners.get("rt_runner").loop.wanted
+        await second.runners.close(in_order=False)
+
+    asyncio.run(play())
