@@ -8,7 +8,7 @@ import contextlib
 import logging
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
-from typing import Any
+from typing import Any, NoReturn
 
 import grpc
 from google.protobuf.message import DecodeError
@@ -79,10 +79,13 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
         async def call(request: Any, context: Any) -> AsyncIterator[Any]:
             async with self._admitted(method, request, context) as peer:
                 if isinstance(request, AsyncIterator):
-                    request = _formed(method, request)
+                    request = self._formed(method, request, peer)
                 with self._noted(method, request, context, peer):
-                    async for response in inner(request, context):
-                        yield response
+                    async with contextlib.aclosing(inner(request, context)) as responses:
+                        async for response in responses:
+                            if needed(method) <= Level.OBSERVE:
+                                await self._check_again(method, request, context, peer)
+                            yield response
 
         return call
 
@@ -101,11 +104,33 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
                 tuning = self.access.tuning(client.peer)
                 enter(Caller(client.peer, client.level, tuning, _asked_ns(context)))
             except Refusal as refusal:
-                if client is not None and client.peer is not None:
-                    text = f"{method} by {client.peer}: refused: {bounded(refusal)}"
-                    self._log(logging.WARNING, text, client.peer, request)
-                await abort(context, refusal, request)
+                known = None if client is None else client.peer
+                await self._refuse(refusal, method, request, context, known)
             yield client.peer
+
+    async def _check_again(self, method: str, request: Any, context: Any, peer: Peer) -> None:
+        """Show nothing more to a watcher whose right was taken away since."""
+        try:
+            self.access.check(peer, method)
+        except Refusal as refusal:
+            await self._refuse(refusal, method, request, context, peer)
+
+    async def _formed(
+        self, method: str, requests: AsyncIterator[Any], peer: Peer
+    ) -> AsyncIterator[Any]:
+        """Look at each message of a stream, which may last longer than a right does."""
+        async for request in requests:
+            self.access.check(peer, method)
+            _require_formed(method, request)
+            yield request
+
+    async def _refuse(
+        self, refusal: Refusal, method: str, request: Any, context: Any, peer: Peer | None
+    ) -> NoReturn:
+        if peer is not None:
+            text = f"{method} by {peer}: refused: {bounded(refusal)}"
+            self._log(logging.WARNING, text, peer, request)
+        await abort(context, refusal, request)
 
     @contextlib.contextmanager
     def _noted(self, method: str, request: Any, context: Any, peer: Peer) -> Iterator[None]:
@@ -149,12 +174,6 @@ def _require_formed(method: str, request: Any) -> None:
         raise request.problem
     if hasattr(request, "DESCRIPTOR"):
         lengths.check(request)
-
-
-async def _formed(method: str, requests: AsyncIterator[Any]) -> AsyncIterator[Any]:
-    async for request in requests:
-        _require_formed(method, request)
-        yield request
 
 
 def _forgiving(method: str, deserialize: Callable[[bytes], Any]) -> Callable[[bytes], Any]:

@@ -117,12 +117,18 @@ async def _listen(
     messages: AsyncIterator[Any], opening: "asyncio.Future[None]", tenancy: Tenancy, outbox: Outbox
 ) -> None:
     """Wait for the caller's `end`.  A stream that just ends says nothing: the connection counts."""
-    async for message in messages:
-        if message.WhichOneof("kind") == "end":
-            await asyncio.wait({opening})
-            try:
-                await tenancy.end()
-            except Exception as error:
-                outbox.refuse(error)
-            outbox.end(control_pb2.LeaseEnded.WHY_ASKED)
+    try:
+        async for message in messages:
+            if message.WhichOneof("kind") == "end":
+                break
+        else:
             return
+    except Exception as error:  # a message that is refused
+        outbox.refuse(error)
+        return
+    await asyncio.wait({opening})
+    try:
+        await tenancy.end()
+    except Exception as error:
+        outbox.refuse(error)
+    outbox.end(control_pb2.LeaseEnded.WHY_ASKED)

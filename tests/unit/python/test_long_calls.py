@@ -1,0 +1,122 @@
+"""Calls that last: each of their messages is looked at, and who loses a right meanwhile is told."""
+
+from queue import SimpleQueue
+
+import grpc
+import pytest
+import rtcf
+from daemon_under_test import DEADLINE_S, DaemonUnderTest, wait_for
+from rtcf.v1 import control_pb2
+from strangers import open_to_strangers, root_only, stranger
+
+WATCH = """
+import sys, rtcf
+from rtcf.events import Place
+with rtcf.Client(sys.argv[1]) as client:
+    try:
+        for number, _ in enumerate({stream}):
+            if number == 0:
+                print("watches", flush=True)
+    except rtcf.RefusedError as refused:
+        print(refused.code, refused, flush=True)
+"""
+
+HOLD = """
+import sys, rtcf
+from rtcf.v1 import control_pb2
+with rtcf.Client(sys.argv[1]) as client:
+    opening = control_pb2.OpenHold(runner="arm", token="mine", holder="test")
+    hold = client.hold_runner(opening)
+    try:
+        for message in hold:
+            if message.WhichOneof("kind") == "taken":
+                print("holds", flush=True)
+                sys.stdin.readline()
+                hold.end()
+    except rtcf.RefusedError as refused:
+        print(refused.code, refused, flush=True)
+"""
+
+
+def rules(default: str) -> str:
+    return f"[access]\ndefault = '{default}'\n"
+
+
+@root_only
+@pytest.mark.parametrize(
+    "stream",
+    [
+        # From the begin on, so that there is one at once.
+        "client.watch_events(after=Place())",
+        "client.watch_statistics(interval_s=0.1)",
+    ],
+)
+def test_who_watches_sees_nothing_more_when_the_right_is_gone(stream: str) -> None:
+    program = WATCH.format(stream=stream)
+    with (
+        open_to_strangers(rules("observe")) as daemon,
+        stranger(program, str(daemon.socket)) as watcher,
+    ):
+        assert watcher.stdout is not None
+        assert watcher.stdout.readline() == "watches\n"
+        daemon.settings.write_text(rules("none"))
+        with daemon.client() as client:
+            client.reload()
+        said = watcher.stdout.readline()
+        assert said.startswith("PERMISSION_DENIED Watch")
+        assert "takes the right to observe, and user #54321 has none" in said
+
+
+@root_only
+def test_a_later_message_takes_the_right_too() -> None:
+    with (
+        open_to_strangers(rules("admin")) as daemon,
+        stranger(HOLD, str(daemon.socket)) as holder,
+    ):
+        assert holder.stdout is not None and holder.stdin is not None
+        assert holder.stdout.readline() == "holds\n"
+        daemon.settings.write_text(rules("observe"))
+        with daemon.client() as client:
+            client.reload()
+        print("go on", file=holder.stdin, flush=True)
+        assert holder.stdout.readline().startswith(
+            "PERMISSION_DENIED HoldRunner takes the right to administer, and user #54321 has only"
+        )
+
+
+@pytest.mark.parametrize(
+    ("message", "said"),
+    [
+        (b"\xff", "the request of LeaseComponent is malformed"),
+        (
+            control_pb2.LeaseComponentRequest(
+                open=control_pb2.OpenLease(component=rtcf.component("demo", "x" * 300))
+            ).SerializeToString(),
+            "characters",
+        ),
+    ],
+    ids=["malformed", "too long"],
+)
+def test_a_second_message_that_is_refused_ends_the_call_and_what_it_holds(
+    daemon: DaemonUnderTest, client: rtcf.Client, message: bytes, said: str
+) -> None:
+    opening = control_pb2.OpenLease(
+        component=rtcf.component("demo", "Fine", name="held"), run_id="run", holder="test"
+    )
+    requests: SimpleQueue[bytes | None] = SimpleQueue()
+    requests.put(control_pb2.LeaseComponentRequest(open=opening).SerializeToString())
+    with grpc.insecure_channel(f"unix:{daemon.socket}") as channel:
+        lease = channel.stream_stream(
+            "/rtcf.v1.Control/LeaseComponent",
+            response_deserializer=control_pb2.LeaseComponentResponse.FromString,
+        )
+        answers = lease(iter(requests.get, None), timeout=DEADLINE_S)
+        while next(answers).WhichOneof("kind") != "loaded":
+            pass
+        requests.put(message)
+        with pytest.raises(grpc.RpcError) as refused:
+            list(answers)
+        requests.put(None)
+    assert refused.value.code() == grpc.StatusCode.INVALID_ARGUMENT
+    assert said in refused.value.details()
+    wait_for(lambda: not client.list_components(), "the end of what was held")
