@@ -62,11 +62,13 @@ async def stop(runner: RunnerCore, progress: Progress) -> control_pb2.ChangeResu
     )
 
     async def work() -> control_pb2.ChangeResult:
+        runner.require_ours()
         # Beside each other: neither a slow disk nor a slow executor holds up the other.
         saving = asyncio.create_task(runner.save())
         try:
             if not runner.up:
                 await runner.settle()  # it may be adopted just now
+                runner.require_ours()
             if runner.up:
                 result = await _ask_to_stop(runner, progress)
                 runner.log.info("loop stopped")

@@ -304,6 +304,11 @@ class RunnerCore(ABC):
             )
         return self._executor
 
+    def require_ours(self) -> None:
+        """Refuse when executor and disk were left to the next rtcfd: its loop may run."""
+        if self.leaving and not self.up:
+            raise Unavailable("rtcfd is being restarted", errors_pb2.REASON_DAEMON_ENDING)
+
     async def _launch(self) -> Executor:
         executor = await Executor.launch(
             self.name, self.shared.command, self.take_unasked, self._ended
@@ -338,9 +343,7 @@ class RunnerCore(ABC):
         """Do one change in its turn."""
 
         async def told() -> Result:
-            if self.leaving and not self.up:
-                # The disk is the next rtcfd's from here on.
-                raise Unavailable("rtcfd is being restarted", errors_pb2.REASON_DAEMON_ENDING)
+            self.require_ours()
             try:
                 return await work()
             finally:

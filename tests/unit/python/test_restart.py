@@ -1,13 +1,16 @@
 """A restart of rtcfd, as systemd asks for it: loops go on, and settings are those of now."""
 
+import asyncio
 import signal
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import rtcf
 from daemon_under_test import DaemonUnderTest, wait_for
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+from rtcfd_in_process import Refused, Rtcfd
 
 RUNNING = runner_pb2.RUNNER_STATE_RUNNING
 GRAPH = """\
@@ -189,3 +192,25 @@ def test_a_fresh_executor_frees_a_runner_whose_change_hangs(service: DaemonUnder
         assert client.get_order() == ["/a"]
         state = client.get_component("a").state
         assert state == graph_pb2.COMPONENT_STATE_CONFIGURED
+
+
+def test_a_stop_that_finds_its_executor_left_to_the_next_rtcfd_is_refused(
+    rtcfd: Callable[[], Rtcfd],
+) -> None:
+    async def play() -> None:
+        first, second = rtcfd(), rtcfd()
+        await first.start()
+        await first.call("Start", control_pb2.StartRequest())
+        await first.runners.leave()
+        with pytest.raises(Refused, match="rtcfd is being restarted"):
+            await first.call("Stop", control_pb2.StopRequest())
+        saved = second.saved("rt_runner")
+        assert saved is not None and saved["running"] is True  # the disk is the next one's
+        await second.start()
+        assert second.runners.get("rt_runner").loop.running
+        await second.call("Stop", control_pb2.StopRequest())
+        peer = second.peer("rt_runner")
+        assert peer is not None and not peer.running
+        await second.runners.close(in_order=True)
+
+    asyncio.run(play())
