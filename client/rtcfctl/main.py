@@ -3,6 +3,7 @@
 import argparse
 import importlib
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -64,6 +65,8 @@ def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None)
 
     output = Output(args.output, args.verbose)
     try:
+        if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:  # by the command, until here
+            signal.signal(signal.SIGINT, signal.default_int_handler)
         with rtcf.Client(args.socket) as client:
             # What a verb returns is its own verdict, e.g. doctor's.
             code = args.run(client, args, output)

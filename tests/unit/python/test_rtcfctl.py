@@ -144,6 +144,19 @@ def test_no_permission_is_exit_code_3_and_names_the_group(
     assert done.returncode == 3
 
 
+def test_ctrl_c_before_all_is_imported_ends_it_without_a_word(tmp_path: Path) -> None:
+    script = tmp_path / "bin" / "rtcfctl"
+    module = tmp_path / "python" / "rtcfctl" / "main.py"
+    for file in (script, module):
+        file.parent.mkdir(parents=True)
+    shutil.copy(BUILD_TREE / "bin" / "rtcfctl", script)
+    module.write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nmain = print\n")
+    done = subprocess.run(
+        ["env", "--default-signal=INT", str(script)], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+
+
 def test_options_become_settings_and_nothing_else() -> None:
     line = "runner set --cpu -1 --spin 5 --overrun catch_up --no-lock-memory --whitelist a"
     args = parser().parse_args(line.split())
