@@ -2,7 +2,7 @@
 
 from rtcf.v1 import control_pb2, errors_pb2
 
-from rtcfd.common.refusals import InvalidArgument
+from rtcfd.common.refusals import FailedPrecondition, InvalidArgument
 from rtcfd.operations.loop import stop_quietly
 from rtcfd.recovery import starting
 from rtcfd.runners.runner import Runner
@@ -15,7 +15,7 @@ class Replay:
     def __init__(self, runners: Runners) -> None:
         self._runners = runners
         self._runner: Runner | None = None  # whose replay is under way
-        self._stops = 0  # of its loop, when it began
+        self._stops = 0  # of its loop, when it was asked for
         self._ended = False
         self._gone = False  # its caller
 
@@ -29,18 +29,29 @@ class Replay:
             )
         if not request.begin:
             assert self._runner is not None
+            self._require_no_stop(self._runner)
             response = await starting.replay(self._runner, request)
             if request.end and not response.more:
                 self._runner, self._ended = None, True
             return response
         runner = self._runners.get(request.runner)
+        self._stops = runner.loop.stops
         return await starting.replay(runner, request, lambda: self._begun(runner))
 
     def _begun(self, runner: Runner) -> None:
         """The executor replays from here on, for a caller who may have left meanwhile."""
-        self._runner, self._stops = runner, runner.loop.stops
+        self._runner = runner
         if self._gone:
             self.lost()
+
+    def _require_no_stop(self, runner: Runner) -> None:
+        """Refuse to go on after a stop: what is replayed there now is somebody else's."""
+        if runner.loop.stops != self._stops:
+            raise FailedPrecondition(
+                f"runner {runner.name}: its loop was stopped, and this replay with it: "
+                "begin another",
+                errors_pb2.REASON_LOOP_STOPPED,
+            )
 
     async def end(self) -> None:
         """End one that its caller did not."""
