@@ -28,6 +28,7 @@ class Runners:
     def __init__(self, surroundings: Surroundings) -> None:
         self._shared = surroundings
         self._runners: dict[str, Runner] = {}
+        self._leaving: set[Runner] = set()  # being removed
         self.closing = asyncio.Event()
         self.operations = Operations("rtcfd", log)
 
@@ -189,19 +190,25 @@ class Runners:
     async def remove(self, name: str) -> None:
         """Stop a runner and forget it."""
         runner = self.get(name)
-        if runner.closing:
-            raise Unavailable(
-                f"runner {runner.name} is being ended", errors_pb2.REASON_RUNNER_ENDING
-            )
 
         async def work() -> None:
+            if runner.closing:
+                raise Unavailable(
+                    f"runner {runner.name} is being ended", errors_pb2.REASON_RUNNER_ENDING
+                )
             await self._remove(runner)
 
         await self.operations.begin(f"the removal of runner {runner.name}", work)
 
     async def _remove(self, runner: Runner) -> None:
-        await runner.shut_down()
-        await runner.forget()
+        if runner in self._leaving:
+            return  # who removes it first sees to it
+        self._leaving.add(runner)
+        try:
+            await runner.shut_down()
+            await runner.forget()
+        finally:
+            self._leaving.discard(runner)
         # Not before: its executor must be gone when another takes the name.
         if self._runners.get(runner.name) is runner:
             del self._runners[runner.name]

@@ -1,5 +1,6 @@
 """Operations of one kind: queued ones are withdrawn, begun ones run to their end; stop is final."""
 
+import asyncio
 import contextlib
 import json
 import os
@@ -14,6 +15,7 @@ import pytest
 import rtcf
 from daemon_under_test import BUILD_TREE, DaemonUnderTest, wait_for
 from rtcf.v1 import control_pb2, runner_pb2
+from rtcfd_in_process import Rtcfd
 
 RUNNING, STOPPED = runner_pb2.RUNNER_STATE_RUNNING, runner_pb2.RUNNER_STATE_STOPPED
 
@@ -359,3 +361,33 @@ def test_a_graph_that_a_reload_refused_is_tried_again(service: DaemonUnderTest) 
     assert 'no package "late"' in reload(service)
     service.package("late", types={"Fine": "fine"})
     assert "2 differences applied" in reload(service)
+
+
+def test_of_two_removals_at_once_neither_is_answered_before_the_executor_is_gone(
+    rtcfd: Callable[[], Rtcfd],
+) -> None:
+    async def play() -> None:
+        daemon = rtcfd()
+        await daemon.start()
+        await daemon.call("AddRunner", control_pb2.AddRunnerRequest(runner="arm"))
+        peer = daemon.peer("arm")
+        assert peer is not None
+        may_stop, stop = asyncio.Event(), peer.stop
+
+        async def slow_stop(*request: Any) -> Any:
+            await may_stop.wait()
+            return await stop(*request)
+
+        peer.stop = slow_stop  # type: ignore[method-assign]
+        request = control_pb2.RemoveRunnerRequest(runner="arm")
+        calls = [asyncio.create_task(daemon.call("RemoveRunner", request)) for _ in range(2)]
+        (answered,), (other,) = await asyncio.wait(calls, return_when=asyncio.FIRST_COMPLETED)
+        may_stop.set()
+        await other
+        assert "runner arm is being ended" in str(answered.exception())
+        assert daemon.peer("arm") is None
+        assert daemon.saved("arm") is None
+        await daemon.call("AddRunner", control_pb2.AddRunnerRequest(runner="arm"))
+        await daemon.runners.close(in_order=True)
+
+    asyncio.run(play())
