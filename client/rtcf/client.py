@@ -147,14 +147,18 @@ class Client(Closing):
 
         Raises nothing: what came of each loop is in the result, by runner.
         """
-        stopped = {each.runner: each for each in direct_stop.stop_all(self.socket)}
+        trouble: RtcfError | None = None
+        try:
+            stopped = {each.runner: each for each in direct_stop.stop_all(self.socket)}
+        except RtcfError as error:
+            stopped, trouble = {}, error
         try:
             runners = [
                 each.runner for each in self.get_status(timeout_s=direct_stop.PATIENCE_S).runners
             ]
         except RtcfError as error:
             if not stopped:
-                stopped[""] = direct_stop.Stopped("", error)
+                stopped[""] = direct_stop.Stopped("", trouble or error)
             runners = []
         # A runner without an executor may be about to get one.
         for runner in runners:

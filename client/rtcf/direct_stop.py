@@ -108,16 +108,21 @@ def _is_rtcfds_trouble(error: RtcfError) -> bool:
 def stop_all(socket: str) -> list[Stopped]:
     """Stop all loops at once; return what came of each, by runner.
 
-    Raises DaemonUnreachableError if their folder cannot be read.
+    Raises DaemonUnreachableError if there are folders, and none can be read.
     """
     runners: set[str] = set()
+    problem: OSError | None = None
+    read = False
     for folder in folders(socket):
         try:
             runners |= {each.name for each in folder.iterdir()}
+            read = True
         except (FileNotFoundError, NotADirectoryError):
             continue
         except OSError as error:
-            raise DaemonUnreachableError(f"cannot look for loops: {error}") from None
+            problem = error
+    if problem is not None and not read:
+        raise DaemonUnreachableError(f"cannot look for loops: {problem}")
     names = sorted(runners)
     if not names:
         return []

@@ -1,0 +1,45 @@
+"""`stop --all`: whatever stands where the executors' sockets are looked for, rtcfd is asked."""
+
+from pathlib import Path
+
+import pytest
+import rtcf
+from daemon_under_test import DaemonUnderTest
+from rtcf import direct_stop
+from rtcf.direct_stop import Stopped
+from rtcf.v1 import runner_pb2
+
+
+def make_unreadable(folder: Path) -> None:
+    """Also for root: a link that leads to itself."""
+    if folder.exists():
+        folder.rename(folder.with_name("before"))
+    folder.parent.mkdir(exist_ok=True)
+    folder.symlink_to(folder.name)
+
+
+def test_rtcfd_is_asked_where_the_executors_cannot_be(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
+    client.start()
+    for folder in direct_stop.folders(str(daemon.socket)):
+        make_unreadable(folder)
+    done = daemon.ctl("stop", "--all")
+    assert (done.stdout, done.stderr, done.returncode) == ("rt_runner stopped\n", "", 0)
+    assert client.get_status().runners[0].state == runner_pb2.RUNNER_STATE_STOPPED
+    daemon.end()
+    (failed,) = client.stop_all()
+    assert str(failed.error).startswith("cannot look for loops: ")
+
+
+def test_a_folder_that_cannot_be_read_keeps_none_from_the_other(tmp_path: Path) -> None:
+    socket = str(tmp_path / "s")
+    ours, beside = direct_stop.folders(socket)
+    make_unreadable(beside)
+    with pytest.raises(rtcf.DaemonUnreachableError, match="cannot look for loops"):
+        direct_stop.stop_all(socket)
+    ours.mkdir(parents=True)
+    (ours / "arm").touch()  # nobody listens
+    (failed,) = direct_stop.stop_all(socket)
+    assert failed == Stopped("arm", failed.error)
+    assert "no executor of runner arm can be stopped" in str(failed.error)
