@@ -1,10 +1,12 @@
 """What ports and state hold, which travels as text, as numbers, lists and objects."""
 
+import math
 import re
 from typing import Any
 
 import yaml
 
+_MOST_DIGITS = 300  # with which a number is finite
 _INTEGER = re.compile(r"[-+]?[0-9]+")
 _FLOAT = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 _WORDS: dict[str, Any] = {"true": True, "false": False}
@@ -36,7 +38,10 @@ def _rows(found: re.Match[str]) -> str:
 
 
 def _scalar(text: str) -> Any:
-    if _INTEGER.fullmatch(text):
+    # JSON has no words for what is not finite, and no reader takes thousands of digits: it stays
+    # a text.
+    if _INTEGER.fullmatch(text) and len(text) <= _MOST_DIGITS:
         return int(text)
-    # JSON has no words for what is not finite: it stays one.
-    return float(text) if _FLOAT.fullmatch(text) else _WORDS.get(text, text)
+    if _FLOAT.fullmatch(text) and math.isfinite(number := float(text)):
+        return number
+    return _WORDS.get(text, text)

@@ -1,6 +1,7 @@
 """Writes graph files: what graph_reader.py reads, and what is loaded as a Graph."""
 
 import math
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -9,6 +10,9 @@ from rtcf.v1 import graph_pb2, runner_pb2
 from rtcf_shared.enums import word
 from rtcf_shared.graph_reader import Graph
 from rtcf_shared.spec import parse_value
+
+# YAML 1.1 takes these for ends of lines, which are folded.
+_OTHER_BREAKS = re.compile("[\x85\u2028\u2029]")
 
 
 def write_graphs(graphs: Iterable[Graph]) -> str:
@@ -20,7 +24,9 @@ def write_graphs(graphs: Iterable[Graph]) -> str:
 
     def text(dumper: Any, value: str) -> Any:
         style = None
-        if value and parse_value(value).WhichOneof("kind") != "string_value":
+        if _OTHER_BREAKS.search(value):
+            style = '"'
+        elif value and not _is_text(value):
             style = "'"
         return dumper.represent_scalar("tag:yaml.org,2002:str", value, style=style)
 
@@ -62,6 +68,14 @@ def same_value(one: graph_pb2.ParameterValue, other: graph_pb2.ParameterValue) -
         return math.isnan(right)
     # True == 1 in Python, but not here.
     return bool(left == right) and isinstance(left, bool) == isinstance(right, bool)
+
+
+def _is_text(value: str) -> bool:
+    """Tell whether a value without quotes is a string, and that one."""
+    try:
+        return parse_value(value).string_value == value
+    except ValueError:
+        return False  # it looks like something that is not valid
 
 
 def _graph(graph: Graph) -> dict[str, Any]:

@@ -1,12 +1,17 @@
 """Graph files: reading, refusing, writing; `rtcfctl apply` and `save`."""
 
+import os
 from pathlib import Path
 
 import pytest
 import rtcf
 import yaml
 from daemon_under_test import DaemonUnderTest
+from hypothesis import example, given, seed, settings
+from hypothesis import strategies as st
 from rtcf.v1 import graph_pb2, runner_pb2
+
+SEED = int(os.environ.get("RTCF_SEED", "1"))
 
 FULL = """\
 runner: arm
@@ -107,6 +112,29 @@ def test_what_is_written_is_read_again_and_says_the_same_to_others() -> None:
     assert (others["a"], others["b"], others["c"], others["d"]) == ("1e3", "yes", "", "0o7")
     two = rtcf.write_graphs([graph, rtcf.Graph("b")])
     assert [each.runner for each in rtcf.read_graphs(two, "z")] == ["arm", "b"]
+
+
+TEXTS = st.one_of(
+    st.text(max_size=40),
+    # What YAML reads as something else, or cannot read.
+    st.text(alphabet="0123456789+-.:_eExXoOinfNaA~#'\"\\ \n\r\t\x85\u2028", max_size=12),
+    st.sampled_from(["9" * 20, "9" * 5000, '"a\\q"', "2001-01-01", "12:30:45", "null", "=", "<<"]),
+)
+
+
+@seed(SEED)
+@settings(max_examples=500, deadline=None)
+@given(TEXTS)
+@example("9" * 20)
+@example('"a\\q"')
+@example("9" * 5000)
+@example("a\x85b")
+@example("'a'")
+def test_any_text_is_saved_and_read_again(text: str) -> None:
+    spec = graph_pb2.ComponentSpec(package="p", type="T", name="x")
+    spec.parameters.add(name="k", value=graph_pb2.ParameterValue(string_value=text))
+    (graph,) = rtcf.read_graphs(rtcf.write_graphs([rtcf.Graph("arm", components=[spec])]), "x")
+    assert list(graph.components) == [spec]
 
 
 def test_a_live_spec_has_the_values_of_now() -> None:

@@ -13,7 +13,7 @@ import pytest
 import rtcf
 import yaml
 from daemon_under_test import BUILD_TREE, DaemonUnderTest, wait_for
-from rtcf.v1 import runner_pb2
+from rtcf.v1 import graph_pb2, runner_pb2
 from rtcfctl.main import parser, verb_of
 from rtcfctl.plain import plain
 from rtcfctl.runner import settings_of
@@ -174,6 +174,23 @@ def test_global_options_stand_before_or_after_the_verb() -> None:
     before = parser().parse_args(["-r", "arm", "-o", "json", "order"])
     after = parser().parse_args(["order", "-r", "arm", "-o", "json"])
     assert (before.runner, before.output) == (after.runner, after.output) == ("arm", "json")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1e3", 1000.0),
+        ("-7", -7),
+        ("1e400", "1e400"),
+        ("[1, -1e999]", [1, "-1e999"]),
+        ("9" * 5000, "9" * 5000),
+    ],
+    ids=["float", "integer", "infinite", "infinite in a list", "too many digits"],
+)
+def test_what_a_port_holds_is_valid_json(text: str, value: object) -> None:
+    found = plain(graph_pb2.PortInfo(value=text))["value"]
+    assert found == value
+    json.dumps(found, allow_nan=False)
 
 
 def test_plain_has_numbers_short_words_and_nulls() -> None:
