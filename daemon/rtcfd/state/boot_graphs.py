@@ -72,6 +72,7 @@ class BootGraphs:
                 given = Given(file, graph, changed)
                 first = owners.setdefault(given.runner, file)
                 if first != file:
+                    digests.pop(str(file), None)  # tried again when the other is gone
                     problems.append(f"{file}: runner {given.runner} is in {first} already")
                 else:
                     graphs.append(given)
