@@ -147,9 +147,17 @@ def await_holder(runners: Runners, runner: Runner) -> None:
 async def release(runners: Runners, runner: Runner, outbox: Outbox | None) -> None:
     """Stop the loop, unload what is leased, give a runner its own settings back or remove it."""
     hold = runner.desired.hold
-    if hold is None or runner.hold_outbox is not outbox or runner.closing:
+    if hold is None or runner.hold_outbox is not outbox or runner.releasing or runner.closing:
         return
     runner.hold_outbox = None
+    runner.releasing = True
+    try:
+        await _release(runners, runner, hold)
+    finally:
+        runner.releasing = False
+
+
+async def _release(runners: Runners, runner: Runner, hold: HoldTerms) -> None:
     await stop_quietly(runner)
     await runner.leases.unload_all()
     runner.leases.end_all(
@@ -174,6 +182,11 @@ async def release(runners: Runners, runner: Runner, outbox: Outbox | None) -> No
 def _attach(runners: Runners, name: str, token: str) -> Runner:
     runner = runners.get(name)
     hold = runner.desired.hold
+    if hold is not None and runner.releasing:
+        raise NotFound(
+            f"runner {name} is being given back, as {hold.holder} was gone: take it anew",
+            errors_pb2.REASON_HOLD_NOT_FOUND,
+        )
     if hold is None or hold.token != token or runner.hold_outbox is not None:
         raise NotFound(
             f"runner {name} is not kept for its holder any more", errors_pb2.REASON_HOLD_NOT_FOUND

@@ -6,7 +6,8 @@ components themselves are not saved.
 """
 
 import asyncio
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Coroutine, Iterable
+from typing import Any
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2
@@ -66,6 +67,7 @@ class Leases:
         self._alarm = alarm
         self._outboxes: dict[str, Outbox] = {}  # by component; of holders that are there
         self._loading: set[str] = set()
+        self._losing: set[str] = set()  # their holders have died, and it is being seen to
         self._leaving: dict[str, asyncio.Task[None]] = {}
         self._groups: dict[str, list[str]] = {}  # by run: what leaves in one transaction
         self._patience: asyncio.Task[None] | None = None  # with holders of before a restart
@@ -145,12 +147,14 @@ class Leases:
         """Give a component back to its holder."""
         name = full_name(request.component)
         terms = self._terms.get(name)
-        if (
-            terms is None
-            or terms.run_id != request.run_id
-            or name in self._outboxes
-            or name in self._leaving
-        ):
+        if terms is not None and (name in self._losing or name in self._leaving):
+            raise NotFound(
+                f"the lease of {name} in runner {self._runner.name} is being ended, as its holder "
+                "was gone: open another",
+                errors_pb2.REASON_LEASE_NOT_FOUND,
+                component=name,
+            )
+        if terms is None or terms.run_id != request.run_id or name in self._outboxes:
             raise NotFound(
                 f"runner {self._runner.name} keeps no {name} for its launcher any more",
                 errors_pb2.REASON_LEASE_NOT_FOUND,
@@ -175,7 +179,7 @@ class Leases:
             return  # open() sees to it
         del self._outboxes[name]
         self._runner.operations.in_background(
-            f"the end of the lease of {name}", self._lose(name, "has died")
+            f"the end of the lease of {name}", self._lost(name, "has died")
         )
 
     def await_holders(self) -> None:
@@ -253,7 +257,19 @@ class Leases:
         await asyncio.sleep(RETURN_S)
         for name in names:
             if name in self._terms and name not in self._outboxes and name not in self._leaving:
-                await self._lose(name, f"did not come back within {RETURN_S:g} s")
+                await self._lost(name, f"did not come back within {RETURN_S:g} s")
+
+    def _lost(self, name: str, how: str) -> Coroutine[Any, Any, None]:
+        """Return what ends a lease; from now on its holder cannot come back."""
+        self._losing.add(name)
+
+        async def work() -> None:
+            try:
+                await self._lose(name, how)
+            finally:
+                self._losing.discard(name)
+
+        return work()
 
     async def _lose(self, name: str, how: str) -> None:
         runner, terms = self._runner, self._terms.get(name)

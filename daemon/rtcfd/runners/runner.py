@@ -37,6 +37,7 @@ class Runner(RunnerCore):
         super().__init__(desired, surroundings)
         self.leases = Leases(self, self.alarm)
         self.hold_outbox: Outbox | None = None  # of the holder, if it is there
+        self.releasing = False  # its holder has ended, and cannot come back
         self._crashes = Crashes()
         self._changed_by_ros: dict[str, set[str]] = {}  # parameters, by component; not noted yet
         self._events = Events(self.name, self, lambda: self.limits)
