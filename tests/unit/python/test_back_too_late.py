@@ -28,7 +28,7 @@ async def lost(daemon: Rtcfd, method: str, opening: Any) -> asyncio.Event:
         await may_stop.wait()
         return await stop(*request)
 
-    peer.stop = slow_stop  # type: ignore[method-assign]
+    peer.stop = slow_stop  # type: ignore[assignment]
     holder.cancel()
     with contextlib.suppress(asyncio.CancelledError):
         await holder

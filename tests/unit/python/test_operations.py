@@ -378,7 +378,7 @@ def test_of_two_removals_at_once_neither_is_answered_before_the_executor_is_gone
             await may_stop.wait()
             return await stop(*request)
 
-        peer.stop = slow_stop  # type: ignore[method-assign]
+        peer.stop = slow_stop  # type: ignore[assignment]
         request = control_pb2.RemoveRunnerRequest(runner="arm")
         calls = [asyncio.create_task(daemon.call("RemoveRunner", request)) for _ in range(2)]
         (answered,), (other,) = await asyncio.wait(calls, return_when=asyncio.FIRST_COMPLETED)
