@@ -211,7 +211,7 @@ async def apply(
         before = runner.settings()
         changes = runner_settings.differences(before, request.settings)
         apply = wire.Apply(components=await loads(runner.catalog, request.components), dry_run=True)
-        rebuilt = await asyncio.to_thread(runner.code.changed)
+        rebuilt = await runner.code.changed()
         for load in apply.components:
             load.anew = request.rebuilt and full_name(load.component) in rebuilt
         if not request.dry_run and (changes or not request.runner):

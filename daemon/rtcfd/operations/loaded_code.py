@@ -13,25 +13,31 @@ from pathlib import Path
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2
 
+from rtcfd.common.aside import Aside
 from rtcfd.common.names import absolute, full_name
+from rtcfd.common.refusals import Unavailable
 
 _Kinds = control_pb2.Difference
 _Identity = tuple[int, int, int]  # inode, time of change, size
+_TIMEOUT_S = 2.0  # for folders to answer, which may be remote
 
 
 class LoadedCode:
-    """The files, by component."""
+    """The files, by component.  Of a file in a folder that does not answer nothing is known."""
 
-    def __init__(self) -> None:
+    def __init__(self, folders: Aside) -> None:
+        self._folders = folders
         self._files: dict[str, tuple[str, _Identity]] = {}
 
     def clear(self) -> None:
         """Forget all: the executor is new."""
         self._files = {}
 
-    def before(self, request: wire.Request) -> dict[str, _Identity]:
-        """Look at the libraries of a change that is about to be asked for."""
-        return {path: found for path in _libraries(request) if (found := _identity(path))}
+    async def before(self, request: wire.Request) -> dict[str, _Identity]:
+        """Look at the libraries of a change that is about to be asked for; one without any does
+        not wait."""
+        found = await self._look(set(_libraries(request)))
+        return {path: identity for path, identity in found.items() if identity is not None}
 
     def after(
         self,
@@ -61,14 +67,27 @@ class LoadedCode:
     def _note(self, name: str, path: str, seen: dict[str, _Identity]) -> None:
         if path in seen:
             self._files[name] = (path, seen[path])
+        else:
+            self._files.pop(name, None)
 
-    def changed(self) -> dict[str, str]:
-        """Return the components whose library is another file now, and its path.
+    async def changed(self) -> dict[str, str]:
+        """Return the components whose library is another file now, and its path."""
+        files = dict(self._files)
+        now = await self._look({path for path, _ in files.values()})
+        return {
+            name: path for name, (path, then) in files.items() if path in now and now[path] != then
+        }
 
-        Looks at files: for a thread beside the event loop.
-        """
-        now = {path: _identity(path) for path in {path for path, _ in self._files.values()}}
-        return {name: path for name, (path, then) in self._files.items() if now[path] != then}
+    async def _look(self, paths: set[str]) -> dict[str, _Identity | None]:
+        """Look at files, beside the event loop; return what is known."""
+        if not paths:
+            return {}
+        try:
+            return await self._folders.run(
+                lambda: {path: _identity(path) for path in paths}, _TIMEOUT_S
+            )
+        except Unavailable:
+            return {}
 
     def store(self, file: Path) -> None:
         """Leave it to the next rtcfd, that adopts the executor."""

@@ -8,6 +8,7 @@ import asyncio
 import contextlib
 from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -17,6 +18,7 @@ from rtcf_shared.enums import word
 
 from rtcfd.access import caller
 from rtcfd.catalog.catalog import Catalog
+from rtcfd.common.aside import Aside
 from rtcfd.common.event_log import EventLog
 from rtcfd.common.limits import Limits
 from rtcfd.common.refusals import Refusal, Unavailable
@@ -57,6 +59,9 @@ class Surroundings:
     limits: Limits = field(default_factory=Limits)
     rules: wire.AccessRules = field(default_factory=wire.AccessRules)  # for executors
     name_of: Callable[[int], Awaitable[str]] = _number  # of a user, for people
+    # Threads of their own: a stop must get to disk whatever else hangs.
+    folders: Aside = field(default_factory=lambda: Aside("folders of components"))
+    disk: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(4, "rtcfd-store"))
 
 
 class RunnerCore(ABC):
@@ -74,7 +79,7 @@ class RunnerCore(ABC):
         self.tuned: dict[str, float] = {}  # when parameters were set whose pace is bound
         self.closing = False
         self.leaving = False  # it ends for this rtcfd only
-        self.code = LoadedCode()
+        self.code = LoadedCode(surroundings.folders)
         self.figures = Figures()
         self._code_file = surroundings.command.folder / f"{self.name}.libraries"
         self._executor: Executor | None = None
@@ -269,8 +274,8 @@ class RunnerCore(ABC):
 
         What its end cuts off is answered with what is known of that end.
         """
+        seen = await self.code.before(request)
         executor = self.alive()
-        seen = self.code.before(request)
         try:
             response = await executor.request(request, timeout_s, progress, on_answer)
             self.code.after(request, response.change, seen)
@@ -361,8 +366,8 @@ class RunnerCore(ABC):
                 text, running = store.text(self.desired), self.desired.running
                 changes, anew = self.desired.history.to_write()
                 # Not here: fsync may take long.
-                await asyncio.to_thread(store.save, self.name, text, running)
-                await asyncio.to_thread(store.save_history, self.name, changes, anew)
+                await self._on_disk(store.save, self.name, text, running)
+                await self._on_disk(store.save_history, self.name, changes, anew)
         except OSError as error:
             self.desired.history.not_written()
             self.unsaved = f"not saved: {error.strerror}"
@@ -376,6 +381,10 @@ class RunnerCore(ABC):
         try:
             async with self._saving:
                 self._forgotten = True
-                await asyncio.to_thread(self.shared.store.remove, self.name)
+                await self._on_disk(self.shared.store.remove, self.name)
         except OSError as error:
             self.log.error("its state stays on disk: %s", error.strerror)
+
+    async def _on_disk(self, work: Callable[..., None], *arguments: object) -> None:
+        """Do work of the store beside the event loop."""
+        await asyncio.get_running_loop().run_in_executor(self.shared.disk, work, *arguments)

@@ -270,7 +270,7 @@ class Control(control_pb2_grpc.ControlServicer):
         components = await self._components(request.runner)
         runner = self._runners.get(request.runner)
         found = components + graph.left_out(runner)
-        rebuilt = await asyncio.to_thread(runner.code.changed)
+        rebuilt = await runner.code.changed()
         for info in found:
             info.library_changed = info.full_name in rebuilt
             _add_holder(runner, info)
@@ -287,7 +287,7 @@ class Control(control_pb2_grpc.ControlServicer):
             if info.full_name == name:
                 return control_pb2.GetComponentResponse(component=_add_holder(runner, info))
         found = await runner.query(wire.Request(get_component=query))
-        rebuilt = await asyncio.to_thread(runner.code.changed)
+        rebuilt = await runner.code.changed()
         found.component.library_changed = name in rebuilt
         return control_pb2.GetComponentResponse(component=_add_holder(runner, found.component))
 

@@ -1,11 +1,18 @@
 """A library that changes on disk: said wherever one looks, and taken when it is asked for."""
 
+import asyncio
 import os
 import signal
+import threading
+from collections.abc import Callable
 from pathlib import Path
 
+import pytest
 import rtcf
-from daemon_under_test import DaemonUnderTest, wait_for
+from daemon_under_test import DEADLINE_S, DaemonUnderTest, wait_for
+from rtcf.v1 import control_pb2
+from rtcfd.operations import loaded_code
+from rtcfd_in_process import Rtcfd, spec
 
 
 def rebuild(library: Path) -> None:
@@ -66,3 +73,33 @@ def test_what_changed_while_rtcfd_was_restarted_is_said_by_the_next(
     daemon.start_service()
     with daemon.client() as client:
         wait_for(lambda: client.get_status().runners[0].libraries_changed, "what has changed")
+
+
+def test_a_folder_that_hangs_keeps_no_stop_from_the_disk(
+    rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers = threading.Event()
+
+    async def play() -> None:
+        daemon = rtcfd()
+        await daemon.start()
+        await daemon.call("Load", control_pb2.LoadRequest(component=spec("a")))
+        await daemon.call("Start", control_pb2.StartRequest())
+        monkeypatch.setattr(loaded_code, "_identity", lambda _: answers.wait())
+        # More than all threads that asyncio has by itself.
+        looks = [
+            asyncio.create_task(daemon.call("GetStatus", control_pb2.GetStatusRequest()))
+            for _ in range(40)
+        ]
+        try:
+            async with asyncio.timeout(DEADLINE_S):
+                await daemon.call("Stop", control_pb2.StopRequest())
+                saved = daemon.saved("rt_runner")
+                assert saved is not None and saved["running"] is False
+                await asyncio.gather(*looks)  # nothing is known of the library
+                await daemon.call("Load", control_pb2.LoadRequest(component=spec("b")))
+        finally:
+            answers.set()
+        await daemon.runners.close(in_order=True)
+
+    asyncio.run(play())
