@@ -13,7 +13,7 @@ refused by name and line.
 
 import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -78,6 +78,11 @@ def read(file: Path) -> Config:
         ) from None
     except tomllib.TOMLDecodeError as error:
         raise InvalidArgument(f"{file}: {error}", errors_pb2.REASON_SETTINGS_FILE_INVALID) from None
+    except RecursionError:
+        raise InvalidArgument(
+            f"{file}: lists or tables in it are nested too deep",
+            errors_pb2.REASON_SETTINGS_FILE_INVALID,
+        ) from None
     config = Config(text=text)
     try:
         _check_keys("", document, ("daemon", "access", "limits", "runner"))
@@ -87,7 +92,9 @@ def read(file: Path) -> Config:
         _read_message(_table(document, "runner"), "runner", config.runner)
         _check_runner(config.runner)
     except _Wrong as wrong:
-        line = lines_of_keys(text).get(wrong.key)
+        lines = lines_of_keys(text)
+        # Of what is missing, or stands in braces, that in which it is.
+        line = lines.get(wrong.key) or lines.get(wrong.key.rpartition(".")[0])
         where = f"{file}:{line}" if line else str(file)
         raise InvalidArgument(
             f"{where}: {wrong}", errors_pb2.REASON_SETTINGS_FILE_INVALID
@@ -130,7 +137,16 @@ def _read_access(table: dict[str, Any], config: Config) -> None:
     rules = table.get("parameters", [])
     if not isinstance(rules, list) or not all(isinstance(rule, dict) for rule in rules):
         raise _Wrong("access.parameters", "access.parameters must be tables: [[access.parameters]]")
-    config.access = rights.rules(named, default, tuple(_parameter_rule(rule) for rule in rules))
+    config.access = rights.rules(named, default, tuple(_parameter_rules(rules)))
+
+
+def _parameter_rules(tables: list[dict[str, Any]]) -> Iterator[Rule]:
+    for number, table in enumerate(tables):
+        try:
+            yield _parameter_rule(table)
+        except _Wrong as wrong:
+            wrong.key = wrong.key.replace("parameters", f"parameters[{number}]", 1)
+            raise
 
 
 def _parameter_rule(table: dict[str, Any]) -> Rule:
@@ -144,11 +160,13 @@ def _parameter_rule(table: dict[str, Any]) -> Rule:
         raise _Wrong(f"{key}.who", f"{key}: who must be a list of users and @groups, not {who!r}")
     if not isinstance(names, list):
         raise _Wrong(f"{key}.names", f"{key}: names must be a list of expressions, not {names!r}")
-    for pattern in (*names, runner):
+    for field_name, pattern in (*(("names", name) for name in names), ("runner", runner)):
         try:
             re.compile(pattern)
         except (re.error, TypeError) as error:
-            raise _Wrong(f"{key}.names", f"{key}: {pattern!r} is no expression: {error}") from None
+            raise _Wrong(
+                f"{key}.{field_name}", f"{key}: {pattern!r} is no expression: {error}"
+            ) from None
     pace = table.get("most_per_s")
     if pace is not None and (type(pace) not in (int, float) or not pace > 0):
         raise _Wrong(f"{key}.most_per_s", f"{key}: most_per_s must be above 0, not {pace!r}")
@@ -197,17 +215,22 @@ def _set_scalar(message: Any, key: str, name: str, value: Any, expected: type) -
 def _check_runner(runner: runner_pb2.RunnerSettings) -> None:
     """Refuse values by the key that has them."""
     for descriptor, value in runner.ListFields():
-        alone = runner_pb2.RunnerSettings()
         key = f"runner.{descriptor.name}"
-        if descriptor.message_type is not None:
-            getattr(alone, descriptor.name).CopyFrom(value)
-            key += ".master_uri"  # the one in it that is checked
-        else:
-            setattr(alone, descriptor.name, value)
-        try:
-            runner_settings.check(alone)
-        except Refusal as refusal:
-            raise _Wrong(key, str(refusal)) from None
+        if descriptor.message_type is None:
+            _check_alone(key, runner_pb2.RunnerSettings(**{descriptor.name: value}))
+            continue
+        for inner, inner_value in value.ListFields():
+            alone = type(value)(**{inner.name: inner_value})
+            _check_alone(
+                f"{key}.{inner.name}", runner_pb2.RunnerSettings(**{descriptor.name: alone})
+            )
+
+
+def _check_alone(key: str, settings: runner_pb2.RunnerSettings) -> None:
+    try:
+        runner_settings.check(settings)
+    except Refusal as refusal:
+        raise _Wrong(key, str(refusal)) from None
 
 
 def _enumerator(name: str, enum_type: Any, value: Any) -> int:

@@ -96,6 +96,7 @@ class Store:
                 TypeError,
                 KeyError,
                 AttributeError,
+                RecursionError,
                 json_format.ParseError,
                 Refusal,
             ) as error:

@@ -56,6 +56,13 @@ def test_a_file_is_read(tmp_path: Path) -> None:
     )
 
 
+# Two rules, of which the second has a mistake.
+RULES = (
+    "[[access.parameters]]\nwho = ['a']\n\n"
+    "[[access.parameters]] # of b\nwho = ['b']\n"
+)  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -78,6 +85,14 @@ def test_a_file_is_read(tmp_path: Path) -> None:
         ("[runner]\n!", "line 2"),
         ("[runner]\npriority = 5\n\nspin_us = -1", "rtcfd.toml:4: runner.spin_us is out of"),
         ("[daemon]\n[runner.ros]\nmaster_uri = 'x'", ':3: ROS master URI "x" is not valid'),
+        ("[runner.ros]\nmaster_uri = 'http://x:1'\nqueue = 0", "rtcfd.toml:3: "),
+        ("[runner]\nros = {queue = 0}", "rtcfd.toml:2: "),
+        (RULES + "most_per_s = 0", "rtcfd.toml:6: access.parameters: most_per_s must be above 0"),
+        (RULES + "runner = '('", "rtcfd.toml:6: access.parameters: '(' is no expression"),
+        (RULES + "names = ['(']", "rtcfd.toml:6: access.parameters: '(' is no expression"),
+        (RULES + "whom = []", 'rtcfd.toml:6: unknown key "access.parameters.whom"'),
+        ("\n[[access.parameters]]\nrunner = 'a'", "rtcfd.toml:2: access.parameters: who must be"),
+        ("x = " + "[" * 3000 + "]" * 3000, "lists or tables in it are nested too deep"),
         ("[access]\ndefault = 'root'", "access.default must be one of none, observe, tune"),
         ("[access]\nobserve = 'alice'", "access.observe must be a list of users and @groups"),
         ("[access]\nobserve = ['a b']", "'a b' is no user's name, nor @ and a group's"),

@@ -238,7 +238,11 @@ def test_a_component_can_be_taken_out_while_the_executor_is_down(
     assert client.start().order == ["/b"]
 
 
-@pytest.mark.parametrize("content", ["{", "[]", '{"version": 0}', '{"version": 1}', "\xff"])
+@pytest.mark.parametrize(
+    "content",
+    ["{", "[]", '{"version": 0}', '{"version": 1}', "\xff", "[" * 5000 + "]" * 5000],
+    ids=["cut", "a list", "version 0", "nothing in it", "no text", "deep"],
+)
 def test_a_corrupt_state_is_set_aside(stopped_daemon: DaemonUnderTest, content: str) -> None:
     stopped_daemon.state.mkdir()
     (stopped_daemon.state / "rt_runner.json").write_text(content, encoding="latin-1")
