@@ -22,6 +22,10 @@ TIMEOUT_S = 10.0
 FAILURE_KEPT_S = 5.0
 _AT_ONCE = 2
 _MAX_STDERR_LINE = 300
+# Bytes of the output of a process that describes.
+_LONGEST_ANSWER = 4 * 1024 * 1024
+_LONGEST_COMPLAINT = 64 * 1024
+_CHUNK = 64 * 1024
 
 _File = tuple[str, int | None]  # path, and whose libraries are trusted
 _Identity = tuple[int, int, int]  # inode, time of change, size
@@ -113,15 +117,22 @@ class Describer:
             )
         except OSError as error:
             return _problem(f"cannot run {self.binary}: {error.strerror}")
+        reading = asyncio.gather(
+            _until_end(process, process.stdout, _LONGEST_ANSWER),
+            _until_end(process, process.stderr, _LONGEST_COMPLAINT),
+        )
         try:
             async with asyncio.timeout(TIMEOUT_S):
-                output, complaint = await process.communicate()
+                output, complaint = await asyncio.shield(reading)
+                await process.wait()
         except TimeoutError:
             return _problem(f"loading it did not end within {TIMEOUT_S:g} s")
         finally:
             if process.returncode is None:
                 process.kill()
                 await process.wait()
+        if len(output) > _LONGEST_ANSWER or len(complaint) > _LONGEST_COMPLAINT:
+            return _problem("the process that loaded it wrote without end")
         status = process.returncode or 0
         if status < 0:
             return _problem(f"the process that loaded it {describe_exit(status)}")
@@ -134,6 +145,21 @@ class Describer:
                 f"the process that loaded it {describe_exit(status)}{_last_line(complaint)}"
             )
         return description
+
+
+async def _until_end(
+    process: asyncio.subprocess.Process, pipe: asyncio.StreamReader | None, longest: int
+) -> bytes:
+    """Return what a process writes to a pipe; end one that writes more than `longest` bytes."""
+    assert pipe is not None
+    data = b""
+    # To the end also of what is too long: asyncio waits for a process with its pipes.
+    while more := await pipe.read(_CHUNK):
+        if len(data) <= longest:
+            data += more
+            if len(data) > longest and process.returncode is None:
+                process.kill()
+    return data
 
 
 def _problem(text: str) -> wire.LibraryDescription:

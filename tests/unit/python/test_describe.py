@@ -74,3 +74,18 @@ def test_of_a_file_that_is_rebuilt_again_and_again_the_last_is_kept(
         assert len(describer.kept) == 1
 
     asyncio.run(work())
+
+
+@pytest.mark.parametrize("pipe", ["1", "2"], ids=["output", "errors"])
+def test_a_library_that_writes_without_end_is_ended(
+    library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pipe: str
+) -> None:
+    binary = tmp_path / "executor"
+    binary.write_text(f"#!/bin/sh\nexec yes 'a constructor that complains' >&{pipe}\n")
+    binary.chmod(0o755)
+    monkeypatch.setattr(describe, "TIMEOUT_S", 600.0)  # not why it ends
+
+    async def work() -> str:
+        return str((await Describer(binary).describe(library, "pkg")).problem)
+
+    assert asyncio.run(work()) == "the process that loaded it wrote without end"
