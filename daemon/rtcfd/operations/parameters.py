@@ -22,6 +22,7 @@ from rtcfd.state.history import Change
 
 _LONGEST_WORD = 60  # of a value in a line
 _MOST_CHANGES = 500  # in one answer
+_MOST_BYTES = 2 * 1024 * 1024  # likewise; clients that are not ours take 4 MiB
 
 Settings = Iterable[graph_pb2.ParameterSetting]
 
@@ -73,20 +74,23 @@ def history(
     component = absolute(request.component) if request.component else ""
     found = runner.desired.history.of(component, request.parameter)
     most = min(request.most or _MOST_CHANGES, _MOST_CHANGES)
-    return control_pb2.GetHistoryResponse(
-        changes=[
-            control_pb2.ParameterChange(
-                component=each.component,
-                parameter=each.parameter,
-                before=each.before,
-                value=each.value,
-                time_ns=each.time_ns,
-                who=each.who,
-                how=each.how,
-            )
-            for each in found[-most:]
-        ]
-    )
+    changes: list[control_pb2.ParameterChange] = []
+    room = _MOST_BYTES
+    for each in reversed(found[-most:]):
+        change = control_pb2.ParameterChange(
+            component=each.component,
+            parameter=each.parameter,
+            before=each.before,
+            value=each.value,
+            time_ns=each.time_ns,
+            who=each.who,
+            how=each.how,
+        )
+        room -= change.ByteSize() + 8  # a tag and a length besides
+        if room < 0 and changes:
+            break
+        changes.append(change)
+    return control_pb2.GetHistoryResponse(changes=reversed(changes))
 
 
 async def follow_ros(runner: RunnerCore, changed: Mapping[str, set[str]]) -> None:

@@ -1,7 +1,8 @@
 """Who set which parameter to what, and when: the last changes of one runner's components.
 
 Part of its Desired; store.py keeps it on disk.  Bounded by component, so that
-one that is tuned all day leaves the others theirs, and in all.
+one that is tuned all day leaves the others theirs, and in all: in number and
+in bytes.
 """
 
 import json
@@ -16,6 +17,9 @@ from rtcf.v1 import graph_pb2
 
 MOST_OF_A_COMPONENT = 200
 MOST = 4000
+# Texts may be long. The newest that was changed at once stays, however large.
+MOST_BYTES_OF_A_COMPONENT = 1024 * 1024
+MOST_BYTES = 8 * 1024 * 1024
 
 Value = graph_pb2.ParameterValue
 
@@ -41,6 +45,8 @@ class History:
     def __init__(self) -> None:
         self._changes: dict[str, deque[Change]] = {}  # by component
         self._count = 0
+        self._bytes: dict[str, int] = {}  # by component
+        self._bytes_on_disk = 0
         self._last = 0  # number
         self._new: list[Change] = []  # not on disk yet
         self._on_disk = 0  # lines
@@ -85,11 +91,16 @@ class History:
         """Return what is to be written, and whether that is all there is, in the place of what is
         on disk; else it is to be appended.  From then on it counts as written."""
         changes, self._new = self._new, []
-        anew = self._on_disk + len(changes) > 2 * MOST
+        more = sum(map(_size, changes))
+        anew = (
+            self._on_disk + len(changes) > 2 * MOST or self._bytes_on_disk + more > 2 * MOST_BYTES
+        )
         if anew:
             changes = self.of()
-            self._on_disk = 0
+            more = sum(map(_size, changes))
+            self._on_disk = self._bytes_on_disk = 0
         self._on_disk += len(changes)
+        self._bytes_on_disk += more
         return changes, anew
 
     def not_written(self) -> None:
@@ -100,6 +111,7 @@ class History:
         """Take what was written; a line that is none, as of a power cut, is passed over."""
         for line in text.splitlines():
             self._on_disk += 1
+            self._bytes_on_disk += len(line)
             try:
                 change = _change(line)
             except (ValueError, TypeError, KeyError, json_format.ParseError):
@@ -111,22 +123,43 @@ class History:
         changes = self._changes.setdefault(change.component, deque())
         changes.append(change)
         self._count += 1
+        name = change.component
+        self._bytes[name] = self._bytes.get(name, 0) + _size(change)
+        while self._bytes[name] > MOST_BYTES_OF_A_COMPONENT and changes[0].number != change.number:
+            self._drop_oldest(name)
+        while sum(self._bytes.values()) > MOST_BYTES:
+            oldest = min(self._changes, key=lambda name: self._changes[name][0].number)
+            if self._changes[oldest][0].number == change.number:
+                break
+            self._drop_oldest(oldest)
         if len(changes) > MOST_OF_A_COMPONENT:
             self._drop(change.component)
         elif self._count > MOST:
             self._drop(min(self._changes, key=lambda name: self._changes[name][0].number))
 
+    def _drop_oldest(self, component: str) -> None:
+        """Drop all that was changed at once: a part of it is not to be taken back."""
+        number = self._changes[component][0].number
+        while component in self._changes and self._changes[component][0].number == number:
+            self._drop(component)
+
     def _drop(self, component: str) -> None:
         changes = self._changes[component]
-        changes.popleft()
+        self._bytes[component] -= _size(changes.popleft())
         self._count -= 1
         if not changes:
-            del self._changes[component]
+            del self._changes[component], self._bytes[component]
 
 
 def text(changes: Iterable[Change]) -> str:
     """Return what read() takes; on any thread."""
     return "".join(_line(each) for each in changes)
+
+
+def _size(change: Change) -> int:
+    before = 0 if change.before is None else change.before.ByteSize()
+    # Names, times and numbers besides.
+    return 200 + len(change.component) + before + int(change.value.ByteSize())
 
 
 def _line(change: Change) -> str:

@@ -4,6 +4,8 @@ import os
 import signal
 from collections import defaultdict
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 import rtcf
@@ -11,6 +13,7 @@ from daemon_under_test import DaemonUnderTest, wait_for
 from hypothesis import given, seed
 from hypothesis import strategies as st
 from rtcf.v1 import control_pb2, graph_pb2
+from rtcfd.operations import parameters
 from rtcfd.state import history
 from rtcfd.state.desired import Desired
 from rtcfd.state.history import History
@@ -241,3 +244,36 @@ def test_who_undoes_is_bound_as_who_sets() -> None:
     assert said[0] == "undone\n"
     assert "/pid.kp may change by 0.5 a second" in said[1]
     assert said[2] == "3\n"
+
+
+def test_long_texts_are_bounded_in_bytes_and_what_was_changed_at_once_stays_whole() -> None:
+    changes, disk = History(), 0
+    for number in range(40):
+        for component in "abcdefghijkl":
+            text = graph_pb2.ParameterValue(string_value=f"{number:03}" + "x" * 65000)
+            changes.note(component, [(name, text, text) for name in "pqr"], "ann", "set")
+            new, anew = changes.to_write()
+            disk = (0 if anew else disk) + len(history.text(new))
+    kept = changes.of()
+    assert sum(each.value.ByteSize() * 2 for each in kept) <= history.MOST_BYTES
+    assert disk <= 3 * history.MOST_BYTES
+    for component in "hijkl":
+        last = changes.to_take_back(component)
+        assert [each.parameter for each in last] == ["p", "q", "r"]
+        assert last[0].value.string_value.startswith("039")
+    # Larger than all that a component may have: it is kept whole, and alone.
+    changes.note("l", [(f"p{each}", text, text) for each in range(15)], "ann", "set")
+    assert len(changes.of("l")) == 15
+
+
+def test_an_answer_holds_the_newest_changes_that_a_client_takes() -> None:
+    desired = Desired("r")
+    text = graph_pb2.ParameterValue(string_value="x" * 65000)
+    for number in range(8):
+        for component in "abcdefgh":
+            desired.history.note(f"/{component}", [(f"p{number}", text, text)], "ann", "set")
+    runner: Any = SimpleNamespace(desired=desired)
+    answer = parameters.history(runner, control_pb2.GetHistoryRequest())
+    assert 1024 * 1024 < answer.ByteSize() <= 2 * 1024 * 1024
+    assert (answer.changes[-1].component, answer.changes[-1].parameter) == ("/h", "p7")
+    assert len(answer.changes) < len(desired.history.of())
