@@ -157,7 +157,7 @@ def text(changes: Iterable[Change]) -> str:
 
 
 def _size(change: Change) -> int:
-    before = 0 if change.before is None else change.before.ByteSize()
+    before = 0 if change.before is None else int(change.before.ByteSize())
     # Names, times and numbers besides.
     return 200 + len(change.component) + before + int(change.value.ByteSize())
 
