@@ -217,7 +217,7 @@ int run(const Options& options) {
         const LogDrain drain(log);
         Runner runner(options.runner, log, publish,
                       std::make_unique<rtcf::ros1::RosNode>(
-                          options.daemon, options.runner,
+                          options.daemon, options.runner, access,
                           [&](const std::string& message) {
                               publish(RunnerEvent{RunnerEvent::Kind::Ros, message, {}, 0});
                           },

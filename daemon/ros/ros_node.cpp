@@ -6,11 +6,11 @@
 namespace rtcf::ros1 {
 
 RosNode::RosNode(const std::string& daemon, const std::string& runner,
-                 executor::BridgeReport report, executor::Log& log, Rosout& rosout,
-                 executor::AskSupervisor ask)
+                 const executor::Access& access, executor::BridgeReport report, executor::Log& log,
+                 Rosout& rosout, executor::AskSupervisor ask)
     : ask_(std::move(ask)),
-      watch_(
-          std::make_unique<MasterWatch>(nodeName(daemon, runner), std::move(report), log, rosout)),
+      watch_(std::make_unique<MasterWatch>(nodeName(daemon, runner), access, std::move(report), log,
+                                           rosout)),
       thread_(quietThread("ros-watch", [this] { watch_->run(); })) {}
 
 RosNode::~RosNode() {

@@ -6,6 +6,7 @@
 #include <string>
 #include <thread>
 
+#include "access/rights.hpp"
 #include "bridge/bridge.hpp"
 #include "bridge/outside_call.hpp"
 #include "logging/log.hpp"
@@ -27,8 +28,10 @@ class RosNode final : public executor::Bridge {
     /// this
     /// @param rosout opened and closed with the node; outlives this
     /// @param ask who decides on changes that ROS peers ask for by services
-    RosNode(const std::string& daemon, const std::string& runner, executor::BridgeReport report,
-            executor::Log& log, Rosout& rosout, executor::AskSupervisor ask);
+    /// @param access whose masters of this machine are followed; outlives this
+    RosNode(const std::string& daemon, const std::string& runner, const executor::Access& access,
+            executor::BridgeReport report, executor::Log& log, Rosout& rosout,
+            executor::AskSupervisor ask);
 
     /// Withdraws from the master and closes all topics, in less than two seconds whatever the
     /// master does. Taps and injectors are not used any more afterwards.

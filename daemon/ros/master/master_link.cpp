@@ -22,9 +22,11 @@ struct MasterLink::Sight {
     std::optional<bool> simulated;
 };
 
-MasterLink::MasterLink(NodeName name, Say say, const std::function<void()>& wake,
+MasterLink::MasterLink(NodeName name, const executor::Access& access, Say say,
+                       const std::function<void()>& wake,
                        const RoscppNode::ParameterWritten& written)
-    : say_(std::move(say)),
+    : access_(access),
+      say_(std::move(say)),
       wanted_name_(name),
       node_(
           std::move(name),
@@ -48,6 +50,7 @@ MasterLink::State MasterLink::look(const executor::BridgeSettings& settings) {
     const std::string uri = uriOf(settings);
     MasterAddress address;
     if (!locate(uri, address)) return State::Away;
+    if (!mayFollow(uri, address, settings.peers)) return node_.started() ? State::Off : State::Away;
     if (!node_.started() && !start(uri, address, settings.hostname))
         return failed_ ? State::Failed : State::Away;
     if (!node_.alive()) {
@@ -153,6 +156,25 @@ bool MasterLink::locate(const std::string& uri, MasterAddress& address) {
     }
     address.address = *found;
     return true;
+}
+
+// Anybody can start a master where ours is expected, and be all of its nodes. What its owner may
+// not do here, nobody may by way of it.
+bool MasterLink::mayFollow(const std::string& uri, const MasterAddress& address,
+                           executor::Right needed) {
+    const std::optional<uid_t> owner = ownerOfListener(address);
+    if (!owner) return true;  // on another machine, or there is none
+    const executor::Right right = access_.ofUser(*owner);
+    if (right >= needed) return true;
+    away("the ROS master at " + uri + " belongs to user " + std::to_string(*owner) +
+         " of this machine, whose right is '" + executor::wordOf(right) +
+         "': it is not followed "
+         "where ROS peers have '" +
+         executor::wordOf(needed) +
+         "'; give that user the right in [access], or fewer to peers: rtcfctl runner set "
+         "--ros-peers");
+    say_(problem_);
+    return false;
 }
 
 bool MasterLink::start(const std::string& uri, const MasterAddress& address,

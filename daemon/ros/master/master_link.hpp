@@ -13,6 +13,7 @@
 #include <string>
 #include <utility>
 
+#include "access/rights.hpp"
 #include "bridge/bridge.hpp"
 #include "ros/parameters/parameter_mirror.hpp"
 #include "ros/roscpp/host_names.hpp"
@@ -36,10 +37,11 @@ class MasterLink {
         Failed,  ///< no node any more in this process
     };
 
+    /// @param access whose masters of this machine are followed; outlives this
     /// @param wake called from any thread when look() has something to do
     /// @param written called from any thread when a parameter has been written
-    MasterLink(NodeName name, Say say, const std::function<void()>& wake,
-               const RoscppNode::ParameterWritten& written);
+    MasterLink(NodeName name, const executor::Access& access, Say say,
+               const std::function<void()>& wake, const RoscppNode::ParameterWritten& written);
 
     /// Where the settings say that the master is.
     static std::string uriOf(const executor::BridgeSettings& settings);
@@ -86,6 +88,7 @@ class MasterLink {
     enum class Why { No, NameTaken, Killed };
     struct Sight;
 
+    bool mayFollow(const std::string& uri, const MasterAddress& address, executor::Right needed);
     bool locate(const std::string& uri, MasterAddress& address);
     bool start(const std::string& uri, const MasterAddress& address, const std::string& hostname);
     bool chooseName(ParallelCalls& master);
@@ -100,6 +103,7 @@ class MasterLink {
     std::string whyOff() const;
     State away(const std::string& problem);
 
+    const executor::Access& access_;
     const Say say_;
     std::mutex mutex_;  // shutdown_request_ and revived_
     bool shutdown_request_ = false;

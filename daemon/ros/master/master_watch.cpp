@@ -14,13 +14,14 @@ constexpr auto kLeaving = std::chrono::milliseconds(1500);  // for all that is s
 
 }  // namespace
 
-MasterWatch::MasterWatch(NodeName name, executor::BridgeReport report, executor::Log& log,
-                         Rosout& rosout)
+MasterWatch::MasterWatch(NodeName name, const executor::Access& access,
+                         executor::BridgeReport report, executor::Log& log, Rosout& rosout)
     : runner_(name.base),
       report_(std::move(report)),
       console_(log),
       link_(
-          std::move(name), [this](const std::string& message) { say(message); }, [this] { wake(); },
+          std::move(name), access, [this](const std::string& message) { say(message); },
+          [this] { wake(); },
           [this](const std::string& key) {
               subjects_.noteParameterWritten(key);
               wake();
@@ -171,7 +172,8 @@ void MasterWatch::serve(const executor::BridgeSettings& looked) {
         settings = *settings_;
         if (settings.enabled != looked.enabled) return;
         answered_ = MasterLink::Clock::now();
-        status_.simulated_time = link_.simulated();
+        const bool operates = settings.peers >= executor::Right::Operate;
+        status_.simulated_time = operates ? link_.simulated() : std::optional<bool>(false);
     }
     const Reconciled result = subjects_.reconcile(link_, settings);
     link_.tell();

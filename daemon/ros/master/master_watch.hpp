@@ -24,7 +24,8 @@ class MasterWatch {
    public:
     /// @param log what is said by ROS_* macros goes there; outlives this
     /// @param rosout opened and closed with the node; outlives this
-    MasterWatch(NodeName name, executor::BridgeReport report, executor::Log& log, Rosout& rosout);
+    MasterWatch(NodeName name, const executor::Access& access, executor::BridgeReport report,
+                executor::Log& log, Rosout& rosout);
 
     /// Once, before configure(): the runner to show, and whom to ask for changes of it.
     void attach(executor::RunnerView& runner, const executor::AskSupervisor& ask);

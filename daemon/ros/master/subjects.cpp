@@ -60,10 +60,15 @@ Reconciled Subjects::reconcile(MasterLink& link, const executor::BridgeSettings&
     if (link.takeNew()) reconfiguring_.forget();
     ros::NodeHandle& handle = link.node().handle();
     if (introspection_)
-        introspection_->open(handle, link.name().full(), claim_.of(link, settings.name_space));
+        introspection_->open(handle, link.name().full(), claim_.of(link, settings.name_space),
+                             settings.peers >= executor::Right::Observe);
     if (!rosout_.isOpen()) rosout_.open(handle, link.name().full());
-    const Reconciled topics = publishing_.reconcile(handle, settings) &
-                              subscribing_.reconcile(handle, link.simulated().value_or(false));
+    // What a stranger says is the loop's matter only if strangers may operate it, time included.
+    const bool operates = settings.peers >= executor::Right::Operate;
+    reconfiguring_.allow(settings.peers >= executor::Right::Tune);
+    const Reconciled topics =
+        publishing_.reconcile(handle, settings) &
+        subscribing_.reconcile(handle, operates && link.simulated().value_or(false), operates);
     ParallelCalls master = link.calls();
     return topics & reconfiguring_.reconcile(handle, master, link.caller());
 }

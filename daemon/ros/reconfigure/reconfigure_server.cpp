@@ -95,6 +95,13 @@ bool ReconfigureServer::change(const dynamic_reconfigure::ReconfigureRequest& as
                                dynamic_reconfigure::ReconfigureResponse& answer) {
     const Set before = set();
     executor::ParameterBatch batch = batchOf(asked.config, *before);
+    if (!range_.allowed) {  // the answer has what holds
+        range_.warn(before->full_name,
+                    "parameters stay as they are: ROS peers have not the right 'tune'; allow it by "
+                    "rtcfctl runner set --ros-peers tune");
+        answer.config = valuesOf(*before);
+        return true;
+    }
     const bool refuse = range_.refuse;
     if (!refuse) {
         for (const std::string& line : bringWithinBounds(batch, *before))

@@ -28,6 +28,7 @@ namespace rtcf::ros1 {
 struct RangePolicy {
     std::atomic<bool> refuse{false};  ///< fail the call; else the nearest value is taken
     std::function<void(const std::string& component, const std::string& line)> warn;
+    std::atomic<bool> allowed{true};  ///< peers may change anything at all
 };
 
 /// Owned by Reconfiguring.

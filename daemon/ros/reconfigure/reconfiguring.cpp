@@ -104,6 +104,11 @@ Reconciled Reconfiguring::reconcile(ros::NodeHandle& handle, ParallelCalls& mast
     return result & mirror_.reconcile(master, caller, components);
 }
 
+void Reconfiguring::allow(bool allowed) {
+    range_.allowed = allowed;
+    mirror_.follow(allowed);
+}
+
 void Reconfiguring::forget() {
     {
         const std::lock_guard lock(mutex_);

@@ -54,6 +54,8 @@ class Reconfiguring {
     /// Opens, closes and uploads what is wanted. Watch thread, with a master.
     Reconciled reconcile(ros::NodeHandle& handle, ParallelCalls& master,
                          const ParameterMirror::Caller& caller);
+    /// Whether peers may change parameters; if not, they are shown. Watch thread.
+    void allow(bool allowed);
     /// The master says that a parameter or a namespace has been written. Any thread.
     void noteWritten(const std::string& key) { mirror_.noteWritten(key); }
     /// The master is another one. Watch thread.

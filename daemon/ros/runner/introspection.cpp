@@ -37,8 +37,8 @@ Introspection::~Introspection() {
 }
 
 void Introspection::open(ros::NodeHandle& handle, const std::string& node,
-                         const std::string& name_space) {
-    if (open_ && name_space == name_space_) return;
+                         const std::string& name_space, bool serves) {
+    if (open_ && name_space == name_space_ && serves == serves_) return;
     close();
     open_ = true;
     name_space_ = name_space;
@@ -50,7 +50,8 @@ void Introspection::open(ros::NodeHandle& handle, const std::string& node,
         report_.nameAfter(node);
         diagnostics_ = diagnostics;
     }
-    services_.open(handle, name_space);
+    serves_ = serves;
+    if (serves) services_.open(handle, name_space);
 }
 
 void Introspection::close() {

@@ -27,8 +27,10 @@ class Introspection {
                   executor::Log& log);
 
     /// Opens what is not open yet, in this namespace and no other. Watch thread.
-    /// @param node full name of the node: what the health is reported of
-    void open(ros::NodeHandle& handle, const std::string& node, const std::string& name_space);
+    /// @param node   full name of the node: what the health is reported of
+    /// @param serves whether there are services; what the callers may do the supervisor decides
+    void open(ros::NodeHandle& handle, const std::string& node, const std::string& name_space,
+              bool serves);
     void close();
     bool isOpen() const { return open_; }
     ~Introspection();
@@ -42,6 +44,7 @@ class Introspection {
     CycleTopic cycles_;
     RunnerServices services_;
     std::string name_space_;
+    bool serves_ = false;
     bool open_ = false;
     std::atomic<bool> stop_{false};
     std::mutex mutex_;  // diagnostics_

@@ -52,6 +52,7 @@ Reconciled Subscribing::reconcileTopics(ros::NodeHandle& handle, bool master) {
         Subscribers wanted;
         std::map<std::string, Connection> topics;
         for (const auto& injector : injectors_) {
+            if (!allowed_) break;
             const auto found = subscribers_.find(injector);
             auto subscriber = found != subscribers_.end()
                                   ? found->second

@@ -47,7 +47,9 @@ class Subscribing {
 
     /// Subscribes and unsubscribes until the topics are those of the injectors. Watch thread.
     /// @param simulated whether the master says that time is simulated
-    Reconciled reconcile(ros::NodeHandle& handle, bool simulated) {
+    /// @param allowed whether peers may give the loop anything; if not, nothing is subscribed
+    Reconciled reconcile(ros::NodeHandle& handle, bool simulated, bool allowed) {
+        allowed_ = allowed;
         return reconcileTopics(handle, true) & clock_.reconcile(handle, queue_, simulated);
     }
     /// The same without a master: only new injectors of topics that are subscribed.
@@ -70,6 +72,7 @@ class Subscribing {
     ros::CallbackQueue queue_;
     ClockSubscription clock_;
     std::atomic<bool> stop_{false};
+    bool allowed_ = true;       // watch thread
     mutable std::mutex mutex_;  // injectors_ and subscribers_
     Injectors injectors_;
     // By injector: a new one on the same topic subscribes anew, and so gets a latched value too.

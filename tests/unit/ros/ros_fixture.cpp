@@ -112,7 +112,7 @@ std::string RosFixture::lookAtLoggers() {
 
 void RosFixture::startNode() {
     node_ = std::make_unique<rtcf::ros1::RosNode>(
-        "", "rt_runner",
+        "", "rt_runner", access_,
         [this](const std::string& message) {
             const std::lock_guard lock(mutex_);
             reports_.push_back(message);
@@ -123,6 +123,7 @@ void RosFixture::startNode() {
         });
     rtcf::executor::BridgeSettings settings;
     settings.master_uri = masterUri();
+    settings.peers = rtcf::executor::Right::Admin;
     node_->configure(settings);
 }
 

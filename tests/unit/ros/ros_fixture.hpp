@@ -115,6 +115,7 @@ class RosFixture : public ::testing::Test {
     std::unique_ptr<ChildProcess> real_master_;  // behind a slow one
     mutable std::mutex mutex_;                   // reports_
     std::vector<std::string> reports_;
+    rtcf::executor::Access access_;
     rtcf::ros1::Rosout rosout_;
     rtcf::executor::Log log_{[this](rtcf::executor::LogEntry&& entry) { rosout_.publish(entry); }};
     std::unique_ptr<rtcf::ros1::RosNode> node_;

@@ -1,0 +1,135 @@
+"""What ROS peers may do with a loop, and whose master is followed at all."""
+
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rosgraph
+import rtcf
+from daemon_process import Daemon, clean_environment, wait_for, with_ros
+from ros_processes import Master, free_port
+from rtcf.v1 import runner_pb2
+from values import iteration
+
+_NOBODY = 65534
+_KNOBS = "/arm/knobs"
+
+
+@pytest.fixture(params=["observe", "tune", "operate"])
+def peers(request: pytest.FixtureRequest) -> str:
+    """Give a right of ROS peers."""
+    return str(request.param)
+
+
+def _load(client: rtcf.Client) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0))
+    client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", ns="/arm"))
+    client.load(rtcf.component("rtcf_test_ros", "Text", name="text", ns="/arm"))
+    client.start()
+
+
+def _rate(client: rtcf.Client) -> float:
+    (rate,) = (each for each in client.get_component(_KNOBS).parameters if each.name == "rate")
+    return float(rate.value.real)
+
+
+def test_peers_may_do_what_the_setting_says(tmp_path: Path, master: Master, peers: str) -> None:
+    daemon = Daemon(tmp_path, with_ros(master.uri, "/arm/heard") + f'peers = "{peers}"\n')
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            _load(client)
+            wait_for(lambda: f"{_KNOBS}/set_parameters" in master.services(), "the service")
+            wait_for(lambda: master.parameter(f"{_KNOBS}/rate") == 1.5, "the parameter server")
+            tunes = peers in ("tune", "operate")
+            answer = master.call(
+                f"{_KNOBS}/set_parameters", "{config: {doubles: [{name: rate, value: 2.5}]}}"
+            )
+            shown = {each["name"]: each["value"] for each in answer["config"]["doubles"]}
+            assert shown["rate"] == (2.5 if tunes else 1.5)
+            master.run("rosparam", "set", f"{_KNOBS}/rate", "4.0")
+            if tunes:
+                wait_for(lambda: _rate(client) == 4.0, "the loop to follow")
+            else:
+                wait_for(lambda: master.parameter(f"{_KNOBS}/rate") == 1.5, "what holds")
+                assert _rate(client) == 1.5
+            _, subscribed = master.topics()
+            assert ("/arm/heard" in subscribed) == (peers == "operate")
+    finally:
+        daemon.end()
+        master.run("rosparam", "delete", _KNOBS, ok=True)
+
+
+@pytest.fixture
+def strangers_master(tmp_path: Path) -> Iterator[str]:
+    """Give the URI of a master that another user of this machine has started."""
+    port = free_port()
+    uri = f"http://localhost:{port}"
+    home = tmp_path / "stranger"
+    home.mkdir()
+    home.chmod(0o777)
+    environment = clean_environment() | {
+        "ROS_MASTER_URI": uri, "ROS_HOSTNAME": "localhost",
+        "ROS_HOME": "/tmp", "ROS_LOG_DIR": "/tmp", "HOME": "/tmp",
+    }  # fmt: skip
+    process = subprocess.Popen(
+        ["/usr/bin/rosmaster", "--core", "-p", str(port)],
+        env=environment, user=_NOBODY, group=_NOBODY, cwd="/",
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    yield uri
+    process.terminate()
+    process.wait()
+
+
+def test_a_master_of_a_user_without_the_right_is_not_followed(
+    tmp_path: Path, strangers_master: str
+) -> None:
+    daemon = Daemon(tmp_path, with_ros(strangers_master, ".*"))
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            _load(client)
+
+            def problem() -> str:
+                return str(client.get_status("rt_runner").runners[0].ros.problem)
+
+            wait_for(lambda: f"belongs to user {_NOBODY}" in problem(), "the status to say so")
+            ros = client.get_status("rt_runner").runners[0].ros
+            assert (ros.connected, ros.publications, ros.subscriptions) == (False, 0, 0)
+    finally:
+        daemon.end()
+
+
+@pytest.mark.parametrize(
+    ("peers", "choice", "simulated"),
+    [
+        ("observe", runner_pb2.SIM_TIME_AUTO, False),
+        ("operate", runner_pb2.SIM_TIME_AUTO, True),
+        ("observe", runner_pb2.SIM_TIME_ALWAYS, True),
+    ],
+)
+def test_a_strangers_word_that_time_is_simulated_counts_where_it_may_operate(
+    tmp_path: Path, master: Master, peers: str, choice: runner_pb2.SimTime, simulated: bool
+) -> None:
+    parameters = rosgraph.Master("/test", master.uri)
+    parameters.setParam("/use_sim_time", True)
+    daemon = Daemon(tmp_path, with_ros(master.uri, "") + f'peers = "{peers}"\n')
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0, sim_time=choice))
+            wait_for(lambda: client.get_status("rt_runner").runners[0].ros.connected, "the node")
+            client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", ns="/arm"))
+            client.start()
+            assert client.get_status("rt_runner").runners[0].simulated == simulated
+            if simulated:  # without a clock there is no cycle
+                _, subscribed = master.topics()
+                assert "/clock" in subscribed
+                assert iteration(client) == 0
+            else:
+                wait_for(lambda: iteration(client) > 10, "the loop to run in real time")
+    finally:
+        daemon.end()
+        parameters.deleteParam("/use_sim_time")
