@@ -14,6 +14,7 @@ constexpr std::size_t kWord = 8;  // what is told apart: a number rarely changes
 }  // namespace
 
 UndeclaredMembers::UndeclaredMembers(const Component& component)
+    // NOLINTNEXTLINE(bugprone-casting-through-void): where the whole object begins
     : object_(static_cast<const std::byte*>(dynamic_cast<const void*>(&component))) {
     const std::size_t size = malloc_usable_size(const_cast<std::byte*>(object_));
     before_.assign(object_, object_ + size);

@@ -42,7 +42,7 @@ bool isBaseName(const std::string& name) {
 }
 
 bool isGraphName(const std::string& name) {
-    if (name.empty() || !(isLetter(name[0]) || name[0] == '/' || name[0] == '~')) return false;
+    if (name.empty() || (!isLetter(name[0]) && name[0] != '/' && name[0] != '~')) return false;
     return std::all_of(name.begin() + 1, name.end(),
                        [](char c) { return isWordCharacter(c) || c == '/'; });
 }

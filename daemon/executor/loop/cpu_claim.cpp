@@ -35,7 +35,7 @@ void keepThreadsOff(int cpu, int except) {
     if (CPU_COUNT(&others) == 0) return;
     std::error_code gone;  // a thread that ends meanwhile
     for (const auto& task : std::filesystem::directory_iterator("/proc/self/task", gone)) {
-        const int thread = std::atoi(task.path().filename().c_str());
+        const auto thread = static_cast<pid_t>(std::stol(task.path().filename()));
         if (thread != except) sched_setaffinity(thread, sizeof others, &others);
     }
 }

@@ -147,7 +147,7 @@ class Loop {
     void followRealTime() noexcept;
     void followClock() noexcept;
     WakeUp waitForClock(std::int64_t deadline_ns) noexcept;
-    WakeUp waitForSource(Source& source) noexcept;
+    WakeUp waitForSource(Source& device) noexcept;
     Source* source() const noexcept;
     std::int64_t nextStep() const noexcept;
     void noteOverrun(const WakeUp& wake_up, std::int64_t begin_ticks, std::int64_t end_ns,

@@ -569,9 +569,10 @@ pb::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t positio
     info.set_doc(component.doc);
     info.set_fault(component.fault);
     info.set_faults(component.figures->faults.count.value());
-    info.set_state(!component.fault.empty()        ? pb::COMPONENT_STATE_FAULTED
-                   : state == RunnerState::Running ? pb::COMPONENT_STATE_RUNNING
-                                                   : pb::COMPONENT_STATE_CONFIGURED);
+    const pb::ComponentState healthy = state == RunnerState::Running
+                                           ? pb::COMPONENT_STATE_RUNNING
+                                           : pb::COMPONENT_STATE_CONFIGURED;
+    info.set_state(component.fault.empty() ? healthy : pb::COMPONENT_STATE_FAULTED);
     for (const PortSnapshot& port : component.ports) {
         pb::PortInfo& message = *info.add_ports();
         setPortType(message, port.name, port.output, *port.type);

@@ -13,13 +13,14 @@ constexpr auto kAgain = std::chrono::seconds(10);
 std::vector<std::string> holders(XmlRpc::XmlRpcValue& state, int kind, const std::string& name) {
     std::vector<std::string> nodes;
     XmlRpc::XmlRpcValue& list = state[kind];
-    // NOLINTNEXTLINE(modernize-loop-convert): its begin() is for structs
+    // NOLINTBEGIN(modernize-loop-convert): its begin() is for structs
     for (int i = 0; i < list.size(); ++i) {
         if (static_cast<std::string&>(list[i][0]) != name) continue;
         XmlRpc::XmlRpcValue& having = list[i][1];
         for (int node = 0; node < having.size(); ++node)
             nodes.push_back(static_cast<std::string&>(having[node]));
     }
+    // NOLINTEND(modernize-loop-convert)
     return nodes;
 }
 

@@ -150,7 +150,8 @@ void MasterWatch::step() {
         if (link_.up()) say("ROS node " + link_.name().full() + " is off");
         leave();
         link_.retry();
-        return setProblem("");
+        setProblem("");
+        return;
     }
     subjects_.prepare(settings);
     const MasterLink::State state = link_.look(settings);
@@ -158,7 +159,10 @@ void MasterWatch::step() {
         const std::lock_guard lock(mutex_);
         status_.node = link_.name().full();
     }
-    if (state == MasterLink::State::Up) return serve(settings);
+    if (state == MasterLink::State::Up) {
+        serve(settings);
+        return;
+    }
     if (state == MasterLink::State::Off) leave();
     if (state == MasterLink::State::Silent) subjects_.reconcileWithoutMaster(link_);
     setProblem(link_.problem());

@@ -52,7 +52,7 @@ class MasterWatch {
 
    private:
     void step();
-    void serve(const executor::BridgeSettings& settings);
+    void serve(const executor::BridgeSettings& looked);
     void leave();
     void end();
     void wake();

@@ -108,7 +108,7 @@ bool MasterCalls::call(const std::string& method, const XmlRpc::XmlRpcValue& arg
         return false;
     }
     value = answer.value;
-    return bool(answer);
+    return static_cast<bool>(answer);
 }
 
 }  // namespace rtcf::ros1

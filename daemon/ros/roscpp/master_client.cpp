@@ -109,8 +109,8 @@ struct ParallelCalls::Line {
     Clock::time_point begun;
 };
 
-ParallelCalls::ParallelCalls(const MasterAddress& server, const std::atomic<bool>& cancel)
-    : server_(server), cancel_(cancel) {}
+ParallelCalls::ParallelCalls(MasterAddress server, const std::atomic<bool>& cancel)
+    : server_(std::move(server)), cancel_(cancel) {}
 
 ParallelCalls::~ParallelCalls() = default;
 

@@ -75,7 +75,7 @@ class ParallelCalls {
     using Clock = std::chrono::steady_clock;
 
     /// @param cancel if it becomes true, calls end within 5 ms; must outlive this
-    ParallelCalls(const MasterAddress& server, const std::atomic<bool>& cancel);
+    ParallelCalls(MasterAddress server, const std::atomic<bool>& cancel);
     ~ParallelCalls();
     ParallelCalls(const ParallelCalls&) = delete;
     ParallelCalls& operator=(const ParallelCalls&) = delete;

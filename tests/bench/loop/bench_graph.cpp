@@ -40,11 +40,11 @@ std::vector<Node> paperGraph() {
 }
 
 BenchGraph::BenchGraph(const std::vector<Node>& nodes, const std::string& library,
-                       const std::string& mapped)
+                       std::string mapped)
     : log_([](executor::LogEntry&&) {}),
       loop_(log_, recorder_),
       code_(libraries_.open(library)),
-      mapped_(mapped) {
+      mapped_(std::move(mapped)) {
     executor::Graph graph;
     for (const Node& node : nodes) {
         executor::Remaps remaps;

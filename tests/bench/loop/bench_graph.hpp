@@ -37,8 +37,7 @@ class BenchGraph {
     /// @param library of rtcf_examples
     /// @param mapped  regular expression of connections that get a tap or an injector; empty = none
     /// @throws executor::Refusal
-    BenchGraph(const std::vector<Node>& nodes, const std::string& library,
-               const std::string& mapped = {});
+    BenchGraph(const std::vector<Node>& nodes, const std::string& library, std::string mapped = {});
     ~BenchGraph();
 
     executor::Loop& loop() noexcept { return loop_; }

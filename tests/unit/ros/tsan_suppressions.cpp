@@ -3,9 +3,11 @@
 /// Debian's roscpp. The paths by which roscpp calls our code (callback queue,
 /// XML-RPC server, log) are not in the list.
 
+// NOLINTBEGIN(bugprone-reserved-identifier): the sanitizer's name
 extern "C" const char* __tsan_default_suppressions();
 
 extern "C" const char* __tsan_default_suppressions() {
+    // NOLINTEND(bugprone-reserved-identifier)
     return
         // roscpp takes its own mutexes in differing order, all in its poll thread.
         "deadlock:libroscpp.so\n"

@@ -80,6 +80,7 @@ struct SequenceBytes {
         return static_cast<std::uint32_t>(value.size() * sizeof(Element));
     }
     static void store(const Sequence& value, std::uint8_t* to) {
+        // NOLINTNEXTLINE(bugprone-not-null-terminated-result): bytes, not text
         if (!value.empty()) std::memcpy(to, value.data(), value.size() * sizeof(Element));
     }
     static void load(Sequence& value, const std::uint8_t* from, std::uint32_t size) {

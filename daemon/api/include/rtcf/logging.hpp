@@ -127,7 +127,7 @@ auto logStore(const T& value) noexcept {
 inline std::string_view logLoad(const LogText& text) noexcept { return text.view(); }
 template <typename T>
 const T& logLoad(const T& value) noexcept {
-    return value;
+    return value;  // NOLINT(bugprone-return-const-ref-from-parameter): read before the call ends
 }
 
 /// Checks a format at compile time; never called.

@@ -54,6 +54,7 @@ class State final {
     /// @param initial value of a new component, and after a reset
     /// @param options Unit, Doc
     template <typename... Options>
+    // NOLINTNEXTLINE(modernize-pass-by-value): T may be large
     State(Component* owner, std::string name, const T& initial, Options... options)
         : value_(initial) {
         StateDeclaration declaration;
@@ -88,8 +89,8 @@ class State final {
     const T* operator->() const noexcept RTCF_NONBLOCKING { return &value_; }
     T* operator->() noexcept RTCF_NONBLOCKING { return &value_; }
 
-    // NOLINTNEXTLINE(bugprone-unhandled-self-assignment,cert-oop54-cpp): as of the value
-    State& operator=(const State& other) {
+    // NOLINTNEXTLINE(bugprone-unhandled-self-assignment,modernize-use-equals-default): see below
+    State& operator=(const State& other) {  // the value alone: the name stays
         value_ = other.value_;
         return *this;
     }

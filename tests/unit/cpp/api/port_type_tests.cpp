@@ -23,7 +23,7 @@ struct Gains {
     std::int32_t joint;
     double gain;
 };
-enum class Mode : std::uint8_t { Idle, Force = 7 };
+enum class Mode : std::uint8_t { Idle = 0, Force = 7 };
 struct Target {
     double x, y, z;
 };

@@ -41,10 +41,10 @@ class Stateful final : public rtcf::Component {
 
 #if VERSION == 2
     void takeOver(const rtcf::Predecessor& previous) noexcept override {
-        if (const double* old = previous.state<double>("old_name")) renamed = *old;
+        if (const auto* old = previous.state<double>("old_name")) renamed = *old;
         if (previous.state<double>("count") != nullptr || previous.state<int>("none") != nullptr)
             renamed = -1.0;  // of another type, and not there
-        if (const double* last = previous.output<double>("out")) fresh = *last;
+        if (const auto* last = previous.output<double>("out")) fresh = *last;
     }
 #endif
 };

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <map>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -93,7 +94,7 @@ TEST_F(LogTest, TakesRecordsOfManyThreadsAtOnce) {
         if (entry.component.empty()) continue;  // a report of lost records
         int id = 0;
         int number = 0;
-        ASSERT_EQ(std::sscanf(entry.message.c_str(), "%d %d", &id, &number), 2) << entry.message;
+        ASSERT_TRUE(std::istringstream(entry.message) >> id >> number) << entry.message;
         if (const auto before = last.find(id); before != last.end()) {
             ASSERT_GT(number, before->second);
         }

@@ -102,7 +102,8 @@ TEST(Library, ThatIsRefusedLeavesNothingOpen) {
         std::ifstream maps("/proc/self/maps");
         std::string line;
         int count = 0;
-        while (std::getline(maps, line)) count += line.find("no_entry_point") == line.npos ? 0 : 1;
+        while (std::getline(maps, line))
+            count += line.find("no_entry_point") == std::string::npos ? 0 : 1;
         return count;
     };
     const auto before = open_files();

@@ -95,7 +95,7 @@ class RunnerFixture : public ::testing::Test {
 
     /// What the refusal of `work` says; empty if it is not refused.
     template <typename Work>
-    std::string refusal(Work work);
+    std::string refusal(Work&& work);
 
     /// Newest value of a port that carries a std_msgs number. @return NaN without a value
     double value(const std::string& component, const std::string& port);
@@ -154,7 +154,7 @@ auto RunnerFixture::onGraphThread(Work work) -> decltype(work()) {
 }
 
 template <typename Work>
-std::string RunnerFixture::refusal(Work work) {
+std::string RunnerFixture::refusal(Work&& work) {
     try {
         work();
         return {};
