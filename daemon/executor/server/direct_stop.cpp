@@ -53,8 +53,8 @@ std::vector<gid_t> groupsOf(int fd, gid_t primary) {
 
 }  // namespace
 
-DirectStop::DirectStop(const std::string& path, std::string mark, const Access& access)
-    : path_(path), mark_(std::move(mark)), access_(access) {
+DirectStop::DirectStop(std::string path, std::string mark, const Access& access)
+    : path_(std::move(path)), mark_(std::move(mark)), access_(access) {
     if (path_.empty()) return;
     listener_ = listenOn(path_, 256);
     ::chmod(path_.c_str(), kSocketMode);
@@ -102,8 +102,9 @@ void DirectStop::threadMain() {
         // Nobody is kept waiting by those who only connect.
         if (clients_.size() >= kMostClients) polled[1].events = 0;
         for (const Client& client : clients_)
-            polled.push_back({client.fd, static_cast<short>(client.asked ? 0 : POLLIN), 0});
-        ::poll(polled.data(), polled.size(), waits ? kLookMs : clients_.empty() ? -1 : 100);
+            polled.push_back({client.asked ? -1 : client.fd, POLLIN, 0});  // nothing more is heard
+        const int at_most_ms = clients_.empty() ? -1 : 100;
+        ::poll(polled.data(), polled.size(), waits ? kLookMs : at_most_ms);
         for (std::size_t i = clients_.size(); i-- > 0;) {
             if (attend(clients_[i], polled[i + 2].revents != 0)) continue;
             ::close(clients_[i].fd);

@@ -39,7 +39,7 @@ class DirectStop {
     /// Listens. @param path of the socket; empty = none @param mark file to be removed with each
     /// stop, by which a loop would be resumed; empty = none
     /// @throws std::system_error
-    DirectStop(const std::string& path, std::string mark, const Access& access);
+    DirectStop(std::string path, std::string mark, const Access& access);
     ~DirectStop();
     DirectStop(const DirectStop&) = delete;
     DirectStop& operator=(const DirectStop&) = delete;

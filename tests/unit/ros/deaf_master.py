@@ -19,7 +19,8 @@ class DeafMaster(socketserver.ThreadingMixIn, SimpleXMLRPCServer):
 
     def _dispatch(self, method: str, params: Any) -> Any:
         if method == "registerPublisher":
-            print("asked", flush=True)
+            sys.stdout.write("asked\n")  # whole, whoever writes beside it
+            sys.stdout.flush()
             threading.Event().wait()
         if method == "registerService":
             self.node = params[3]
