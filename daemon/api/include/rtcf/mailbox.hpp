@@ -52,8 +52,10 @@ class MailboxBase {
 
    protected:
     explicit MailboxBase(Component* owner);
-    /// Returns once nobody is in a call any more.
-    ~MailboxBase() {
+    ~MailboxBase() = default;
+
+    /// Returns once nobody is in a call any more; while request and reply are still there.
+    void finish() {
         std::unique_lock lock(mutex_);
         open_ = false;
         changed_.notify_all();
@@ -145,7 +147,7 @@ class Mailbox final : public MailboxBase {
    public:
     /// @param owner the component, `this`
     explicit Mailbox(Component* owner) : MailboxBase(owner) {}
-    ~Mailbox() = default;
+    ~Mailbox() { finish(); }
 
     /// @name In update()
     /// @{

@@ -4,7 +4,9 @@
 
 #include <atomic>
 #include <future>
+#include <memory>
 #include <random>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -133,6 +135,27 @@ TEST(Mailbox, ItsEndLetsCallersGo) {
     ASSERT_TRUE(finds(*box));
     box.reset();
     EXPECT_EQ(asked.get().status, MailStatus::Ended);
+}
+
+// Of a component that is unloaded in the moment of its reply. To be run with AddressSanitizer.
+TEST(Mailbox, AReplyOutlivesTheMailboxForWhoTakesIt) {
+    const std::string text(200, 'x');  // has memory of its own
+    for (int i = 0; i < 200; ++i) {
+        Idle idle;
+        auto box = std::make_unique<Mailbox<int, std::string>>(&idle);
+        box->open();
+        auto asked = std::async(std::launch::async, [&to = *box] {
+            std::string reply;
+            const MailStatus status = to.call(1, reply, hours(1));
+            return std::pair(status, reply);
+        });
+        ASSERT_TRUE(eventually([&] { return box->request() != nullptr; }));
+        box->reply(text);
+        box->close();
+        box.reset();
+        const auto [status, reply] = asked.get();
+        EXPECT_EQ(reply, status == MailStatus::Answered ? text : std::string());
+    }
 }
 
 // Many callers, some of whom give up, while the loop ends and begins: each answer belongs to its
