@@ -6,8 +6,11 @@
 #include <ros/message_traits.h>
 #include <ros/serialization.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <sstream>
 #include <stdexcept>
+#include <vector>
 
 #include "rtcf/exact_text.hpp"
 #include "rtcf/port_type.hpp"
@@ -30,6 +33,33 @@ inline std::string joinLines(const std::string& lines) {
     return joined;
 }
 
+/// Bytes of a message. roscpp makes room for as many elements as a vector says it has, and then
+/// looks whether they are there: twelve bytes could take gigabytes.
+struct BoundedStream : ros::serialization::IStream {
+    using IStream::IStream;
+    template <typename T>
+    void next(T& value) {
+        deserialize(*this, value);
+    }
+    template <typename T>
+    BoundedStream& operator>>(T& value) {
+        deserialize(*this, value);
+        return *this;
+    }
+};
+
+/// Found by argument; everything but vectors roscpp deserialises, vectors' elements included.
+template <typename T, typename Allocator>
+void deserialize(BoundedStream& stream, std::vector<T, Allocator>& values) {
+    static const std::uint32_t least = std::max(1U, ros::serialization::serializationLength(T()));
+    BoundedStream ahead = stream;
+    std::uint32_t count = 0;
+    ros::serialization::deserialize(ahead, count);
+    if (std::uint64_t{count} * least > ahead.getLength())
+        throw std::length_error("fewer bytes than the elements of a vector have");
+    ros::serialization::deserialize(stream, values);
+}
+
 }  // namespace detail
 
 template <typename T>
@@ -50,7 +80,7 @@ struct PortType<T, std::enable_if_t<ros::message_traits::IsMessage<T>::value>> {
     }
     static void deserialize(T& value, const std::uint8_t* from, std::uint32_t size) {
         // roscpp's stream takes a mutable pointer although it only reads.
-        ros::serialization::IStream stream(const_cast<std::uint8_t*>(from), size);
+        detail::BoundedStream stream(const_cast<std::uint8_t*>(from), size);
         ros::serialization::deserialize(stream, value);
         if (stream.getLength() != 0) throw std::length_error("bytes after the end of the message");
     }

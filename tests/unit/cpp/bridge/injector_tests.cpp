@@ -1,7 +1,9 @@
 #include "bridge/injector.hpp"
 
 #include <gtest/gtest.h>
+#include <std_msgs/Float64MultiArray.h>
 #include <std_msgs/String.h>
+#include <sys/resource.h>
 
 #include <atomic>
 #include <cstring>
@@ -48,6 +50,32 @@ TEST(Injector, CountsAndRefusesWhatIsLargerThanAllowed) {
     EXPECT_TRUE(injector.adopt(LoopClock{}));
     const auto* slot = static_cast<const Slot<std_msgs::String>*>(injector.front());
     EXPECT_EQ(slot->value.data, "hi");
+}
+
+// In KiB: the most that was ever present.
+long mostMemory() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_maxrss;
+}
+
+// A length is only a number until the bytes are there.
+TEST(Injector, MakesNoRoomForWhatIsNotThere) {
+    constexpr long kLittle = 16 * 1024;  // KiB
+    Injector numbers("/x", typeInfo<std_msgs::Float64MultiArray>());
+    std::vector<std::uint8_t> bytes(12);
+    const std::uint32_t dimensions = 8U << 20U;  // of 40 bytes each: 320 MiB
+    std::memcpy(bytes.data(), &dimensions, sizeof dimensions);
+    long before = mostMemory();
+    EXPECT_FALSE(numbers.deliver(bytes.data(), 12));
+    EXPECT_LT(mostMemory() - before, kLittle);
+
+    bytes.assign(12, 0);
+    const std::uint32_t count = 1U << 29U;  // times 8 bytes is 0 in 32 bits: 4 GiB of "valid" zeros
+    std::memcpy(bytes.data() + 8, &count, sizeof count);
+    before = mostMemory();
+    EXPECT_FALSE(numbers.deliver(bytes.data(), 12));
+    EXPECT_LT(mostMemory() - before, kLittle);
 }
 
 TEST(Injector, GivesTheNewestOfSeveral) {
