@@ -63,6 +63,21 @@ void nameThreads(const std::set<int>& before) {
     }
 }
 
+// The URIs of the nodes whose messages on a topic arrive in this process.
+std::vector<std::string> connectedPublishers(MasterClient& node, const std::string& topic) {
+    std::vector<std::string> uris;
+    MasterAnswer answer = node.call("getBusInfo", texts({"/master"}));
+    if (!answer || answer.value.getType() != XmlRpc::XmlRpcValue::TypeArray) return uris;
+    for (int i = 0; i < answer.value.size(); ++i) {
+        // Number, the other node, direction, transport, topic, and more.
+        XmlRpc::XmlRpcValue& link = answer.value[i];
+        if (static_cast<std::string&>(link[2]) == "i" &&
+            static_cast<std::string&>(link[4]) == topic)
+            uris.push_back(static_cast<std::string&>(link[1]));
+    }
+    return uris;
+}
+
 }  // namespace
 
 RoscppNode::RoscppNode(NodeName name, ShutdownRequest on_shutdown_request,
@@ -132,13 +147,22 @@ std::string RoscppNode::uri() const { return ros::XMLRPCManager::instance()->get
 
 std::uint32_t RoscppNode::port() const { return ros::XMLRPCManager::instance()->getServerPort(); }
 
-// As the master itself does when publishers come and go.
-void RoscppNode::connect(const std::string& topic, const XmlRpc::XmlRpcValue& publishers) {
+// As the master itself does when publishers come and go. It may have done so since it gave this
+// answer: whoever is connected stays, until it says otherwise.
+void RoscppNode::connect(const std::string& topic, const XmlRpc::XmlRpcValue& publishers) const {
+    if (publishers.size() == 0) return;
     constexpr auto kTimeout = std::chrono::milliseconds(1000);
     const std::atomic<bool> never{false};
+    const MasterAddress here{"127.0.0.1", port()};
     XmlRpc::XmlRpcValue update = texts({"/master", topic, ""});
     update[2] = publishers;
-    MasterClient({"127.0.0.1", port()}, kTimeout, never).call("publisherUpdate", update);
+    MasterClient asking(here, kTimeout, never);
+    for (const std::string& uri : connectedPublishers(asking, topic)) {
+        int i = 0;
+        while (i < update[2].size() && static_cast<std::string&>(update[2][i]) != uri) ++i;
+        update[2][i] = uri;
+    }
+    MasterClient(here, kTimeout, never).call("publisherUpdate", update);
 }
 
 void RoscppNode::stop() {

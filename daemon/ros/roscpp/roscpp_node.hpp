@@ -70,7 +70,7 @@ class RoscppNode {
     void stop();
 
    private:
-    void connect(const std::string& topic, const XmlRpc::XmlRpcValue& publishers);
+    void connect(const std::string& topic, const XmlRpc::XmlRpcValue& publishers) const;
 
     NodeName name_;
     ShutdownRequest on_shutdown_request_;
