@@ -113,22 +113,23 @@ Reconciled ParameterMirror::reconcile(ParallelCalls& master, const Caller& calle
         for (const Component& component : components) {
             const std::string& name = component.set->full_name;
             // While the loop is asked, nobody knows which value is to hold.
-            if (pending_->asked.count(name) != 0) continue;
+            if (pending_->asked.count(name) != 0 || owed_.count(name) != 0) continue;
             present.push_back(component);
             if (pending_->refused.count(name) != 0) refused.push_back(component);
         }
     }
+    const Reconciled owing = owed_.empty() ? Reconciled::Done : Reconciled::Later;
     Reconciled result = Reconciled::Done;
     // Before it is read again, and asked for again.
     if (!refused.empty()) {
-        if (!write(master, caller, refused, result)) return result;
+        if (!write(master, caller, refused, result)) return result & owing;
         const std::lock_guard lock(pending_->mutex);
         for (const Component& component : refused) {
             pending_->refused.erase(component.set->full_name);
             known_[component.set->full_name].others.clear();
         }
     }
-    if (!read(master, caller, present, result)) return result;
+    if (!read(master, caller, present, result)) return result & owing;
     {
         const std::lock_guard lock(pending_->mutex);
         const auto waits = [this](const Component& component) {
@@ -138,7 +139,7 @@ Reconciled ParameterMirror::reconcile(ParallelCalls& master, const Caller& calle
         present.erase(std::remove_if(present.begin(), present.end(), waits), present.end());
     }
     write(master, caller, present, result);
-    return result;
+    return result & owing;
 }
 
 // @return false if nothing more is to be done in this turn
@@ -200,13 +201,14 @@ void ParameterMirror::take(XmlRpc::XmlRpcValue& values, const Component& compone
             continue;
         }
         const auto before = known.values.find(name);
-        if (before == known.values.end() || before->second != *found) {
+        if (before == known.values.end() || !sameValue(before->second, *found)) {
             known.others[name] = values[name];
             known.ours.erase(name);
         }
         known.values[name] = *found;
-        const bool was_given = first && component.is_new && value != declaration.default_value;
-        if (*found != value && !was_given) batch.emplace_back(name, *std::move(found));
+        const bool was_given =
+            first && component.is_new && !sameValue(value, declaration.default_value);
+        if (!sameValue(*found, value) && !was_given) batch.emplace_back(name, *std::move(found));
     }
     if (!batch.empty() && follows_) ask(set.full_name, std::move(batch));
 }
@@ -245,7 +247,7 @@ bool ParameterMirror::write(ParallelCalls& master, const Caller& caller,
                 continue;
             }
             const auto found = known.values.find(name);
-            if (found != known.values.end() && found->second == parameter.value) continue;
+            if (found != known.values.end() && sameValue(found->second, parameter.value)) continue;
             if (calls.size() == kMost) {
                 result = result & Reconciled::Again;
                 break;
@@ -277,8 +279,8 @@ bool ParameterMirror::write(ParallelCalls& master, const Caller& caller,
 void ParameterMirror::leave(ParallelCalls& master, const Caller& caller,
                             const std::set<std::string>& components,
                             std::chrono::steady_clock::time_point deadline) {
-    std::vector<MasterCall> calls = std::exchange(owed_, {});
     for (const std::string& component : components) {
+        std::vector<MasterCall>& calls = owed_[component];
         {
             const std::lock_guard lock(pending_->mutex);
             pending_->written.erase(component);
@@ -298,9 +300,15 @@ void ParameterMirror::leave(ParallelCalls& master, const Caller& caller,
         }
         known_.erase(known);
     }
+    std::vector<std::string> of;
+    std::vector<MasterCall> calls;
+    for (auto& [component, owed] : std::exchange(owed_, {})) {
+        of.insert(of.end(), owed.size(), component);
+        calls.insert(calls.end(), owed.begin(), owed.end());
+    }
     const std::vector<MasterAnswer> answers = master.run(calls, kEach, deadline);
     for (std::size_t i = 0; i < answers.size(); ++i) {
-        if (answers[i].silent()) owed_.push_back(std::move(calls[i]));
+        if (answers[i].silent()) owed_[of[i]].push_back(std::move(calls[i]));
     }
 }
 

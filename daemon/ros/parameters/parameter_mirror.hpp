@@ -85,7 +85,9 @@ class ParameterMirror {
     executor::ParameterRequest request_;
     bool follows_ = true;
     std::map<std::string, Known> known_;  // by component
-    std::vector<MasterCall> owed_;        // of components that left, not answered yet
+    // What the master is still to be told of components that left, before anything of others of
+    // their names.
+    std::map<std::string, std::vector<MasterCall>> owed_;
     std::shared_ptr<Pending> pending_ = std::make_shared<Pending>();
 };
 

@@ -48,7 +48,7 @@ void Reconfiguring::setSets(const Sets& sets) {
                 const ParameterDeclaration& other = set->parameters[i].declaration;
                 if (one.name != other.name || one.type != other.type ||
                     one.minimum != other.minimum || one.maximum != other.maximum ||
-                    one.default_value != other.default_value || one.doc != other.doc ||
+                    !sameValue(one.default_value, other.default_value) || one.doc != other.doc ||
                     one.unit != other.unit || !sameChoices(one.choices, other.choices))
                     return false;
             }
@@ -110,12 +110,14 @@ void Reconfiguring::allow(bool allowed) {
 }
 
 void Reconfiguring::forget() {
-    {
-        const std::lock_guard lock(mutex_);
-        met_ = false;
-        new_.clear();
-    }
+    unmeet();
     mirror_.forget();
+}
+
+void Reconfiguring::unmeet() {
+    const std::lock_guard lock(mutex_);
+    met_ = false;
+    new_.clear();
 }
 
 void Reconfiguring::closeAll(ParallelCalls& master, const ParameterMirror::Caller& caller,
@@ -127,7 +129,7 @@ void Reconfiguring::closeAll(ParallelCalls& master, const ParameterMirror::Calle
     }
     for (const auto& [component, server] : closing) server->close();
     mirror_.leaveAll(master, caller, deadline);
-    forget();
+    unmeet();
 }
 
 std::string Reconfiguring::problem() const {

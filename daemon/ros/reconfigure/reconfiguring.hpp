@@ -70,6 +70,8 @@ class Reconfiguring {
    private:
     using Servers = std::map<std::string, std::shared_ptr<ReconfigureServer>>;
 
+    /// Components that come from now on are new to a master that comes then.
+    void unmeet();
     void run();
 
     executor::ParameterRequest request_;

@@ -1,0 +1,87 @@
+// The mirror of parameters, by hand, at a real master.
+#include "ros/parameters/parameter_mirror.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "ros_fixture.hpp"
+
+namespace {
+
+using rtcf::executor::ParameterSet;
+using rtcf::ros1::MasterAddress;
+using rtcf::ros1::MasterCall;
+using rtcf::ros1::ParallelCalls;
+using rtcf::ros1::ParameterMirror;
+using rtcf::ros1::texts;
+
+class ParameterMirrorTest : public RosFixture {
+   protected:
+    void SetUp() override {
+        startMaster();
+        std::string host;
+        ASSERT_TRUE(rtcf::ros1::splitMasterUri(masterUri(), host, address_.port));
+        address_.address = host;
+        master_calls_ = std::make_unique<ParallelCalls>(address_, never_);
+    }
+    ParallelCalls& calls() { return *master_calls_; }
+    static ParameterMirror::Component component(double value) {
+        auto set = std::make_shared<ParameterSet>();
+        set->full_name = "/C";
+        rtcf::ParameterDeclaration declaration;
+        declaration.name = "kp";
+        declaration.type = "double";
+        declaration.default_value = 1.0;
+        set->parameters.push_back({declaration, value});
+        return {set, true};
+    }
+    std::vector<rtcf::ros1::MasterAnswer> ask(const char* method,
+                                              const XmlRpc::XmlRpcValue& arguments) {
+        return calls().run({MasterCall{method, arguments}}, 1000ms,
+                           std::chrono::steady_clock::now() + 1s);
+    }
+    const ParameterMirror::Caller caller_{"/mirror", "http://127.0.0.1:1"};
+
+   private:
+    const std::atomic<bool> never_{false};
+    MasterAddress address_;
+    std::unique_ptr<ParallelCalls> master_calls_;
+};
+
+// What is owed to the master of a component that left must not be said of one that came since.
+TEST_F(ParameterMirrorTest, OwesNothingOfAComponentThatIsBack) {
+    ParameterMirror mirror;
+    mirror.serve([](const std::string&, rtcf::executor::ParameterBatch,
+                    const std::function<void(const std::string&)>& done) { done({}); });
+    mirror.reconcile(calls(), caller_, {component(2.0)});
+    ASSERT_TRUE(ask("getParam", texts({"/test", "/C/kp"}))[0]);
+    // Replaced, while the master is too slow to hear of it.
+    mirror.leave(calls(), caller_, {"/C"}, std::chrono::steady_clock::now() - 1s);
+    mirror.reconcile(calls(), caller_, {component(3.0)});
+    for (int turn = 0; turn < 3; ++turn) {
+        mirror.leave(calls(), caller_, {}, std::chrono::steady_clock::now() + 1s);
+        mirror.reconcile(calls(), caller_, {component(3.0)});
+    }
+    EXPECT_TRUE(ask("getParam", texts({"/test", "/C/kp"}))[0]) << "it was deleted";
+}
+
+// NaN is a value that a default may have; that it does not equal itself is no change.
+TEST_F(ParameterMirrorTest, AsksForNoNaNThatIsThere) {
+    constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+    int asked = 0;
+    ParameterMirror mirror;
+    mirror.serve([&](const std::string&, rtcf::executor::ParameterBatch,
+                     const std::function<void(const std::string&)>& done) {
+        ++asked;
+        done({});
+    });
+    auto limit = component(kNaN);
+    limit.is_new = false;
+    mirror.reconcile(calls(), caller_, {limit});
+    mirror.reconcile(calls(), caller_, {limit});
+    mirror.noteWritten("/C/other");
+    mirror.reconcile(calls(), caller_, {limit});
+    EXPECT_EQ(asked, 0);
+}
+
+}  // namespace
