@@ -164,7 +164,8 @@ class Builder {
 
     void unbind(InputBase* input) {
         Binding binding = present(input);
-        if (binding.source_owner == nullptr) return;  // never had a writer
+        // Never had a writer, nor a value that a snapshot has brought.
+        if (binding.source_owner == nullptr && binding.kept_owner == nullptr) return;
         if (binding.writer != nullptr)
             adoption_.rewires.push_back({input, nullptr, nullptr, false});
         binding.writer = nullptr;

@@ -17,6 +17,12 @@ const StateDeclaration* find(const Component& component, const std::string& name
 
 }  // namespace
 
+std::size_t bytesOf(const std::vector<StateCopy>& copies) {
+    std::size_t bytes = 0;
+    for (const StateCopy& copy : copies) bytes += copy.size;
+    return bytes;
+}
+
 void planHandOver(const Component& previous, const Component& successor,
                   std::vector<StateCopy>& copies, std::vector<std::string>& notes) {
     const std::string& name = successor.fullName();

@@ -22,6 +22,9 @@ struct StateCopy {
     void copy() const noexcept { std::memcpy(to, from, size); }
 };
 
+/// Of all of them.
+std::size_t bytesOf(const std::vector<StateCopy>& copies);
+
 /// What of a component's state is copied to one that takes its place: by name and type.
 /// Appends to `copies`, and to `notes` one line for each state that does not go over.
 void planHandOver(const Component& previous, const Component& successor,

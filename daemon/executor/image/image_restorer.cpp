@@ -28,6 +28,7 @@ ImageRestorer::ImageRestorer(const RunnerImage& image, const Plan& plan)
         }
     }
     for (const auto& [name, injector] : plan.injectors) readers_[injector.get()];
+    requireTimes();
     fitEach(
         {}, "component", image.components, plan.graph.nodes(),
         [](const GraphNode& node) { return node.instance->fullName(); },
@@ -55,6 +56,28 @@ void ImageRestorer::fitEach(const std::string& of, const char* kind, const From&
     }
     for (const auto& [left, each] : there)
         problem(fmt::format("there is no {} {}{}", kind, of, left));
+}
+
+// What components compute with must be times that a loop can have.
+void ImageRestorer::requireTimes() const {
+    constexpr std::int64_t kLongest = INT64_MAX / 2;
+    constexpr std::int64_t kLastStamp = 4'294'967'295'999'999'999;  // of a ros::Time
+    const auto is = [](std::int64_t time, std::int64_t most) { return time >= 0 && time <= most; };
+    const auto isElapsed = [&](std::int64_t elapsed) {
+        return is(elapsed, kLongest) && elapsed != 0 && elapsed % image_.period_ns == 0;
+    };
+    const auto isTurn = [&](const ImageComponent& component) {
+        return is(component.updated_ns + 1, kLongest) && is(component.elapsed_ns, kLongest);
+    };
+    const ClockImage& clock = image_.clock;
+    if (is(clock.time_ns, kLongest) && is(clock.stamp_ns, kLastStamp) &&
+        is(clock.total_elapsed_ns, kLongest) && isElapsed(clock.elapsed_ns) &&
+        std::all_of(image_.components.begin(), image_.components.end(), isTurn))
+        return;
+    throw Refusal(RefusalKind::InvalidArgument,
+                  fmt::format("the snapshot of {} has a clock that no loop has (time {} ns, stamp "
+                              "{} ns, elapsed {} ns): it has been changed; take another one",
+                              image_.runner, clock.time_ns, clock.stamp_ns, clock.elapsed_ns));
 }
 
 void ImageRestorer::requireFit() const {
@@ -179,6 +202,10 @@ void ImageRestorer::fitInput(const ImageInput& image, InputBase& input, const st
     Restoration::Input to{&input, {nullptr, nullptr, image.seen, image.kept_is_new}};
     const auto binding = plan_.bindings.find(&input);
     const bool was_bound = binding != plan_.bindings.end();
+    if (source.empty() && image.seen != 0 && !image.left) {
+        problem(fmt::format("input {} has seen values of what has gone, and none is in it", name));
+        return;
+    }
     if (source.empty() && (image.left || was_bound)) {
         auto left = image.left ? slotFrom(type, *image.left, name) : type.make_slot(nullptr);
         restoration_.headers.push_back(left.get());
@@ -224,8 +251,9 @@ void ImageRestorer::fitTopics() {
 }
 
 std::shared_ptr<SlotHeader> ImageRestorer::slotFrom(const TypeInfo& type, const ImageValue& value,
-                                                    const std::string& name) {
-    std::shared_ptr<SlotHeader> slot = type.make_slot(nullptr);
+                                                    const std::string& name,
+                                                    const SlotHeader* sample) {
+    std::shared_ptr<SlotHeader> slot = type.make_slot(sample);
     const auto* const bytes = reinterpret_cast<const std::uint8_t*>(value.bytes.data());
     bool valid = false;
     if (type.fixed_size) {
@@ -242,9 +270,10 @@ std::shared_ptr<SlotHeader> ImageRestorer::slotFrom(const TypeInfo& type, const 
 
 void ImageRestorer::restoreTo(SlotHeader* to, const TypeInfo& type, const ImageValue& value,
                               const std::string& name) {
-    restoration_.values.push_back({&type, to, slotFrom(type, value, name)});
+    const SlotHeader* const sample = outputs_.at(name).second;
+    restoration_.values.push_back({&type, to, slotFrom(type, value, name, sample)});
     restoration_.headers.push_back(to);
-    if (!type.fixed_size) reserved_[to] = {name, outputs_.at(name).second};
+    if (!type.fixed_size) reserved_[to] = {name, sample};
 }
 
 void ImageRestorer::requireReserved() const {

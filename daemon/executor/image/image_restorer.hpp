@@ -27,8 +27,7 @@ class ImageRestorer {
 
     /// To be applied at a boundary.
     Restoration& restoration() noexcept { return restoration_; }
-    /// Requires that nothing is larger than what its component has reserved, so that copying it
-    /// allocates nothing. @throws Refusal
+    /// Requires that nothing is larger than what its component has reserved. @throws Refusal
     void requireReserved() const;
     /// Parameters that are to change, and the cycles of their every() in which components run.
     const std::map<Instance*, Batch>& parameters() const noexcept { return parameters_; }
@@ -48,12 +47,15 @@ class ImageRestorer {
     template <typename From, typename To, typename Name, typename Fit>
     void fitEach(const std::string& of, const char* kind, const From& from, const To& to, Name name,
                  Fit fit);
+    /// @param sample what has the room that the slot is to have, if any
     std::shared_ptr<SlotHeader> slotFrom(const TypeInfo& type, const ImageValue& value,
-                                         const std::string& name);
+                                         const std::string& name,
+                                         const SlotHeader* sample = nullptr);
     void restoreTo(SlotHeader* to, const TypeInfo& type, const ImageValue& value,
                    const std::string& name);
     void problem(std::string text) { problems_.push_back(std::move(text)); }
     void requireFit() const;
+    void requireTimes() const;
 
     const RunnerImage& image_;
     const Plan& plan_;

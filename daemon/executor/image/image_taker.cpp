@@ -17,6 +17,13 @@ ImageValue valueFrom(const Capture::Value& value) {
             std::string(value.bytes.begin(), value.bytes.begin() + value.length)};
 }
 
+// What an input goes on to read whose source is no more; null if it had none.
+const SlotHeader* leftBy(const Binding& binding) {
+    if (binding.writer != nullptr) return nullptr;
+    if (binding.source != nullptr || binding.source_owner == nullptr) return binding.source;
+    return static_cast<const Injector*>(binding.source_owner.get())->front();
+}
+
 }  // namespace
 
 Sources::Sources(const Plan& plan) : plan_(plan) {
@@ -68,9 +75,7 @@ ImageTaker::ImageTaker(const Plan& plan) : plan_(plan), sources_(plan) {
             capture_.inputs.push_back({input});
             const auto binding = plan.bindings.find(input);
             if (binding == plan.bindings.end()) continue;
-            // What has gone leaves its last value.
-            if (binding->second.writer == nullptr)
-                add(input->type(), binding->second.source, nullptr);
+            add(input->type(), leftBy(binding->second), nullptr);
             add(input->type(), binding->second.kept, nullptr);
         }
     }
@@ -111,8 +116,8 @@ ImageInput ImageTaker::inputOf(const InputBase& input, const InputBase::Reading&
     image.reads_source = reading.current == reading.source;
     const auto binding = plan_.bindings.find(&input);
     if (binding == plan_.bindings.end()) return image;
-    if (binding->second.writer == nullptr && binding->second.source != nullptr)
-        image.left = valueAt(binding->second.source);
+    if (const SlotHeader* const left = leftBy(binding->second); left != nullptr)
+        image.left = valueAt(left);
     if (image.reads_source || reading.current != binding->second.kept) return image;
     image.kept_of = sources_.output(reading.current);
     if (image.kept_of.empty()) image.kept = valueAt(reading.current);

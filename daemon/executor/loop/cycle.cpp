@@ -289,8 +289,7 @@ bool Cycle::restore(Restoration& restoration) noexcept {
         return false;
     }
     for (const StateCopy& state : restoration.states) state.copy();
-    for (const Restoration::Value& value : restoration.values)
-        value.type->copy(*value.to, *value.from);
+    for (const Restoration::Value& value : restoration.values) value.put();
     const ClockImage& image = restoration.clock;
     const std::int64_t later = restoration.sets_time ? 0 : clock_.time_ns - image.time_ns;
     for (SlotHeader* header : restoration.headers) header->time_ns += later;

@@ -82,6 +82,8 @@ class Cycle {
     void makeSafe(std::int64_t time_ns) noexcept;
     /// Takes the newest values from outside.
     void feed() noexcept RTCF_NONBLOCKING;
+    /// The time before the first cycle, from which a snapshot's values count back.
+    void setTime(std::int64_t time_ns) noexcept RTCF_NONBLOCKING { clock_.time_ns = time_ns; }
     /// What elapsed() says to components from the next cycle on, whole periods.
     void setElapsed(std::int64_t elapsed_ns) noexcept RTCF_NONBLOCKING {
         clock_.elapsed_ns = elapsed_ns;

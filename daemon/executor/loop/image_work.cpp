@@ -24,6 +24,15 @@ bool Capture::Value::take() noexcept {
     return true;
 }
 
+void Restoration::Value::put() const noexcept {
+    if (type->fixed_size) {
+        type->copy(*to, *from);
+        return;
+    }
+    type->exchange(*to, *from);
+    *to = *from;
+}
+
 std::size_t Capture::bytes() const {
     std::size_t bytes = (inputs.size() + turns.size()) * kLine;
     for (const StateCopy& state : states) bytes += lines(state.size);

@@ -75,7 +75,10 @@ struct Restoration {
     struct Value {
         const TypeInfo* type;
         SlotHeader* to;
-        std::shared_ptr<const SlotHeader> from;
+        std::shared_ptr<SlotHeader> from;  ///< with the room that `to` has
+
+        /// Real-time safe. What was there is then `from`'s, if it has memory of its own.
+        void put() const noexcept;
     };
     struct Input {
         InputBase* input;

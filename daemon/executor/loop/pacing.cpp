@@ -34,6 +34,7 @@ std::uint64_t Loop::step(std::uint64_t cycles) noexcept {
     Log::setRealtimeThread(true);
     for (; done < cycles && goesOn(); ++done) {
         cycle_.run(nextStep(), 0);
+        cycle_.setElapsed(cycle_.clock().period_ns);  // also if a snapshot said otherwise
     }
     Log::setRealtimeThread(false);
     return done;
@@ -58,7 +59,9 @@ Source* Loop::source() const noexcept {
 }
 
 void Loop::followRealTime() noexcept {
-    std::int64_t deadline = monotonicNow() + cycle_.clock().period_ns;
+    const std::int64_t now = monotonicNow();
+    cycle_.setTime(now);
+    std::int64_t deadline = now + cycle_.clock().period_ns;
     std::int64_t end = 0;
     while (goesOn()) {
         Source* const device = source();

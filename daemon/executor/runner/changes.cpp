@@ -115,14 +115,12 @@ std::vector<std::string> Runner::adopt(Change change, const Progress& progress) 
     return std::move(change.notes);
 }
 
-void Runner::handOver(Change& change, const Instance& previous, const Instance& successor) {
+void Runner::handOver(Change& change, const Instance& previous, const Instance& successor) const {
     HandOver hand_over{&successor.component(), &previous.component(), {}};
     planHandOver(previous.component(), successor.component(), hand_over.states, change.notes);
-    std::size_t bytes = 0;
-    for (const StateCopy& state : hand_over.states) bytes += state.size;
-    for (const HandOver& other : change.hand_overs) {
-        for (const StateCopy& state : other.states) bytes += state.size;
-    }
+    std::size_t bytes = bytesOf(hand_over.states);
+    for (const HandOver& other : change.hand_overs) bytes += bytesOf(other.states);
+    requireSmall(bytes, "the state to hand over");
     if (bytes > kLargestState) {
         throw Refusal(RefusalKind::StateTooLarge,
                       fmt::format("{} bytes of state are to be handed over at once, {} at most: "
@@ -323,6 +321,7 @@ ChangeOutcome Runner::reset(const std::string& name) {
     Change change;
     change.graph = plan_->graph;
     change.copies = planReset(component);
+    requireSmall(bytesOf(change.copies), "the reset");
     adopt(std::move(change), [](const std::string&) {});
     return outcome(name);
 }

@@ -23,10 +23,14 @@ constexpr std::size_t kToldComponents = 5;
 
 }  // namespace
 
+std::size_t Runner::mostAtOnce() const {
+    if (!loop_.inRealTime()) return SIZE_MAX;
+    return static_cast<std::size_t>(kLargestImage * settings_.loop.period_ns / kItsPeriod);
+}
+
 void Runner::requireSmall(std::size_t bytes, const char* what) const {
-    if (!loop_.inRealTime()) return;
-    const std::int64_t most = kLargestImage * settings_.loop.period_ns / kItsPeriod;
-    if (static_cast<std::int64_t>(bytes) <= most) return;
+    const std::size_t most = mostAtOnce();
+    if (bytes <= most) return;
     throw Refusal(
         RefusalKind::ResourceExhausted,
         fmt::format("{} touches {} bytes in one cycle of {}, at most {} at {:g} Hz: stop the loop, "
@@ -90,7 +94,6 @@ ChangeOutcome Runner::restore(const RunnerImage& image, const Progress& progress
     requireSmall(restorer.restoration().bytes(), "the snapshot");
     if (loop_.inRealTime()) restorer.requireReserved();
     const bool begins = !loop_.joinable() && state_ != RunnerState::Stepping;
-    if (begins) pause(progress);
     restorer.restoration().sets_time = !loop_.joinable();
 
     Change change;
@@ -98,6 +101,7 @@ ChangeOutcome Runner::restore(const RunnerImage& image, const Progress& progress
     change.restoration = &restorer.restoration();
     std::vector<std::pair<Instance*, std::vector<ParameterValue>>> values;
     std::vector<std::pair<Instance*, std::uint32_t>> phases;
+    bool begun = false;
     try {
         for (const auto& [instance, batch] : restorer.parameters()) {
             values.emplace_back(instance, instance->parameterValues());
@@ -109,17 +113,20 @@ ChangeOutcome Runner::restore(const RunnerImage& image, const Progress& progress
             phases.emplace_back(instance, instance->phase());
             instance->setPhase(phase);
         }
+        // The last that can be refused, as it starts what is stopped.
+        if (begins) pause(progress);
+        begun = begins;
         adopt(std::move(change), progress);
     } catch (...) {
         for (auto& [instance, before] : values) instance->restoreParameterValues(before);
         for (const auto& [instance, phase] : phases) instance->setPhase(phase);
-        if (begins) endStepping();
+        if (begun) endStepping();
         throw;
     }
     restorer.noteIn(*plan_);
     ChangeOutcome result = outcome();
     if (begins) {
-        result.notes.push_back(
+        result.notes.emplace_back(
             "the loop is paused as after a step: rtcfctl step goes on from the snapshot, rtcfctl "
             "start begins anew");
     }

@@ -162,7 +162,8 @@ std::vector<std::string> Runner::states(const std::string& name) {
     StatePicture picture(plan_->graph.get(name).instance->component());
     Adoption look;
     look.copies = picture.copies();
-    if (look.copies.empty()) return {};
+    // A look makes no loop wait.
+    if (look.copies.empty() || bytesOf(look.copies) > mostAtOnce()) return {};
     if (!loop_.adopt(look, kProbeTimeout + 2 * settings_.loop.period_ns)) return {};
     return picture.texts();
 }

@@ -79,7 +79,8 @@ struct RunnerEvent {
     std::string message;
     std::string component;
     std::uint64_t iteration = 0;
-    std::vector<std::string> parameters = {};  ///< that were changed, other than by a request
+    /// Those that were changed, other than by a request.
+    std::vector<std::string> parameters = {};  // NOLINT(readability-redundant-member-init): gcc's
     NumberedState state = {};                  ///< when it happened
 };
 
@@ -232,6 +233,8 @@ class Runner final : private RunnerView {
     const GraphNode* nodeOf(const Component* component) const noexcept;
     void beginStepping(std::int64_t stamp_ns = 0);
     void pause(const Progress& progress);
+    /// Bytes that may be copied at one boundary.
+    std::size_t mostAtOnce() const;
     void requireSmall(std::size_t bytes, const char* what) const;
     void endStepping();
     ReplayOutcome beginReplay(const ReplayChunk& chunk, const Progress& progress);
@@ -246,7 +249,7 @@ class Runner final : private RunnerView {
     /// @return notes on what was handed over @throws Refusal and others; nothing has changed then
     std::vector<std::string> adopt(Change change, const Progress& progress);
     /// Has a component take another's place, with its state.
-    static void handOver(Change& change, const Instance& previous, const Instance& successor);
+    void handOver(Change& change, const Instance& previous, const Instance& successor) const;
     /// Of a change that the loop has: makes it known.
     void adopted(const Change& change);
     void startAll(const Progress& progress);
@@ -297,7 +300,7 @@ class Runner final : private RunnerView {
     std::int64_t sizes_due_ns_ = 0;
 
     // Published for queries.
-    std::atomic<NumberedState> numbered_state_{};
+    std::atomic<NumberedState> numbered_state_;
     mutable std::mutex published_mutex_;
     std::shared_ptr<const GraphSnapshot> snapshot_ = std::make_shared<GraphSnapshot>();
     RunnerPicture picture_;

@@ -60,9 +60,9 @@ struct AbiProbe {
         add({sizeof(TypeInfo), offsetof(TypeInfo, name), offsetof(TypeInfo, size),
              offsetof(TypeInfo, ros_type), offsetof(TypeInfo, fixed_size),
              offsetof(TypeInfo, plain), offsetof(TypeInfo, make_slot), offsetof(TypeInfo, copy),
-             offsetof(TypeInfo, length), offsetof(TypeInfo, serialize),
-             offsetof(TypeInfo, deserialize), offsetof(TypeInfo, print),
-             offsetof(TypeInfo, finite)});
+             offsetof(TypeInfo, exchange), offsetof(TypeInfo, length),
+             offsetof(TypeInfo, serialize), offsetof(TypeInfo, deserialize),
+             offsetof(TypeInfo, print), offsetof(TypeInfo, finite)});
         using Declaration = ParameterDeclaration;
         add({sizeof(ParameterBase), sizeof(ParameterValue), sizeof(Declaration),
              offsetof(Declaration, name), offsetof(Declaration, type),

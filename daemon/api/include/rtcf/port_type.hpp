@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 
 #include "rtcf/finite.hpp"
 #include "rtcf/slot.hpp"
@@ -43,6 +44,8 @@ struct TypeInfo {
     /// Copies value and header. Real-time safe for fixed-size types, and for
     /// others as long as the target's capacity suffices.
     void (*copy)(SlotHeader& to, const SlotHeader& from);
+    /// Exchanges the values, not the headers, of two slots. Real-time safe.
+    void (*exchange)(SlotHeader& a, SlotHeader& b);
     /// Serialised length in bytes. Real-time safe.
     std::uint32_t (*length)(const SlotHeader& slot);
     /// Writes length() bytes. Real-time safe.
@@ -105,6 +108,12 @@ bool deserializeSlot(SlotHeader& slot, const std::uint8_t* from, std::uint32_t s
 }
 
 template <typename T>
+void exchangeSlots(SlotHeader& a, SlotHeader& b) {
+    using std::swap;
+    swap(static_cast<Slot<T>&>(a).value, static_cast<Slot<T>&>(b).value);
+}
+
+template <typename T>
 bool finiteSlot(const SlotHeader& slot) {
     return isFinite(static_cast<const Slot<T>&>(slot).value);
 }
@@ -136,6 +145,7 @@ const TypeInfo& typeInfo() {
                                PortType<T>::kFixedSize,
                                &detail::makeSlot<T>,
                                &detail::copySlot<T>,
+                               &detail::exchangeSlots<T>,
                                &detail::slotLength<T>,
                                &detail::serializeSlot<T>,
                                &detail::deserializeSlot<T>,

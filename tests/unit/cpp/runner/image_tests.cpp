@@ -378,6 +378,120 @@ TEST_F(Image, OfWhatWasTakenOutIsRefused) {
     restore(before);
 }
 
+// A cycle that came late has an elapsed() of its own; the steps after it have not.
+TEST_F(Image, AfterAMissedCycleStepsHaveOnePeriodEach) {
+    load(definition("Spinner", "S"));
+    step(5);
+    RunnerImage image = take();
+    image.clock.elapsed_ns = 3 * image.period_ns;  // as of a loop that had just missed two
+    const double before = value("/S", "periods");
+    restore(image);
+    step(11);
+    EXPECT_EQ(value("/S", "periods"), before + 3.0 + 10.0);
+}
+
+// A topic that is taken away leaves its last value, and so does its image.
+TEST_F(Image, KeepsWhatATopicLeft) {
+    configure([](RunnerSettings& settings) { settings.whitelist = "/outside"; });
+    ComponentDefinition relay = definition("Relay", "P");
+    relay.remaps = {{"in", "/outside"}};
+    load(relay);
+    const double number = 0.25;
+    std::uint8_t bytes[sizeof number];
+    std::memcpy(bytes, &number, sizeof number);
+    bridge().injector("/outside")->deliver(bytes, sizeof bytes);
+    step(3);
+    configure([](RunnerSettings& settings) { settings.whitelist = ""; });
+    step(1);
+    ASSERT_EQ(value("/P", "out"), 1.25);
+    const RunnerImage image = take();
+    const auto expectOld = [&](const char* where) {
+        restore(image);
+        step(1);
+        EXPECT_EQ(value("/P", "out"), 1.25) << where;
+        EXPECT_EQ(value("/P", "status"), static_cast<double>(DataStatus::Old)) << where;
+    };
+    expectOld("in the runner that it was taken of");
+    replace("/P", relay);
+    expectOld("in an input that never had a writer");
+}
+
+// To be run with AddressSanitizer: the input's value is freed by the next change.
+TEST_F(Image, AKeptValueOutlivesTheNextChange) {
+    ComponentDefinition ticker = definition("Ticker", "W");
+    ticker.remaps = {{"out", "/w"}};
+    load(ticker);
+    ComponentDefinition relay = definition("Relay", "P");
+    relay.remaps = {{"in", "/w"}};
+    load(relay);
+    step(4);
+    const double kept = value("/P", "out");
+    configure([](RunnerSettings& settings) { settings.whitelist = "/w"; });
+    unload("/W");  // P turns to the topic, on which nothing comes,
+    configure([](RunnerSettings& settings) { settings.whitelist = ""; });  // which then goes too
+    const RunnerImage image = take();
+    replace("/P", relay);
+    restore(image);
+    step(1);
+    ASSERT_EQ(value("/P", "out"), kept);
+    for (const char* name : {"X", "Y", "Z"}) {  // its memory is used again
+        ComponentDefinition other = definition("Ticker", name);
+        other.remaps = {{"out", std::string("/") + name}};
+        load(other);
+    }
+    step(1);
+    EXPECT_EQ(value("/P", "out"), kept);
+}
+
+// Fewer bytes on the wire are not less memory: here a dimension that nothing is reserved for. The
+// sanitizer of the cycle says whether it allocates.
+TEST_F(Image, OfAnotherShapeAllocatesNothingInTheCycle) {
+    loadRing();
+    RunnerImage image = take();
+    const auto word = [](std::uint32_t number) {
+        return std::string(reinterpret_cast<const char*>(&number), sizeof number);
+    };
+    const std::string other =
+        word(1) + word(0) + word(0) + word(0) + word(0) + word(2) + std::string(16, '\0');
+    image.components[0].outputs[3].value.bytes = other;
+    start();
+    ASSERT_TRUE(runs());
+    restore(image);
+    stop();
+    restore(image);
+    EXPECT_EQ(take().components[0].outputs[3].value.bytes, other);
+}
+
+TEST_F(Image, WithAClockThatIsNoneIsRefused) {
+    loadRing();
+    step(5);
+    const RunnerImage image = take();
+    for (const auto& change : std::vector<std::function<void(RunnerImage&)>>{
+             [](RunnerImage& other) { other.clock.elapsed_ns = 0; },
+             [](RunnerImage& other) { other.clock.elapsed_ns = -1; },
+             [](RunnerImage& other) { other.clock.time_ns = INT64_MIN; },
+             [](RunnerImage& other) { other.clock.time_ns = INT64_MAX; },
+             [](RunnerImage& other) { other.clock.total_elapsed_ns = INT64_MIN; },
+             // More seconds than a ros::Time has: whoever publishes the cycle would throw.
+             [](RunnerImage& other) { other.clock.stamp_ns = 5'000'000'000'000'000'000; }}) {
+        RunnerImage other = image;
+        change(other);
+        expectRefused(other, "clock");
+    }
+}
+
+// What a stopped runner refuses runs no hook of its components.
+TEST_F(Image, ThatIsRefusedStartsNothing) {
+    load(definition("Recorder", "C"));
+    RunnerImage image = take();
+    for (auto& [name, value] : image.components[0].parameters) {
+        if (name == "gain") value = 50.0;  // above its maximum
+    }
+    const std::uint32_t before = runner().numberedState().number;
+    EXPECT_NE(refusal([&] { restore(image); }), "");
+    EXPECT_EQ(runner().numberedState().number, before) << "it was started, made safe and stopped";
+}
+
 TEST_F(Image, FileThatIsNotAsItWasWrittenIsRefused) {
     loadRing();
     step(5);
