@@ -127,6 +127,13 @@ void RosFixture::startNode() {
     node_->configure(settings);
 }
 
+bool RosFixture::nodeEnds() {
+    constexpr auto kHangs = 40s;  // the node's own bound is two, on a machine that has time for it
+    const auto begin = std::chrono::steady_clock::now();
+    stopNode();
+    return std::chrono::steady_clock::now() - begin < kHangs;
+}
+
 void RosFixture::serve(const std::vector<Source*>& outputs, const std::vector<Sink*>& inputs) {
     auto table = std::make_shared<rtcf::executor::BridgeTable>();
     for (const Source* source : outputs) table->outputs.push_back(source->tap());

@@ -93,6 +93,8 @@ class RosFixture : public ::testing::Test {
     /// Starts the node with this master.
     void startNode();
     void stopNode() { node_.reset(); }
+    /// Ends the node. @return false if it took as long as only waiting for a master does
+    bool nodeEnds();
     rtcf::ros1::RosNode& rosNode() { return *node_; }
     void serve(const std::vector<Source*>& outputs, const std::vector<Sink*>& inputs);
 

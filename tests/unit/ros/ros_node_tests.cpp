@@ -3,6 +3,7 @@
 #include <ros/node_handle.h>
 #include <std_msgs/Int32.h>
 
+#include <atomic>
 #include <csignal>
 #include <thread>
 
@@ -11,13 +12,16 @@
 
 class RosNodeTest : public RosFixture {};
 
+// Until then the resolver below has no answer.
+std::atomic<bool> resolver_answers{false};
+
 // Takes the place of the C library's: asked for this name, it is as slow as resolvers can be.
 extern "C" int getaddrinfo(const char* node, const char* service, const addrinfo* hints,
                            addrinfo** found) {
     using Function = int (*)(const char*, const char*, const addrinfo*, addrinfo**);
     static const auto real = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "getaddrinfo"));
     if (node != nullptr && std::string(node) == "slow.example") {
-        std::this_thread::sleep_for(10s);
+        while (!resolver_answers) std::this_thread::sleep_for(10ms);
         return EAI_NONAME;
     }
     return real(node, service, hints, found);
@@ -351,9 +355,7 @@ TEST_F(RosNodeTest, EndsSoonWithoutAMaster) {
     startNode();
     serve({&source}, {});
     ASSERT_TRUE(eventually([&] { return reported("no ROS master"); }));
-    const auto begin = std::chrono::steady_clock::now();
-    stopNode();
-    EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
+    EXPECT_TRUE(nodeEnds());
 }
 
 TEST_F(RosNodeTest, EndsSoonAfterItsMasterHasGone) {
@@ -364,9 +366,7 @@ TEST_F(RosNodeTest, EndsSoonAfterItsMasterHasGone) {
     serve({&source}, {&sink});
     ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
     stopMaster();
-    const auto begin = std::chrono::steady_clock::now();
-    stopNode();
-    EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
+    EXPECT_TRUE(nodeEnds());
 }
 
 TEST_F(RosNodeTest, EndsSoonWithAMasterThatHangs) {
@@ -377,11 +377,15 @@ TEST_F(RosNodeTest, EndsSoonWithAMasterThatHangs) {
     serve({&source}, {&sink});
     ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
     master().signal(SIGSTOP);
-    Source other("/other");
-    serve({&other}, {});
-    const auto begin = std::chrono::steady_clock::now();
-    stopNode();
-    EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
+    // To wait for the master because of each would take a minute.
+    std::vector<std::unique_ptr<Source>> sources;
+    std::vector<Source*> others;
+    for (int i = 0; i < 60; ++i) {
+        sources.push_back(std::make_unique<Source>("/other" + std::to_string(i)));
+        others.push_back(sources.back().get());
+    }
+    serve(others, {});
+    EXPECT_TRUE(nodeEnds());
 }
 
 // The process must end too, which roscpp's exit handler would prevent.
@@ -391,9 +395,7 @@ TEST_F(RosNodeTest, EndsSoonWithAMasterThatHangsInACall) {
     startNode();
     serve({&source}, {});
     ASSERT_EQ(master().line(10s).value_or(""), "asked");
-    const auto begin = std::chrono::steady_clock::now();
-    stopNode();
-    EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
+    EXPECT_TRUE(nodeEnds());
 }
 
 TEST_F(RosNodeTest, LeavesNothingAtASlowMaster) {
@@ -416,11 +418,14 @@ TEST_F(RosNodeTest, LeavesNothingAtASlowMaster) {
         [&] { return run({"rosnode", "info", name}).find("/in19") != std::string::npos; }));
     // As a graph that is torn down does, at once before the end.
     serve({}, {});
-    const auto begin = std::chrono::steady_clock::now();
     stopNode();
-    EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
-    EXPECT_EQ(run({"rosnode", "list"}).find(name), std::string::npos);
-    EXPECT_FALSE(reported("may be left"));
+    // One after the other would take longer than there is time.
+    int most_at_once = 0;
+    while (const auto line = master().line(100ms)) most_at_once = std::stoi(*line);
+    EXPECT_GE(most_at_once, 4);
+    // On a machine that is too busy for all, it is said.
+    const bool left = run({"rosnode", "list"}).find(name) != std::string::npos;
+    EXPECT_TRUE(!left || reported("may be left"));
 }
 
 TEST_F(RosNodeTest, SaysWhatItHadToLeaveAtAMasterThatHangs) {
@@ -447,9 +452,8 @@ TEST_F(RosNodeTest, AwaitsNoSlowResolver) {
         return rosNode().status().problem.find("'slow.example' has no address") !=
                std::string::npos;
     }));
-    const auto begin = std::chrono::steady_clock::now();
-    stopNode();
-    EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
+    EXPECT_TRUE(nodeEnds());
+    resolver_answers = true;
 }
 
 TEST_F(RosNodeTest, LeavesNothingAtTheMaster) {
