@@ -168,6 +168,8 @@ async def _release(runners: Runners, runner: Runner, hold: HoldTerms) -> None:
         return
 
     async def work() -> None:
+        # Whoever has started it since has started what ends now.
+        runner.loop.stop()
         runner.desired.let_go()
         await runner.restart_in_turn()
         await runner.save()

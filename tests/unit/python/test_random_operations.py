@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, Phase, given, seed, settings
+from hypothesis import HealthCheck, Phase, example, given, seed, settings
 from hypothesis import strategies as st
 from rtcf.v1 import control_pb2, runner_pb2
 from rtcfd.runners import held_runners, leases
@@ -227,13 +227,17 @@ def drawn(number: int) -> Any:
             deadline=None,
             database=None,
             suppress_health_check=health,
-            phases=[Phase.generate, Phase.shrink],
+            phases=[Phase.explicit, Phase.generate, Phase.shrink],
         )(test)
         return seed(SEED)(test)
 
     return decorate
 
 
+# A start that comes while a launch's runner is being given back.
+@example(  # type: ignore[misc]
+    sequence=[(("HoldRunner", "rt_runner"), 3, 0), (("Start", "rt_runner"), "waits", 0)]
+)
 @drawn(40)  # type: ignore[misc]
 def test_random_sequences_keep_what_is_promised(
     place: Path, machine: Machine, sequence: list[Any]
