@@ -132,7 +132,7 @@ class _Line:
             types = client.list_types(self._given[-1]).types
             yield from (str(each.type) for each in types)
         elif source in ("NAME:=VALUE", "FROM:=TO", "PORT") and len(self._given) > 1:
-            yield from _declared(client, *self._given[-2:], source)
+            yield from _declared(client, self._given[-2], self._given[-1], source)
         elif source == "COMPONENT.PORT":
             for component in client.list_components(runner):
                 name = component.full_name.removeprefix("/")
