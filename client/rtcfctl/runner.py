@@ -128,7 +128,7 @@ def _take(message: Any, field: str, value: Any) -> None:
 def _settings_options(to: argparse.ArgumentParser) -> None:
     switch = argparse.BooleanOptionalAction
     add_quantity(to, "--frequency", "frequency_hz", "cycles a second, e.g. 2kHz")
-    to.add_argument("--cpu", type=int, metavar="N", help="CPU of the loop; -1: the last free one")
+    to.add_argument("--cpu", type=int, metavar="N", help="CPU of the loop; -1: one with few loops")
     add_quantity(to, "--priority", "priority", "of SCHED_FIFO; the default is that at 1 kHz")
     add_quantity(to, "--spin", "spin_us", "busy wait before each deadline, e.g. 30us")
     to.add_argument(

@@ -8,6 +8,8 @@
 #include <cstddef>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <sstream>
 #include <system_error>
 
 namespace rtcf::executor {
@@ -40,23 +42,46 @@ void keepThreadsOff(int cpu, int except) {
     }
 }
 
+std::vector<int> byPreference(const std::vector<int>& cpus, const std::string& isolated) {
+    std::vector<int> found(cpus.rbegin(), cpus.rend());
+    std::stable_partition(found.begin(), found.end(), [&isolated](int cpu) {
+        std::istringstream ranges(isolated);
+        for (std::string range; std::getline(ranges, range, ',');) {
+            std::istringstream numbers(range);
+            int first = 0;
+            int last = 0;
+            char dash = 0;
+            if (!(numbers >> first)) continue;
+            if (!(numbers >> dash >> last)) last = first;
+            if (cpu >= first && cpu <= last) return true;
+        }
+        return false;
+    });
+    return found;
+}
+
 CpuClaim::CpuClaim(int wanted, std::string names) : names_(std::move(names)) {
-    if (wanted >= 0) {
-        take(wanted);
-        return;
+    constexpr int kMost = 100;  // loops of one CPU that are counted
+    std::vector<int> cpus{wanted};
+    if (wanted < 0) {
+        std::string isolated;
+        std::getline(std::ifstream("/sys/devices/system/cpu/isolated"), isolated);
+        cpus = byPreference(processCpus(), isolated);
     }
-    const std::vector<int>& cpus = processCpus();
-    if (std::any_of(cpus.rbegin(), cpus.rend(), [this](int cpu) { return take(cpu); })) return;
-    if (!cpus.empty()) cpu_ = cpus.back();
+    for (int place = 0; place < kMost; ++place) {
+        if (std::any_of(cpus.begin(), cpus.end(), [&](int cpu) { return take(cpu, place); }))
+            return;
+    }
+    if (!cpus.empty()) cpu_ = cpus.front();
 }
 
 CpuClaim::~CpuClaim() {
     if (fd_ >= 0) ::close(fd_);
 }
 
-bool CpuClaim::take(int cpu) {
-    cpu_ = cpu;
-    const std::string name = names_ + "-" + std::to_string(cpu);
+bool CpuClaim::take(int cpu, int place) {
+    std::string name = names_ + "-" + std::to_string(cpu);
+    if (place > 0) name += "-" + std::to_string(place);
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     // A zero, then the name: it stands in no folder.
@@ -69,6 +94,8 @@ bool CpuClaim::take(int cpu) {
         return false;
     }
     fd_ = fd;
+    cpu_ = cpu;
+    place_ = place;
     return true;
 }
 

@@ -1,7 +1,7 @@
 /// @file
-/// The CPU of a real-time loop. Loops on one CPU would wait for each other: one that may choose
-/// takes a CPU that no other loop of this machine has, and each knows whether it is alone. Not
-/// real-time; graph thread.
+/// The CPU of a real-time loop. Loops on one CPU wait for each other: one that may choose takes a
+/// CPU that no other loop of this machine has, or else one of those that the fewest have, and knows
+/// whether it was alone there when it came. Not real-time; graph thread.
 #pragma once
 
 #include <sched.h>
@@ -14,14 +14,18 @@ namespace rtcf::executor {
 /// The CPUs that this process was started with, in order. Threads of it may have fewer since.
 const std::vector<int>& processCpus();
 
+/// CPUs for a loop that may choose, the best first: those that are isolated (nothing else is
+/// scheduled there), then the others, each from the last on: the first ones serve interrupts.
+/// @param isolated as in /sys/devices/system/cpu/isolated: "2-3,6"
+std::vector<int> byPreference(const std::vector<int>& cpus, const std::string& isolated);
+
 /// Keeps all threads of this process off a CPU where there is another one, but for one thread.
 /// Threads that are made later by those inherit it. @param except 0 = none
 void keepThreadsOff(int cpu, int except);
 
 class CpuClaim {
    public:
-    /// @param wanted -1 = the last CPU of this process that no other loop has; the last, if each
-    /// has one
+    /// @param wanted -1 = of all CPUs of this process the best of those with the fewest loops
     /// @param names in the abstract namespace of sockets, which the kernel clears when a process
     /// ends, however it does
     explicit CpuClaim(int wanted, std::string names = "rtcf-loop-cpu");
@@ -30,14 +34,15 @@ class CpuClaim {
     CpuClaim& operator=(const CpuClaim&) = delete;
 
     int cpu() const noexcept { return cpu_; }
-    /// No other loop has this CPU.
-    bool alone() const noexcept { return fd_ >= 0; }
+    /// No other loop had this CPU before.
+    bool alone() const noexcept { return place_ == 0; }
 
    private:
-    bool take(int cpu);
+    bool take(int cpu, int place);
 
     std::string names_;
     int cpu_ = -1;
+    int place_ = -1;  // among the loops of that CPU; -1 = nobody knows
     int fd_ = -1;
 };
 

@@ -22,7 +22,7 @@ Settings = TypeVar("Settings", runner_pb2.RunnerSettings, runner_pb2.RosSettings
 _DOUBLE = FieldDescriptor.CPPTYPE_DOUBLE
 # Of the units in names of settings.
 _SUFFIXES = {"Hz": "hz", "µs": "us", "ms": "ms", "s": "s", "KiB": "kb"}
-LAST_CPU = -1  # the last one that is allowed
+LAST_CPU = -1  # one of those with the fewest loops, the last ones first
 _LEVELS_PER_OCTAVE = 2  # of SCHED_FIFO: 53 at 0.1 Hz, 91 at 50 kHz
 ORPHAN_TIMEOUT_S = quantities.RUNNER["orphan_timeout_s"].default
 # A private rtcfd takes its executors with it, however it ends.

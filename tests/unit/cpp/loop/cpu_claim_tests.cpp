@@ -26,9 +26,29 @@ TEST(CpuClaim, SpreadsLoopsOverTheCpus) {
     }
     EXPECT_EQ(taken.size(), loops.size());
     EXPECT_EQ(loops.front()->cpu(), processCpus().back()) << "the first has the last";
-    const CpuClaim late(-1, names());
-    EXPECT_FALSE(late.alone());
-    EXPECT_EQ(late.cpu(), processCpus().back());
+    // And again, one for each.
+    taken.clear();
+    for (std::size_t i = 0; i < processCpus().size(); ++i) {
+        loops.push_back(std::make_unique<CpuClaim>(-1, names()));
+        EXPECT_FALSE(loops.back()->alone());
+        taken.insert(loops.back()->cpu());
+    }
+    EXPECT_EQ(taken.size(), processCpus().size());
+    // Where one has gone there are the fewest.
+    const int left = loops.back()->cpu();
+    loops.pop_back();
+    EXPECT_EQ(CpuClaim(-1, names()).cpu(), left);
+}
+
+TEST(CpuClaim, PrefersCpusThatAreIsolatedAndThenTheLast) {
+    const std::vector<int> cpus{0, 1, 2, 3, 5, 12};
+    using Order = std::vector<int>;
+    EXPECT_EQ(byPreference(cpus, ""), (Order{12, 5, 3, 2, 1, 0}));
+    EXPECT_EQ(byPreference(cpus, "1-2"), (Order{2, 1, 12, 5, 3, 0}));
+    EXPECT_EQ(byPreference(cpus, "0,4-5,7"), (Order{5, 0, 12, 3, 2, 1}));
+    EXPECT_EQ(byPreference(cpus, "2,"), (Order{2, 12, 5, 3, 1, 0}));
+    EXPECT_EQ(byPreference(cpus, "(null)"), (Order{12, 5, 3, 2, 1, 0}));
+    EXPECT_TRUE(byPreference({}, "1").empty());
 }
 
 TEST(CpuClaim, ThatEndsIsFreeAgain) {
