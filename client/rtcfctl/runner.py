@@ -26,7 +26,7 @@ _FIELDS = ("frequency_hz", "cpu", "priority", "spin_us", "spin_auto", "max_overr
            "warmup_cycles", "stall_timeout_ms", "orphan_timeout_s", "lock_memory", "heap_kb",
            "stack_kb", "max_clock_jump_s", "log_limit")  # fmt: skip
 _ROS_FIELDS = ("enabled", "master_uri", "hostname", "ns", "whitelist", "blacklist", "queue",
-               "latch", "decimation", "decimate", "largest_message_kb",
+               "latch", "decimation", "decimate", "stamped", "largest_message_kb",
                "refuse_out_of_range")  # fmt: skip
 
 
@@ -220,6 +220,12 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
         dest="ros_decimate",
         metavar="REGEX",
         help="published connections that --decimation holds for (default: .*)",
+    )
+    to.add_argument(
+        "--stamped",
+        dest="ros_stamped",
+        metavar="REGEX",
+        help="published numbers and bools that go with the time of their cycle in a header",
     )
     add_quantity(
         to, "--largest-message", "ros_largest_message_kb", "of variable size, in both directions"

@@ -3,6 +3,7 @@
 introspection_peer.py cycles TOPIC COUNT      prints `connected`, then iteration, stamp, latency
                                               and duration (ns) of so many cycles
 introspection_peer.py info TOPIC COUNT        the same of RTCF 2021's messages: stamp and duration
+introspection_peer.py stamped TOPIC COUNT     stamp (ns) and value of so many rtcf_msgs/Int32Stamped
 introspection_peer.py diagnostics NAME LEVEL  prints all statuses, until that name has that level:
                                               name|level|message|key=value|...
 """
@@ -14,16 +15,17 @@ from typing import Any
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
-from rtcf_msgs.msg import Cycle, IterationInfo
+from rtcf_msgs.msg import Cycle, Int32Stamped, IterationInfo
 
 _POLL_S = 0.01
 _DEADLINE_S = 60.0
-_KINDS = {"cycles": Cycle, "info": IterationInfo}
+_KINDS = {"cycles": Cycle, "info": IterationInfo, "stamped": Int32Stamped}
 _TEXT = {
     Cycle: lambda each: (
         f"{each.iteration} {each.header.stamp.to_nsec()} {each.latency_ns} {each.duration_ns}"
     ),
     IterationInfo: lambda each: f"{each.stamp.to_nsec()} {each.duration_ns}",
+    Int32Stamped: lambda each: f"{each.header.stamp.to_nsec()} {each.data}",
 }
 
 

@@ -1,6 +1,7 @@
 """What ROS peers see of a loop besides its topics, and what they may ask of it."""
 
 import itertools
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,7 +13,7 @@ import yaml
 from daemon_process import BUILD_TREE, DEADLINE_S, Daemon, wait_for, with_ros
 from ros_processes import Master
 from rtcf.v1 import runner_pb2
-from values import iteration
+from values import iteration, state
 
 PEER = Path(__file__).with_name("introspection_peer.py")
 SERVICES = {
@@ -103,6 +104,39 @@ def test_every_cycle_is_published_with_stamp_and_duration(
     assert all(duration > 0 for _, _, _, duration in cycles)
     # RTCF 2021's has the time at which the cycle began.
     assert infos == [[stamp + latency, duration] for _, stamp, latency, duration in cycles]
+
+
+def test_a_stamped_number_has_the_time_of_the_cycle_that_wrote_it(
+    daemon: Daemon, client: rtcf.Client, master: Master
+) -> None:
+    done = daemon.ctl(
+        *("runner", "set", "--frequency", "500", "--whitelist", "/c/.*", "--stamped", "/c/out")
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert state(client).settings.ros.stamped == "/c/out"
+    client.load(rtcf.component("rtcf_test", "Counter", name="counter", ns="/c"))
+    _wait_for_services(master)
+    peers = [
+        _peer(master, "cycles", "/rt_runner/cycles", "1000"),
+        _peer(master, "stamped", "/c/out", "1000"),
+    ]
+    for peer in peers:
+        assert peer.stdout is not None
+        assert peer.stdout.readline() == "connected\n"
+    client.start()
+    cycles, values = ([list(map(int, line.split())) for line in _lines(peer)] for peer in peers)
+    assert values == [[stamp, iteration + 1] for iteration, stamp, _, _ in cycles]
+    # As a person looks: the value where it is in a message of std_msgs, and its time.
+    for field in ("data", "header/stamp", "header/seq"):
+        shown = subprocess.run(
+            ["/usr/bin/rostopic", "echo", "-n1", f"/c/out/{field}"],
+            env=_environment(master),
+            capture_output=True,
+            text=True,
+            timeout=DEADLINE_S,
+            check=True,
+        )
+        assert re.search("[1-9]", shown.stdout), f"{field}: {shown.stdout}"
 
 
 def test_rostopic_knows_the_types_of_the_cycles(daemon: Daemon, master: Master) -> None:

@@ -182,6 +182,7 @@ def test_what_was_latched_before_there_was_a_master_is_not_lost(tmp_path: Path) 
         ("--largest-message", "65537", ["largest message of 65537", "65536 KiB"]),
         ("--latch", "(a", ["latch", "'(a'"]),
         ("--decimate", "(a", ["decimate", "'(a'"]),
+        ("--stamped", "(a", ["stamped", "'(a'"]),
         ("--namespace", "/a b", ["namespace", "/a b"]),
     ],
 )

@@ -61,6 +61,8 @@ private parameters:
   ros_latch                regular expression: topics whose last message late subscribers get
   ros_decimation, ros_decimate
                            of the topics that match, publish each n-th value (default: 1, .*)
+  ros_stamped              regular expression: topics of numbers and bools that have a header with
+                           the time of the cycle
   ros_largest_message_kB   of types of variable size, in both directions (default: 256)
   sim_time                 follow /clock: auto (default: if /use_sim_time), never, always
   max_clock_jump           a clock that goes further in one tick begins anew, in s (default: 10)

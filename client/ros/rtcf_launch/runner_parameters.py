@@ -32,7 +32,7 @@ _NAMES = (
     *("lock_memory", "safe_heap_size_kB", "safe_stack_size_kB", "cpu_affinity_mask", "cpu"),
     *("priority", "spin", "realtime", "stall_timeout", "warmup_cycles", "on_crash"),
     *("daemon", "on_fault", "ros_latch", "ros_decimation", "ros_decimate"),
-    *("ros_largest_message_kB", "sim_time", "max_clock_jump"),
+    *("ros_stamped", "ros_largest_message_kB", "sim_time", "max_clock_jump"),
 )
 
 
@@ -79,6 +79,7 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
     put("latch", given.text("ros_latch"), settings.ros)
     put("decimation", given.integer("ros_decimation", *_whole("decimation", ROS)), settings.ros)
     put("decimate", given.text("ros_decimate"), settings.ros)
+    put("stamped", given.text("ros_stamped"), settings.ros)
     largest = given.integer("ros_largest_message_kB", *_whole("largest_message_kb", ROS))
     put("largest_message_kb", largest, settings.ros)
     put("sim_time", _value(_SIM_TIME, given.word("sim_time", _SIM_TIME)))

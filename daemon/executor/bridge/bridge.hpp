@@ -60,6 +60,7 @@ struct BridgeSettings {
     std::string latch;           ///< outputs whose last value late subscribers get; an expression
     std::uint32_t decimation = 1;                ///< each n-th value of an output is published,
     std::string decimate = ".*";                 ///< if its name matches this expression
+    std::string stamped;                         ///< scalar outputs that go with the cycle's time
     std::uint32_t largest_message = 256 * 1024;  ///< of a type of variable size, bytes
     Right peers = Right::Observe;                ///< what peers may do, who are strangers
     bool refuse_out_of_range = false;  ///< what peers ask for; else it is brought into the range

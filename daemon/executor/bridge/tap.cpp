@@ -13,9 +13,9 @@ Tap::Tap(std::string topic, const TypeInfo& type, std::shared_ptr<const SlotHead
       passed_over_(UINT32_MAX - 1),  // the first value is taken
       largest_(type.fixed_size ? SIZE_MAX : largest) {
     // Of a value of its own: the loop may be writing the source's.
-    const std::size_t one = kAlign + padded(type_.length(*type_.make_slot(nullptr)));
+    const std::size_t one = kHead + padded(type_.length(*type_.make_slot(nullptr)));
     // A power of two, so that a place in the ring is found without a division.
-    std::size_t size = kAlign;
+    std::size_t size = kHead;
     while (size < std::max(capacity, 2 * one)) size *= 2;
     ring_.resize(size);
     mask_ = size - 1;
@@ -27,7 +27,13 @@ std::uint32_t Tap::lengthAt(std::size_t offset) const noexcept {
     return length;
 }
 
-void Tap::push() noexcept RTCF_NONBLOCKING {
+std::int64_t Tap::stampAt(std::size_t offset) const noexcept {
+    std::int64_t stamp_ns = 0;
+    std::memcpy(&stamp_ns, ring_.data() + offset + kAlign, sizeof stamp_ns);
+    return stamp_ns;
+}
+
+void Tap::push(std::int64_t stamp_ns) noexcept RTCF_NONBLOCKING {
     if (source_->sequence == last_sequence_) return;
     last_sequence_ = source_->sequence;
     if (++passed_over_ < decimation_.load(std::memory_order_relaxed)) return;
@@ -37,7 +43,7 @@ void Tap::push() noexcept RTCF_NONBLOCKING {
         too_large_.store(too_large_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
         return;
     }
-    const std::size_t record = kAlign + padded(length);
+    const std::size_t record = kHead + padded(length);
     std::size_t head = head_.load(std::memory_order_relaxed);
     const std::size_t free = mask_ + 1 - (head - tail_.load(std::memory_order_acquire));
     std::size_t offset = head & mask_;
@@ -53,7 +59,8 @@ void Tap::push() noexcept RTCF_NONBLOCKING {
         offset = 0;
     }
     std::memcpy(ring_.data() + offset, &length, sizeof length);
-    type_.serialize(*source_, ring_.data() + offset + kAlign, length);
+    std::memcpy(ring_.data() + offset + kAlign, &stamp_ns, sizeof stamp_ns);
+    type_.serialize(*source_, ring_.data() + offset + kHead, length);
     head_.store(head + record, std::memory_order_release);
 }
 

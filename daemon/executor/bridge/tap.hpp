@@ -39,12 +39,12 @@ class Tap {
     }
 
     /// Copies the source's value if it was written since the last call. Producer only; real-time
-    /// safe.
-    void push() noexcept RTCF_NONBLOCKING;
+    /// safe. @param stamp_ns of the cycle, ROS time
+    void push(std::int64_t stamp_ns) noexcept RTCF_NONBLOCKING;
 
-    /// Gives the oldest message's bytes to `use(const std::uint8_t*, std::uint32_t)` and removes
-    /// it. The bytes are valid during the call. Not by the producer; of two who come at once, one
-    /// finds nothing. @return false if the ring is empty
+    /// Gives the oldest message to `use(const std::uint8_t* bytes, std::uint32_t size, std::int64_t
+    /// stamp_ns)` and removes it. The bytes are valid during the call. Not by the producer; of two
+    /// who come at once, one finds nothing. @return false if the ring is empty
     template <typename Use>
     bool pop(Use&& use);
 
@@ -54,14 +54,17 @@ class Tap {
     std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
 
    private:
-    // A record is a length and its bytes, padded to kAlign. kSkip: the rest of the ring is empty.
+    // A record is a length, a stamp and the bytes, each padded to kAlign. kSkip for a length: the
+    // rest of the ring is empty.
     static constexpr std::size_t kAlign = 8;
+    static constexpr std::size_t kHead = 2 * kAlign;
     static constexpr std::uint32_t kSkip = 0xffffffffU;
 
     static constexpr std::size_t padded(std::size_t bytes) {
         return (bytes + kAlign - 1) / kAlign * kAlign;
     }
     std::uint32_t lengthAt(std::size_t offset) const noexcept;
+    std::int64_t stampAt(std::size_t offset) const noexcept;
 
     std::string topic_;
     const TypeInfo& type_;
@@ -94,8 +97,8 @@ bool Tap::pop(Use&& use) {
         offset = 0;
         length = lengthAt(0);
     }
-    use(static_cast<const std::uint8_t*>(ring_.data() + offset + kAlign), length);
-    tail_.store(tail + kAlign + padded(length), std::memory_order_release);
+    use(static_cast<const std::uint8_t*>(ring_.data() + offset + kHead), length, stampAt(offset));
+    tail_.store(tail + kHead + padded(length), std::memory_order_release);
     return true;
 }
 

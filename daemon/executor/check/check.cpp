@@ -47,10 +47,11 @@ class ValueSource final : public Bridge {
         for (const auto& tap : table_->outputs) {
             const TypeInfo& type = tap->type();
             const std::shared_ptr<SlotHeader> value = type.make_slot(nullptr);
-            while (tap->pop([&](const std::uint8_t* bytes, std::uint32_t size) {
-                if (type.deserialize(*value, bytes, size) && !type.finite(*value))
-                    not_finite_.insert(tap->topic());
-            })) {
+            while (tap->pop(
+                [&](const std::uint8_t* bytes, std::uint32_t size, std::int64_t /*stamp_ns*/) {
+                    if (type.deserialize(*value, bytes, size) && !type.finite(*value))
+                        not_finite_.insert(tap->topic());
+                })) {
             }
         }
     }

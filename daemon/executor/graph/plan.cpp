@@ -17,8 +17,8 @@ constexpr std::size_t kVariableTapValues = 2;  // of the largest
 constexpr std::size_t kLargestTap = 8 * 1024 * 1024;
 
 std::size_t tapCapacity(const TypeInfo& type, double frequency_hz, std::size_t largest) {
-    if (!type.fixed_size) return kVariableTapValues * (largest + 16);
-    const std::size_t record = 16 + type.length(*type.make_slot(nullptr));
+    if (!type.fixed_size) return kVariableTapValues * (largest + 24);
+    const std::size_t record = 24 + type.length(*type.make_slot(nullptr));
     const auto values =
         static_cast<std::size_t>(std::clamp(frequency_hz * kTapSeconds, 64.0, 16384.0));
     return std::min(record * values, kLargestTap);

@@ -83,7 +83,7 @@ void Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     }
     notes_.leaveComponents();
     if (exchanges_ && before != kAbandoned) {
-        for (Tap* tap : schedule.taps) tap->push();
+        for (Tap* tap : schedule.taps) tap->push(clock_.stamp_ns);
     }
     const std::int64_t duration = readCycleCounter() - begin;
     if (iteration >= warmup_cycles_) {
@@ -216,7 +216,7 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
         if (step.optional && step.context->disabled) continue;
         makeSafe(*step.component, *step.figures, OnBadOutput::GoOn);
     }
-    for (Tap* tap : schedule_->taps) tap->push();
+    for (Tap* tap : schedule_->taps) tap->push(clock_.stamp_ns);
     active_ = false;
 }
 
@@ -242,7 +242,7 @@ void Cycle::apply(Adoption& adoption) noexcept {
             if (!leaving.component->context().disabled)
                 makeSafe(*leaving.component, *leaving.figures, OnBadOutput::GoOn);
             for (const Latch& latch : leaving.latches) latch.copy();
-            for (Tap* tap : leaving.taps) tap->push();
+            for (Tap* tap : leaving.taps) tap->push(clock_.stamp_ns);
         }
     }
     std::for_each(new_inputs, adoption.rewires.end(), [](Rewire& each) { each.apply(); });

@@ -83,11 +83,12 @@ void Replay::inject(const RecordedMessage& message) {
 std::size_t Replay::takeOutputs(std::vector<RecordedMessage>& outputs) {
     std::size_t bytes = 0;
     for (const auto& tap : table_.outputs) {
-        while (tap->pop([&](const std::uint8_t* data, std::uint32_t size) {
-            outputs.push_back(
-                {tap->topic(), next_ns_, std::string(reinterpret_cast<const char*>(data), size)});
-            bytes += size;
-        })) {
+        while (
+            tap->pop([&](const std::uint8_t* data, std::uint32_t size, std::int64_t /*stamp_ns*/) {
+                outputs.push_back({tap->topic(), next_ns_,
+                                   std::string(reinterpret_cast<const char*>(data), size)});
+                bytes += size;
+            })) {
         }
     }
     return bytes;

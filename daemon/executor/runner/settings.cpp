@@ -65,6 +65,7 @@ void validate(RunnerSettings& settings) {
     requireRange("largest message", settings.bridge.largest_message / 1024, 1U, 64U * 1024, "KiB");
     (void)NamePattern("latch", settings.bridge.latch);
     (void)NamePattern("decimate", settings.bridge.decimate);
+    (void)NamePattern("stamped", settings.bridge.stamped);
     (void)NamePattern("whitelist", settings.whitelist);
     (void)NamePattern("blacklist", settings.blacklist);
 }

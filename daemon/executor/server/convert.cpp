@@ -280,6 +280,7 @@ RunnerSettings settingsFrom(const pb::RunnerSettings& message, RunnerSettings ba
     if (ros.has_latch()) base.bridge.latch = ros.latch();
     if (ros.has_decimation()) base.bridge.decimation = ros.decimation();
     if (ros.has_decimate()) base.bridge.decimate = ros.decimate();
+    if (ros.has_stamped()) base.bridge.stamped = ros.stamped();
     if (ros.has_largest_message_kb()) {
         // What does not fit is out of range anyway.
         base.bridge.largest_message =
@@ -324,6 +325,7 @@ pb::RunnerSettings settingsTo(const RunnerSettings& settings) {
     ros.set_latch(settings.bridge.latch);
     ros.set_decimation(settings.bridge.decimation);
     ros.set_decimate(settings.bridge.decimate);
+    ros.set_stamped(settings.bridge.stamped);
     ros.set_largest_message_kb(settings.bridge.largest_message / 1024);
     ros.set_peers(rightTo(settings.bridge.peers));
     ros.set_refuse_out_of_range(settings.bridge.refuse_out_of_range);

@@ -7,6 +7,28 @@
 
 namespace rtcf::ros1 {
 
+namespace {
+
+// What settings say of each topic.
+class Deliveries {
+   public:
+    explicit Deliveries(const executor::BridgeSettings& settings)
+        : queue_(settings.queue),
+          latched_("latch", settings.latch),
+          stamped_("stamped", settings.stamped) {}
+
+    Delivery of(const std::string& topic) const {
+        return {queue_, latched_.matches(topic), stamped_.matches(topic)};
+    }
+
+   private:
+    std::uint32_t queue_;
+    executor::NamePattern latched_;
+    executor::NamePattern stamped_;
+};
+
+}  // namespace
+
 Publishing::Publishing() {
     thread_ = quietThread("ros-publish", [this] { run(); });
 }
@@ -30,14 +52,14 @@ void Publishing::setTaps(Taps taps) {
 }
 
 void Publishing::prepare(const executor::BridgeSettings& settings) {
-    const executor::NamePattern latched("latch", settings.latch);
+    const Deliveries deliveries(settings);
     const std::lock_guard lock(mutex_);
     bool any = false;
     for (const auto& tap : taps_) {
         std::shared_ptr<TopicPublisher>& publisher = publishers_[tap->topic()];
         if (publisher != nullptr) continue;
-        publisher = std::make_shared<TopicPublisher>(tap->topic(), tap->type(), settings.queue,
-                                                     latched.matches(tap->topic()));
+        publisher = std::make_shared<TopicPublisher>(tap->topic(), tap->type(),
+                                                     deliveries.of(tap->topic()));
         any = true;
     }
     if (!any) return;
@@ -47,7 +69,7 @@ void Publishing::prepare(const executor::BridgeSettings& settings) {
 
 Reconciled Publishing::reconcile(ros::NodeHandle& handle,
                                  const executor::BridgeSettings& settings) {
-    const executor::NamePattern latched("latch", settings.latch);
+    const Deliveries deliveries(settings);
     std::vector<std::shared_ptr<TopicPublisher>> opening;
     std::vector<std::shared_ptr<TopicPublisher>> closing;
     {
@@ -56,16 +78,15 @@ Reconciled Publishing::reconcile(ros::NodeHandle& handle,
         for (const auto& tap : taps_) {
             // Several outputs may write one topic.
             if (wanted.count(tap->topic()) != 0) continue;
-            const bool latch = latched.matches(tap->topic());
+            const Delivery delivery = deliveries.of(tap->topic());
             const auto found = publishers_.find(tap->topic());
             if (found != publishers_.end() && found->second->serves(tap->type()) &&
-                found->second->queue() == settings.queue && found->second->latch() == latch) {
+                found->second->delivery() == delivery) {
                 wanted[tap->topic()] = found->second;
                 if (found->second->isDue()) opening.push_back(found->second);
                 continue;
             }
-            auto publisher =
-                std::make_shared<TopicPublisher>(tap->topic(), tap->type(), settings.queue, latch);
+            auto publisher = std::make_shared<TopicPublisher>(tap->topic(), tap->type(), delivery);
             if (found != publishers_.end()) publisher->inherit(*found->second);
             wanted[tap->topic()] = publisher;
             opening.push_back(std::move(publisher));
@@ -133,8 +154,9 @@ void Publishing::drain(const std::vector<Stream>& streams) {
     constexpr int kMost =
         1000;  // a tap that fills as fast as it is emptied must not starve the others
     for (const Stream& stream : streams) {
-        const auto use = [&stream](const std::uint8_t* bytes, std::uint32_t size) {
-            if (stream.publisher) stream.publisher->publish(bytes, size);
+        const auto use = [&stream](const std::uint8_t* bytes, std::uint32_t size,
+                                   std::int64_t stamp_ns) {
+            if (stream.publisher) stream.publisher->publish(bytes, size, stamp_ns);
         };
         for (int i = 0; i < kMost && stream.tap->pop(use); ++i) {
         }

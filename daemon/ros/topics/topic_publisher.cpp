@@ -8,17 +8,14 @@
 
 namespace rtcf::ros1 {
 
-TopicPublisher::TopicPublisher(std::string topic, const TypeInfo& type, std::uint32_t queue,
-                               bool latch)
+TopicPublisher::TopicPublisher(std::string topic, const TypeInfo& type, Delivery delivery)
     : topic_(std::move(topic)),
-      type_(type.ros_type),
-      md5_(type.ros_md5),
-      definition_(type.ros_definition),
-      queue_(queue),
-      latch_(latch) {}
+      type_{type.ros_type, type.ros_md5, type.ros_definition},
+      delivery_(delivery),
+      stamped_(delivery.stamped ? stampedType(type_.name) : nullptr) {}
 
 bool TopicPublisher::serves(const TypeInfo& type) const {
-    return type_ == type.ros_type && md5_ == type.ros_md5;
+    return type_.name == type.ros_type && type_.md5 == type.ros_md5;
 }
 
 bool TopicPublisher::isOpen() const {
@@ -45,9 +42,10 @@ void TopicPublisher::send(const std::uint8_t* bytes, std::size_t size) {
 }
 
 void TopicPublisher::open(ros::NodeHandle& handle) {
-    ros::AdvertiseOptions options(topic_, queue_, md5_, type_, definition_);
-    options.has_header = startsWithHeader(definition_);
-    options.latch = latch_;
+    const MessageType& type = stamped_ != nullptr ? *stamped_ : type_;
+    ros::AdvertiseOptions options(topic_, delivery_.queue, type.md5, type.name, type.definition);
+    options.has_header = startsWithHeader(type.definition);
+    options.latch = delivery_.latch;
     ros::Publisher publisher;
     std::string problem;
     try {
@@ -59,7 +57,8 @@ void TopicPublisher::open(ros::NodeHandle& handle) {
     const std::lock_guard lock(mutex_);
     publisher_ = publisher;
     if (publisher_ && !kept_.empty()) send(kept_.data(), kept_.size());
-    problem_ = problem.empty() ? "" : "cannot publish " + topic_ + " as " + type_ + ": " + problem;
+    problem_ =
+        problem.empty() ? "" : "cannot publish " + topic_ + " as " + type.name + ": " + problem;
     retry_.note(problem_.empty());
 }
 
@@ -67,15 +66,22 @@ bool TopicPublisher::isDue() const { return !isOpen() && retry_.due(); }
 
 void TopicPublisher::inherit(const TopicPublisher& before) {
     const std::scoped_lock lock(mutex_, before.mutex_);
-    if (latch_ && before.type_ == type_ && before.md5_ == md5_) kept_ = before.kept_;
+    if (delivery_.latch && before.type_.name == type_.name && before.type_.md5 == type_.md5 &&
+        before.stamped_ == stamped_)
+        kept_ = before.kept_;
 }
 
 void TopicPublisher::close() { shutDown(mutex_, publisher_); }
 
-void TopicPublisher::publish(const std::uint8_t* bytes, std::uint32_t size) {
+void TopicPublisher::publish(const std::uint8_t* bytes, std::uint32_t size, std::int64_t stamp_ns) {
     const std::lock_guard lock(mutex_);
+    if (stamped_ != nullptr) {
+        stampBytes(bytes, size, stamp_ns, message_);
+        bytes = message_.data();
+        size = static_cast<std::uint32_t>(message_.size());
+    }
     if (publisher_) send(bytes, size);
-    if (latch_) kept_.assign(bytes, bytes + size);
+    if (delivery_.latch) kept_.assign(bytes, bytes + size);
 }
 
 }  // namespace rtcf::ros1

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ros/roscpp/handles.hpp"
+#include "ros/topics/stamped_type.hpp"
 #include "rtcf/port_type.hpp"
 
 namespace ros {
@@ -18,17 +19,27 @@ class NodeHandle;
 
 namespace rtcf::ros1 {
 
+/// How subscribers get what is published.
+struct Delivery {
+    std::uint32_t queue = 0;  ///< messages kept for a slow one
+    bool latch = false;       ///< those that come later get the last message
+    bool stamped = false;     ///< a number or a bool goes with the time of its cycle
+
+    bool operator==(const Delivery& other) const {
+        return queue == other.queue && latch == other.latch && stamped == other.stamped;
+    }
+};
+
 /// Owned by Publishing. open() and close() speak to the master; publish()
 /// comes from another thread and never waits for them.
 class TopicPublisher {
    public:
-    /// @param latch whether subscribers that come later get the last message
-    TopicPublisher(std::string topic, const TypeInfo& type, std::uint32_t queue, bool latch);
+    /// @param type of the values it is given
+    TopicPublisher(std::string topic, const TypeInfo& type, Delivery delivery);
 
-    /// True if it takes messages of such a type.
+    /// True if it takes values of such a type.
     bool serves(const TypeInfo& type) const;
-    std::uint32_t queue() const { return queue_; }
-    bool latch() const { return latch_; }
+    const Delivery& delivery() const { return delivery_; }
     bool isOpen() const;
     /// It is to be opened: it is not yet, and has not failed just now. Watch thread.
     bool isDue() const;
@@ -44,21 +55,21 @@ class TopicPublisher {
 
     /// Sends one message. While it is closed none is sent; of a latched topic the last one is
     /// kept, and sent whenever it opens. The bytes are copied only for that, or for a subscriber.
-    void publish(const std::uint8_t* bytes, std::uint32_t size);
+    /// @param stamp_ns of the cycle, ROS time
+    void publish(const std::uint8_t* bytes, std::uint32_t size, std::int64_t stamp_ns);
 
    private:
     void send(const std::uint8_t* bytes, std::size_t size);
 
     std::string topic_;
-    std::string type_;
-    std::string md5_;
-    std::string definition_;
-    std::uint32_t queue_;
-    bool latch_;
-    mutable std::mutex mutex_;  // all below
+    MessageType type_;  // of the values
+    Delivery delivery_;
+    const MessageType* stamped_;  // null: the values are the messages
+    mutable std::mutex mutex_;    // all below
     std::string problem_;
     std::uint64_t lost_ = 0;
     std::vector<std::uint8_t> kept_;
+    std::vector<std::uint8_t> message_;  // that is being stamped
     ros::Publisher publisher_;
     Retry retry_;  // watch thread
 };

@@ -55,6 +55,7 @@ def defaults(
             ns="",
             latch="",
             decimate=".*",
+            stamped="",
             refuse_out_of_range=False,
             peers=peers,
         ),

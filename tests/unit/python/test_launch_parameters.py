@@ -44,6 +44,7 @@ def test_each_parameter_of_a_runner_is_a_setting() -> None:
             "ros_latch": "/l",
             "ros_decimation": 4,
             "ros_decimate": "/d",
+            "ros_stamped": "/s",
             "ros_largest_message_kB": 512,
             "sim_time": "never",
             "max_clock_jump": 2.5,
@@ -76,7 +77,8 @@ def test_each_parameter_of_a_runner_is_a_setting() -> None:
         max_clock_jump_s=2.5,
         ros=runner_pb2.RosSettings(
             whitelist="/a", blacklist="/b", queue=7,
-            latch="/l", decimation=4, decimate="/d", largest_message_kb=512,
+            latch="/l", decimation=4, decimate="/d", stamped="/s",
+            largest_message_kb=512,
         ),
     )  # fmt: skip
 

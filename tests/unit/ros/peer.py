@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """A ROS node on the other side of a test's topics; the test starts and ends it.
 
-peer.py listen TOPIC TYPE   prints the value of each message
+peer.py listen TOPIC TYPE   prints the value of each message, of a stamped one its stamp (ns) before
 peer.py send TOPIC VALUE    publishes one latched std_msgs/Float64 and stays
 peer.py node NAME           only has that name; ends when its master says so
 peer.py loggers NODE        does what rqt_logger_level does to a node, prints `done` and ends
@@ -15,11 +15,13 @@ from typing import Any
 import roscpp.srv
 import rospy
 import std_msgs.msg
+from roslib.message import get_message_class
 
 
 def show(message: Any) -> None:
     """Prints a message's value on a line of its own."""
-    print(message.data, flush=True)
+    stamp = f"{message.header.stamp.to_nsec()} " if message._has_header else ""
+    print(f"{stamp}{message.data}", flush=True)
 
 
 def look_at_loggers(node: str) -> None:
@@ -42,7 +44,7 @@ def main() -> None:
     else:
         rospy.init_node("peer", anonymous=True, disable_signals=True)
     if action == "listen":
-        rospy.Subscriber(argument, getattr(std_msgs.msg, sys.argv[3]), show, tcp_nodelay=True)
+        rospy.Subscriber(argument, get_message_class(sys.argv[3]), show, tcp_nodelay=True)
     if action == "send":
         publisher = rospy.Publisher(argument, std_msgs.msg.Float64, latch=True, queue_size=1)
         publisher.publish(float(sys.argv[3]))

@@ -43,11 +43,9 @@ RosFixture::~RosFixture() {
 }
 
 std::map<std::string, std::string> RosFixture::environment() const {
-    return {{"ROS_MASTER_URI", masterUri()},
-            {"ROS_IP", "127.0.0.1"},
-            {"ROS_HOME", folder_ / "home"},
-            {"ROS_LOG_DIR", folder_ / "log"},
-            {"PYTHONUNBUFFERED", "1"}};
+    return {{"ROS_MASTER_URI", masterUri()}, {"ROS_IP", "127.0.0.1"},
+            {"ROS_HOME", folder_ / "home"},  {"ROS_LOG_DIR", folder_ / "log"},
+            {"PYTHONPATH", RTCF_PYTHON},     {"PYTHONUNBUFFERED", "1"}};
 }
 
 void RosFixture::startMaster() {

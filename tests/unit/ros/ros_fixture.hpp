@@ -32,10 +32,11 @@ class Source {
                                                      slot_, 1 << 16)) {}
 
     const std::shared_ptr<rtcf::executor::Tap>& tap() const { return tap_; }
-    void write(double value) {
+    /// @param stamp_ns of the cycle
+    void write(double value, std::int64_t stamp_ns = 0) {
         slot_->value.data = value;
         ++slot_->sequence;
-        tap_->push();
+        tap_->push(stamp_ns);
     }
 
    private:
@@ -78,9 +79,9 @@ class RosFixture : public ::testing::Test {
     ChildProcess& master() { return *master_; }
     std::string masterUri() const { return "http://127.0.0.1:" + std::to_string(port_); }
 
-    /// A rospy node that prints the values of a topic, one a line.
+    /// A rospy node that prints the values of a topic, one a line, after the stamp if there is one.
     std::unique_ptr<ChildProcess> listen(const std::string& topic,
-                                         const std::string& type = "Float64");
+                                         const std::string& type = "std_msgs/Float64");
     /// A rospy node that publishes one latched value and stays.
     std::unique_ptr<ChildProcess> send(const std::string& topic, double value);
     /// A rospy node of that name.

@@ -194,7 +194,7 @@ TEST_F(RosNodeTest, ARefusedConnectionShowsInTheStatus) {
     startNode();
     serve({&source}, {});
     ASSERT_TRUE(eventually([&] { return rosNode().status().publications == 1; }));
-    const auto listener = listen("/out", "Int32");
+    const auto listener = listen("/out", "std_msgs/Int32");
     EXPECT_TRUE(eventually([&] {
         return rosNode().status().problem.find("std_msgs/Int32") != std::string::npos;
     })) << rosNode().status().problem;
@@ -288,6 +288,33 @@ TEST_F(RosNodeTest, KeepsLatchedValuesWhenItGoesAndComes) {
     EXPECT_EQ(listen("/out")->line(20s).value_or(""), "3.5");
 }
 
+TEST_F(RosNodeTest, PublishesNumbersWithTheTimeOfTheirCycleIfAsked) {
+    startMaster();
+    Source source("/out");
+    Source plain("/plain");
+    startNode();
+    rtcf::executor::BridgeSettings settings;
+    settings.master_uri = masterUri();
+    settings.latch = "/out";
+    settings.stamped = "/out";
+    rosNode().configure(settings);
+    serve({&source, &plain}, {});
+    ASSERT_TRUE(eventually([&] { return rosNode().status().publications == 2; }));
+    source.write(3.5, 1'700'000'000'123'456'789);
+    const std::string stamped = "1700000000123456789 3.5";
+    EXPECT_EQ(listen("/out", "rtcf_msgs/Float64Stamped")->line(20s).value_or(""), stamped);
+    EXPECT_NE(flow(plain, *listen("/plain")), "");
+    // What late subscribers get keeps its stamp when the topic is opened again.
+    settings.queue = 7;
+    rosNode().configure(settings);
+    EXPECT_EQ(listen("/out", "rtcf_msgs/Float64Stamped")->line(20s).value_or(""), stamped);
+    // As it was, while the loop runs: nothing stamped goes to those who expect no header.
+    settings.stamped = "";
+    rosNode().configure(settings);
+    const auto listener = listen("/out");
+    EXPECT_NE(flow(source, *listener), "");
+}
+
 TEST_F(RosNodeTest, OpensLaterWhatItCouldNotOpen) {
     startMaster();
     Source source("/out");
@@ -344,7 +371,7 @@ TEST_F(RosNodeTest, LookingAtItsLoggersDoesNotCrashIt) {
     ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
     EXPECT_EQ(lookAtLoggers(), "done\n");
     // These make roscpp log.
-    const auto wrong = listen("/out", "Int32");
+    const auto wrong = listen("/out", "std_msgs/Int32");
     EXPECT_TRUE(eventually([&] { return !rosNode().status().problem.empty(); }));
     const auto listener = listen("/out");
     EXPECT_NE(flow(source, *listener), "");

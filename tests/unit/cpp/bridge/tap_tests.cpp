@@ -25,7 +25,7 @@ void write(const std::shared_ptr<Slot<T>>& slot, const T& value) {
 
 std::vector<double> takeAll(Tap& tap) {
     std::vector<double> values;
-    while (tap.pop([&](const std::uint8_t* bytes, std::uint32_t size) {
+    while (tap.pop([&](const std::uint8_t* bytes, std::uint32_t size, std::int64_t) {
         ASSERT_EQ(size, sizeof(double));
         double value = 0.0;
         std::memcpy(&value, bytes, size);
@@ -38,15 +38,29 @@ std::vector<double> takeAll(Tap& tap) {
 TEST(Tap, PassesEachWrittenValueOnce) {
     const auto slot = std::make_shared<Slot<double>>();
     Tap tap("/x", typeInfo<double>(), slot, 1024);
-    tap.push();
+    tap.push(0);
     EXPECT_TRUE(takeAll(tap).empty()) << "nothing was written yet";
     write(slot, 1.0);
-    tap.push();
-    tap.push();
+    tap.push(0);
+    tap.push(0);
     write(slot, 2.0);
-    tap.push();
+    tap.push(0);
     EXPECT_EQ(takeAll(tap), (std::vector<double>{1.0, 2.0}));
-    EXPECT_FALSE(tap.pop([](const std::uint8_t*, std::uint32_t) {}));
+    EXPECT_FALSE(tap.pop([](const std::uint8_t*, std::uint32_t, std::int64_t) {}));
+}
+
+TEST(Tap, TellsTheStampOfTheCycleThatWroteAValue) {
+    const auto slot = std::make_shared<Slot<double>>();
+    Tap tap("/x", typeInfo<double>(), slot, 64);
+    for (std::int64_t stamp = 1'700'000'000'000'000'000; stamp < 1'700'000'000'000'000'020;
+         ++stamp) {
+        write(slot, 1.0);
+        tap.push(stamp);
+        std::int64_t told = 0;
+        ASSERT_TRUE(tap.pop(
+            [&](const std::uint8_t*, std::uint32_t, std::int64_t stamp_ns) { told = stamp_ns; }));
+        ASSERT_EQ(told, stamp);
+    }
 }
 
 // A topic that is closed and opened again: the old reader has not gone yet.
@@ -55,11 +69,12 @@ TEST(Tap, OfTwoReadersAtOnceOneFindsNothing) {
     Tap tap("/x", typeInfo<double>(), slot, 1024);
     for (const double value : {1.0, 2.0}) {
         write(slot, value);
-        tap.push();
+        tap.push(0);
     }
-    EXPECT_TRUE(tap.pop([&](const std::uint8_t*, std::uint32_t) {
-        std::thread other(
-            [&] { EXPECT_FALSE(tap.pop([](const std::uint8_t*, std::uint32_t) {})); });
+    EXPECT_TRUE(tap.pop([&](const std::uint8_t*, std::uint32_t, std::int64_t) {
+        std::thread other([&] {
+            EXPECT_FALSE(tap.pop([](const std::uint8_t*, std::uint32_t, std::int64_t) {}));
+        });
         other.join();
     }));
     EXPECT_EQ(takeAll(tap), std::vector<double>{2.0});
@@ -71,12 +86,12 @@ TEST(Tap, TakesTheFirstValueAndThenEachNth) {
     tap.setDecimation(3);
     for (int i = 1; i <= 8; ++i) {
         write(slot, static_cast<double>(i));
-        tap.push();
+        tap.push(0);
     }
     EXPECT_EQ(takeAll(tap), (std::vector<double>{1.0, 4.0, 7.0}));
     tap.setDecimation(1);
     write(slot, 9.0);
-    tap.push();
+    tap.push(0);
     EXPECT_EQ(takeAll(tap), (std::vector<double>{9.0}));
     EXPECT_EQ(tap.dropped(), 0U);
 }
@@ -87,15 +102,16 @@ TEST(Tap, CountsWhatIsLargerThanAllowed) {
     std_msgs::String text;
     text.data.assign(100, 'x');  // and its length, 4 bytes
     write(slot, text);
-    tap.push();
+    tap.push(0);
     EXPECT_EQ(tap.tooLarge(), 0U);
     text.data.assign(101, 'x');
     write(slot, text);
-    tap.push();
+    tap.push(0);
     EXPECT_EQ(tap.tooLarge(), 1U);
     EXPECT_EQ(tap.dropped(), 0U);
-    EXPECT_TRUE(tap.pop([](const std::uint8_t*, std::uint32_t size) { EXPECT_EQ(size, 104U); }));
-    EXPECT_FALSE(tap.pop([](const std::uint8_t*, std::uint32_t) {}));
+    EXPECT_TRUE(tap.pop(
+        [](const std::uint8_t*, std::uint32_t size, std::int64_t) { EXPECT_EQ(size, 104U); }));
+    EXPECT_FALSE(tap.pop([](const std::uint8_t*, std::uint32_t, std::int64_t) {}));
 }
 
 TEST(Tap, GoesOnWhereItsRingEnds) {
@@ -104,7 +120,7 @@ TEST(Tap, GoesOnWhereItsRingEnds) {
         Tap tap("/x", typeInfo<double>(), slot, capacity);
         for (int i = 1; i < 100; ++i) {
             write(slot, static_cast<double>(i));
-            tap.push();
+            tap.push(0);
             ASSERT_EQ(takeAll(tap), std::vector<double>{static_cast<double>(i)})
                 << "ring of " << capacity;
         }
@@ -114,23 +130,23 @@ TEST(Tap, GoesOnWhereItsRingEnds) {
 
 TEST(Tap, FullRingDropsTheNewestAndCounts) {
     const auto slot = std::make_shared<Slot<double>>();
-    Tap tap("/x", typeInfo<double>(), slot, 64);  // four records of 8 + 8 bytes
-    for (int i = 1; i <= 6; ++i) {
+    Tap tap("/x", typeInfo<double>(), slot, 128);  // five records of 16 + 8 bytes
+    for (int i = 1; i <= 7; ++i) {
         write(slot, static_cast<double>(i));
-        tap.push();
+        tap.push(0);
     }
     EXPECT_EQ(tap.dropped(), 2U);
-    EXPECT_EQ(takeAll(tap), (std::vector<double>{1.0, 2.0, 3.0, 4.0}));
-    write(slot, 7.0);
-    tap.push();
-    EXPECT_EQ(takeAll(tap), std::vector<double>{7.0});
+    EXPECT_EQ(takeAll(tap), (std::vector<double>{1.0, 2.0, 3.0, 4.0, 5.0}));
+    write(slot, 8.0);
+    tap.push(0);
+    EXPECT_EQ(takeAll(tap), std::vector<double>{8.0});
 }
 
 TEST(Tap, RingTooSmallForAValueIsMadeLargeEnough) {
     const auto slot = std::make_shared<Slot<double>>();
     Tap tap("/x", typeInfo<double>(), slot, 1);
     write(slot, 1.0);
-    tap.push();
+    tap.push(0);
     EXPECT_EQ(takeAll(tap).size(), 1U);
 }
 
@@ -140,12 +156,13 @@ TEST(Tap, ValueLargerThanTheRingIsDroppedAndCounted) {
     std_msgs::String text;
     text.data.assign(200, 'x');
     write(slot, text);
-    tap.push();
+    tap.push(0);
     EXPECT_EQ(tap.dropped(), 1U);
     text.data = "small";
     write(slot, text);
-    tap.push();
-    EXPECT_TRUE(tap.pop([](const std::uint8_t*, std::uint32_t size) { EXPECT_EQ(size, 9U); }));
+    tap.push(0);
+    EXPECT_TRUE(tap.pop(
+        [](const std::uint8_t*, std::uint32_t size, std::int64_t) { EXPECT_EQ(size, 9U); }));
 }
 
 TEST(Tap, ValuesOfAllLengthsComeOutAsTheyWentIn) {
@@ -155,9 +172,9 @@ TEST(Tap, ValuesOfAllLengthsComeOutAsTheyWentIn) {
         std_msgs::String text;
         text.data.assign(length % 90, static_cast<char>('a' + length % 26));
         write(slot, text);
-        tap.push();
+        tap.push(0);
         std::string bytes;
-        ASSERT_TRUE(tap.pop([&](const std::uint8_t* data, std::uint32_t size) {
+        ASSERT_TRUE(tap.pop([&](const std::uint8_t* data, std::uint32_t size, std::int64_t) {
             bytes.assign(reinterpret_cast<const char*>(data), size);
         }));
         ASSERT_EQ(bytes.substr(4), text.data);
@@ -173,7 +190,7 @@ TEST(Tap, ConsumerInAnotherThreadGetsAllThatWasNotDropped) {
     std::thread producer([&] {
         for (int i = 1; i <= kCount; ++i) {
             write(slot, static_cast<double>(i));
-            tap.push();
+            tap.push(0);
         }
         done = true;
     });

@@ -14,7 +14,7 @@ class RealtimeSafety : public RunnerFixture {
     void drainTaps() {
         for (const char* topic : {"/R3_G2H1", "/R1_H1R2", "/T_out"}) {
             const auto tap = bridge().tap(topic);
-            while (tap && tap->pop([](const std::uint8_t*, std::uint32_t) {})) {
+            while (tap && tap->pop([](const std::uint8_t*, std::uint32_t, std::int64_t) {})) {
             }
         }
     }

@@ -252,7 +252,8 @@ TEST_F(Change, TopicsFollowTheWhitelistOfARunningLoop) {
     ASSERT_NE(bridge().tap("/A_out"), nullptr);
     ASSERT_NE(bridge().injector("/A_in"), nullptr);
     const auto tap = bridge().tap("/A_out");
-    EXPECT_TRUE(eventually([&] { return tap->pop([](const std::uint8_t*, std::uint32_t) {}); }));
+    EXPECT_TRUE(eventually(
+        [&] { return tap->pop([](const std::uint8_t*, std::uint32_t, std::int64_t) {}); }));
     load(recorder("B"));
     EXPECT_EQ(bridge().tap("/A_out"), tap) << "what stays goes on undisturbed";
 }
@@ -298,8 +299,9 @@ TEST_F(Change, RingOfALargeTypeIsBoundedInBytes) {
     const auto tap = bridge().tap("/picture");
     ASSERT_NE(tap, nullptr);
     EXPECT_GE(tap->dropped(), 20U);
-    EXPECT_TRUE(
-        tap->pop([](const std::uint8_t*, std::uint32_t size) { EXPECT_EQ(size, 1024U * 1024U); }));
+    EXPECT_TRUE(tap->pop([](const std::uint8_t*, std::uint32_t size, std::int64_t) {
+        EXPECT_EQ(size, 1024U * 1024U);
+    }));
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ class Safe : public RunnerFixture {
     // The newest value that a tap has for the ROS node.
     std::optional<double> published(const std::shared_ptr<executor::Tap>& tap) {
         std::optional<double> last;
-        while (tap->pop([&](const std::uint8_t* bytes, std::uint32_t size) {
+        while (tap->pop([&](const std::uint8_t* bytes, std::uint32_t size, std::int64_t) {
             double value = 0.0;
             if (size == sizeof value) std::memcpy(&value, bytes, size);
             last = value;

@@ -149,7 +149,8 @@ class Soak : public RunnerFixture {
     void exchange(char letter) {
         const std::string topic = std::string("/") + letter + "_out";
         if (const auto tap = bridge().tap(topic)) {
-            while (tap->pop([this](const std::uint8_t*, std::uint32_t) { ++taken_; })) {
+            while (
+                tap->pop([this](const std::uint8_t*, std::uint32_t, std::int64_t) { ++taken_; })) {
             }
         }
         if (const auto injector = bridge().injector(topic)) {

@@ -24,12 +24,13 @@ class Stepping : public RunnerFixture {
 
     std::vector<double> taken(const std::string& topic) {
         std::vector<double> values;
-        while (bridge().tap(topic)->pop([&](const std::uint8_t* bytes, std::uint32_t size) {
-            double number = 0.0;
-            ASSERT_EQ(size, sizeof number);
-            std::memcpy(&number, bytes, sizeof number);
-            values.push_back(number);
-        })) {
+        while (bridge().tap(topic)->pop(
+            [&](const std::uint8_t* bytes, std::uint32_t size, std::int64_t) {
+                double number = 0.0;
+                ASSERT_EQ(size, sizeof number);
+                std::memcpy(&number, bytes, sizeof number);
+                values.push_back(number);
+            })) {
         }
         return values;
     }
