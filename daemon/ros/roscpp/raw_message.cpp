@@ -28,11 +28,30 @@ bool startsWithHeader(const std::string& definition) {
     return false;
 }
 
-boost::shared_array<std::uint8_t> networkBytes(std::size_t bytes) {
+boost::shared_array<std::uint8_t> networkBytes(std::size_t bytes,
+                                               const std::shared_ptr<void>& owner) {
     const std::shared_ptr<std::uint8_t[]> block =
         executor::UnlockedMemory::ofProcess().allocate(bytes);
     if (!block) throw std::bad_alloc();
-    return {block.get(), [block](const std::uint8_t* /*bytes*/) {}};
+    return {block.get(), [block, owner](const std::uint8_t* /*bytes*/) {}};
+}
+
+boost::shared_array<std::uint8_t> Departures::add(std::size_t bytes) {
+    auto added = networkBytes(bytes, now_);
+    if (latch_) last_ = added;
+    return added;
+}
+
+Departures::Until Departures::mark() {
+    Until marked = now_;
+    now_ = std::make_shared<char>();
+    return marked;
+}
+
+bool Departures::gone(const Until& marked) const {
+    if (marked.expired()) return true;
+    // What is latched stays: with us and with roscpp, and with nobody else once it is sent.
+    return latch_ && marked.use_count() == 1 && last_ && last_.use_count() <= 2;
 }
 
 }  // namespace rtcf::ros1

@@ -8,15 +8,19 @@
 
 #include <cstdint>
 #include <cstring>
+#include <memory>
 #include <string>
 #include <vector>
 
 namespace rtcf::ros1 {
 
+class Departures;
+
 /// A message to be sent: bytes that live until publish() has returned.
 struct RawView {
     const std::uint8_t* bytes;
     std::uint32_t size;
+    Departures* departures = nullptr;  ///< told of the message; null = nobody waits for it
 };
 
 /// A message that was received.
@@ -26,8 +30,35 @@ struct RawBytes {
 };
 
 /// Bytes that wait, or are on their way, outside of the memory that is locked for the loop.
+/// @param owner kept as long as they are
 /// @throws std::bad_alloc if there are too many
-boost::shared_array<std::uint8_t> networkBytes(std::size_t bytes);
+boost::shared_array<std::uint8_t> networkBytes(std::size_t bytes,
+                                               const std::shared_ptr<void>& owner = nullptr);
+
+/// The messages of a topic that roscpp has not handed to the kernel yet, for each of its
+/// subscribers: a topic that closes drops what waits in roscpp. Not thread-safe; the bytes may go
+/// in any thread.
+class Departures {
+   public:
+    /// Those of one moment.
+    using Until = std::weak_ptr<void>;
+
+    /// @param latch roscpp keeps the last message
+    explicit Departures(bool latch) : latch_(latch) {}
+    /// Bytes for one more message. @throws std::bad_alloc as networkBytes() does
+    boost::shared_array<std::uint8_t> add(std::size_t bytes);
+    /// All messages so far.
+    Until mark();
+    /// They are with the kernel, or lost.
+    bool gone(const Until& marked) const;
+    /// Roscpp does not keep the last message any more.
+    void release() { last_.reset(); }
+
+   private:
+    bool latch_;
+    std::shared_ptr<void> now_ = std::make_shared<char>();
+    boost::shared_array<std::uint8_t> last_;  // if roscpp keeps it
+};
 
 /// True if a message definition's first field is `Header header`, whose
 /// sequence number roscpp counts when it publishes.
@@ -85,7 +116,9 @@ struct Serializer<rtcf::ros1::RawBytes> {
 template <>
 inline SerializedMessage serializeMessage(const rtcf::ros1::RawView& message) {
     const std::uint32_t size = message.size + 4;
-    SerializedMessage serialized(rtcf::ros1::networkBytes(size), size);
+    SerializedMessage serialized(message.departures != nullptr ? message.departures->add(size)
+                                                               : rtcf::ros1::networkBytes(size),
+                                 size);
     OStream stream(serialized.buf.get(), size);
     serialize(stream, message.size);
     serialized.message_start = stream.getData();

@@ -1,6 +1,8 @@
 #include "ros/topics/publishing.hpp"
 
 #include <chrono>
+#include <limits>
+#include <set>
 
 #include "graph/name_pattern.hpp"
 #include "ros/roscpp/quiet_thread.hpp"
@@ -8,6 +10,8 @@
 namespace rtcf::ros1 {
 
 namespace {
+
+constexpr int kMost = 1000;  // a tap that fills as fast as it is emptied starves no other
 
 // What settings say of each topic.
 class Deliveries {
@@ -70,8 +74,8 @@ void Publishing::prepare(const executor::BridgeSettings& settings) {
 Reconciled Publishing::reconcile(ros::NodeHandle& handle,
                                  const executor::BridgeSettings& settings) {
     const Deliveries deliveries(settings);
-    std::vector<std::shared_ptr<TopicPublisher>> opening;
-    std::vector<std::shared_ptr<TopicPublisher>> closing;
+    Publishers opening;
+    Publishers closing;
     {
         const std::lock_guard lock(mutex_);
         std::map<std::string, std::shared_ptr<TopicPublisher>> wanted;
@@ -101,7 +105,7 @@ Reconciled Publishing::reconcile(ros::NodeHandle& handle,
     }
     changed_.notify_all();
     // Without the lock: peers come and go. A topic that changes its type closes first.
-    for (const auto& publisher : closing) publisher->close();
+    close(closing);
     Reconciled result = Reconciled::Done;
     for (const auto& publisher : opening) {
         publisher->open(handle);
@@ -111,13 +115,27 @@ Reconciled Publishing::reconcile(ros::NodeHandle& handle,
 }
 
 void Publishing::closeAll() {
-    std::map<std::string, std::shared_ptr<TopicPublisher>> closing;
+    Publishers closing;
     {
         // They stay, with the last messages of those that are latched.
         const std::lock_guard lock(mutex_);
-        closing = publishers_;
+        for (const auto& [topic, publisher] : publishers_) closing.push_back(publisher);
     }
-    for (const auto& [topic, publisher] : closing) publisher->close();
+    close(closing);
+}
+
+// A subscriber that takes nothing holds up no more than this: what waits for it is lost.
+void Publishing::close(const Publishers& closing) {
+    constexpr auto kPatience = std::chrono::milliseconds(500);
+    if (closing.empty()) return;
+    const auto deadline = std::chrono::steady_clock::now() + kPatience;
+    {
+        std::unique_lock lock(mutex_);
+        changed_.wait_until(lock, deadline,
+                            [this, wanted = generation_] { return served_ >= wanted; });
+    }
+    for (const auto& publisher : closing) publisher->flush(deadline);
+    for (const auto& publisher : closing) publisher->close();
 }
 
 std::uint32_t Publishing::open() const {
@@ -150,16 +168,22 @@ std::vector<Publishing::Stream> Publishing::streams() const {
     return streams;
 }
 
-void Publishing::drain(const std::vector<Stream>& streams) {
-    constexpr int kMost =
-        1000;  // a tap that fills as fast as it is emptied must not starve the others
+void Publishing::drain(const Stream& stream, int most) {
+    const auto use = [&stream](const std::uint8_t* bytes, std::uint32_t size,
+                               std::int64_t stamp_ns) {
+        if (stream.publisher) stream.publisher->publish(bytes, size, stamp_ns);
+    };
+    for (int i = 0; i < most && stream.tap->pop(use); ++i) {
+    }
+}
+
+// The last values of taps that leave: nobody fills them any more.
+void Publishing::leave(const std::vector<Stream>& streams, const std::vector<Stream>& next) {
+    std::set<const executor::Tap*> staying;
+    for (const Stream& stream : next) staying.insert(stream.tap.get());
     for (const Stream& stream : streams) {
-        const auto use = [&stream](const std::uint8_t* bytes, std::uint32_t size,
-                                   std::int64_t stamp_ns) {
-            if (stream.publisher) stream.publisher->publish(bytes, size, stamp_ns);
-        };
-        for (int i = 0; i < kMost && stream.tap->pop(use); ++i) {
-        }
+        const bool stays = staying.count(stream.tap.get()) != 0;
+        drain(stream, stays ? kMost : std::numeric_limits<int>::max());
     }
 }
 
@@ -177,11 +201,15 @@ void Publishing::run() {
                 generation = generation_;
                 std::vector<Stream> next = streams();
                 lock.unlock();
-                drain(serving);  // the last values of taps that leave
+                leave(serving, next);
                 serving = std::move(next);
+                lock.lock();
+                served_ = generation;
+                lock.unlock();
+                changed_.notify_all();
             }
         }
-        drain(serving);
+        for (const Stream& stream : serving) drain(stream, kMost);
         std::this_thread::sleep_for(kPeriod);
     }
 }

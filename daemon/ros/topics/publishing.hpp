@@ -36,9 +36,11 @@ class Publishing {
     /// Makes ready for topics that are to be opened once there is a master: of those that are
     /// latched, the last message is kept. Watch thread.
     void prepare(const executor::BridgeSettings& settings);
-    /// Opens and closes topics until they are those of the taps. Watch thread, with a node.
+    /// Opens and closes topics until they are those of the taps. One that closes first sends what
+    /// its tap has given: the last is what safe() wrote. Watch thread, with a node.
     Reconciled reconcile(ros::NodeHandle& handle, const executor::BridgeSettings& settings);
-    /// Closes all topics; reconcile() opens them again. Watch thread.
+    /// Closes all topics, after what the taps that were set have given so far was sent; reconcile()
+    /// opens them again. Watch thread.
     void closeAll();
 
     /// Topics that are open. Any thread.
@@ -52,15 +54,21 @@ class Publishing {
         std::shared_ptr<TopicPublisher> publisher;  // none: the values are dropped
     };
 
+    using Publishers = std::vector<std::shared_ptr<TopicPublisher>>;
+
     void run();
-    static void drain(const std::vector<Stream>& streams);
+    static void drain(const Stream& stream, int most);
+    static void leave(const std::vector<Stream>& streams, const std::vector<Stream>& next);
     std::vector<Stream> streams() const;
+    void close(const Publishers& closing);
 
     mutable std::mutex mutex_;  // all below
     std::condition_variable changed_;
     Taps taps_;
     std::map<std::string, std::shared_ptr<TopicPublisher>> publishers_;
     std::uint64_t generation_ = 0;
+    std::uint64_t served_ =
+        0;  // the generation that the thread is at; it is done with those before
     bool stop_ = false;
     std::thread thread_;
 };

@@ -3,6 +3,7 @@
 #include <ros/node_handle.h>
 
 #include <new>
+#include <thread>
 
 #include "ros/roscpp/raw_message.hpp"
 
@@ -12,7 +13,8 @@ TopicPublisher::TopicPublisher(std::string topic, const TypeInfo& type, Delivery
     : topic_(std::move(topic)),
       type_{type.ros_type, type.ros_md5, type.ros_definition},
       delivery_(delivery),
-      stamped_(delivery.stamped ? stampedType(type_.name) : nullptr) {}
+      stamped_(delivery.stamped ? stampedType(type_.name) : nullptr),
+      departures_(delivery.latch) {}
 
 bool TopicPublisher::serves(const TypeInfo& type) const {
     return type_.name == type.ros_type && type_.md5 == type.ros_md5;
@@ -35,7 +37,7 @@ std::uint64_t TopicPublisher::lost() const {
 
 void TopicPublisher::send(const std::uint8_t* bytes, std::size_t size) {
     try {
-        publisher_.publish(RawView{bytes, static_cast<std::uint32_t>(size)});
+        publisher_.publish(RawView{bytes, static_cast<std::uint32_t>(size), &departures_});
     } catch (const std::bad_alloc&) {
         ++lost_;
     }
@@ -71,7 +73,25 @@ void TopicPublisher::inherit(const TopicPublisher& before) {
         kept_ = before.kept_;
 }
 
-void TopicPublisher::close() { shutDown(mutex_, publisher_); }
+bool TopicPublisher::flush(std::chrono::steady_clock::time_point deadline) {
+    constexpr auto kPause = std::chrono::milliseconds(1);
+    std::unique_lock lock(mutex_);
+    if (!publisher_) return true;
+    const Departures::Until sent = departures_.mark();
+    while (!departures_.gone(sent)) {
+        if (std::chrono::steady_clock::now() >= deadline) return false;
+        lock.unlock();
+        std::this_thread::sleep_for(kPause);
+        lock.lock();
+    }
+    return true;
+}
+
+void TopicPublisher::close() {
+    shutDown(mutex_, publisher_);
+    const std::lock_guard lock(mutex_);
+    departures_.release();
+}
 
 void TopicPublisher::publish(const std::uint8_t* bytes, std::uint32_t size, std::int64_t stamp_ns) {
     const std::lock_guard lock(mutex_);

@@ -4,12 +4,14 @@
 
 #include <ros/publisher.h>
 
+#include <chrono>
 #include <cstdint>
 #include <mutex>
 #include <string>
 #include <vector>
 
 #include "ros/roscpp/handles.hpp"
+#include "ros/roscpp/raw_message.hpp"
 #include "ros/topics/stamped_type.hpp"
 #include "rtcf/port_type.hpp"
 
@@ -51,6 +53,10 @@ class TopicPublisher {
     std::uint64_t lost() const;
 
     void open(ros::NodeHandle& handle);
+    /// Waits until subscribers have been sent all that was published.
+    /// @return false if one does not take it until then
+    bool flush(std::chrono::steady_clock::time_point deadline);
+    /// What has not been sent is lost.
     void close();
 
     /// Sends one message. While it is closed none is sent; of a latched topic the last one is
@@ -70,6 +76,7 @@ class TopicPublisher {
     std::uint64_t lost_ = 0;
     std::vector<std::uint8_t> kept_;
     std::vector<std::uint8_t> message_;  // that is being stamped
+    Departures departures_;
     ros::Publisher publisher_;
     Retry retry_;  // watch thread
 };

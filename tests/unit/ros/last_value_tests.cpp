@@ -1,0 +1,103 @@
+// What a component's safe() wrote is the last value of its topics, and the one that counts: each
+// subscriber gets it, though the topic closes right after it.
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <thread>
+
+#include "ros_fixture.hpp"
+
+namespace {
+
+constexpr int kTimes = 50;
+
+// What the listener prints until the value that safe() wrote; false if it does not come.
+bool getsZero(ChildProcess& listener) {
+    while (const auto line = listener.line(10s)) {
+        if (*line == "0.0") return true;
+    }
+    return false;
+}
+
+}  // namespace
+
+class LastValueTest : public RosFixture {};
+
+TEST_F(LastValueTest, ReachesSubscribersBeforeTheTopicOfAnUnloadedComponentCloses) {
+    startMaster();
+    startNode();
+    const auto listener = listen("/out");
+    for (int i = 0; i < kTimes; ++i) {
+        Source source("/out");
+        serve({&source}, {});
+        ASSERT_NE(flow(source, *listener), "") << i;
+        for (double value = 1.0; value <= 20.0; value += 1.0) source.write(value);
+        source.write(0.0);
+        serve({}, {});
+        ASSERT_TRUE(getsZero(*listener)) << i;
+    }
+}
+
+// roscpp starts once per process: each end has its own.
+TEST_F(LastValueTest, ReachesSubscribersBeforeTheNodeEnds) {
+    startMaster();
+    const auto listener = listen("/out");
+    for (int i = 0; i < kTimes; ++i) {
+        std::array<int, 2> heard{};  // closed by us when the listener has got something
+        ASSERT_EQ(pipe(heard.data()), 0);
+        const pid_t child = fork();
+        ASSERT_GE(child, 0);
+        if (child == 0) {
+            close(heard[1]);
+            Source source("/out");
+            startNode();
+            serve({&source}, {});
+            std::atomic<bool> ending{false};
+            std::thread loop([&] {
+                while (!ending) {
+                    source.write(1.0);
+                    std::this_thread::sleep_for(1ms);
+                }
+                source.write(0.0);
+            });
+            char nothing = 0;
+            (void)!read(heard[0], &nothing, 1);  // returns when it is closed
+            ending = true;
+            loop.join();
+            stopNode();
+            _exit(0);
+        }
+        close(heard[0]);
+        const bool flows = listener->line(30s).has_value();
+        close(heard[1]);
+        const bool zero = flows && getsZero(*listener);
+        int status = -1;
+        ASSERT_EQ(waitpid(child, &status, 0), child);
+        ASSERT_TRUE(flows) << i;
+        ASSERT_TRUE(zero) << i;
+        ASSERT_EQ(status, 0) << i;
+    }
+}
+
+// Nobody waits for a subscriber that takes nothing.
+TEST_F(LastValueTest, AStoppedSubscriberHoldsUpNoEnd) {
+    startMaster();
+    startNode();
+    Source source("/out");
+    serve({&source}, {});
+    const auto listener = listen("/out");
+    ASSERT_NE(flow(source, *listener), "");
+    listener->signal(SIGSTOP);
+    // More than the kernel takes for it.
+    constexpr int kMany = 400'000;
+    for (int i = 1; i <= kMany; ++i) {
+        source.write(i);
+        if (i % 1000 == 0) std::this_thread::sleep_for(2ms);
+    }
+    const auto begin = std::chrono::steady_clock::now();
+    stopNode();
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
+    listener->signal(SIGCONT);
+}
