@@ -235,7 +235,7 @@ def drawn(number: int) -> Any:
 
 
 # A start that comes while a launch's runner is being given back.
-@example(  # type: ignore[misc]
+@example(
     sequence=[(("HoldRunner", "rt_runner"), 3, 0), (("Start", "rt_runner"), "waits", 0)]
 )
 @drawn(40)  # type: ignore[misc]
