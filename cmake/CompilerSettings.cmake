@@ -18,10 +18,8 @@ if(RTCF_SANITIZE)
   endif()
   add_compile_options(-fsanitize=${RTCF_SANITIZE} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${RTCF_SANITIZE})
-  if(NOT RTCF_SANITIZE STREQUAL "realtime")
-    # Half the time to build; stacks still have their lines.
-    add_compile_options(-O1 -g1)
-  endif()
+  # Half the time to build; stacks still have their lines.
+  add_compile_options(-O1 -g1)
   if(RTCF_SANITIZE MATCHES "undefined")
     # Undefined behaviour ends the test, as the other sanitizers' findings do.
     add_compile_options(-fno-sanitize-recover=undefined)
