@@ -235,9 +235,7 @@ def drawn(number: int) -> Any:
 
 
 # A start that comes while a launch's runner is being given back.
-@example(
-    sequence=[(("HoldRunner", "rt_runner"), 3, 0), (("Start", "rt_runner"), "waits", 0)]
-)
+@example(sequence=[(("HoldRunner", "rt_runner"), 3, 0), (("Start", "rt_runner"), "waits", 0)])
 @drawn(40)  # type: ignore[misc]
 def test_random_sequences_keep_what_is_promised(
     place: Path, machine: Machine, sequence: list[Any]
