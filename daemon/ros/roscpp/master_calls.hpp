@@ -10,6 +10,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <map>
 #include <mutex>
 #include <string>
 
@@ -57,9 +58,14 @@ class MasterCalls {
    private:
     std::atomic<bool> ended_{false};
     std::atomic<std::int64_t> deaf_until_ms_{0};  // the master left a call without an answer
-    mutable std::mutex mutex_;                    // down to address_
+    struct Recent {
+        MasterAnswer answer;
+        std::int64_t at_ms;
+    };
+    mutable std::mutex mutex_;  // down to recent_
     std::string uri_;
     MasterAddress address_;
+    std::map<std::string, Recent> recent_;  // what roscpp asks again and again
     Registrar registrar_;
 };
 

@@ -3,6 +3,7 @@
 
 peer.py listen TOPIC TYPE   prints the value of each message, of a stamped one its stamp (ns) before
 peer.py send TOPIC VALUE    publishes one latched std_msgs/Float64 and stays
+peer.py count TOPIC         publishes 1.0, 2.0, ... as std_msgs/Float64, 20 a second
 peer.py node NAME           only has that name; ends when its master says so
 peer.py loggers NODE        does what rqt_logger_level does to a node, prints `done` and ends
 """
@@ -48,6 +49,13 @@ def main() -> None:
     if action == "send":
         publisher = rospy.Publisher(argument, std_msgs.msg.Float64, latch=True, queue_size=1)
         publisher.publish(float(sys.argv[3]))
+    if action == "count":
+        publisher = rospy.Publisher(argument, std_msgs.msg.Float64, queue_size=1)
+        value = 0.0
+        while not rospy.is_shutdown():
+            value += 1.0
+            publisher.publish(value)
+            rospy.sleep(0.05)
     if action == "loggers":
         look_at_loggers(argument)
         return

@@ -92,6 +92,11 @@ std::unique_ptr<ChildProcess> RosFixture::send(const std::string& topic, double 
         environment());
 }
 
+std::unique_ptr<ChildProcess> RosFixture::count(const std::string& topic) {
+    return std::make_unique<ChildProcess>(
+        std::vector<std::string>{"/usr/bin/python3", RTCF_PEER, "count", topic}, environment());
+}
+
 std::unique_ptr<ChildProcess> RosFixture::node(const std::string& name) {
     return std::make_unique<ChildProcess>(
         std::vector<std::string>{"/usr/bin/python3", RTCF_PEER, "node", name}, environment());

@@ -84,6 +84,8 @@ class RosFixture : public ::testing::Test {
                                          const std::string& type = "std_msgs/Float64");
     /// A rospy node that publishes one latched value and stays.
     std::unique_ptr<ChildProcess> send(const std::string& topic, double value);
+    /// A rospy node that publishes 1, 2, 3...
+    std::unique_ptr<ChildProcess> count(const std::string& topic);
     /// A rospy node of that name.
     std::unique_ptr<ChildProcess> node(const std::string& name);
     /// What a command such as `rosnode` prints.

@@ -455,6 +455,33 @@ TEST_F(RosNodeTest, LeavesNothingAtASlowMaster) {
     EXPECT_TRUE(!left || reported("may be left"));
 }
 
+// What a registration is answered is old once the master has said more. Here all answers are taken
+// in when the last has come, seconds after the first.
+TEST_F(RosNodeTest, KeepsAPublisherThatCameWhileTheMasterWasTold) {
+    startSlowMaster(500ms);
+    Sink sink("/a");  // first in the order of registrations
+    std::vector<std::unique_ptr<Sink>> others;
+    std::vector<Sink*> inputs{&sink};
+    for (int i = 0; i < 100; ++i) {  // 7 rounds of 16 at a time: 3.5 s
+        others.push_back(std::make_unique<Sink>("/in" + std::to_string(i)));
+        inputs.push_back(others.back().get());
+    }
+    startNode();
+    ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    serve({}, inputs);
+    // Each would take five calls of half a second, were roscpp not answered from memory.
+    ASSERT_TRUE(eventually([&] { return rosNode().status().subscriptions == 101; }));
+    const auto counter = count("/a");  // registers within about a second
+    ASSERT_TRUE(eventually([&] { return sink.value() > 0.0; }));
+    const std::string name = rosNode().status().node;
+    ASSERT_TRUE(eventually(
+        [&] { return run({"rosnode", "info", name}).find("/in99") != std::string::npos; }));
+    // The last is known to the master, its answer half a second later here.
+    const double then = sink.value();
+    EXPECT_TRUE(eventually([&] { return sink.value() > then + 40.0; }, 10s))
+        << "it was cut off at " << sink.value();
+}
+
 TEST_F(RosNodeTest, SaysWhatItHadToLeaveAtAMasterThatHangs) {
     startMaster();
     Source source("/out");
