@@ -38,7 +38,8 @@ def test_the_first_client_starts_the_service_and_waits_for_it(service: Service) 
     service.systemctl("stop", "rtcfd.service")
     assert service.unit_property("ActiveState") == "inactive"
     assert "rt_runner" in service.ctl("status").stdout
-    assert service.unit_property("ActiveState") == "active"
+    # The client may have its answer before systemd has read that the service is ready.
+    wait_for(lambda: service.unit_property("ActiveState") == "active", "systemd to know of it")
 
 
 def test_a_client_that_comes_during_a_restart_waits(service: Service) -> None:
