@@ -25,13 +25,15 @@ def peers(request: pytest.FixtureRequest) -> str:
 def _load(client: rtcf.Client) -> None:
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0))
     client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", ns="/arm"))
-    client.load(rtcf.component("rtcf_test_ros", "Text", name="text", ns="/arm"))
+    client.load(
+        rtcf.component("rtcf_test_ros", "Text", name="text", ns="/arm", remaps=["length:=words"])
+    )
     client.start()
 
 
 def _rate(client: rtcf.Client) -> float:
     (rate,) = (each for each in client.get_component(_KNOBS).parameters if each.name == "rate")
-    return float(rate.value.real)
+    return float(rate.value.double_value)
 
 
 def test_peers_may_do_what_the_setting_says(tmp_path: Path, master: Master, peers: str) -> None:
