@@ -33,7 +33,7 @@ TEST_F(LastValueTest, ReachesSubscribersBeforeTheTopicOfAnUnloadedComponentClose
         Source source("/out");
         serve({&source}, {});
         ASSERT_NE(flow(source, *listener), "") << i;
-        for (double value = 1.0; value <= 20.0; value += 1.0) source.write(value);
+        for (int value = 1; value <= 20; ++value) source.write(value);
         source.write(0.0);
         serve({}, {});
         ASSERT_TRUE(getsZero(*listener)) << i;
@@ -63,7 +63,7 @@ TEST_F(LastValueTest, ReachesSubscribersBeforeTheNodeEnds) {
                 source.write(0.0);
             });
             char nothing = 0;
-            (void)!read(heard[0], &nothing, 1);  // returns when it is closed
+            [[maybe_unused]] const ssize_t end = read(heard[0], &nothing, 1);  // it is closed
             ending = true;
             loop.join();
             stopNode();
