@@ -51,7 +51,7 @@ class ParameterMirrorTest : public RosFixture {
 // What is owed to the master of a component that left must not be said of one that came since.
 TEST_F(ParameterMirrorTest, OwesNothingOfAComponentThatIsBack) {
     ParameterMirror mirror;
-    mirror.serve([](const std::string&, rtcf::executor::ParameterBatch,
+    mirror.serve([](const std::string&, const rtcf::executor::ParameterBatch&,
                     const std::function<void(const std::string&)>& done) { done({}); });
     mirror.reconcile(calls(), caller_, {component(2.0)});
     ASSERT_TRUE(ask("getParam", texts({"/test", "/C/kp"}))[0]);
@@ -70,7 +70,7 @@ TEST_F(ParameterMirrorTest, AsksForNoNaNThatIsThere) {
     constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
     int asked = 0;
     ParameterMirror mirror;
-    mirror.serve([&](const std::string&, rtcf::executor::ParameterBatch,
+    mirror.serve([&](const std::string&, const rtcf::executor::ParameterBatch&,
                      const std::function<void(const std::string&)>& done) {
         ++asked;
         done({});
