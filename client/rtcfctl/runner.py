@@ -9,7 +9,7 @@ from rtcf_shared.enums import choices
 from rtcf_shared.quantities import ROS, RUNNER
 
 from rtcfctl.output import Output
-from rtcfctl.status import print_runners, shared_cpus
+from rtcfctl.status import print_runners
 from rtcfctl.words import amount
 
 # Fields of RunnerSettings whose values are words.
@@ -64,8 +64,6 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     runners = list(client.get_status(args.runner).runners)
     if output.for_people:
         print_runners(runners, output)
-        for line in shared_cpus(runners):
-            output.line(line, "yellow")
     else:
         output.data(runners)
 

@@ -44,14 +44,12 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         if runner.late:
             output.line(f"!! {runner.runner} IS LATE: {runner.late}", "bold red")
     print_runners(list(response.runners), output)
-    for line in shared_cpus(list(response.runners)):
-        output.line(line, "yellow")
     for runner in response.runners:
         _details(runner, output)
 
 
 def print_runners(runners: list[runner_pb2.RunnerStatus], output: Output) -> None:
-    """Print a table of runners."""
+    """Print a table of runners, and which of them share a CPU."""
     numbers = ("Hz", "CPU", "prio", "components", "iteration", "overruns", "missed", "pid")
     output.table(
         ("runner", "state", *numbers),
@@ -72,6 +70,8 @@ def print_runners(runners: list[runner_pb2.RunnerStatus], output: Output) -> Non
         ),
         right=numbers,
     )
+    for line in shared_cpus(runners):
+        output.line(line, "yellow")
 
 
 def shared_cpus(runners: list[runner_pb2.RunnerStatus]) -> list[str]:
@@ -102,8 +102,7 @@ def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
     if runner.faults:
         output.line(
             f"{runner.runner}: {counted(runner.faults, 'fault')} of components since its loop "
-            "began: "
-            "`rtcfctl list` shows whose",
+            "began: `rtcfctl list` shows whose",
             "yellow",
         )
     for library in runner.libraries_changed:
