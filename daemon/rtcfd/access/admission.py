@@ -80,10 +80,11 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
             async with self._admitted(method, request, context) as peer:
                 if isinstance(request, AsyncIterator):
                     request = self._formed(method, request, peer)
+                watches = needed(method) <= Level.OBSERVE
                 with self._noted(method, request, context, peer):
                     async with contextlib.aclosing(inner(request, context)) as responses:
                         async for response in responses:
-                            if needed(method) <= Level.OBSERVE:
+                            if watches:
                                 await self._check_again(method, request, context, peer)
                             yield response
 

@@ -120,22 +120,26 @@ class History:
             self._last = max(self._last, change.number)
 
     def _put(self, change: Change) -> None:
-        changes = self._changes.setdefault(change.component, deque())
+        name = change.component
+        changes = self._changes.setdefault(name, deque())
         changes.append(change)
         self._count += 1
-        name = change.component
         self._bytes[name] = self._bytes.get(name, 0) + _size(change)
         while self._bytes[name] > MOST_BYTES_OF_A_COMPONENT and changes[0].number != change.number:
             self._drop_oldest(name)
         while sum(self._bytes.values()) > MOST_BYTES:
-            oldest = min(self._changes, key=lambda name: self._changes[name][0].number)
+            oldest = self._with_oldest()
             if self._changes[oldest][0].number == change.number:
                 break
             self._drop_oldest(oldest)
         if len(changes) > MOST_OF_A_COMPONENT:
-            self._drop(change.component)
+            self._drop(name)
         elif self._count > MOST:
-            self._drop(min(self._changes, key=lambda name: self._changes[name][0].number))
+            self._drop(self._with_oldest())
+
+    def _with_oldest(self) -> str:
+        """Return the component that has the oldest change."""
+        return min(self._changes, key=lambda name: self._changes[name][0].number)
 
     def _drop_oldest(self, component: str) -> None:
         """Drop all that was changed at once: a part of it is not to be taken back."""
