@@ -1,12 +1,12 @@
 """`rtcfctl apply|save`: graph files, see docs/graph-files.md."""
 
 import argparse
-import os
 import sys
 from typing import Any
 
 import rtcf
 from rtcf.v1 import control_pb2
+from rtcf_shared import durable
 
 from rtcfctl.output import Output
 from rtcfctl.plain import enumerator
@@ -135,12 +135,7 @@ def _read(file: str) -> tuple[str, str]:
 
 def _write(file: str, text: str) -> None:
     """Replace a file at once: half a graph would be another graph."""
-    temporary = f"{file}.new"
     try:
-        with open(temporary, "w", encoding="utf-8") as out:
-            out.write(text)
-            out.flush()
-            os.fsync(out.fileno())
-        os.replace(temporary, file)
+        durable.replace(file, text.encode())
     except OSError as error:
         raise rtcf.RtcfError(f"{file}: {error.strerror}") from None

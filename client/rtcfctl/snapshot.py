@@ -1,11 +1,11 @@
 """`rtcfctl snapshot|restore`: all that a runner's next cycle depends on, in a file."""
 
 import argparse
-import os
 from pathlib import Path
 from typing import Any
 
 import rtcf
+from rtcf_shared import durable
 
 from rtcfctl.output import Output
 
@@ -56,12 +56,7 @@ def restore(client: rtcf.Client, args: argparse.Namespace, output: Output) -> No
 
 def _write(file: Path, snapshot: bytes) -> None:
     """Replace a file at once: half a snapshot is none."""
-    temporary = file.with_name(f"{file.name}.new")
     try:
-        with temporary.open("wb") as out:
-            out.write(snapshot)
-            out.flush()
-            os.fsync(out.fileno())
-        temporary.replace(file)
+        durable.replace(file, snapshot)
     except OSError as error:
         raise rtcf.RtcfError(f"{file}: {error.strerror}") from None

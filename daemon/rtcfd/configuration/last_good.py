@@ -8,7 +8,8 @@ import logging
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rtcfd.common import durable
+from rtcf_shared import durable
+
 from rtcfd.common.refusals import Refusal
 from rtcfd.configuration import settings_file
 
@@ -52,6 +53,7 @@ class Settings:
         try:
             if not self._copy.exists() or self._copy.read_bytes() != data:
                 durable.replace(self._copy, data)
+                durable.sync_folder(self._copy.parent)
         except OSError as error:
             log.warning("no copy of the settings at %s: %s", self._copy, error.strerror)
 

@@ -14,8 +14,8 @@ from typing import Any
 
 from google.protobuf import json_format
 from rtcf.v1 import graph_pb2, runner_pb2
+from rtcf_shared import durable
 
-from rtcfd.common import durable
 from rtcfd.common.names import check_base_name, full_name
 from rtcfd.common.refusals import Refusal
 from rtcfd.state import history
@@ -140,7 +140,7 @@ class Store:
         durable.replace(self._folder / f"{runner}{_SUFFIX}", text)
         if running:
             mark.touch(mode=0o640)
-            durable.sync_folder(self._folder)
+        durable.sync_folder(self._folder)
 
     def save_history(self, runner: str, changes: Sequence[Change], anew: bool) -> None:
         """Write what History.to_write() gave; raises OSError.  May run on any thread.
