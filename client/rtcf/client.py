@@ -12,6 +12,7 @@ from rtcf import direct_stop, failures
 from rtcf.closing import Closing
 from rtcf.errors import DaemonUnreachableError, RefusedError
 from rtcf.events import EventStream, Place
+from rtcf.ports import PortStream
 from rtcf.replay_call import ReplayCall
 from rtcf.tenancy import Tenancy
 from rtcf.v1 import control_pb2, control_pb2_grpc, graph_pb2, runner_pb2
@@ -414,6 +415,16 @@ class Client(Closing):
         begins, None is now.  With `until_now` it ends with what has happened so far.
         """
         return EventStream(self._stub.WatchEvents, self.socket, runners, after, until_now)
+
+    def watch_ports(
+        self, selection: Iterable[str] = (), runner: str = "", every: int = 1
+    ) -> PortStream:
+        """Watch values of outputs and declared state, of each `every`-th cycle.
+
+        `selection` names them with the wildcards of a shell, e.g. "/arm/*.effort"; all without.
+        Nothing is missed from here on; what the caller does not take in time is counted.
+        """
+        return PortStream(self._stub.WatchPorts, self.socket, runner, selection, every)
 
     def reset_statistics(self, runner: str = "") -> None:
         """Begin the figures anew."""

@@ -41,6 +41,7 @@ _MODULES = {
     "types": "types",
     "stats": "stats",
     "events": "events",
+    "echo": "echo",
     "check": "check",
     "doctor": "doctor",
 }

@@ -66,6 +66,11 @@ def port_value(text: str) -> str:
     return _LONG_NUMBER.sub(lambda found: f"{float(found[0]):.{_MEASURED_DIGITS}g}", text)
 
 
+def figure(number: float) -> str:
+    """Return a number that was measured or computed, with the digits that matter to the eye."""
+    return f"{number:.{_MEASURED_DIGITS}g}"
+
+
 def yes(condition: bool, word: str = "yes") -> str:
     """Return a word, or nothing."""
     return word if condition else ""

@@ -47,6 +47,8 @@ class Instance {
     const ComponentDefinition& definition() const noexcept { return definition_; }
     const std::string& fullName() const noexcept { return context_.full_name; }
     const Library& library() const noexcept { return *library_; }
+    /// Keeps its code loaded.
+    const std::shared_ptr<const Library>& code() const noexcept { return library_; }
     const ComponentRecord& record() const noexcept { return *record_; }
     const NamePattern& ignore() const noexcept { return ignore_; }
     Component& component() const noexcept { return *component_; }

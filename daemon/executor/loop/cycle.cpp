@@ -85,15 +85,19 @@ void Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     if (exchanges_ && before != kAbandoned) {
         for (Tap* tap : schedule.taps) tap->push(clock_.stamp_ns);
     }
+    FrameRing* const frames = frames_;
+    if (frames != nullptr) frames->take();
     const std::int64_t duration = readCycleCounter() - begin;
     if (iteration >= warmup_cycles_) {
         figures_.duration.add(duration);
         figures_.latency.add(latency_ns);
     }
+    const CycleRecord cycle{iteration, clock_.stamp_ns, latency_ns, counter_.toNs(duration)};
     if (CycleRecord* record = records_.claim()) {
-        *record = {iteration, clock_.stamp_ns, latency_ns, counter_.toNs(duration)};
+        *record = cycle;
         records_.commit();
     }
+    if (frames != nullptr) frames->commit(cycle, false);
     clock_.iteration = iteration + 1;
     figures_.iteration.store(iteration + 1, std::memory_order_relaxed);
 }
@@ -217,6 +221,10 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
         makeSafe(*step.component, *step.figures, OnBadOutput::GoOn);
     }
     for (Tap* tap : schedule_->taps) tap->push(clock_.stamp_ns);
+    if (frames_ != nullptr) {
+        frames_->take();
+        frames_->commit({clock_.iteration, clock_.stamp_ns, 0, 0}, true);
+    }
     active_ = false;
 }
 
@@ -253,6 +261,7 @@ void Cycle::apply(Adoption& adoption) noexcept {
         schedule_ = adoption.schedule;
         noteSchedule();
     }
+    if (adoption.frames) frames_ = *adoption.frames;
     if (adoption.period_ns != 0) {
         clock_.period_ns = adoption.period_ns;
         clock_.elapsed_ns = adoption.period_ns;

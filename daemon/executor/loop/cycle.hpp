@@ -9,6 +9,8 @@
 #include <cstdint>
 
 #include "faults/flight_recorder.hpp"
+#include "frames/cycle_record.hpp"
+#include "frames/frame_ring.hpp"
 #include "loop/boundary.hpp"
 #include "loop/cycle_counter.hpp"
 #include "loop/faults.hpp"
@@ -17,14 +19,6 @@
 #include "statistics/histogram.hpp"
 
 namespace rtcf::executor {
-
-/// One executed cycle.
-struct CycleRecord {
-    std::uint64_t iteration;
-    std::int64_t stamp_ns;     ///< CLOCK_REALTIME of the deadline, or the simulated clock's time
-    std::int64_t latency_ns;   ///< wake-up after the deadline; may be negative
-    std::int64_t duration_ns;  ///< calculation
-};
 
 /// What the loop counts. Written by the real-time thread alone.
 struct LoopFigures {
@@ -127,8 +121,9 @@ class Cycle {
     const FlightRecorder::RealtimeNotes notes_;
     LoopClock clock_;
     std::uint64_t warmup_cycles_ = 0;
-    bool exchanges_ = false;  // the schedule has feeds, latches or taps
-    bool active_ = false;     // between begin() and the last cycle
+    bool exchanges_ = false;       // the schedule has feeds, latches or taps
+    bool active_ = false;          // between begin() and the last cycle
+    FrameRing* frames_ = nullptr;  // while somebody watches
     // Shared.
     std::atomic<std::int64_t> stamp_offset_ns_{0};  // CLOCK_REALTIME minus CLOCK_MONOTONIC
     Boundary boundary_;

@@ -6,10 +6,12 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "bridge/injector.hpp"
 #include "bridge/tap.hpp"
+#include "frames/frame_ring.hpp"
 #include "graph/state_copy.hpp"
 #include "loop/faults.hpp"
 #include "loop/image_work.hpp"
@@ -147,6 +149,7 @@ struct Adoption {
     std::vector<Leaving> leaving;
     std::vector<StagedValue*> values;  ///< parameters, and what derives from them
     std::int64_t period_ns = 0;        ///< the loop's new period; 0 = stays
+    std::optional<FrameRing*> frames;  ///< that cycles fill from now on, null = none; unset = stays
     /// Of an earlier state, before anything else; if that refuses, nothing else is done either.
     Restoration* restoration = nullptr;
 };

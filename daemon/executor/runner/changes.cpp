@@ -79,6 +79,11 @@ std::vector<std::string> Runner::adopt(Change change, const Progress& progress) 
     adoption.copies = change.copies;
     adoption.period_ns = change.period_ns;
     adoption.restoration = change.restoration;
+    std::shared_ptr<const FrameTable> frames;
+    if (!watches_.empty())
+        frames = makeFrameTable(*plan, watches_, frames_.get(), settings_.frequency_hz);
+    // What leaves is not to be copied any more, whoever watches.
+    adoption.frames = frames == nullptr ? nullptr : frames->ring.get();
     if (loop_.running() || state_ == RunnerState::Stepping) {
         for (const auto& instance : change.arriving) {
             progress("starting " + instance->fullName());
@@ -95,6 +100,7 @@ std::vector<std::string> Runner::adopt(Change change, const Progress& progress) 
     }
     plan->noteKept(adoption, *plan_);
     std::swap(plan_, plan);
+    publishFrames(std::move(frames));
     // It stands, whatever goes wrong from here on.
     guarded("making a change known", [&] { adopted(change); });
     // Out of the loop since its last boundary: what left may take its time.

@@ -34,6 +34,7 @@
 #include "runner/runner_view.hpp"
 #include "runner/settings.hpp"
 #include "runner/snapshot.hpp"
+#include "watch/frame_table.hpp"
 
 namespace rtcf::executor {
 
@@ -168,6 +169,10 @@ class Runner final : private RunnerView {
     std::vector<std::string> states(const std::string& name);
     /// Values of a component's ports, inputs first. Empty if the loop reaches no boundary in time.
     std::vector<Probe::Value> probe(const std::string& name);
+    /// Has cycles keep the values of a selection for a watch. @param watch a number of its own
+    void watch(std::uint64_t watch, PortSelection selection);
+    /// Ends that; one that is not known has ended.
+    void endWatch(std::uint64_t watch);
     /// Settings to start from.
     const RunnerSettings& settings() const noexcept { return settings_; }
     /// @}
@@ -180,6 +185,12 @@ class Runner final : private RunnerView {
     NumberedState numberedState() const noexcept { return numbered_state_.load(); }
     const Loop& loop() const noexcept override { return loop_; }
     const FlightRecorder& recorder() const noexcept { return recorder_; }
+    /// What has come since the last call of how frames look: each table holds for the frames in its
+    /// ring, up to those of the next one. Its last owner is to let go of it on the graph thread.
+    std::vector<std::shared_ptr<const FrameTable>> takeFrameTables();
+    /// Is called, on the graph thread, when there are so many frames that cycles which run as fast
+    /// as they go wait for somebody to take them.
+    void onFramesWaiting(std::function<void()> tell);
     /// Name of the hook that the graph thread is in, and since when; empty = none.
     std::pair<std::string, std::int64_t> activity() const;
     /// @}
@@ -252,6 +263,11 @@ class Runner final : private RunnerView {
     void handOver(Change& change, const Instance& previous, const Instance& successor) const;
     /// Of a change that the loop has: makes it known.
     void adopted(const Change& change);
+    /// Has the loop fill the frames that the watches want, of the present plan.
+    void renewFrames();
+    void publishFrames(std::shared_ptr<const FrameTable> frames);
+    std::uint64_t stepWatched(std::uint64_t cycles);
+    void awaitReaders();
     void startAll(const Progress& progress);
     void stopAll() noexcept;
     ChangeOutcome outcome(std::string component = {}) const;
@@ -298,12 +314,16 @@ class Runner final : private RunnerView {
     HistogramSnapshot tuned_from_;  // wake-up latency at the last tuneSpin()
     std::int64_t tuned_at_ns_ = 0;
     std::int64_t sizes_due_ns_ = 0;
+    Watches watches_;
+    std::shared_ptr<const FrameTable> frames_;  // that the loop fills; null while nobody watches
 
     // Published for queries.
     std::atomic<NumberedState> numbered_state_;
     mutable std::mutex published_mutex_;
     std::shared_ptr<const GraphSnapshot> snapshot_ = std::make_shared<GraphSnapshot>();
     RunnerPicture picture_;
+    std::vector<std::shared_ptr<const FrameTable>> new_frames_;
+    std::function<void()> frames_waiting_;
     std::string activity_;
     std::int64_t activity_since_ns_ = 0;
 

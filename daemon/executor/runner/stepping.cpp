@@ -44,7 +44,7 @@ ChangeOutcome Runner::step(std::uint64_t cycles, const Progress& progress) {
     std::uint64_t left = cycles;
     while (left > 0) {
         const std::uint64_t wanted = std::min(left, kChunk);
-        const std::uint64_t done = loop_.step(wanted);
+        const std::uint64_t done = stepWatched(wanted);
         left -= done;
         log_.drain();
         note({});  // a long run is not a hook that hangs

@@ -26,7 +26,9 @@ class Connection {
     std::uint64_t id() const noexcept { return id_; }
     bool greeted() const noexcept { return greeted_; }
     void setGreeted() noexcept { greeted_ = true; }
-    bool wantsWrite() const noexcept { return written_ < out_.size(); }
+    bool wantsWrite() const noexcept { return waiting() != 0; }
+    /// Bytes that the peer has not taken.
+    std::size_t waiting() const noexcept { return out_.size() - written_; }
 
     /// Reads what has come. @return false if the peer has gone or sent no frames
     bool receive(std::vector<v1::Request>& requests);

@@ -38,6 +38,9 @@ constexpr std::chrono::seconds kAskTimeout{70};
 constexpr std::size_t kLargestOutbox = 10000;  // messages kept while no daemon is connected
 constexpr std::size_t kLargestConnections = 8;
 constexpr int kBacklog = 8;
+constexpr int kPortsInterval = 20;  // ms between batches of values
+constexpr std::size_t kMostPorts =
+    std::size_t{4} * 1024 * 1024;  // bytes that wait for their reader
 
 [[noreturn]] void fail(const std::string& what) {
     throw std::system_error(errno, std::generic_category(), what);
@@ -140,6 +143,10 @@ void Server::post(std::uint64_t connection, v1::Response response, bool last) {
         }
         outbox_.push_back({connection, std::move(response), last});
     }
+    wakeUp();
+}
+
+void Server::wakeUp() const {
     const std::uint64_t one = 1;
     // Full means that it is awake already.
     [[maybe_unused]] const ssize_t count = ::write(wake_, &one, sizeof one);
@@ -196,6 +203,7 @@ void Server::serve(Runner& runner, Log& log, Access& access, const DirectStop& d
     log_ = &log;
     access_ = &access;
     direct_stop_ = &direct_stop;
+    runner.onFramesWaiting([this] { wakeUp(); });
     while (!exiting_) {
         std::vector<pollfd> polled{
             {listener_, POLLIN, 0}, {signals_, POLLIN, 0}, {wake_, POLLIN, 0}};
@@ -205,7 +213,7 @@ void Server::serve(Runner& runner, Log& log, Access& access, const DirectStop& d
             polled.push_back({connection->fd(), events, 0});
             ids.push_back(id);
         }
-        ::poll(polled.data(), polled.size(), waiting_.empty() ? 1000 : 20);
+        ::poll(polled.data(), polled.size(), waiting_.empty() ? 1000 : kPortsInterval);
         if ((polled[1].revents & POLLIN) != 0) exiting_ = true;
         if ((polled[2].revents & POLLIN) != 0) {
             std::uint64_t count = 0;
@@ -223,9 +231,11 @@ void Server::serve(Runner& runner, Log& log, Access& access, const DirectStop& d
         }
         if ((polled[0].revents & POLLIN) != 0) accept();
         deliver();
+        servePorts();
         expire();
         if (orphaned()) exiting_ = true;
     }
+    runner.onFramesWaiting({});
     runner.requestStop();
 }
 
@@ -266,6 +276,7 @@ void Server::receive(Connection& connection) {
 void Server::drop(std::uint64_t id) {
     connections_.erase(id);
     calls_.lost(id);
+    endWatches(ports_.endAll(id));
     for (auto it = waiting_.begin(); it != waiting_.end();)
         it = it->first.first == id ? waiting_.erase(it) : std::next(it);
 }
@@ -300,7 +311,10 @@ void Server::deliver() {
         if (message.connection != 0) {
             const auto request = std::make_pair(message.connection, message.response.id());
             if (waiting_.count(request) == 0) continue;  // given up on, or its daemon has gone
-            if (message.last) waiting_.erase(request);
+            if (message.last) {
+                waiting_.erase(request);
+                ports_.end(request);  // one that is refused
+            }
             respond(message.connection, message.response);
             continue;
         }
@@ -365,6 +379,8 @@ void Server::handle(Connection& connection, const v1::Request& request) {
         if (answerQuery(id, request)) return;
         if (request.kind_case() == v1::Request::kGetComponent) {
             submitProbe(id, request);
+        } else if (request.kind_case() == v1::Request::kWatchPorts) {
+            beginWatch(id, request);
         } else {
             submitChange(id, request);
         }
@@ -409,6 +425,13 @@ bool Server::answerQuery(std::uint64_t connection, const v1::Request& request) {
             access_->set(rulesFrom(request.access()));
             response.mutable_done();
             break;
+        case v1::Request::kEndWatch: {
+            const auto id = std::make_pair(connection, request.end_watch().watch());
+            waiting_.erase(id);
+            if (const std::uint64_t watch = ports_.end(id); watch != 0) endWatches({watch});
+            response.mutable_done();
+            break;
+        }
         case v1::Request::kExit:
             response.mutable_done();
             exiting_ = true;
@@ -606,6 +629,44 @@ void Server::submitProbe(std::uint64_t connection, const v1::Request& request) {
         }
         post(connection, std::move(response), true);
     });
+}
+
+// Its values begin once the graph thread has the loop keep them.
+void Server::beginWatch(std::uint64_t connection, const v1::Request& request) {
+    const std::uint64_t id = request.id();
+    const std::uint64_t watch = next_watch_++;
+    const auto& patterns = request.watch_ports().selection();
+    const PortSelection selection({patterns.begin(), patterns.end()});
+    ports_.begin({connection, id}, watch, selection, request.watch_ports().every());
+    const auto nothing = [id] {
+        return errorResponse(id, RefusalKind::Unavailable, "the stream has ended");
+    };
+    waiting_[{connection, id}] = {INT64_MAX, nothing, nullptr};
+    runner_->post([this, connection, id, watch, selection] {
+        try {
+            runner_->watch(watch, selection);
+        } catch (const Refusal& refusal) {
+            post(connection, errorResponse(id, refusal.kind(), refusal.what()), true);
+        } catch (const std::exception& error) {
+            post(connection, errorResponse(id, RefusalKind::FailedPrecondition, error.what()),
+                 true);
+        }
+    });
+}
+
+void Server::endWatches(const std::vector<std::uint64_t>& watches) {
+    for (const std::uint64_t watch : watches)
+        runner_->post([this, watch] { runner_->endWatch(watch); });
+}
+
+void Server::servePorts() {
+    const auto send = [this](const PortStreams::Id& id, const v1::Response& response) {
+        respond(id.first, response);
+        const auto found = connections_.find(id.first);
+        return found != connections_.end() && found->second->waiting() < kMostPorts;
+    };
+    std::vector<PortStreams::Table> done = ports_.serve(runner_->takeFrameTables(), send);
+    if (!done.empty()) runner_->post([done = std::move(done)]() mutable { done.clear(); });
 }
 
 pb::RunnerStatus Server::status() const {

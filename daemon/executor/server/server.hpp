@@ -19,6 +19,7 @@
 #include "server/connection.hpp"
 #include "server/direct_stop.hpp"
 #include "server/outside_calls.hpp"
+#include "server/port_streams.hpp"
 #include "statistics/histogram.hpp"
 
 namespace rtcf::executor {
@@ -75,6 +76,7 @@ class Server {
 
     static Baseline::Component figuresOf(const ComponentFigures& figures);
     void post(std::uint64_t connection, v1::Response response, bool last);
+    void wakeUp() const;
     void handOn(const v1::Response& call);
     void accept();
     void receive(Connection& connection);
@@ -85,6 +87,9 @@ class Server {
     void submitChange(std::uint64_t connection, const v1::Request& request);
     void requireStopsKnown(const v1::Request& request) const;
     void submitProbe(std::uint64_t connection, const v1::Request& request);
+    void beginWatch(std::uint64_t connection, const v1::Request& request);
+    void endWatches(const std::vector<std::uint64_t>& watches);
+    void servePorts();
     void expire();
     bool orphaned();
     template <typename Message>
@@ -119,6 +124,8 @@ class Server {
     std::map<std::pair<std::uint64_t, std::uint64_t>, Waiting> waiting_;
 
     OutsideCalls calls_;
+    PortStreams ports_;
+    std::uint64_t next_watch_ = 1;
 
     std::mutex outbox_mutex_;
     std::deque<Outgoing> outbox_;

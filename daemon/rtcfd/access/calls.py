@@ -60,6 +60,7 @@ CALLS = {
     "WatchStatistics": Call(Level.OBSERVE),
     "GetHistory": Call(Level.OBSERVE),
     "WatchEvents": Call(Level.OBSERVE),
+    "WatchPorts": Call(Level.OBSERVE),
     "SetParameters": Call(Level.TUNE, _LISTS),
     "UndoParameters": Call(Level.TUNE),
     "Start": Call(Level.OPERATE),

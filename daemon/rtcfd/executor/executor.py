@@ -14,7 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import errors_pb2
+from rtcf.v1 import errors_pb2, ports_pb2
 
 from rtcfd import VERSION
 from rtcfd.common.limits import Limits
@@ -28,6 +28,7 @@ from rtcfd.executor.link import (
     PROTOCOL,
     Link,
     OnAnswer,
+    OnPorts,
     Progress,
     Unasked,
 )
@@ -172,6 +173,14 @@ class Executor:
         if self.foreign and request.WhichOneof("kind") not in ("stop", "exit"):
             raise FailedPrecondition(self.foreign, errors_pb2.REASON_EXECUTOR_FOREIGN)
         return await self._link.request(request, timeout_s, on_progress, on_answer)
+
+    async def watch_ports(self, request: ports_pb2.WatchPortsRequest, on_ports: OnPorts) -> None:
+        """Hand on the values of ports until cancelled; see Link.watch_ports."""
+        if self._link is None:
+            raise Unavailable(f"{self._peer} is not connected", errors_pb2.REASON_EXECUTOR_DOWN)
+        if self.foreign:
+            raise FailedPrecondition(self.foreign, errors_pb2.REASON_EXECUTOR_FOREIGN)
+        await self._link.watch_ports(request, on_ports)
 
     async def limit(self, limits: Limits) -> None:
         """Tell it what its graph may have; one that does not know of limits goes without."""

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from google.protobuf.message import DecodeError
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import errors_pb2
+from rtcf.v1 import errors_pb2, ports_pb2
 
 from rtcfd.common import refusals
 from rtcfd.common.tasks import looked_at
@@ -31,6 +31,7 @@ _CREDENTIALS = struct.Struct("3i")  # struct ucred, unix(7)
 Progress = Callable[[str], None]
 Unasked = Callable[[wire.Response], None]
 OnAnswer = Callable[[wire.Response], None]
+OnPorts = Callable[[ports_pb2.WatchPortsResponse], None]
 
 # By code; and the reason of one that an executor which knows of none gives.
 _REFUSALS: dict[int, tuple[type[refusals.Refusal], errors_pb2.Reason]] = {
@@ -53,9 +54,15 @@ _REFUSALS: dict[int, tuple[type[refusals.Refusal], errors_pb2.Reason]] = {
 class _Pending:
     """A request on its way."""
 
-    def __init__(self, on_progress: Progress | None, on_answer: OnAnswer | None) -> None:
+    def __init__(
+        self,
+        on_progress: Progress | None = None,
+        on_answer: OnAnswer | None = None,
+        on_ports: OnPorts | None = None,
+    ) -> None:
         self.on_progress = on_progress
         self.on_answer = on_answer
+        self.on_ports = on_ports
         self.result: asyncio.Future[wire.Response] = asyncio.get_running_loop().create_future()
 
 
@@ -119,12 +126,35 @@ class Link:
         Raises the executor's refusal, or Unavailable when the link ends or
         `timeout_s` of wall-clock time passes (None: for callers with an own limit).
         """
-        if self.ended.is_set():
-            raise refusals.Unavailable(self._lost(), errors_pb2.REASON_EXECUTOR_SILENT)
+        return await self._request(request, timeout_s, _Pending(on_progress, on_answer))
+
+    async def watch_ports(self, request: ports_pb2.WatchPortsRequest, on_ports: OnPorts) -> None:
+        """Have the executor tell the values of ports until this is cancelled.
+
+        Raises as request() does.
+        """
+        opening = wire.Request(watch_ports=request)
+        try:
+            await self._request(opening, None, _Pending(on_ports=on_ports))
+        finally:
+            if opening.id and not self.ended.is_set():
+                # Its answer is nobody's.
+                closing = wire.Request(end_watch=wire.EndWatch(watch=opening.id))
+                self._writer.write(frames.pack(self._numbered(closing).SerializeToString()))
+
+    def _numbered(self, request: wire.Request) -> wire.Request:
         request.id = self._next_id
         request.direct_stops = self.direct_stops
         self._next_id += 1
-        pending = self._pending[request.id] = _Pending(on_progress, on_answer)
+        return request
+
+    async def _request(
+        self, request: wire.Request, timeout_s: float | None, pending: _Pending
+    ) -> wire.Response:
+        if self.ended.is_set():
+            raise refusals.Unavailable(self._lost(), errors_pb2.REASON_EXECUTOR_SILENT)
+        self._numbered(request)
+        self._pending[request.id] = pending
         try:
             self._writer.write(frames.pack(request.SerializeToString()))
             async with asyncio.timeout(timeout_s):
@@ -177,6 +207,9 @@ class Link:
         if response.WhichOneof("kind") == "progress":
             if pending.on_progress is not None:
                 pending.on_progress(response.progress)
+        elif response.WhichOneof("kind") == "ports":
+            if pending.on_ports is not None:
+                pending.on_ports(response.ports)
         elif not pending.result.done():
             if pending.on_answer is not None and response.WhichOneof("kind") != "error":
                 pending.on_answer(response)

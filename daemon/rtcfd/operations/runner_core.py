@@ -7,13 +7,13 @@ here and nowhere else.
 import asyncio
 import contextlib
 from abc import ABC, abstractmethod
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TypeVar
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import control_pb2, errors_pb2, runner_pb2
+from rtcf.v1 import control_pb2, errors_pb2, ports_pb2, runner_pb2
 from rtcf_shared.enums import word
 
 from rtcfd.access import caller
@@ -25,7 +25,7 @@ from rtcfd.common.refusals import Refusal, Unavailable
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.events import logger_of
 from rtcfd.executor.executor import CONNECT_TIMEOUT_S, QUERY_TIMEOUT_S, Executor
-from rtcfd.executor.link import OnAnswer, Progress
+from rtcfd.executor.link import OnAnswer, OnPorts, Progress
 from rtcfd.executor.process import End
 from rtcfd.operations.figures import Figures
 from rtcfd.operations.loaded_code import LoadedCode
@@ -270,16 +270,26 @@ class RunnerCore(ABC):
         on_answer: OnAnswer | None = None,
         timeout_s: float | None = None,
     ) -> wire.Response:
-        """Ask the executor; of a change the caller's limit is change()'s.
-
-        What its end cuts off is answered with what is known of that end.
-        """
+        """Ask the executor; of a change the caller's limit is change()'s."""
         seen = await self.code.before(request)
         executor = self.alive()
-        try:
+        async with self._last_words(executor):
             response = await executor.request(request, timeout_s, progress, on_answer)
-            self.code.after(request, response.change, seen)
-            return response
+        self.code.after(request, response.change, seen)
+        return response
+
+    async def watch_ports(self, request: ports_pb2.WatchPortsRequest, on_ports: OnPorts) -> None:
+        """Hand on the values of ports until cancelled, or until the executor ends."""
+        await self.settle()
+        executor = self.alive()
+        async with self._last_words(executor):
+            await executor.watch_ports(request, on_ports)
+
+    @contextlib.asynccontextmanager
+    async def _last_words(self, executor: Executor) -> AsyncIterator[None]:
+        """Say what is known of an executor's end, where that has cut something off."""
+        try:
+            yield
         except Unavailable:
             if executor.connected:
                 raise

@@ -10,7 +10,7 @@ from collections.abc import AsyncIterator
 from typing import Any, Protocol
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import control_pb2, control_pb2_grpc, errors_pb2, graph_pb2, runner_pb2
+from rtcf.v1 import control_pb2, control_pb2_grpc, errors_pb2, graph_pb2, ports_pb2, runner_pb2
 from rtcf_shared.naming import listing
 
 from rtcfd import VERSION
@@ -31,6 +31,7 @@ from rtcfd.runners.runners import Runners
 from rtcfd.runners.status import statuses_of
 from rtcfd.service.answers import answering, changing, holding, lasting
 from rtcfd.service.pages import page
+from rtcfd.service.ports import watch_ports
 from rtcfd.service.replay import Replay
 from rtcfd.service.watching import watch
 
@@ -342,6 +343,16 @@ class Control(control_pb2_grpc.ControlServicer):
         """What happens."""
         try:
             async for response in watch(self._events, request):
+                yield response
+        except Exception as error:
+            await abort(context, error, request)
+
+    async def WatchPorts(
+        self, request: ports_pb2.WatchPortsRequest, context: Any
+    ) -> AsyncIterator[ports_pb2.WatchPortsResponse]:
+        """Values of every cycle."""
+        try:
+            async for response in watch_ports(self._runners.get(request.runner), request):
                 yield response
         except Exception as error:
             await abort(context, error, request)

@@ -1,0 +1,196 @@
+"""Values of ports and declared state of every cycle, as NumPy columns."""
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import grpc
+from rtcf_shared.errors import RtcfError
+
+from rtcf import failures, ros_layout
+from rtcf.closing import Closing
+from rtcf.v1 import ports_pb2
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+_STATE = re.compile(r"^(bool|float|double|u?int(?:8|16|32|64))(?:\[(\d+)(?:x(\d+))?\])?$")
+_FORMATS = {"bool": "?", "float": "<f4", "double": "<f8"}
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A number, or an array of numbers, that has a value in every cycle."""
+
+    name: str  # full: component, '.', port or state, and the field if it is one of several
+    unit: str  # empty = not told
+    column: int  # of the schema
+    format: str  # of one number, as NumPy writes it
+    shape: tuple[int, ...]  # () = one number
+    offset: int  # bytes, in a value of the column
+    transposed: bool = False  # a matrix, which lies in memory column by column
+
+
+@dataclass(frozen=True)
+class PortSchema:
+    """What a stream tells, until the graph changes."""
+
+    columns: tuple[ports_pb2.PortColumn, ...] = ()
+    notes: tuple[str, ...] = ()  # what matches and is not there, a line each
+    signals: dict[str, Signal] = field(default_factory=dict)  # by name, in schedule order
+
+
+@dataclass(frozen=True)
+class PortBatch:
+    """Some cycles one after the other, `every` apart."""
+
+    schema: PortSchema
+    every: int
+    first_cycle: int
+    lost: int  # cycles before these that were asked for and that nobody took in time
+    last_of_loop: bool  # the last one is the cycle in which components made safe
+    message: ports_pb2.PortBatch
+
+    def __len__(self) -> int:
+        return len(self.message.stamps_ns)
+
+    @property
+    def cycles(self) -> "NDArray[np.int64]":
+        """The numbers of the cycles."""
+        last = self.first_cycle + len(self) * self.every
+        return _integers(range(self.first_cycle, last, self.every))
+
+    @property
+    def stamps_ns(self) -> "NDArray[np.int64]":
+        """CLOCK_REALTIME of each cycle's deadline, or the simulated time; ns."""
+        return _integers(self.message.stamps_ns)
+
+    @property
+    def latencies_ns(self) -> "NDArray[np.int64]":
+        """Wake-up after each deadline; ns."""
+        return _integers(self.message.latencies_ns)
+
+    @property
+    def durations_ns(self) -> "NDArray[np.int64]":
+        """Calculation in each cycle; ns."""
+        return _integers(self.message.durations_ns)
+
+    def __getitem__(self, name: str) -> "NDArray[Any]":
+        """Return the values of a signal: by cycle, then as the signal is shaped."""
+        np = _numpy()
+        signal = self.schema.signals[name]
+        data = self.message.values[signal.column]
+        if not data:
+            return np.zeros((0, *signal.shape), signal.format)  # type: ignore[no-any-return]
+        each = ros_layout.size_of(signal.format)
+        strides = [each] * len(signal.shape)
+        for axis in range(len(signal.shape) - 1, 0, -1):
+            strides[axis - 1] = strides[axis] * signal.shape[axis]
+        values = np.ndarray(
+            (len(self), *signal.shape),
+            dtype=signal.format,
+            buffer=data,
+            offset=signal.offset,
+            strides=(self.schema.columns[signal.column].size, *strides),
+        )
+        columns: NDArray[Any] = values.swapaxes(1, 2) if signal.transposed else values
+        return columns
+
+
+class PortStream(Closing):
+    """An iterator over PortBatch; made by Client.watch_ports, used by one thread.
+
+    `schema` is that of the batches to come, as far as is known.  Raises RefusedError, and
+    DaemonUnreachableError if the connection is lost.
+    """
+
+    def __init__(
+        self, method: Any, socket: str, runner: str, selection: Iterable[str], every: int
+    ) -> None:
+        _numpy()
+        if isinstance(selection, str):
+            selection = [selection]
+        request = ports_pb2.WatchPortsRequest(runner=runner, selection=selection, every=every)
+        self.schema = PortSchema()
+        self._socket = socket
+        self._every = max(every, 1)
+        self._call = method(request)
+        self._next()  # the schema: from here on nothing is missed
+
+    def __iter__(self) -> Iterator[PortBatch]:
+        while (response := self._next()) is not None:
+            if response.WhichOneof("kind") == "batch":
+                yield PortBatch(
+                    self.schema,
+                    self._every,
+                    response.batch.first_cycle,
+                    response.batch.lost,
+                    response.batch.last_of_loop,
+                    response.batch,
+                )
+
+    def close(self) -> None:
+        """End the stream.  Any thread."""
+        self._call.cancel()
+
+    def _next(self) -> ports_pb2.WatchPortsResponse | None:
+        try:
+            response: ports_pb2.WatchPortsResponse | None = next(self._call, None)
+        except grpc.RpcError as error:
+            if error.code() == grpc.StatusCode.CANCELLED:
+                return None  # by close()
+            raise failures.from_grpc(error, self._socket) from None
+        if response is not None and response.WhichOneof("kind") == "schema":
+            self.schema = _schema(response.schema)
+        return response
+
+
+def _schema(message: ports_pb2.PortSchema) -> PortSchema:
+    signals = {}
+    for number, column in enumerate(message.columns):
+        name = f"{column.component}.{column.name}"
+        for signal in _signals(number, name, column):
+            signals[signal.name] = signal
+    return PortSchema(tuple(message.columns), tuple(message.notes), signals)
+
+
+def _signals(number: int, name: str, column: ports_pb2.PortColumn) -> Iterator[Signal]:
+    if column.kind == ports_pb2.PortColumn.KIND_OUTPUT:
+        for leaf in ros_layout.leaves(column.ros_definition, column.sample):
+            full = f"{name}.{leaf.path}" if leaf.path else name
+            shape = () if leaf.count is None else (leaf.count,)
+            yield Signal(full, column.unit, number, leaf.format, shape, leaf.offset)
+        return
+    if column.type in ("quaternion", "transform"):
+        numbers = 4 if column.type == "quaternion" else 16
+        form = "<f8" if column.size == 8 * numbers else "<f4"
+        shape = (4,) if numbers == 4 else (4, 4)
+        yield Signal(name, column.unit, number, form, shape, 0, transposed=numbers == 16)
+        return
+    match = _STATE.match(column.type)
+    if match is None:
+        return  # a structure, of which nobody has told the fields
+    kind, rows, columns = match.groups()
+    form = _FORMATS.get(kind) or f"<{'u' if kind[0] == 'u' else 'i'}{int(kind.strip('uint')) // 8}"
+    if rows is None:
+        yield Signal(name, column.unit, number, form, (), 0)
+    elif columns is None or "1" in (rows, columns):
+        yield Signal(name, column.unit, number, form, (int(rows) * int(columns or 1),), 0)
+    else:
+        shape = (int(columns), int(rows))
+        yield Signal(name, column.unit, number, form, shape, 0, transposed=True)
+
+
+def _integers(numbers: Iterable[int]) -> "NDArray[np.int64]":
+    integers: NDArray[np.int64] = _numpy().array(numbers, dtype="i8")
+    return integers
+
+
+def _numpy() -> Any:
+    try:
+        import numpy
+    except ImportError:
+        raise RtcfError("values of ports are NumPy arrays: install python3-numpy") from None
+    return numpy

@@ -1,0 +1,102 @@
+"""Where the numbers of a serialised ROS message lie, by its definition and a sample of it.
+
+Of messages of one length: strings and arrays are as long in each as in the sample.  How ROS 1
+serialises is told in http://wiki.ros.org/msg.
+"""
+
+import re
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+_NUMBERS = {
+    "bool": "?", "int8": "i1", "byte": "i1", "uint8": "u1", "char": "u1", "int16": "<i2",
+    "uint16": "<u2", "int32": "<i4", "uint32": "<u4", "int64": "<i8", "uint64": "<u8",
+    "float32": "<f4", "float64": "<f8",
+}  # fmt: skip
+_SIZES = {"?": 1, "i1": 1, "u1": 1, "<i2": 2, "<u2": 2, "<i4": 4, "<u4": 4, "<f4": 4, "<i8": 8}
+_TIMES = {"time": "<u4", "duration": "<i4"}
+_FIELD = re.compile(r"^([\w/]+)(\[(\d*)\])?\s+(\w+)\s*$")
+_LENGTH = struct.Struct("<I")
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """A number of a message, or an array of numbers."""
+
+    path: str  # e.g. "twist.linear.x"; empty: the message is nothing else
+    format: str  # as NumPy writes it
+    count: int | None  # None: one number
+    offset: int  # bytes
+
+
+def size_of(form: str) -> int:
+    """Return the bytes of one number."""
+    return _SIZES.get(form, 8)
+
+
+def leaves(definition: str, sample: bytes) -> list[Leaf]:
+    """Return the numbers of such a message, in order."""
+    first, *others = re.split(r"^=+$", definition, flags=re.MULTILINE)
+    types = {"": first}
+    for text in others:
+        head, _, body = text.strip().partition("\n")
+        types[head.removeprefix("MSG:").strip()] = body
+    found = list(_Walk(types, sample).message("", "", ""))
+    # std_msgs wrap one thing, whose name says nothing.
+    data = [leaf for leaf in found if leaf.path == "data"]
+    rest = {leaf.path.partition(".")[0] for leaf in found} - {"data", "layout"}
+    if len(data) == 1 and not rest:
+        return [Leaf("", data[0].format, data[0].count, data[0].offset)]
+    return found
+
+
+class _Walk:
+    """One way through a sample."""
+
+    def __init__(self, types: dict[str, str], sample: bytes) -> None:
+        self._types = types
+        self._sample = sample
+        self._at = 0
+
+    def message(self, name: str, package: str, path: str) -> Iterator[Leaf]:
+        for line in self._types[name].splitlines():
+            match = _FIELD.match(line.partition("#")[0].strip())
+            if match is None:
+                continue  # a constant, or nothing
+            kind, array, length, field = match.groups()
+            full = f"{path}.{field}" if path else field
+            count = None if array is None else int(length) if length else self._length()
+            yield from self._field(kind, package, full, count)
+
+    def _field(self, kind: str, package: str, path: str, count: int | None) -> Iterator[Leaf]:
+        if kind in _NUMBERS or kind in _TIMES:
+            form, each = _NUMBERS.get(kind, ""), 1
+            if kind in _TIMES:
+                form, each = _TIMES[kind], 2  # seconds and nanoseconds
+                count = each * (1 if count is None else count)
+            yield Leaf(path, form, count, self._at)
+            self._at += size_of(form) * (1 if count is None else count)
+            return
+        for index in range(1 if count is None else count):
+            each_path = path if count is None else f"{path}[{index}]"
+            if kind == "string":
+                length = self._length()
+                self._at += length
+            else:
+                name = self._resolve(kind, package)
+                yield from self.message(name, name.rpartition("/")[0], each_path)
+
+    def _resolve(self, kind: str, package: str) -> str:
+        if kind == "Header":
+            return "std_msgs/Header"
+        if "/" in kind:
+            return kind
+        if f"{package}/{kind}" in self._types:
+            return f"{package}/{kind}"
+        return next(name for name in self._types if name.endswith(f"/{kind}"))
+
+    def _length(self) -> int:
+        (length,) = _LENGTH.unpack_from(self._sample, self._at)
+        self._at += _LENGTH.size
+        return int(length)

@@ -1,0 +1,92 @@
+"""`rtcfctl echo`: values of outputs and declared state, cycle by cycle."""
+
+import argparse
+import sys
+import time
+from typing import Any
+
+import rtcf
+from rtcf.ports import PortBatch
+
+from rtcfctl.output import Output
+from rtcfctl.words import amount, counted, figure
+
+_TOLD_HZ = 10.0  # what a person can read
+
+
+def register(verbs: Any, common: argparse.ArgumentParser) -> None:
+    """Add the verb."""
+    echo = verbs.add_parser(
+        "echo", parents=[common], help="values of outputs and state, cycle by cycle"
+    )
+    echo.add_argument(
+        "selection",
+        nargs="*",
+        metavar="NAME",
+        help="a component, or an output or state of it; with *, ** and ? as in /arm/*.effort; "
+        "all without",
+    )
+    echo.add_argument("-n", type=int, metavar="N", help="end after so many cycles")
+    echo.add_argument(
+        "--rate",
+        type=amount("Hz"),
+        metavar="HZ",
+        help=f"cycles to print a second, 0 = every cycle (default: {_TOLD_HZ:g} for people, every "
+        "cycle for machines)",
+    )
+    echo.set_defaults(run=show)
+
+
+def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Print values until the user has had enough."""
+    if args.n is not None and args.n < 1:
+        raise ValueError(f"-n {args.n}: at least 1")
+    rate_hz = args.rate if args.rate is not None else _TOLD_HZ if output.for_people else 0.0
+    every = 1
+    if rate_hz > 0:
+        (runner,) = client.get_status(args.runner or "rt_runner").runners
+        every = max(1, round(runner.settings.frequency_hz / rate_hz))
+    left = args.n
+    try:
+        with client.watch_ports(args.selection, args.runner, every) as stream:
+            for note in stream.schema.notes:
+                output.line(f"rtcfctl: note: {note}", to=sys.stderr)
+            for batch in stream:
+                if batch.lost:
+                    _say_lost(batch.lost, output)
+                for index in range(len(batch)):
+                    _print(batch, index, output)
+                    left = None if left is None else left - 1
+                    if left == 0:
+                        return
+                sys.stdout.flush()
+    except KeyboardInterrupt:
+        return
+
+
+def _print(batch: PortBatch, index: int, output: Output) -> None:
+    values = {name: batch[name][index].tolist() for name in batch.schema.signals}
+    cycle = batch.first_cycle + index * batch.every
+    stamp_ns = batch.message.stamps_ns[index]
+    if not output.for_people:
+        output.record({"cycle": cycle, "stamp_ns": stamp_ns, "values": values})
+        return
+    seconds, rest = divmod(stamp_ns, 1_000_000_000)
+    clock = time.strftime("%H:%M:%S", time.localtime(seconds))
+    output.line(f"cycle {cycle} at {clock}.{rest // 1000:06}", "bold")
+    for name, signal in batch.schema.signals.items():
+        unit = f" {signal.unit}" if signal.unit else ""
+        output.line(f"  {name}: {_text(values[name])}{unit}")
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(_text(each) for each in value)}]"
+    return figure(value) if isinstance(value, float) else str(value).lower()
+
+
+def _say_lost(count: int, output: Output) -> None:
+    if output.for_people:
+        output.line(f"{counted(count, 'cycle')} lost: they came faster than they were read", "red")
+    else:
+        output.record({"lost": count})

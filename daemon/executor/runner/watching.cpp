@@ -1,0 +1,96 @@
+// What a runner does for those who watch values of every cycle.
+#include <algorithm>
+#include <chrono>
+#include <thread>
+#include <utility>
+
+#include "runner/runner.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+// For readers who take nothing.
+constexpr std::chrono::milliseconds kPatience{250};
+constexpr std::chrono::milliseconds kLook{1};
+
+}  // namespace
+
+void Runner::watch(std::uint64_t watch, PortSelection selection) {
+    requireMatches(selection, *plan_);
+    watches_.emplace(watch, std::move(selection));
+    try {
+        renewFrames();
+    } catch (...) {
+        watches_.erase(watch);
+        throw;
+    }
+}
+
+void Runner::endWatch(std::uint64_t watch) {
+    if (watches_.erase(watch) != 0) renewFrames();
+}
+
+void Runner::onFramesWaiting(std::function<void()> tell) {
+    const std::lock_guard<std::mutex> lock(published_mutex_);
+    frames_waiting_ = std::move(tell);
+}
+
+// Cycles that go as fast as they can wait for those who watch them.
+std::uint64_t Runner::stepWatched(std::uint64_t cycles) {
+    if (frames_ == nullptr) return loop_.step(cycles);
+    const std::uint64_t most = frames_->ring->capacity() / 2;
+    std::uint64_t done = 0;
+    while (done < cycles) {
+        const std::uint64_t wanted = std::min(cycles - done, most);
+        const std::uint64_t ran = loop_.step(wanted);
+        done += ran;
+        if (ran < wanted) break;
+        awaitReaders();
+    }
+    return done;
+}
+
+void Runner::awaitReaders() {
+    const FrameRing& ring = *frames_->ring;
+    std::function<void()> tell;
+    {
+        const std::lock_guard<std::mutex> lock(published_mutex_);
+        tell = frames_waiting_;
+    }
+    auto since = std::chrono::steady_clock::now();
+    std::uint64_t before = ring.waiting();
+    while (before > ring.capacity() / 4 && std::chrono::steady_clock::now() - since < kPatience) {
+        if (tell) tell();
+        std::this_thread::sleep_for(kLook);
+        const std::uint64_t now = ring.waiting();
+        if (now < before) since = std::chrono::steady_clock::now();
+        before = now;
+    }
+}
+
+void Runner::renewFrames() {
+    noticeEnd();
+    std::shared_ptr<const FrameTable> frames;
+    if (!watches_.empty())
+        frames = makeFrameTable(*plan_, watches_, frames_.get(), settings_.frequency_hz);
+    Adoption adoption;
+    adoption.frames = frames == nullptr ? nullptr : frames->ring.get();
+    adoptAtBoundary(adoption);
+    publishFrames(std::move(frames));
+}
+
+// Once the loop fills them.
+void Runner::publishFrames(std::shared_ptr<const FrameTable> frames) {
+    frames_ = std::move(frames);
+    if (frames_ == nullptr) return;
+    const std::lock_guard<std::mutex> lock(published_mutex_);
+    new_frames_.push_back(frames_);
+}
+
+std::vector<std::shared_ptr<const FrameTable>> Runner::takeFrameTables() {
+    const std::lock_guard<std::mutex> lock(published_mutex_);
+    return std::exchange(new_frames_, {});
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,112 @@
+#include "watch/frame_table.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "refusal.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+constexpr double kSeconds = 1.0;
+constexpr std::size_t kNamesInMessage = 8;
+
+// A column and where its value lies.
+struct Candidate {
+    FrameColumn column;
+    const void* from;
+};
+
+std::vector<Candidate> candidatesOf(const Plan& plan) {
+    std::vector<Candidate> found;
+    for (const std::size_t index : plan.wiring.order) {
+        const Instance& instance = *plan.graph.nodes()[index].instance;
+        const Component& component = instance.component();
+        const auto& outputs = component.outputs();
+        for (std::size_t port = 0; port < outputs.size(); ++port) {
+            const OutputBase& output = *outputs[port];
+            const TypeInfo& type = output.type();
+            if (!type.fixed_size) continue;
+            found.push_back({{instance.fullName(), output.name(), type.name, output.unit(),
+                              instance.outputNames()[port], &type, type.size, instance.code()},
+                             valueOf(type, *output.slot())});
+        }
+        for (const StateDeclaration& state : component.states()) {
+            found.push_back({{instance.fullName(),
+                              state.name,
+                              state.type,
+                              state.unit,
+                              {},
+                              nullptr,
+                              state.size,
+                              instance.code()},
+                             state.value});
+        }
+    }
+    return found;
+}
+
+}  // namespace
+
+std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const Watches& watches,
+                                                 const FrameTable* previous, double frequency_hz) {
+    auto table = std::make_shared<FrameTable>();
+    table->watches = watches;
+    std::vector<FrameRing::Source> sources;
+    std::size_t bytes = 0;
+    std::size_t left_out = 0;
+    for (Candidate& candidate : candidatesOf(plan)) {
+        const std::string name = candidate.column.fullName();
+        if (std::none_of(watches.begin(), watches.end(),
+                         [&](const auto& watch) { return watch.second.matches(name); }))
+            continue;
+        const std::size_t size = (candidate.column.size + 7) / 8 * 8;
+        if (bytes + size > kLargestFrame) {
+            ++left_out;
+            continue;
+        }
+        bytes += size;
+        sources.push_back({candidate.from, candidate.column.size});
+        table->columns.push_back(std::move(candidate.column));
+    }
+    if (left_out != 0) {
+        table->notes.push_back(fmt::format(
+            "{} outputs and states are left out: a cycle copies {} bytes at most: select fewer",
+            left_out, kLargestFrame));
+    }
+    if (previous != nullptr && previous->ring->sources() == sources) {
+        table->ring = previous->ring;
+    } else {
+        table->ring = std::make_shared<FrameRing>(
+            std::move(sources), static_cast<std::size_t>(std::ceil(kSeconds * frequency_hz)));
+    }
+    return table;
+}
+
+void requireMatches(const PortSelection& selection, const Plan& plan) {
+    std::vector<std::string> names;
+    for (const Candidate& candidate : candidatesOf(plan))
+        names.push_back(candidate.column.fullName());
+    for (const PortSelection::Pattern& pattern : selection.patterns()) {
+        if (std::any_of(names.begin(), names.end(), [&](const std::string& name) {
+                return PortSelection::matches(pattern.full, name);
+            }))
+            continue;
+        if (names.empty()) {
+            throw Refusal(RefusalKind::PortNotFound,
+                          fmt::format("{} matches nothing: no component of this runner has an "
+                                      "output of fixed size or declared state",
+                                      pattern.given));
+        }
+        const bool all = names.size() <= kNamesInMessage;
+        if (!all) names.resize(kNamesInMessage);
+        throw Refusal(RefusalKind::PortNotFound,
+                      fmt::format("{} matches no output of fixed size and no state; there is {}{}",
+                                  pattern.given, fmt::join(names, ", "), all ? "" : ", …"));
+    }
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,56 @@
+/// @file
+/// What the frames of a loop hold while somebody watches: which outputs and states, in which order,
+/// and the ring itself. Made by the graph thread for one plan and never changed; others read it,
+/// and give it back to that thread, as it keeps component libraries loaded.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "frames/frame_ring.hpp"
+#include "graph/plan.hpp"
+#include "watch/port_selection.hpp"
+
+namespace rtcf::executor {
+
+/// One output or state of a frame.
+struct FrameColumn {
+    std::string component;  ///< full name
+    std::string name;
+    std::string type;
+    std::string unit;
+    std::string mapped;                ///< of an output: the name of its connection
+    const TypeInfo* output = nullptr;  ///< null: a state
+    std::size_t size = 0;              ///< bytes in the frame
+    std::shared_ptr<const Library> library;
+
+    std::string fullName() const { return component + "." + name; }
+};
+
+/// Selections by the number of the watch that made them.
+using Watches = std::map<std::uint64_t, PortSelection>;
+
+struct FrameTable {
+    std::vector<FrameColumn> columns;  ///< in schedule order, as the ring's sources
+    std::vector<std::string> notes;    ///< what is left out, a line each
+    std::shared_ptr<FrameRing> ring;
+    Watches watches;  ///< whom it is for
+};
+
+/// The most bytes of values that a cycle copies.
+constexpr std::size_t kLargestFrame = std::size_t{64} * 1024;
+
+/// Makes the table for a plan.
+/// @param previous the one before it, whose ring is kept if that copies the same; may be null
+/// @param frequency_hz of the loop; the ring holds about a second
+std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const Watches& watches,
+                                                 const FrameTable* previous, double frequency_hz);
+
+/// Refuses a selection that has a pattern which matches nothing in the plan, and says what there
+/// is.
+void requireMatches(const PortSelection& selection, const Plan& plan);
+
+}  // namespace rtcf::executor

@@ -1,0 +1,80 @@
+"""Values of ports for one caller: what its executor tells, relayed; a slow caller loses some."""
+
+import asyncio
+from collections import deque
+from collections.abc import AsyncGenerator
+
+from rtcf.v1 import ports_pb2
+
+from rtcfd.runners.runner import Runner
+
+_MOST = 8 * 1024 * 1024  # bytes that wait for the caller
+
+
+class _Waiting:
+    """What the caller has not taken yet.  Schemas are never lost: batches mean nothing without."""
+
+    def __init__(self, every: int) -> None:
+        self._every = max(every, 1)
+        self._responses: deque[tuple[ports_pb2.WatchPortsResponse, int]] = deque()
+        self._bytes = 0
+        self._lost: ports_pb2.PortBatch | None = None  # no cycles, and how many are missing
+        self.some = asyncio.Event()
+
+    def put(self, response: ports_pb2.WatchPortsResponse) -> None:
+        size = response.ByteSize()
+        if response.WhichOneof("kind") == "batch":
+            batch = response.batch
+            if self._bytes + size > _MOST:
+                self._lose(batch)
+                return
+            if self._lost is not None:
+                batch.lost += self._lost.lost
+                self._lost = None
+        elif self._lost is not None:
+            # Of the schema before.
+            self._responses.append((ports_pb2.WatchPortsResponse(batch=self._lost), 0))
+            self._lost = None
+        self._responses.append((response, size))
+        self._bytes += size
+        self.some.set()
+
+    def take(self) -> ports_pb2.WatchPortsResponse | None:
+        if not self._responses:
+            if self._lost is not None:
+                lost, self._lost = self._lost, None
+                return ports_pb2.WatchPortsResponse(batch=lost)
+            self.some.clear()
+            return None
+        response, size = self._responses.popleft()
+        self._bytes -= size
+        return response
+
+    def _lose(self, batch: ports_pb2.PortBatch) -> None:
+        cycles = len(batch.stamps_ns)
+        before = 0 if self._lost is None else self._lost.lost
+        self._lost = ports_pb2.PortBatch(
+            first_cycle=batch.first_cycle + cycles * self._every,
+            lost=before + batch.lost + cycles,
+            values=[b""] * len(batch.values),
+        )
+
+
+async def watch_ports(
+    runner: Runner, request: ports_pb2.WatchPortsRequest
+) -> AsyncGenerator[ports_pb2.WatchPortsResponse, None]:
+    """Yield schemas and batches, without end; raises the executor's refusal, or what ended it."""
+    waiting = _Waiting(request.every)
+    telling = asyncio.ensure_future(runner.watch_ports(request, waiting.put))
+    telling.add_done_callback(lambda _: waiting.some.set())
+    try:
+        while True:
+            while (response := waiting.take()) is not None:
+                yield response
+            if telling.done():
+                telling.result()
+                return
+            await waiting.some.wait()
+    finally:
+        telling.cancel()
+        await asyncio.gather(telling, return_exceptions=True)

@@ -1,0 +1,71 @@
+"""`rtcfctl echo` on a loop that runs."""
+
+import json
+import signal
+import subprocess
+from collections.abc import Iterator
+
+import pytest
+import rtcf
+from daemon_process import BUILD_TREE, Daemon, clean_environment
+
+
+@pytest.fixture
+def running(daemon: Daemon, client: rtcf.Client) -> Iterator[Daemon]:
+    client.load(rtcf.component("rtcf_examples", "Wave", name="wave", parameters=["rate:=1.0"]))
+    client.load(rtcf.component("rtcf_examples", "Mimo", name="mimo"))
+    client.start()
+    yield daemon
+    client.stop()
+
+
+def test_every_cycle_is_a_line_for_machines(running: Daemon) -> None:
+    done = running.ctl("echo", "wave", "-n", "50", "-o", "json")
+    assert done.returncode == 0, done.stderr
+    lines = [json.loads(line) for line in done.stdout.splitlines()]
+    assert len(lines) == 50
+    numbers = [line["cycle"] for line in lines]
+    assert numbers == list(range(numbers[0], numbers[0] + 50))
+    assert set(lines[0]["values"]) == {"/wave.wave", "/wave.phase", "/wave.above"}
+    assert isinstance(lines[0]["values"]["/wave.phase"], float)
+    assert isinstance(lines[0]["values"]["/wave.above"], bool)
+
+
+def test_people_get_some_cycles_a_second(running: Daemon) -> None:
+    done = running.ctl("echo", "wave.wave", "--rate", "100Hz", "-n", "3")
+    assert done.returncode == 0, done.stderr
+    heads = [line for line in done.stdout.splitlines() if line.startswith("cycle ")]
+    values = [line for line in done.stdout.splitlines() if line.startswith("  /wave.wave: ")]
+    assert len(heads) == len(values) == 3
+    first, second, third = (int(head.split()[1]) for head in heads)
+    assert (second - first, third - second) == (10, 10)
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("nobody",), 1, "nobody matches no output of fixed size and no state; there is "),
+        (("wave", "-n", "0"), 2, "-n 0: at least 1"),
+        (("wave", "--rate", "fast"), 2, "fast"),
+    ],
+)
+def test_refused_in_a_line(running: Daemon, words: tuple[str, ...], code: int, said: str) -> None:
+    done = running.ctl("echo", *words)
+    assert done.returncode == code
+    assert said in done.stderr.splitlines()[-1]
+
+
+def test_ctrl_c_ends_it(running: Daemon) -> None:
+    process = subprocess.Popen(
+        [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "echo", "wave", "-o", "json"],
+        stdout=subprocess.PIPE,
+        env=clean_environment(),
+        # A shell's background job, or nohup, may have it ignored.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    rest = process.stdout.read()
+    assert process.wait() == 0
+    assert rest.endswith(b"\n")

@@ -1,0 +1,127 @@
+#include "frames/frame_ring.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <cstring>
+#include <thread>
+#include <vector>
+
+namespace rtcf::test {
+namespace {
+
+using executor::CycleRecord;
+using executor::Frame;
+using executor::FrameRing;
+
+#ifdef RTCF_SANITIZED
+constexpr std::uint64_t kFrames = 20'000;
+#else
+constexpr std::uint64_t kFrames = 200'000;
+#endif
+
+void fill(FrameRing& ring, std::uint64_t iteration) {
+    ring.take();
+    const auto number = static_cast<std::int64_t>(iteration);
+    ring.commit({iteration, 10 * number, -number, 3 * number}, false);
+}
+
+template <typename T>
+T valueAt(const Frame& frame, std::size_t offset) {
+    T value{};
+    std::memcpy(&value, frame.values() + offset, sizeof value);
+    return value;
+}
+
+TEST(FrameRing, HasEachValueOfEachCycle) {
+    double number = 0.0;
+    bool flag = false;
+    std::array<std::uint8_t, 11> bytes{};
+    FrameRing ring({{&number, sizeof number}, {&flag, sizeof flag}, {bytes.data(), bytes.size()}},
+                   16);
+    for (std::uint64_t i = 0; i < 10; ++i) {
+        number = 0.5 * static_cast<double>(i);
+        flag = i % 2 == 1;
+        bytes.fill(static_cast<std::uint8_t>(i));
+        fill(ring, i);
+    }
+    ASSERT_EQ(ring.end(), 10);
+    Frame frame;
+    for (std::uint64_t i = 0; i < 10; ++i) {
+        ASSERT_TRUE(ring.read(i, frame));
+        EXPECT_EQ(frame.cycle().iteration, i);
+        EXPECT_EQ(frame.cycle().stamp_ns, static_cast<std::int64_t>(10 * i));
+        EXPECT_EQ(frame.cycle().latency_ns, -static_cast<std::int64_t>(i));
+        EXPECT_EQ(frame.cycle().duration_ns, static_cast<std::int64_t>(3 * i));
+        EXPECT_FALSE(frame.lastOfLoop());
+        EXPECT_EQ(valueAt<double>(frame, ring.offset(0)), 0.5 * static_cast<double>(i));
+        EXPECT_EQ(valueAt<bool>(frame, ring.offset(1)), i % 2 == 1);
+        EXPECT_EQ(valueAt<std::uint8_t>(frame, ring.offset(2) + 10), i);
+    }
+    EXPECT_FALSE(ring.read(10, frame)) << "it has not been";
+}
+
+TEST(FrameRing, KnowsWhichFramesHaveGone) {
+    double number = 0.0;
+    FrameRing ring({{&number, sizeof number}}, 16);
+    ASSERT_EQ(ring.capacity(), 16);
+    for (std::uint64_t i = 0; i < 40; ++i) fill(ring, i);
+    Frame frame;
+    EXPECT_FALSE(ring.read(23, frame));
+    ASSERT_TRUE(ring.read(24, frame));
+    EXPECT_EQ(frame.cycle().iteration, 24);
+}
+
+TEST(FrameRing, SaysWhichCycleWasTheLastOfItsLoop) {
+    FrameRing ring({}, 16);
+    fill(ring, 0);
+    ring.take();
+    ring.commit({1, 0, 0, 0}, true);
+    Frame frame;
+    ASSERT_TRUE(ring.read(0, frame));
+    EXPECT_FALSE(frame.lastOfLoop());
+    ASSERT_TRUE(ring.read(1, frame));
+    EXPECT_TRUE(frame.lastOfLoop());
+}
+
+TEST(FrameRing, IsBoundedInBytes) {
+    const std::vector<std::uint8_t> large(std::size_t{64} * 1024);
+    const FrameRing ring({{large.data(), large.size()}}, 50'000);
+    EXPECT_LE(ring.capacity() * large.size(), FrameRing::kLargestRing);
+    EXPECT_GE(ring.capacity(), FrameRing::kFewestFrames);
+}
+
+// All words of a frame are the same number; a torn one would have two.
+TEST(FrameRing, GivesNoReaderATornFrame) {
+    std::array<std::uint64_t, 32> values{};
+    FrameRing ring({{values.data(), sizeof values}}, 16);
+    std::atomic<bool> done{false};
+    std::thread writer([&] {
+        for (std::uint64_t i = 0; i < kFrames; ++i) {
+            values.fill(i);
+            fill(ring, i);
+        }
+        done = true;
+    });
+    Frame frame;
+    std::uint64_t whole = 0;
+    std::uint64_t next = 0;
+    while (!done || next < ring.end()) {
+        const std::uint64_t end = ring.end();
+        if (end - next > ring.capacity()) next = end - ring.capacity();
+        for (; next < end; ++next) {
+            if (!ring.read(next, frame)) continue;
+            ++whole;
+            ASSERT_EQ(frame.cycle().iteration, next);
+            for (std::size_t i = 0; i < values.size(); ++i)
+                ASSERT_EQ(valueAt<std::uint64_t>(frame, 8 * i), next) << "word " << i;
+        }
+    }
+    writer.join();
+    EXPECT_GE(whole, ring.capacity()) << "at least what was there at the end";
+}
+
+}  // namespace
+}  // namespace rtcf::test

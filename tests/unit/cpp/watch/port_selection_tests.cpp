@@ -1,0 +1,70 @@
+#include "watch/port_selection.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "refusal.hpp"
+
+namespace rtcf::test {
+namespace {
+
+using executor::PortSelection;
+using executor::Refusal;
+
+bool selects(const std::string& pattern, const std::string& name) {
+    return PortSelection({pattern}).matches(name);
+}
+
+TEST(PortSelection, WithoutPatternsIsEverything) {
+    EXPECT_TRUE(PortSelection({}).matches("/arm/pid.effort"));
+}
+
+TEST(PortSelection, NamesOnePort) {
+    EXPECT_TRUE(selects("/arm/pid.effort", "/arm/pid.effort"));
+    EXPECT_TRUE(selects("arm/pid.effort", "/arm/pid.effort"));
+    EXPECT_FALSE(selects("/arm/pid.effort", "/arm/pid.efforts"));
+    EXPECT_FALSE(selects("/arm/pid.effort", "/arm/pid2.effort"));
+}
+
+TEST(PortSelection, OfAComponentIsAllItHas) {
+    EXPECT_TRUE(selects("pid", "/pid.effort"));
+    EXPECT_TRUE(selects("/arm/pid", "/arm/pid.integral"));
+    EXPECT_FALSE(selects("pid", "/arm/pid.effort"));
+    EXPECT_FALSE(selects("pid", "/pid2.effort"));
+}
+
+TEST(PortSelection, OneStarStopsAtASlashTwoDoNot) {
+    EXPECT_TRUE(selects("/arm/*.effort", "/arm/pid.effort"));
+    EXPECT_FALSE(selects("/arm/*.effort", "/arm/left/pid.effort"));
+    EXPECT_TRUE(selects("/arm/**.effort", "/arm/left/pid.effort"));
+    EXPECT_TRUE(selects("**.effort", "/arm/left/pid.effort"));
+    EXPECT_TRUE(selects("/*/*.e*t", "/arm/pid.effort"));
+    EXPECT_TRUE(selects("/arm*", "/arm1.x"));
+}
+
+TEST(PortSelection, TakesOneCharacterAndSets) {
+    EXPECT_TRUE(selects("/joint?.out", "/joint3.out"));
+    EXPECT_FALSE(selects("/joint?.out", "/joint13.out"));
+    EXPECT_FALSE(selects("/arm?pid.out", "/arm/pid.out"));
+    EXPECT_TRUE(selects("/joint[135].out", "/joint3.out"));
+    EXPECT_FALSE(selects("/joint[135].out", "/joint2.out"));
+    EXPECT_TRUE(selects("/joint[1-4].out", "/joint2.out"));
+    EXPECT_FALSE(selects("/joint[1-4].out", "/joint5.out"));
+    EXPECT_TRUE(selects("/joint[1.out", "/joint[1.out")) << "without its end it stands for itself";
+}
+
+TEST(PortSelection, HardPatternsEndSoon) {
+    std::string pattern = "/";
+    for (int i = 0; i < 300; ++i) pattern += "*a";
+    EXPECT_FALSE(selects(pattern, "/" + std::string(250, 'a') + ".b"));
+}
+
+TEST(PortSelection, RefusesWhatIsEmptyOrTooLong) {
+    EXPECT_THROW(PortSelection({""}), Refusal);
+    EXPECT_THROW(PortSelection({std::string(2000, 'a')}), Refusal);
+}
+
+}  // namespace
+}  // namespace rtcf::test
