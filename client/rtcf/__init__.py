@@ -23,20 +23,25 @@ if TYPE_CHECKING:
     from rtcf_shared.graph_writer import live_spec, write_graphs
     from rtcf_shared.spec import component, parse_parameter, parse_port, parse_remap, parse_value
 
+    from rtcf.recording import Recording, RecordingError, read_recording
+
 __version__ = "0.1.0"
 
 # Imported when they are used first: a command is short, and few need them.
 _LATER = {
-    "Graph": "graph_reader",
-    "GraphFileError": "graph_reader",
-    "read_graphs": "graph_reader",
-    "live_spec": "graph_writer",
-    "write_graphs": "graph_writer",
-    "component": "spec",
-    "parse_parameter": "spec",
-    "parse_port": "spec",
-    "parse_remap": "spec",
-    "parse_value": "spec",
+    "Recording": "rtcf.recording",
+    "RecordingError": "rtcf.recording",
+    "read_recording": "rtcf.recording",
+    "Graph": "rtcf_shared.graph_reader",
+    "GraphFileError": "rtcf_shared.graph_reader",
+    "read_graphs": "rtcf_shared.graph_reader",
+    "live_spec": "rtcf_shared.graph_writer",
+    "write_graphs": "rtcf_shared.graph_writer",
+    "component": "rtcf_shared.spec",
+    "parse_parameter": "rtcf_shared.spec",
+    "parse_port": "rtcf_shared.spec",
+    "parse_remap": "rtcf_shared.spec",
+    "parse_value": "rtcf_shared.spec",
 }
 
 __all__ = [
@@ -44,6 +49,8 @@ __all__ = [
     "DaemonUnreachableError",
     "Graph",
     "GraphFileError",
+    "Recording",
+    "RecordingError",
     "RefusedError",
     "RtcfError",
     "Tenancy",
@@ -55,6 +62,7 @@ __all__ = [
     "parse_remap",
     "parse_value",
     "read_graphs",
+    "read_recording",
     "write_graphs",
 ]
 
@@ -62,4 +70,4 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _LATER:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"rtcf_shared.{_LATER[name]}"), name)
+    return getattr(import_module(_LATER[name]), name)

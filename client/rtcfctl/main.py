@@ -42,6 +42,7 @@ _MODULES = {
     "stats": "stats",
     "events": "events",
     "echo": "echo",
+    "record": "record",
     "check": "check",
     "doctor": "doctor",
 }

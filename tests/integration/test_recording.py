@@ -1,0 +1,229 @@
+"""Recordings: what a loop did, in a file that others read, too."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rtcf
+from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for
+
+# MCAP's own reader, which is not in Debian.
+_MCAP = ("mcap==1.6.0", "lz4==4.4.5", "zstandard==0.25.0")
+_DUMP = """
+import json, sys
+from mcap.reader import make_reader
+with open(sys.argv[1], "rb") as file:
+    reader = make_reader(file)
+    summary = reader.get_summary()
+    counts = {}
+    last = {}
+    for schema, channel, message in reader.iter_messages(log_time_order=True):
+        counts[channel.topic] = counts.get(channel.topic, 0) + 1
+        assert message.log_time >= last.get(channel.topic, 0)
+        last[channel.topic] = message.log_time
+    print(json.dumps({
+        "profile": reader.get_header().profile,
+        "types": {c.topic: summary.schemas[c.schema_id].name for c in summary.channels.values()},
+        "encodings": sorted({s.encoding for s in summary.schemas.values()}),
+        "counted": summary.statistics.message_count,
+        "counts": counts,
+    }))
+"""
+
+
+@pytest.fixture(scope="session")
+def mcap_python() -> Path:
+    """A Python that has MCAP's own reader."""
+    folder = BUILD_TREE / "venv-mcap"
+    python = folder / "bin" / "python"
+    asked = [str(python), "-c", "import importlib.metadata as m; print(m.version('mcap'))"]
+    if (
+        not python.exists()
+        or subprocess.run(asked, capture_output=True, text=True).stdout.strip()
+        != _MCAP[0].partition("==")[2]
+    ):
+        shutil.rmtree(folder, ignore_errors=True)
+        subprocess.run([sys.executable, "-m", "venv", folder], check=True)
+        pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+        subprocess.run([*pip, *_MCAP], check=True)
+    return python
+
+
+@pytest.fixture
+def running(daemon: Daemon, client: rtcf.Client) -> Iterator[Daemon]:
+    client.load(rtcf.component("rtcf_examples", "Wave", name="wave", parameters=["rate:=1.0"]))
+    client.load(rtcf.component("rtcf_examples", "Mimo", name="mimo"))
+    client.start()
+    yield daemon
+    client.stop()
+
+
+def _recorded(daemon: Daemon, file: Path, *words: str) -> None:
+    done = daemon.ctl("record", "-o", str(file), *words)
+    assert done.returncode == 0, done.stderr
+    assert f"{file}: " in done.stdout and "none lost" in done.stdout
+
+
+def test_every_cycle_is_in_the_file(running: Daemon, tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    _recorded(running, file, "--duration", "1s")
+    with rtcf.read_recording(file) as recording:
+        assert recording.whole
+        assert {"/wave.wave", "/wave.phase", "/wave.above", "/mimo.out1"} <= set(recording.signals)
+        cycles = recording.cycles
+        assert len(cycles) >= 1000
+        assert np.all(np.diff(cycles) == 1)
+        phase = recording["/wave.phase"]
+        assert len(phase) == len(cycles)
+        step = np.diff(phase) % 1.0
+        assert np.all(np.abs(step - 0.001) < 1e-9)
+        assert np.allclose(recording["/wave.wave"], np.sin(2 * np.pi * phase))
+        assert recording["/wave.above"].dtype == np.bool_
+        assert len(recording.durations_ns) == len(recording.latencies_ns) == len(cycles)
+        assert np.all(recording.durations_ns >= 0)
+
+
+def test_a_slice_is_what_lies_between_two_stamps(running: Daemon, tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    _recorded(running, file, "wave.phase", "--duration", "1s")
+    with rtcf.read_recording(file) as recording:
+        whole = recording.read("/wave.phase")
+        begin, end = int(whole.stamps_ns[100]), int(whole.stamps_ns[200])
+        part = recording.read("/wave.phase", begin, end)
+        assert np.array_equal(part.cycles, whole.cycles[100:200])
+        assert np.array_equal(part.values, whole.values[100:200])
+
+
+def test_mcaps_own_reader_reads_it(running: Daemon, tmp_path: Path, mcap_python: Path) -> None:
+    file = tmp_path / "run.mcap"
+    _recorded(running, file, "--duration", "0.5s")
+    done = subprocess.run(
+        [mcap_python, "-c", _DUMP, file], capture_output=True, text=True, env=clean_environment()
+    )
+    assert done.returncode == 0, done.stderr
+    found: dict[str, Any] = json.loads(done.stdout)
+    assert found["profile"] == "ros1"
+    assert found["encodings"] == ["ros1msg"]
+    assert found["types"]["/rt_runner/cycles"] == "rtcf_msgs/Cycle"
+    assert found["types"]["/wave/phase"] == "std_msgs/Float64"
+    assert found["types"]["/wave/above"] == "std_msgs/Bool"
+    assert found["types"]["/mimo/out1"] == "std_msgs/Float64"
+    assert found["counted"] == sum(found["counts"].values())
+    assert len(set(found["counts"].values())) == 1
+    with rtcf.read_recording(file) as recording:
+        assert found["counts"]["/wave/phase"] == len(recording.cycles)
+
+
+def test_a_file_whose_writer_was_killed_can_be_read(running: Daemon, tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    process = subprocess.Popen(
+        [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "record", "-o", file],
+        env=clean_environment(),
+    )
+    wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a chunk in the file")
+    process.kill()
+    process.wait()
+    with rtcf.read_recording(file) as recording:
+        assert not recording.whole
+        assert len(recording.cycles) > 0
+        assert np.all(np.diff(recording.cycles) == 1)
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(file.read_bytes()[:-10])
+    with rtcf.read_recording(cut) as recording:
+        assert len(recording["/wave.phase"]) <= len(recording.cycles)
+
+
+def test_ctrl_c_ends_the_file_in_order(running: Daemon, tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    process = subprocess.Popen(
+        [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "record", "-o", file],
+        env=clean_environment(),
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        stdout=subprocess.PIPE,
+    )
+    wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a chunk in the file")
+    process.send_signal(signal.SIGINT)
+    said, _ = process.communicate()
+    assert process.returncode == 0
+    assert b"none lost" in said
+    with rtcf.read_recording(file) as recording:
+        assert recording.whole
+
+
+def test_ports_join_while_it_is_recorded(
+    daemon: Daemon, client: rtcf.Client, tmp_path: Path
+) -> None:
+    client.load(rtcf.component("rtcf_examples", "Wave", name="wave"))
+    client.start()
+    file = tmp_path / "run.mcap"
+    process = subprocess.Popen(
+        [BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "record", "-o", file],
+        env=clean_environment(),
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        stdout=subprocess.PIPE,
+    )
+    wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a chunk in the file")
+    client.load(rtcf.component("rtcf_examples", "Mimo", name="late"))
+    size = file.stat().st_size
+    wait_for(lambda: file.stat().st_size > size + 50_000, "chunks with the new component")
+    process.send_signal(signal.SIGINT)
+    process.communicate()
+    with rtcf.read_recording(file) as recording:
+        cycles = recording.cycles
+        assert np.all(np.diff(cycles) == 1)
+        late = recording.read("/late.out1")
+        assert np.array_equal(late.cycles, cycles[-len(late.cycles) :])
+        assert 0 < len(late.cycles) < len(cycles)
+
+
+def test_refused_and_no_file_is_touched(running: Daemon, tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    done = running.ctl("record", "-o", str(file), "nobody")
+    assert done.returncode == 1
+    assert "nobody matches no output" in done.stderr
+    assert not file.exists()
+    file.write_text("mine")
+    done = running.ctl("record", "-o", str(file))
+    assert done.returncode == 2
+    assert "is there already: --force writes over it" in done.stderr
+    assert file.read_text() == "mine"
+    done = running.ctl("record", "-o", str(tmp_path / "no" / "where"))
+    assert done.returncode == 2
+    assert "No such file or directory" in done.stderr
+    done = running.ctl("record", "-o", str(file), "--duration", "0")
+    assert done.returncode == 2
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="a disk of its own takes root")
+def test_a_full_disk_ends_it_with_a_line_and_what_was_written_can_be_read(
+    running: Daemon, tmp_path: Path
+) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=256k", "none", disk], check=True)
+    try:
+        file = disk / "run.mcap"
+        done = running.ctl("record", "-o", str(file))
+        assert done.returncode == 1
+        assert "No space left on device: what was written before can be read" in done.stderr
+        with rtcf.read_recording(file) as recording:
+            assert len(recording.cycles) > 0
+    finally:
+        subprocess.run(["umount", disk], check=True)
+
+
+def test_what_is_no_recording_is_said(tmp_path: Path) -> None:
+    file = tmp_path / "x.mcap"
+    with pytest.raises(rtcf.RecordingError, match="No such file"):
+        rtcf.read_recording(file)
+    file.write_bytes(b"nothing of the kind")
+    with pytest.raises(rtcf.RecordingError, match="is no MCAP file"):
+        rtcf.read_recording(file)
