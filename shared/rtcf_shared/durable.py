@@ -1,24 +1,33 @@
 """Files that are replaced at once, and outlive a power cut."""
 
+import contextlib
 import os
 
 
-def replace(file: str | os.PathLike[str], data: bytes) -> None:
+def replace(file: str | os.PathLike[str], data: bytes, *, sync: bool = True) -> None:
     """Make `data` what a file holds, or leave it as it is; raises OSError.  Blocks.
 
-    After a power cut it may still hold what it held, until sync_folder().
+    After a power cut it may still hold what it held, until sync_folder(); without
+    `sync` it may hold nothing.
     """
     folder, name = os.path.split(file)
     new = os.path.join(folder, f".{name}.new")
     try:
-        with open(new, "wb") as out:
-            out.write(data)
-            out.flush()
-            os.fsync(out.fileno())
-        os.replace(new, file)
-    except OSError:
-        if os.path.lexists(new):
+        # What is there, of a power cut or of somebody, is not opened: it may be a named pipe.
+        with contextlib.suppress(FileNotFoundError):
             os.unlink(new)
+        with open(new, "xb") as out:
+            out.write(data)
+            if sync:
+                out.flush()
+                os.fsync(out.fileno())
+        os.replace(new, file)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            os.unlink(new)
+        for path in (new, file):
+            if isinstance(error, IsADirectoryError) and os.path.isdir(path):
+                raise IsADirectoryError(error.errno, f"{path} is a folder") from None
         raise
 
 

@@ -4,12 +4,14 @@ A file that cannot be read must not keep rtcfd from supervising loops that run:
 at a start, the copy in the state folder is taken in its place.
 """
 
+import contextlib
 import logging
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from rtcf_shared import durable
 
+from rtcfd.common import regular_files
 from rtcfd.common.refusals import Refusal
 from rtcfd.configuration import settings_file
 
@@ -50,10 +52,12 @@ class Settings:
         if self._copy is None or self.problem:
             return
         data = (self.found.text or _NONE).encode()
+        with contextlib.suppress(OSError):
+            if regular_files.read_bytes(self._copy) == data:
+                return
         try:
-            if not self._copy.exists() or self._copy.read_bytes() != data:
-                durable.replace(self._copy, data)
-                durable.sync_folder(self._copy.parent)
+            durable.replace(self._copy, data)
+            durable.sync_folder(self._copy.parent)
         except OSError as error:
             log.warning("no copy of the settings at %s: %s", self._copy, error.strerror)
 

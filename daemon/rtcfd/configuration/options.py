@@ -14,7 +14,7 @@ from rtcf_shared.folders import compiled_folder, component_folders
 from rtcfd import VERSION
 from rtcfd.access.rights import Access
 from rtcfd.catalog.catalog import Folder
-from rtcfd.common import runner_settings
+from rtcfd.common import regular_files, runner_settings
 from rtcfd.common.limits import Limits
 from rtcfd.configuration import paths, settings_file
 from rtcfd.configuration.last_good import Settings
@@ -216,9 +216,15 @@ def reload_wanted(arguments: Sequence[str] | None) -> Path | None:
 
 
 def _file(args: argparse.Namespace) -> Path | None:
-    if args.config is None and not args.foreground and settings_file.DEFAULT_FILE.exists():
-        return settings_file.DEFAULT_FILE
     chosen: Path | None = args.config
+    if chosen is None and not args.foreground:
+        chosen = settings_file.DEFAULT_FILE
+        try:
+            regular_files.require_present(chosen)
+        except FileNotFoundError:
+            return None
+        except OSError:
+            pass  # there is one, and reading it says what is wrong
     return chosen
 
 

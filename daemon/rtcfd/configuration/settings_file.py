@@ -25,7 +25,7 @@ from rtcf_shared.naming import listing, suggestion
 from rtcfd.access import rights
 from rtcfd.access.rights import Access, Level
 from rtcfd.access.tuning import Rule
-from rtcfd.common import runner_settings
+from rtcfd.common import regular_files, runner_settings
 from rtcfd.common.limits import RANGES, Limits
 from rtcfd.common.refusals import InvalidArgument, Refusal
 from rtcfd.configuration.toml_lines import lines_of_keys
@@ -66,7 +66,8 @@ class _Wrong(InvalidArgument):
 def read(file: Path) -> Config:
     """Read a configuration file; a Refusal names the file, the line and what is wrong there."""
     try:
-        text = file.read_text(encoding="utf-8-sig")  # some editors write a byte order mark
+        # Some editors write a byte order mark.
+        text = regular_files.read_text(file, encoding="utf-8-sig")
         document = tomllib.loads(text)
     except OSError as error:
         raise InvalidArgument(

@@ -12,13 +12,17 @@ from pathlib import Path
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2
+from rtcf_shared import durable
 
+from rtcfd.common import regular_files
 from rtcfd.common.aside import Aside
 from rtcfd.common.names import absolute, full_name
 from rtcfd.common.refusals import Unavailable
 
 _Kinds = control_pb2.Difference
 _Identity = tuple[int, int, int]  # inode, time of change, size
+# Of a file that is none of ours.
+_NONSENSE = (ValueError, TypeError, AttributeError, LookupError, OverflowError, RecursionError)
 _TIMEOUT_S = 2.0  # for folders to answer, which may be remote
 
 
@@ -92,13 +96,13 @@ class LoadedCode:
     def store(self, file: Path) -> None:
         """Leave it to the next rtcfd, that adopts the executor."""
         with contextlib.suppress(OSError):  # then that one does not know
-            file.write_text(json.dumps(self._files), encoding="utf-8")
+            durable.replace(file, json.dumps(self._files).encode(), sync=False)
 
     def restore(self, file: Path) -> None:
         """Take what the rtcfd before this one left."""
         self._files = {}
-        with contextlib.suppress(OSError, ValueError, TypeError):
-            found = json.loads(file.read_text(encoding="utf-8"))
+        with contextlib.suppress(OSError, *_NONSENSE):
+            found = json.loads(regular_files.read_bytes(file))
             self._files = {
                 str(name): (str(path), (int(then[0]), int(then[1]), int(then[2])))
                 for name, (path, then) in found.items()

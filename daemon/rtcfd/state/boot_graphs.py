@@ -13,7 +13,7 @@ from pathlib import Path
 from rtcf_shared.errors import RtcfError
 from rtcf_shared.graph_reader import Graph, read_graphs
 
-from rtcfd.common import runner_settings
+from rtcfd.common import regular_files, runner_settings
 from rtcfd.common.names import DEFAULT_RUNNER, check_base_name, check_graph
 from rtcfd.common.refusals import Refusal
 from rtcfd.state.desired import Desired
@@ -53,12 +53,15 @@ class BootGraphs:
         digests: dict[str, str] = {}
         for file in self._files(problems):
             try:
-                text = file.read_text(encoding="utf-8")
+                text = regular_files.read_text(file)
                 found = read_graphs(text, str(file))
                 for graph in found:
                     _check(graph)
-            except (OSError, UnicodeDecodeError) as error:
-                problems.append(f"cannot read {file}: {error}")
+            except OSError as error:
+                problems.append(f"cannot read {file}: {error.strerror}")
+                continue
+            except UnicodeDecodeError:
+                problems.append(f"{file}: it is not UTF-8 text")
                 continue
             except RtcfError as error:
                 problems.append(str(error))
@@ -89,6 +92,7 @@ class BootGraphs:
         if self._folder is None:
             return
         try:
+            regular_files.require_present(self._folder)
             files = sorted(self._folder.iterdir())
         except FileNotFoundError:
             return

@@ -8,12 +8,14 @@ what a client has changed in a runner.
 import contextlib
 import json
 import logging
-import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from google.protobuf import json_format
 from rtcf.v1 import runner_pb2
+from rtcf_shared import durable
+
+from rtcfd.common import regular_files
 
 log = logging.getLogger(__name__)
 
@@ -32,14 +34,23 @@ def read(folder: Path) -> Handover | None:
     """Return what an earlier rtcfd left; None if there is nothing, or nothing of use."""
     file = folder / _NAME
     try:
-        document = json.loads(file.read_bytes())
+        document = json.loads(regular_files.read_bytes(file))
         defaults = json_format.ParseDict(
             document["defaults"], runner_pb2.RunnerSettings(), ignore_unknown_fields=True
         )
         return Handover(defaults, {str(k): str(v) for k, v in document["graphs"].items()})
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, json_format.ParseError):
+    except (
+        OSError,
+        ValueError,
+        TypeError,
+        KeyError,
+        AttributeError,
+        OverflowError,
+        RecursionError,
+        json_format.ParseError,
+    ):
         log.warning("%s is of no use: runners are taken as they are", file)
         return None
 
@@ -50,10 +61,8 @@ def write(folder: Path, handover: Handover) -> None:
         "defaults": json_format.MessageToDict(handover.defaults, preserving_proto_field_name=True),
         "graphs": handover.graphs,
     }
-    temporary = folder / f".{_NAME}.new"
     try:
-        temporary.write_text(json.dumps(document))
-        os.replace(temporary, folder / _NAME)
+        durable.replace(folder / _NAME, json.dumps(document).encode(), sync=False)
     except OSError as error:
         log.warning("cannot write %s: %s", folder / _NAME, error.strerror)
 

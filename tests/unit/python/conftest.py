@@ -27,7 +27,10 @@ def stopped_daemon(tmp_path: Path) -> Iterator[DaemonUnderTest]:
     )
     yield daemon
     if daemon.process is not None and daemon.process.poll() is None:
-        daemon.end()
+        try:
+            daemon.end()
+        finally:
+            daemon.process.kill()  # one that hangs
 
 
 @pytest.fixture

@@ -1,7 +1,10 @@
 """The files of graphs.d: which of them count, and when they count as changed."""
 
+from collections.abc import Callable
 from pathlib import Path
 
+import odd_files
+import pytest
 from rtcfd.state.boot_graphs import BootGraphs
 
 
@@ -21,3 +24,24 @@ def test_a_graph_counts_when_the_file_that_was_in_its_way_is_gone(tmp_path: Path
     first.unlink()
     assert read() == ([("b.yaml", True)], [])
     assert read() == ([("b.yaml", False)], [])
+
+
+@pytest.mark.parametrize("odd", odd_files.ODD)
+def test_what_is_no_file_is_one_line_and_the_others_count(
+    tmp_path: Path, odd: Callable[[Path], None]
+) -> None:
+    odd(tmp_path / "a.yaml")
+    (tmp_path / "b.yaml").write_text("runner: arm\ncomponents: []\n")
+    with odd_files.deadline():
+        graphs, (problem,) = BootGraphs(tmp_path, {}).read()
+    assert [each.file.name for each in graphs] == ["b.yaml"]
+    assert problem.startswith(f"cannot read {tmp_path}/a.yaml: ")
+    assert "[Errno" not in problem and "\n" not in problem
+
+
+def test_a_link_to_a_folder_that_is_not_there_is_a_problem(tmp_path: Path) -> None:
+    link = tmp_path / "graphs.d"
+    assert BootGraphs(link, {}).read() == ([], [])
+    odd_files.dangling(link)
+    problem = f"cannot read {link}: it is a symbolic link that leads nowhere"
+    assert BootGraphs(link, {}).read() == ([], [problem])

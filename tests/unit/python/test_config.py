@@ -2,9 +2,11 @@
 
 import os
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import odd_files
 import pytest
 from rtcf.v1 import runner_pb2
 from rtcfd.access.rights import Access
@@ -116,6 +118,49 @@ def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
     with pytest.raises(Refusal) as refused:
         settings_file.read(file)
     assert str(refused.value) == f"{file}: it is not UTF-8 text"
+
+
+@pytest.mark.parametrize("odd", odd_files.ODD)
+def test_what_is_in_the_place_of_the_file_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, odd: Callable[[Path], None]
+) -> None:
+    file = tmp_path / "rtcfd.toml"
+    monkeypatch.setattr(settings_file, "DEFAULT_FILE", file)
+    odd(file)
+    lines: list[list[str]] = [[], ["--config", str(file)]]
+    for line in lines:
+        with odd_files.deadline(), pytest.raises(Refusal) as refused:
+            options.parse(line, None)
+        assert str(refused.value).startswith(f"cannot read {file}: ")
+        assert "\n" not in str(refused.value)
+
+
+def test_only_a_file_that_is_not_there_means_the_defaults(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, state = tmp_path / "rtcfd", tmp_path / "state"
+    file = folder / "rtcfd.toml"
+    state.mkdir()
+    monkeypatch.setattr(settings_file, "DEFAULT_FILE", file)
+    line = ["--state-dir", str(state)]
+    assert options.parse(line, None).access == Access()
+    folder.mkdir()
+    assert options.parse(line, None).access == Access()
+    file.write_text("[access]\ndefault = 'observe'\n")
+    options.parse(line, None).settings.keep()
+    file.unlink()
+    odd_files.dangling(file)
+    given = options.parse(line, None, last_good=True)
+    assert given.access.default.word == "observe"
+    assert given.settings.problem == (
+        f"cannot read {file}: it is a symbolic link that leads nowhere; the last good settings are "
+        "taken instead"
+    )
+    # Of a folder on the way to it as well.
+    file.unlink()
+    folder.rmdir()
+    odd_files.dangling(folder)
+    assert options.parse(line, None, last_good=True).access.default.word == "observe"
 
 
 def test_a_byte_order_mark_is_passed_over(tmp_path: Path) -> None:

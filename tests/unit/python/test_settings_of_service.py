@@ -3,8 +3,10 @@
 import logging
 import os
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
+import odd_files
 import pytest
 from daemon_under_test import BUILD_TREE, DaemonUnderTest
 from rtcfd.common.refusals import Refusal
@@ -80,6 +82,20 @@ def test_an_empty_copy_grants_nobody_anything(tmp_path: Path) -> None:
     Settings.read(settings, tmp_path, last_good=True).keep()
     settings.write_text(BAD)
     assert "frequency_hz" in Settings.read(settings, tmp_path, last_good=True).problem
+
+
+@pytest.mark.parametrize("odd", [odd_files.pipe, odd_files.dangling, odd_files.plug])
+def test_what_is_in_the_place_of_the_copy_is_replaced(
+    tmp_path: Path, odd: Callable[[Path], None]
+) -> None:
+    settings = tmp_path / "rtcfd.toml"
+    settings.write_text(GOOD)
+    odd(tmp_path / "rtcfd.toml.last-good")
+    odd(tmp_path / ".rtcfd.toml.last-good.new")
+    with odd_files.deadline():
+        Settings.read(settings, tmp_path, last_good=True).keep()
+    assert (tmp_path / "rtcfd.toml.last-good").read_text() == GOOD
+    assert not (tmp_path / "nowhere").exists()
 
 
 def test_a_reload_fails_when_a_graph_is_refused(stopped_daemon: DaemonUnderTest) -> None:

@@ -1,0 +1,59 @@
+"""What may be in the place of a file, for tests; and a deadline for who waits for such a thing."""
+
+import contextlib
+import os
+import signal
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+from types import FrameType
+
+from daemon_under_test import DEADLINE_S
+
+
+def pipe(place: Path) -> None:
+    os.mkfifo(place)
+
+
+def folder(place: Path) -> None:
+    place.mkdir()
+
+
+def dangling(place: Path) -> None:
+    place.symlink_to(place.with_name("nowhere"))
+
+
+def plug(place: Path) -> None:
+    # By a short path: a unix socket's has 107 characters at most.
+    descriptor = os.open(place.parent, os.O_RDONLY | os.O_DIRECTORY)
+    with socket.socket(socket.AF_UNIX) as end:
+        end.bind(f"/proc/self/fd/{descriptor}/{place.name}")
+    os.close(descriptor)
+
+
+def device(place: Path) -> None:
+    place.symlink_to("/dev/null")
+
+
+def unreadable(place: Path) -> None:
+    """A regular file whose read fails, also for root: EIO at address 0."""
+    place.symlink_to("/proc/self/mem")
+
+
+@contextlib.contextmanager
+def deadline() -> Iterator[None]:
+    """Let a call that waits for ever fail."""
+
+    def late(_: int, __: FrameType | None) -> None:
+        raise AssertionError(f"it hangs: {DEADLINE_S:g} s")
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.setitimer(signal.ITIMER_REAL, DEADLINE_S)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+ODD = [pipe, folder, dangling, plug, device, unreadable]
