@@ -114,7 +114,14 @@ class History:
             self._bytes_on_disk += len(line)
             try:
                 change = _change(line)
-            except (ValueError, TypeError, KeyError, json_format.ParseError):
+            except (
+                ValueError,
+                TypeError,
+                KeyError,
+                OverflowError,
+                RecursionError,
+                json_format.ParseError,
+            ):
                 continue
             self._put(change)
             self._last = max(self._last, change.number)

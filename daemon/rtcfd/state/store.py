@@ -1,12 +1,17 @@
 """Desired states on disk: one JSON file per runner, replaced atomically.
 
-A file that cannot be read, or is of a newer rtcfd, is set aside and reported,
-never overwritten.  One of an older rtcfd is upgraded, and kept beside: a way back.
+A file that cannot be read, or is of a newer rtcfd, is set aside and reported; where
+that fails, nothing is saved in its place.  One of an older rtcfd is upgraded, and
+kept beside: a way back.
 """
 
 import dataclasses
+import errno
+import itertools
 import json
 import logging
+import os
+import stat
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -16,6 +21,7 @@ from google.protobuf import json_format
 from rtcf.v1 import graph_pb2, runner_pb2
 from rtcf_shared import durable
 
+from rtcfd.common import regular_files
 from rtcfd.common.names import check_base_name, full_name
 from rtcfd.common.refusals import Refusal
 from rtcfd.state import history
@@ -28,6 +34,9 @@ VERSION = 2
 _SUFFIX = ".json"
 _MARK = ".running"
 _HISTORY = ".history"
+_UNREADABLE = (
+    "it cannot be read ({}); once that is mended, stop rtcfd and rename it back to have it again"
+)
 
 _Document = dict[str, Any]
 
@@ -54,6 +63,8 @@ class Store:
 
     def __init__(self, folder: Path | None) -> None:
         self._folder = folder
+        self._kept: set[Path] = set()  # what could neither be read nor set aside
+        self._unseen = False  # what is in the folder is not known
         self.problems: list[str] = []  # that load() met, a line each
 
     def prepare(self) -> None:
@@ -74,21 +85,13 @@ class Store:
         if self._folder is None:
             return []
         states = []
-        for file in sorted(self._folder.glob(f"*{_SUFFIX}")):
+        for file in self._files():
             try:
-                text = file.read_bytes()
+                text = regular_files.read_bytes(file)
                 document, version = _upgraded(text)
                 desired = _parse(file.stem, document)
-                mark = self.mark(desired.runner)
-                if desired.running and mark is not None and not mark.exists():
-                    # Stopped, and there was nobody or no room to write it down.
-                    desired.running, desired.ended_boot = False, this_boot()
-                self._read_history(desired)
-                states.append(desired)
-                if version != VERSION:
-                    self._keep_beside(file, text, version)
             except OSError as error:
-                self._report(f"state {file} cannot be read: {error.strerror}")
+                self._set_aside(file, "unreadable", _UNREADABLE.format(error.strerror))
             except _Newer as newer:
                 self._set_aside(file, "newer", str(newer))
             except (
@@ -96,13 +99,43 @@ class Store:
                 TypeError,
                 KeyError,
                 AttributeError,
+                OverflowError,
                 RecursionError,
                 json_format.ParseError,
                 Refusal,
             ) as error:
                 reason = " ".join(str(error).split())
                 self._set_aside(file, "corrupt", f"it is corrupt ({reason})")
+            else:
+                if desired.running and not self._marked(desired.runner):
+                    # Stopped, and there was nobody or no room to write it down.
+                    desired.running, desired.ended_boot = False, this_boot()
+                self._read_history(desired)
+                states.append(desired)
+                if version != VERSION:
+                    self._keep_beside(file, text, version)
         return states
+
+    def _files(self) -> list[Path]:
+        assert self._folder is not None
+        try:
+            return sorted(each for each in self._folder.iterdir() if each.suffix == _SUFFIX)
+        except OSError as error:
+            self._unseen = not isinstance(error, FileNotFoundError)
+            if self._unseen:
+                self._report(
+                    f"state folder {self._folder} cannot be read, and what is there is not "
+                    f"overwritten: {error.strerror}; mend that and restart rtcfd"
+                )
+            return []
+
+    def _marked(self, runner: str) -> bool:
+        mark = self.mark(runner)
+        if mark is None:
+            return False
+        if os.path.lexists(mark) and not _is_mark(mark):
+            self._set_aside(mark, "unreadable", "it is no regular file, its loop is not resumed")
+        return _is_mark(mark)
 
     def text(self, desired: Desired) -> bytes:
         """Return what save() is to write; on the thread that owns the state."""
@@ -134,12 +167,15 @@ class Store:
         if self._folder is None or mark is None:
             return
         if not running:
-            mark.unlink(missing_ok=True)
+            _unmark(mark)
             # At once: the rest may find no room, and the state before says that it runs.
             durable.sync_folder(self._folder)
-        durable.replace(self._folder / f"{runner}{_SUFFIX}", text)
-        if running:
-            mark.touch(mode=0o640)
+        file = self._folder / f"{runner}{_SUFFIX}"
+        self._require_known(file)
+        durable.replace(file, text)
+        if running and not _is_mark(mark):
+            # Whatever else has its name is none.
+            durable.replace(mark, b"", sync=False)
         durable.sync_folder(self._folder)
 
     def save_history(self, runner: str, changes: Sequence[Change], anew: bool) -> None:
@@ -150,38 +186,43 @@ class Store:
         if self._folder is None or not changes:
             return
         file = self._folder / f"{runner}{_HISTORY}"
+        self._require_known(file)
+        data = history.text(changes).encode()
         if anew:
-            temporary = self._folder / f".{runner}{_HISTORY}.new"
-            temporary.write_text(history.text(changes), encoding="utf-8")
-            temporary.replace(file)
-            return
-        with file.open("a", encoding="utf-8") as out:
-            out.write(history.text(changes))
+            durable.replace(file, data, sync=False)
+        else:
+            regular_files.append(file, data)
 
     def _read_history(self, desired: Desired) -> None:
         assert self._folder is not None
         file = self._folder / f"{desired.runner}{_HISTORY}"
         try:
-            desired.history.read(file.read_text(encoding="utf-8", errors="replace"))
+            desired.history.read(regular_files.read_text(file, errors="replace"))
         except FileNotFoundError:
             pass
         except OSError as error:
-            self._report(f"{file} cannot be read: {error.strerror}")
+            self._set_aside(file, "unreadable", _UNREADABLE.format(error.strerror))
 
     def remove(self, runner: str) -> None:
         """Forget a runner; raises OSError."""
         if self._folder is None:
             return
-        (self._folder / f"{runner}{_SUFFIX}").unlink(missing_ok=True)
-        (self._folder / f"{runner}{_MARK}").unlink(missing_ok=True)
-        (self._folder / f"{runner}{_HISTORY}").unlink(missing_ok=True)
+        _unmark(self._folder / f"{runner}{_MARK}")
+        for suffix in (_SUFFIX, _HISTORY):
+            file = self._folder / f"{runner}{suffix}"
+            self._require_known(file)
+            file.unlink(missing_ok=True)
         durable.sync_folder(self._folder)
 
     def _set_aside(self, file: Path, why: str, reason: str) -> None:
-        aside = file.with_name(f"{file.stem}.{why}-{time.strftime('%Y%m%dT%H%M%S')}")
+        name = file.stem if file.suffix == _SUFFIX else file.name
+        first = file.with_name(f"{name}.{why}-{time.strftime('%Y%m%dT%H%M%S')}")
+        more = (first.with_name(f"{first.name}.{number}") for number in itertools.count(2))
+        aside = next(each for each in itertools.chain([first], more) if not os.path.lexists(each))
         try:
             file.rename(aside)
         except OSError as failure:
+            self._kept.add(file)
             self._report(f"state {file} is not used, and stays: {reason}; {failure.strerror}")
             return
         self._report(f"state {file} is set aside as {aside.name}: {reason}")
@@ -189,15 +230,39 @@ class Store:
     def _keep_beside(self, file: Path, text: bytes, version: int) -> None:
         beside = file.with_name(f"{file.stem}.version-{version}")
         try:
-            beside.write_bytes(text)
+            durable.replace(beside, text)
         except OSError as failure:
             log.warning("state %s of version %d is not kept: %s", file, version, failure.strerror)
             return
         log.info("state %s is of version %d: upgraded, kept as %s", file, version, beside.name)
 
+    def _require_known(self, file: Path) -> None:
+        """Raise OSError if what a file holds could not be read, and would be lost."""
+        if (file in self._kept or self._unseen) and os.path.lexists(file):
+            raise OSError(
+                errno.EPERM,
+                f"{file} could not be read, and is not overwritten: mend or move it, and restart "
+                "rtcfd",
+            )
+
     def _report(self, problem: str) -> None:
         log.error("%s", problem)
         self.problems.append(problem)
+
+
+def _is_mark(mark: Path) -> bool:
+    try:
+        return stat.S_ISREG(mark.lstat().st_mode)
+    except OSError:
+        return False
+
+
+def _unmark(mark: Path) -> None:
+    try:
+        mark.unlink(missing_ok=True)
+    except OSError:
+        if _is_mark(mark):
+            raise
 
 
 def _json(message: Any) -> str:

@@ -2,12 +2,14 @@
 
 import logging
 import os
+import signal
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
 import odd_files
 import pytest
+import rtcf
 from daemon_under_test import BUILD_TREE, DaemonUnderTest
 from rtcfd.common.refusals import Refusal
 from rtcfd.configuration.last_good import Settings
@@ -96,6 +98,35 @@ def test_what_is_in_the_place_of_the_copy_is_replaced(
         Settings.read(settings, tmp_path, last_good=True).keep()
     assert (tmp_path / "rtcfd.toml.last-good").read_text() == GOOD
     assert not (tmp_path / "nowhere").exists()
+
+
+def test_pipes_in_the_place_of_files_keep_no_service_from_its_start(
+    stopped_daemon: DaemonUnderTest,
+) -> None:
+    daemon = stopped_daemon
+    executors = daemon.folder / "run" / "executors"
+    for folder in (daemon.state, daemon.graphs, executors):
+        folder.mkdir(parents=True)
+    names = ("rt_runner.json", "rt_runner.history", "rt_runner.running", "rtcfd.toml.last-good")
+    for name in names:
+        odd_files.pipe(daemon.state / name)
+        odd_files.pipe(daemon.state / f".{name}.new")
+    for name in ("handover.json", ".handover.json.new", "rt_runner.libraries"):
+        odd_files.pipe(executors / name)
+    odd_files.pipe(daemon.graphs / "a.yaml")
+    daemon.start_service()
+    with daemon.client() as client:
+        client.load(rtcf.component("demo", "Fine", name="a"))
+        client.start()
+        notes = " ".join(client.get_status().notes)
+    assert "rt_runner.json is set aside as rt_runner.unreadable-" in notes
+    assert f"cannot read {daemon.graphs}/a.yaml: it is a named pipe" in notes
+    assert daemon.saved()["running"] is True
+    # Nor do they hold up what is left to the next one.
+    daemon.end(signal.SIGUSR1)
+    daemon.start_service()
+    with daemon.client() as client:
+        assert client.get_order() == ["/a"]
 
 
 def test_a_reload_fails_when_a_graph_is_refused(stopped_daemon: DaemonUnderTest) -> None:

@@ -3,11 +3,16 @@
 import errno
 import os
 import stat
+from collections.abc import Callable
 from pathlib import Path
 
+import odd_files
 import pytest
+from rtcf.v1 import graph_pb2
 from rtcfd.state.desired import Desired
 from rtcfd.state.store import Store
+
+Value = graph_pb2.ParameterValue
 
 
 def test_a_stop_outlives_a_power_cut_also_on_a_full_disk(
@@ -34,3 +39,196 @@ def test_a_stop_outlives_a_power_cut_also_on_a_full_disk(
     (state,) = store.load()
     assert not state.running
     assert sorted(file.name for file in tmp_path.iterdir()) == ["arm.json"]
+
+
+def saved(folder: Path, runner: str, running: bool = False) -> str:
+    """Save the state of a runner as an earlier rtcfd did; return what is on disk."""
+    desired = Desired(runner)
+    desired.running = running
+    desired.history.note("/a", [("kp", None, Value(int_value=1))], "somebody", "set")
+    store = Store(folder)
+    store.save(runner, store.text(desired), running)
+    store.save_history(runner, *desired.history.to_write())
+    return (folder / f"{runner}.json").read_text()
+
+
+def aside(folder: Path, name: str) -> list[Path]:
+    return [each for each in folder.iterdir() if each.name.startswith(f"{name}.unreadable-")]
+
+
+@pytest.mark.parametrize("odd", odd_files.ODD)
+def test_what_is_in_the_place_of_a_state_is_set_aside_and_the_others_are_read(
+    tmp_path: Path, odd: Callable[[Path], None]
+) -> None:
+    saved(tmp_path, "leg")
+    odd(tmp_path / "arm.json")
+    there = (tmp_path / "arm.json").lstat()
+    store = Store(tmp_path)
+    with odd_files.deadline():
+        assert [state.runner for state in store.load()] == ["leg"]
+    (problem,) = store.problems
+    assert f"{tmp_path}/arm.json is set aside as arm.unreadable-" in problem
+    assert "it cannot be read (" in problem and "\n" not in problem
+    # A state that is saved afterwards takes nothing's place.
+    saved(tmp_path, "arm")
+    (kept,) = aside(tmp_path, "arm")
+    assert os.path.samestat(kept.lstat(), there)
+
+
+@pytest.mark.parametrize("odd", odd_files.ODD)
+def test_what_is_in_the_place_of_a_history_is_set_aside(
+    tmp_path: Path, odd: Callable[[Path], None]
+) -> None:
+    saved(tmp_path, "arm")
+    (tmp_path / "arm.history").unlink()
+    odd(tmp_path / "arm.history")
+    store = Store(tmp_path)
+    with odd_files.deadline():
+        (state,) = store.load()
+        assert aside(tmp_path, "arm.history")
+        assert "arm.history is set aside as" in store.problems[0]
+        state.history.note("/a", [("kp", None, Value(int_value=2))], "somebody", "set")
+        store.save_history("arm", *state.history.to_write())
+    (again,) = Store(tmp_path).load()
+    assert [each.value.int_value for each in again.history.of()] == [2]
+
+
+def test_two_that_are_set_aside_in_one_second_are_both_kept(tmp_path: Path) -> None:
+    for _ in range(3):
+        (tmp_path / "arm.json").write_text("{")
+        Store(tmp_path).load()
+    assert len(list(tmp_path.glob("arm.corrupt-*"))) == 3
+
+
+def test_a_state_that_can_neither_be_read_nor_set_aside_is_not_overwritten(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    saved(tmp_path, "arm", running=True)
+    state, mark = tmp_path / "arm.json", tmp_path / "arm.running"
+    state.unlink()
+    odd_files.unreadable(state)
+
+    def read_only(*_: object) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    store = Store(tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "rename", read_only)
+        assert store.load() == []
+    assert "is not used, and stays: it cannot be read (" in store.problems[0]
+    with pytest.raises(OSError, match="could not be read, and is not overwritten"):
+        store.save("arm", b"{}", running=False)
+    # What is stopped stays stopped all the same.
+    assert not mark.exists()
+    with pytest.raises(OSError, match="could not be read"):
+        store.remove("arm")
+    assert os.readlink(state) == "/proc/self/mem"
+    # Once it is out of the way.
+    state.unlink()
+    store.save("arm", b"{}", running=False)
+    assert state.read_bytes() == b"{}"
+
+
+def test_a_folder_that_cannot_be_listed_has_nothing_overwritten(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = saved(tmp_path, "arm")
+
+    def refuse(*_: object) -> None:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    store = Store(tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "listdir", refuse)
+        patch.setattr(os, "scandir", refuse)
+        assert store.load() == []
+    assert "Permission denied" in store.problems[0]
+    with pytest.raises(OSError, match="could not be read"):
+        store.save("arm", b"{}", running=False)
+    assert (tmp_path / "arm.json").read_text() == before
+
+
+@pytest.mark.parametrize("odd", [odd_files.pipe, odd_files.dangling, odd_files.plug])
+def test_what_is_in_the_way_of_a_save_does_not_hold_it_up(
+    tmp_path: Path, odd: Callable[[Path], None]
+) -> None:
+    for name in (".arm.json.new", ".arm.history.new", "arm.json", "arm.running"):
+        odd(tmp_path / name)
+    with odd_files.deadline():
+        text = saved(tmp_path, "arm", running=True)
+    assert (tmp_path / "arm.json").read_text() == text
+    assert (tmp_path / "arm.running").is_file()
+    assert not (tmp_path / "nowhere").exists()
+    (state,) = Store(tmp_path).load()
+    assert state.running
+
+
+def test_a_pipe_that_takes_the_place_of_a_history_holds_nothing_up(tmp_path: Path) -> None:
+    saved(tmp_path, "arm")
+    store = Store(tmp_path)
+    (state,) = store.load()
+    file = tmp_path / "arm.history"
+    file.unlink()
+    odd_files.pipe(file)
+    state.history.note("/a", [("kp", None, Value(int_value=2))], "somebody", "set")
+    with odd_files.deadline(), pytest.raises(OSError, match="it is a named pipe"):
+        store.save_history("arm", *state.history.to_write())
+    # All there is takes its place the next time.
+    state.history.not_written()
+    state.history.note("/a", [("kp", None, Value(int_value=3))], "somebody", "set")
+    store.save_history("arm", *state.history.to_write())
+    (again,) = Store(tmp_path).load()
+    assert [each.value.int_value for each in again.history.of()] == [1, 2, 3]
+
+
+@pytest.mark.parametrize("odd", [odd_files.pipe, odd_files.folder, odd_files.dangling])
+def test_only_a_file_is_a_mark(tmp_path: Path, odd: Callable[[Path], None]) -> None:
+    saved(tmp_path, "arm", running=True)
+    mark = tmp_path / "arm.running"
+    mark.unlink()
+    odd(mark)
+    store = Store(tmp_path)
+    (state,) = store.load()
+    assert not state.running
+    assert "its loop is not resumed" in store.problems[0]
+    # Nor does one that comes later keep a stop from the disk.
+    odd(mark)
+    store.save("arm", store.text(state), running=False)
+    assert not mark.is_file()
+
+
+def test_a_folder_in_the_place_of_a_file_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / ".arm.json.new").mkdir()
+    with pytest.raises(OSError) as failed:
+        Store(tmp_path).save("arm", b"{}", running=False)
+    assert failed.value.strerror == f"{tmp_path}/.arm.json.new is a folder"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '{"version": 2, "runner": "arm", "settings": {"frequency_hz": 1%s}}' % ("0" * 400),
+        '{"version": %s}' % ("9" * 5000),
+        "[" * 100_000,
+    ],
+)
+def test_a_state_whose_numbers_or_depth_are_beyond_all_is_set_aside(
+    tmp_path: Path, text: str
+) -> None:
+    saved(tmp_path, "leg")
+    (tmp_path / "arm.json").write_text(text)
+    store = Store(tmp_path)
+    assert [state.runner for state in store.load()] == ["leg"]
+    assert "it is corrupt" in store.problems[0]
+
+
+def test_a_line_of_a_history_that_is_none_spoils_no_state(tmp_path: Path) -> None:
+    saved(tmp_path, "arm")
+    with (tmp_path / "arm.history").open("a") as history:
+        history.write(
+            "[" * 100_000 + "\n[]\n" + '{"before": null, "value": {"int_value": 1e400}}\n'
+        )
+    store = Store(tmp_path)
+    (state,) = store.load()
+    assert len(state.history.of()) == 1
+    assert store.problems == []
