@@ -1,6 +1,7 @@
 """`rtcfctl runner list|add|set|restart|remove`."""
 
 import argparse
+import math
 from typing import Any
 
 import rtcf
@@ -243,7 +244,7 @@ def add_quantity(to: argparse.ArgumentParser, option: str, dest: str, text: str)
     def value(text: str) -> float | int:
         number = amount(quantity.unit)(text)
         if isinstance(quantity.default, int):
-            if number != int(number):
+            if not math.isfinite(number) or number != int(number):
                 raise argparse.ArgumentTypeError(f"{text} is no whole number of {quantity.unit}")
             return int(number)
         return number

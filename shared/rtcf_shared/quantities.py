@@ -74,6 +74,8 @@ def parse(text: str, unit: str) -> float:
         allowed = f" with one of {', '.join(known)}" if known else ""
         raise ValueError(f"{text}: a number{allowed}, please")
     value = float(found[1]) * known[found[2]] / known[unit]
+    if not math.isfinite(value):
+        return value  # in no range
     # 30us is 30 µs, not 29.999999999999996.
     return round(value) if math.isclose(value, round(value), rel_tol=1e-12) else value
 

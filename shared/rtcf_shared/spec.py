@@ -19,6 +19,7 @@ _BOOLS = {
     "false": False, "False": False, "FALSE": False,
 }  # fmt: skip
 _INT_RANGE = range(-(2**63), 2**63)
+_LONGEST_INT = 100  # characters, with zeros in front
 
 
 def component(
@@ -77,6 +78,9 @@ def parse_value(text: str) -> graph_pb2.ParameterValue:
     if text in _BOOLS:
         return graph_pb2.ParameterValue(bool_value=_BOOLS[text])
     if _INT.fullmatch(text) or _HEX_OR_OCTAL.fullmatch(text):
+        # Python itself reads no more than thousands of digits.
+        if len(text) > _LONGEST_INT:
+            raise ValueError(f"{text[:20]}… does not fit into 64 bits")
         number = int(text) if _INT.fullmatch(text) else int(text, 0)
         if number not in _INT_RANGE:
             raise ValueError(f"{text} does not fit into 64 bits")

@@ -11,6 +11,7 @@ Every key is optional.  What is not known, of the wrong type or out of range is
 refused by name and line.
 """
 
+import math
 import re
 import tomllib
 from collections.abc import Iterable, Iterator
@@ -35,6 +36,8 @@ DEFAULT_FILE = Path("/etc/rtcfd/rtcfd.toml")
 _PATHS = ("socket", "state_dir", "runtime_dir", "graphs_dir", "executor")
 # As adduser(8) allows them, and systemd: with @ before a group.
 _PRINCIPAL = re.compile(r"@?[A-Za-z_][A-Za-z0-9_.-]*\$?")
+_INTEGERS = range(-(2**63), 2**63)
+_ENDLESS = re.compile(r"\d[\d_]{4300}")  # sys.int_info.default_max_str_digits
 _TYPE_WORDS = {bool: "true or false", int: "an integer", float: "a number", str: "a string"}
 
 
@@ -79,13 +82,19 @@ def read(file: Path) -> Config:
         ) from None
     except tomllib.TOMLDecodeError as error:
         raise InvalidArgument(f"{file}: {error}", errors_pb2.REASON_SETTINGS_FILE_INVALID) from None
-    except RecursionError:
+    except ValueError:
+        # Python itself reads no integer of thousands of digits.
+        digits = _ENDLESS.search(text)
+        place = f":{text.count(chr(10), 0, digits.start()) + 1}" if digits else ""
         raise InvalidArgument(
-            f"{file}: lists or tables in it are nested too deep",
+            f"{file}{place}: an integer does not fit into 64 bits",
             errors_pb2.REASON_SETTINGS_FILE_INVALID,
         ) from None
+    except RecursionError:
+        raise _too_deep(file) from None
     config = Config(text=text)
     try:
+        _check_numbers(document, "")
         _check_keys("", document, ("daemon", "access", "limits", "runner"))
         _read_daemon(_table(document, "daemon"), config)
         _read_access(_table(document, "access"), config)
@@ -100,7 +109,31 @@ def read(file: Path) -> Config:
         raise InvalidArgument(
             f"{where}: {wrong}", errors_pb2.REASON_SETTINGS_FILE_INVALID
         ) from None
+    except RecursionError:
+        raise _too_deep(file) from None
     return config
+
+
+def _too_deep(file: Path) -> InvalidArgument:
+    return InvalidArgument(
+        f"{file}: lists or tables in it are nested too deep",
+        errors_pb2.REASON_SETTINGS_FILE_INVALID,
+    )
+
+
+def _check_numbers(value: Any, key: str) -> None:
+    """Refuse, wherever they stand, numbers that no setting can have: Python's have no bounds, and
+    what is infinite passes as more than any."""
+    if isinstance(value, dict):
+        for name, each in value.items():
+            _check_numbers(each, f"{key}.{name}" if key else name)
+    elif isinstance(value, list):
+        for number, each in enumerate(value):
+            _check_numbers(each, f"{key}[{number}]" if isinstance(each, dict) else key)
+    elif isinstance(value, int) and value not in _INTEGERS:
+        raise _Wrong(key, f"{key}: an integer does not fit into 64 bits")
+    elif isinstance(value, float) and not math.isfinite(value):
+        raise _Wrong(key, f"{key} must be a finite number, not {value}")
 
 
 def _read_daemon(table: dict[str, Any], config: Config) -> None:

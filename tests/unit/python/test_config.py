@@ -99,6 +99,7 @@ RULES = (
         ("[access]\nobserve = 'alice'", "access.observe must be a list of users and @groups"),
         ("[access]\nobserve = ['a b']", "'a b' is no user's name, nor @ and a group's"),
         ("[access]\nobserve=['a']\nadmin=['a']", ":3: access.admin: a is in access.observe"),
+        ("[access.default" + ".a" * 5000 + "]", "lists or tables in it are nested too deep"),
         ("[limits]\nclients = 0", ":2: limits.clients of 0 is out of range: 1 to 4096"),
         ("[limits]\nclients = 1.5", "limits.clients must be an integer"),
         ("[limits]\nclient = 1", 'unknown key "limits.client"; did you mean "clients"'),
@@ -110,6 +111,58 @@ def test_a_bad_file_is_refused_by_name(tmp_path: Path, text: str, said: str) -> 
         settings_file.read(file)
     assert said in str(refused.value)
     assert str(file) in str(refused.value)
+
+
+@pytest.mark.parametrize("number", ["1e400", "-1e400", "inf", "nan"])
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        (RULES + "most_per_s = ", "6: access.parameters[1].most_per_s"),
+        ("[runner]\nfrequency_hz = ", "2: runner.frequency_hz"),
+        ("[runner]\npriority = ", "2: runner.priority"),
+        ("[limits]\nclients = ", "2: limits.clients"),
+    ],
+)
+def test_a_number_that_is_none_is_refused(tmp_path: Path, text: str, key: str, number: str) -> None:
+    file = written(tmp_path, text + number)
+    with pytest.raises(Refusal) as refused:
+        settings_file.read(file)
+    value = number.replace("1e400", "inf")
+    assert str(refused.value) == f"{file}:{key} must be a finite number, not {value}"
+
+
+@pytest.mark.parametrize(
+    ("digits", "number"),
+    [
+        (401, "1" + "0" * 400),
+        (5000, "-" + "9" * 5000),
+        (5000, "9_" * 4999 + "9"),
+        (9000, "0x" + "f" * 9000),
+        (20000, "0b" + "1" * 20000),
+    ],
+    ids=lambda value: value if isinstance(value, int) else value[:4],
+)
+@pytest.mark.parametrize(
+    "text",
+    [
+        RULES + "most_per_s = {}",
+        "[runner]\nfrequency_hz = {}",
+        "[runner]\npriority = {}",
+        "[limits]\nclients = {}",
+        "[access]\ntune = [[{}]]",
+        "[daemon]\nsocket = {{a = {}}}",
+    ],
+)
+def test_an_integer_beyond_64_bits_is_refused_with_its_line(
+    tmp_path: Path, text: str, digits: int, number: str
+) -> None:
+    file = written(tmp_path, text.format(number))
+    with pytest.raises(Refusal) as refused:
+        settings_file.read(file)
+    said = str(refused.value)
+    assert said.startswith(f"{file}:{len(text.splitlines())}: ")
+    assert said.endswith("an integer does not fit into 64 bits")
+    assert len(said) < len(str(file)) + 100 < digits
 
 
 def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:

@@ -45,6 +45,10 @@ def test_an_integer_of_more_than_64_bits_is_refused() -> None:
     assert rtcf.parse_value(str(2**63 - 1)).int_value == 2**63 - 1
     with pytest.raises(ValueError, match="64 bits"):
         rtcf.parse_value(str(2**63))
+    for digits in ("9" * 5000, "0x" + "f" * 9000):
+        with pytest.raises(ValueError, match="64 bits") as refused:
+            rtcf.parse_value(digits)
+        assert len(str(refused.value)) < 100
 
 
 def test_a_parameter_keeps_signs_in_its_value() -> None:
