@@ -25,6 +25,7 @@
 #include "ros/ros_node.hpp"
 #include "rtcf/version.hpp"
 #include "runner/runner.hpp"
+#include "server/check_settings.hpp"
 #include "server/describe.hpp"
 #include "server/direct_stop.hpp"
 #include "server/server.hpp"
@@ -44,6 +45,7 @@ struct Options {
     std::string package;
     std::vector<uid_t> trusted;
     CheckRequest check;
+    bool check_settings = false;
 };
 
 constexpr const char* kUsage =
@@ -52,6 +54,7 @@ constexpr const char* kUsage =
     "       rtcf-executor --describe LIBRARY --package PACKAGE [--trust UID]...\n"
     "       rtcf-executor --check LIBRARY --package PACKAGE --type TYPE [--cycles N] [--param "
     "NAME:=VALUE]...\n"
+    "       rtcf-executor --check-settings <SETTINGS\n"
     "       rtcf-executor --version\n"
     "It is started by rtcfd(8); see rtcf-executor(8).\n";
 
@@ -68,6 +71,7 @@ int parse(int argc, char** argv, Options& options) {
         kDescribe,
         kPackage,
         kCheck,
+        kCheckSettings,
         kType,
         kCycles,
         kParam,
@@ -83,6 +87,7 @@ int parse(int argc, char** argv, Options& options) {
                             {"describe", required_argument, nullptr, kDescribe},
                             {"package", required_argument, nullptr, kPackage},
                             {"check", required_argument, nullptr, kCheck},
+                            {"check-settings", no_argument, nullptr, kCheckSettings},
                             {"type", required_argument, nullptr, kType},
                             {"cycles", required_argument, nullptr, kCycles},
                             {"param", required_argument, nullptr, kParam},
@@ -117,6 +122,9 @@ int parse(int argc, char** argv, Options& options) {
             case kCheck:
                 options.check.library = optarg;
                 break;
+            case kCheckSettings:
+                options.check_settings = true;
+                break;
             case kType:
                 options.check.type = optarg;
                 break;
@@ -145,7 +153,8 @@ int parse(int argc, char** argv, Options& options) {
     const bool checks =
         !options.check.library.empty() && !options.package.empty() && !options.check.type.empty();
     const bool runs = isBaseName(options.runner) && !options.socket.empty();
-    const int tasks = (describes ? 1 : 0) + (checks ? 1 : 0) + (runs ? 1 : 0);
+    const int tasks =
+        (describes ? 1 : 0) + (checks ? 1 : 0) + (runs ? 1 : 0) + (options.check_settings ? 1 : 0);
     if (optind == argc && tasks == 1) return -1;
     std::fputs(kUsage, stderr);
     return kUsageStatus;
@@ -256,6 +265,7 @@ int main(int argc, char** argv) {
         if (!options.describe.empty())
             return describeLibrary(options.describe, options.package, options.trusted);
         if (!options.check.library.empty()) return checkComponent(options.check);
+        if (options.check_settings) return checkSettings();
         return run(options);
     } catch (const std::exception& error) {
         std::fprintf(stderr, "rtcf-executor: %s\n", error.what());

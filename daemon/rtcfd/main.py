@@ -291,7 +291,7 @@ def _check(arguments: Sequence[str] | None, build_tree: Path | None) -> int:
     """Say whether settings and graphs are valid."""
     log.addHandler(logging.NullHandler())  # what is wrong is printed
     given = options.parse(arguments, build_tree)
-    _, problems = BootGraphs(given.graphs_dir, {}).read()
+    _, problems = BootGraphs(given.graphs_dir, {}, given.opinion).read()
     for problem in problems:
         print(f"rtcfd: {problem}", file=sys.stderr)
     if not problems:

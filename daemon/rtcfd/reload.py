@@ -61,7 +61,7 @@ class Reloads:
         self._users = Aside("user database")
         self._aside = Aside("settings and graphs")
         self._left: Handover | None = None  # by the rtcfd before this one
-        self._graphs = BootGraphs(given.graphs_dir, {})
+        self._graphs = BootGraphs(given.graphs_dir, {}, self._opinion)
         self._late: list[Given] = []  # for runners that are adopted first
         self._graph_problems: list[str] = []
         self._files = (Path(__file__), given.executor)
@@ -78,7 +78,7 @@ class Reloads:
             if not left.defaults.HasField("priority"):
                 before.ClearField("priority")
             self._shared.defaults = before
-            self._graphs = BootGraphs(self._given.graphs_dir, left.graphs)
+            self._graphs = BootGraphs(self._given.graphs_dir, left.graphs, self._opinion)
         graphs, self._graph_problems = self._graphs.read()
         found = {state.runner: state for state in states}
         for given in graphs:
@@ -166,6 +166,9 @@ class Reloads:
             control_pb2.Event.KIND_DAEMON, "; ".join(["settings read again", *lines])
         )
         return lines
+
+    def _opinion(self, settings: runner_pb2.RunnerSettings) -> str:
+        return self._given.opinion(settings)
 
     def _leave_note(self) -> None:
         handover.write(self._command_folder, Handover(self._shared.defaults, self._graphs.digests))

@@ -1,7 +1,7 @@
 """Settings of runners: their defaults, and what is allowed.
 
 Regular expressions are left to the executor, which compiles them with the
-engine that will use them.
+engine that will use them: executor/opinion.py asks one.
 """
 
 import math

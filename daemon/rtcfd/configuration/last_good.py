@@ -30,7 +30,12 @@ class Settings:
     _copy: Path | None = None
 
     @staticmethod
-    def read(file: Path | None, folder: Path | None, last_good: bool) -> "Settings":
+    def read(
+        file: Path | None,
+        folder: Path | None,
+        last_good: bool,
+        opinion: settings_file.Opinion = lambda _: "",
+    ) -> "Settings":
         """Read a file, if one is given; `folder` is that of the copy.
 
         Raises Refusal, with `last_good` only if there is no good copy either.
@@ -39,7 +44,7 @@ class Settings:
         if file is None:
             return Settings()
         try:
-            return Settings(settings_file.read(file), _copy=copy)
+            return Settings(settings_file.read(file, opinion), _copy=copy)
         except Refusal as refusal:
             if not last_good or copy is None or not _is_there(copy):
                 raise

@@ -18,6 +18,7 @@ from rtcfd.common import regular_files, runner_settings
 from rtcfd.common.limits import Limits
 from rtcfd.configuration import paths, settings_file
 from rtcfd.configuration.last_good import Settings
+from rtcfd.executor import opinion
 
 _REALTIME = {
     "required": runner_pb2.REALTIME_REQUIRED,
@@ -45,6 +46,10 @@ class Options:
     verbose: bool
     settings: Settings  # as they were read
 
+    def opinion(self, settings: runner_pb2.RunnerSettings) -> str:
+        """Return why an executor would refuse settings that a runner chooses, or nothing."""
+        return opinion.of_settings(self.executor, runner_settings.merged(self.defaults, settings))
+
 
 def parse(
     arguments: Sequence[str] | None, build_tree: Path | None, *, last_good: bool = False
@@ -57,7 +62,16 @@ def parse(
     kept = None
     if not args.foreground:
         kept = _absolute(args.state_dir or _from_systemd("STATE_DIRECTORY", paths.STATE_DIR))
-    settings = Settings.read(_file(args), kept, last_good)
+
+    def executor(file: settings_file.Config) -> Path:
+        return _absolute(args.executor or file.executor or paths.executor(build_tree))
+
+    settings = Settings.read(
+        _file(args),
+        kept,
+        last_good,
+        lambda file: opinion.of_settings(executor(file), file.runner),
+    )
     file = settings.found
     socket = _socket(args, file)
     realtime = args.realtime or file.realtime or ("preferred" if args.foreground else "required")
@@ -77,7 +91,7 @@ def parse(
         runtime_dir=_absolute(runtime_dir),
         own_runtime_dir=own_runtime_dir,
         state_dir=_absolute(state_dir) if state_dir else None,
-        executor=_absolute(args.executor or file.executor or paths.executor(build_tree)),
+        executor=executor(file),
         graphs_dir=_absolute(graphs_dir) if graphs_dir else None,
         folders=_folders([*args.path, *file.path], build_tree)
         + ([Folder(compiled_folder(), named=True)] if args.foreground else []),

@@ -14,7 +14,7 @@ refused by name and line.
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -58,6 +58,10 @@ class Config:
     text: str = field(default="", repr=False)  # of the file
 
 
+# Why an executor would refuse what a file says; empty: it would not.
+Opinion = Callable[[Config], str]
+
+
 class _Wrong(InvalidArgument):
     """Something is wrong with a key."""
 
@@ -66,8 +70,11 @@ class _Wrong(InvalidArgument):
         self.key = key
 
 
-def read(file: Path) -> Config:
-    """Read a configuration file; a Refusal names the file, the line and what is wrong there."""
+def read(file: Path, opinion: Opinion = lambda _: "") -> Config:
+    """Read a configuration file; a Refusal names the file, the line and what is wrong there.
+
+    `opinion` is the executor's, of the settings of runners.
+    """
     try:
         # Some editors write a byte order mark.
         text = regular_files.read_text(file, encoding="utf-8-sig")
@@ -101,6 +108,8 @@ def read(file: Path) -> Config:
         _read_limits(_table(document, "limits"), config)
         _read_message(_table(document, "runner"), "runner", config.runner)
         _check_runner(config.runner)
+        if config.runner.ListFields() and (complaint := opinion(config)):
+            raise _Wrong(_key(complaint), complaint)
     except _Wrong as wrong:
         lines = lines_of_keys(text)
         # Of what is missing, or stands in braces, that in which it is.
@@ -258,6 +267,13 @@ def _check_runner(runner: runner_pb2.RunnerSettings) -> None:
             _check_alone(
                 f"{key}.{inner.name}", runner_pb2.RunnerSettings(**{descriptor.name: alone})
             )
+
+
+def _key(complaint: str) -> str:
+    """Return the key that an executor complains of."""
+    first = re.match(r"\w*", complaint)
+    known = runner_pb2.RosSettings.DESCRIPTOR.fields_by_name
+    return f"runner.ros.{first[0]}" if first and first[0] in known else "runner"
 
 
 def _check_alone(key: str, settings: runner_pb2.RunnerSettings) -> None:

@@ -6,16 +6,17 @@ out, whole.
 
 import hashlib
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from rtcf.v1 import errors_pb2, runner_pb2
 from rtcf_shared.errors import RtcfError
 from rtcf_shared.graph_reader import Graph, read_graphs
 
 from rtcfd.common import regular_files, runner_settings
 from rtcfd.common.names import DEFAULT_RUNNER, check_base_name, check_graph
-from rtcfd.common.refusals import Refusal
+from rtcfd.common.refusals import InvalidArgument, Refusal
 from rtcfd.state.desired import Desired
 
 log = logging.getLogger(__name__)
@@ -40,9 +41,16 @@ class Given:
 class BootGraphs:
     """The folder, and what was read from it last."""
 
-    def __init__(self, folder: Path | None, applied: Mapping[str, str]) -> None:
-        """`applied`: the digests of an earlier rtcfd."""
+    def __init__(
+        self,
+        folder: Path | None,
+        applied: Mapping[str, str],
+        opinion: Callable[[runner_pb2.RunnerSettings], str] = lambda _: "",
+    ) -> None:
+        """`applied`: the digests of an earlier rtcfd; `opinion`: why an executor would refuse
+        settings, or nothing."""
         self._folder = folder
+        self._opinion = opinion
         self.digests = dict(applied)  # by file; of what was read last
 
     def read(self) -> tuple[list[Given], list[str]]:
@@ -56,7 +64,7 @@ class BootGraphs:
                 text = regular_files.read_text(file)
                 found = read_graphs(text, str(file))
                 for graph in found:
-                    _check(graph)
+                    self._check(graph)
             except OSError as error:
                 problems.append(f"cannot read {file}: {error.strerror}")
                 continue
@@ -88,6 +96,13 @@ class BootGraphs:
         """Count a file as changed by the next read()."""
         self.digests.pop(str(file), None)
 
+    def _check(self, graph: Graph) -> None:
+        check_base_name("runner", graph.runner or DEFAULT_RUNNER)
+        runner_settings.check(graph.settings)
+        check_graph(graph.components)
+        if graph.settings.ListFields() and (complaint := self._opinion(graph.settings)):
+            raise InvalidArgument(complaint, errors_pb2.REASON_VALUE_INVALID)
+
     def _files(self, problems: list[str]) -> Iterator[Path]:
         if self._folder is None:
             return
@@ -111,9 +126,3 @@ def become(desired: Desired, graph: Graph) -> None:
     desired.choose(graph.settings)
     for name, reason in quarantined.items():
         desired.quarantine(name, reason)
-
-
-def _check(graph: Graph) -> None:
-    check_base_name("runner", graph.runner or DEFAULT_RUNNER)
-    runner_settings.check(graph.settings)
-    check_graph(graph.components)

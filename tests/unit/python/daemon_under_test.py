@@ -43,6 +43,7 @@ class DaemonUnderTest:
         peer = Path(__file__).with_name("peer_executor.py")
         self.executor.write_text(
             "#!/bin/sh\n"
+            f'[ "$1" = --check-settings ] && exec {BUILD_TREE}/bin/rtcf-executor "$@"\n'
             # The build tree's own libraries are none of its: two dozen times Python for nothing.
             f'case "$*" in *--describe\\ {BUILD_TREE}/*) exit 1 ;; esac\n'
             f'PYTHONPATH={BUILD_TREE}/python exec {sys.executable} {peer} "$@"\n'

@@ -12,6 +12,7 @@ import pytest
 import rtcf
 from daemon_under_test import BUILD_TREE, DaemonUnderTest
 from rtcfd.common.refusals import Refusal
+from rtcfd.configuration import options
 from rtcfd.configuration.last_good import Settings
 from rtcfd.journal import standing_alone
 
@@ -162,6 +163,92 @@ def test_settings_and_graphs_are_checked_without_a_daemon(stopped_daemon: Daemon
     done = rtcfd(daemon, *arguments)
     assert done.returncode == 1
     assert f"{daemon.settings}:2: runner.frequency_hz must be a number" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (
+            "latch = '*.ros'",
+            "latch: bad regular expression '*.ros': a repeat (*",
+        ),
+        ("whitelist = '['", "whitelist: bad regular expression '[': a [ is not closed"),
+        ('latch = """a\nb("""', "latch: bad regular expression 'a b(': a ( is not closed"),
+        ("blacklist = 'a{2'", "blacklist: bad regular expression 'a{2': a { } is not complete"),
+        ("decimate = '(?<=a)b'", "decimate: bad regular expression '(?<=a)b': "),
+        (f"stamped = '{'a' * 1001}'", "has 1001 characters: at most 1000 are allowed"),
+    ],
+    ids=lambda text: str(text)[:10],
+)
+def test_settings_that_an_executor_would_refuse_are_refused(
+    stopped_daemon: DaemonUnderTest, line: str, said: str
+) -> None:
+    daemon = stopped_daemon
+    daemon.settings.write_text(f"[runner]\nfrequency_hz = 500.0\n[runner.ros]\n{line}\n")
+    done = rtcfd(daemon, "--check-config", "--config", str(daemon.settings))
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith(f"rtcfd: {daemon.settings}:4: {line.partition(' =')[0]}")
+    assert said in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_an_expression_that_keeps_a_runner_down_passes_neither_reload_nor_start(
+    stopped_daemon: DaemonUnderTest,
+) -> None:
+    daemon = stopped_daemon
+    good = "[runner.ros]\nwhitelist = '/arm/.*'\n"
+    bad = "[runner.ros]\nwhitelist = '*'\n"
+    daemon.settings.write_text(good)
+    daemon.start_service()
+    daemon.settings.write_text(bad)
+    done = rtcfd(daemon, "--reload")
+    assert done.returncode == 1
+    said = f"{daemon.settings}:2: whitelist: bad regular expression '*'"
+    assert said in done.stderr
+    daemon.end()
+    daemon.start_service()
+    with daemon.client() as client:
+        status = client.get_status()
+    assert status.runners[0].settings.ros.whitelist == "/arm/.*"
+    assert status.notes[0].startswith(said)
+
+
+def test_settings_of_a_graph_are_judged_with_those_they_come_on_top_of(
+    stopped_daemon: DaemonUnderTest,
+) -> None:
+    daemon = stopped_daemon
+    daemon.settings.write_text("[runner]\nfrequency_hz = 100.0\n")
+    daemon.graphs.mkdir()
+    graph = daemon.graphs / "a.yaml"
+    check = (
+        *("--check-config", "--config", str(daemon.settings)),
+        *("--graphs-dir", str(daemon.graphs), "--executor", str(daemon.executor)),
+    )
+    # Half a period at most: of 10 ms, not of the 1 ms that is the default.
+    graph.write_text("settings: {spin_us: 5000}\n" + GRAPH)
+    assert rtcfd(daemon, *check).returncode == 0
+    graph.write_text("settings: {spin_us: 5001}\n" + GRAPH)
+    done = rtcfd(daemon, *check)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith(f"rtcfd: {graph}: spin 5001 ")
+    graph.write_text("settings: {ros: {latch: '('}}\n" + GRAPH)
+    done = rtcfd(daemon, *check)
+    assert done.stderr.startswith(f"rtcfd: {graph}: latch: bad regular expression '('")
+    # A start takes the others.
+    (daemon.graphs / "b.yaml").write_text("runner: arm\n" + GRAPH)
+    daemon.start_service()
+    with daemon.client() as client:
+        assert client.get_order("arm") == ["/a"]
+        assert any("latch: bad regular" in note for note in client.get_status().notes)
+        assert not client.get_status("rt_runner").runners[0].status
+
+
+def test_where_there_is_no_executor_to_ask_settings_are_what_rtcfd_knows(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "rtcfd.toml").write_text("[runner.ros]\nlatch = '('\n")
+    nobody = ["--config", str(tmp_path / "rtcfd.toml"), "--executor", str(tmp_path / "none")]
+    assert options.parse(nobody, None).defaults.ros.latch == "("
 
 
 def test_a_line_of_the_journal_stands_by_itself() -> None:
