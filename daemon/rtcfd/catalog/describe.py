@@ -13,6 +13,7 @@ from pathlib import Path
 from google.protobuf.message import DecodeError
 from rtcf.executor.v1 import executor_pb2 as wire
 
+from rtcfd.common import regular_files
 from rtcfd.common.aside import Aside
 from rtcfd.common.refusals import Refusal
 from rtcfd.executor.command import ExecutorCommand
@@ -73,6 +74,8 @@ class Describer:
         """
         try:
             found = await self._aside.run(library.stat, TIMEOUT_S)
+            # Else the process that loads it waits for the other end of a pipe.
+            regular_files.require_regular(library, found)
         except OSError as error:
             return _problem(f"cannot read it: {error.strerror}")
         except Refusal as refusal:

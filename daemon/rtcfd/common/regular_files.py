@@ -56,24 +56,25 @@ def require_present(path: Path) -> None:
         raise
 
 
+def require_regular(file: Path, found: os.stat_result) -> None:
+    """Raise OSError if what was found at a path is no regular file."""
+    if not stat.S_ISREG(found.st_mode):
+        kind = next((word for is_one, word in _KINDS if is_one(found.st_mode)), "something else")
+        raise OSError(errno.EINVAL, f"it is {kind}, no regular file", str(file))
+
+
 def _opened(file: Path, flags: int) -> int:
     try:
         require_present(file)
-        _require_regular(file, file.stat())
+        require_regular(file, file.stat())
     except FileNotFoundError:
         if not flags & os.O_CREAT:
             raise
     # Without waiting: it may have become something else meanwhile.
     descriptor = os.open(file, flags | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
     try:
-        _require_regular(file, os.fstat(descriptor))
+        require_regular(file, os.fstat(descriptor))
     except OSError:
         os.close(descriptor)
         raise
     return descriptor
-
-
-def _require_regular(file: Path, found: os.stat_result) -> None:
-    if not stat.S_ISREG(found.st_mode):
-        kind = next((word for is_one, word in _KINDS if is_one(found.st_mode)), "something else")
-        raise OSError(errno.EINVAL, f"it is {kind}, no regular file", str(file))

@@ -2,8 +2,10 @@
 
 import asyncio
 import os
+from collections.abc import Callable
 from pathlib import Path
 
+import odd_files
 import pytest
 from rtcfd.catalog import describe
 from rtcfd.catalog.describe import Describer
@@ -89,3 +91,20 @@ def test_a_library_that_writes_without_end_is_ended(
         return str((await Describer(binary).describe(library, "pkg")).problem)
 
     assert asyncio.run(work()) == "the process that loaded it wrote without end"
+
+
+@pytest.mark.parametrize(
+    ("odd", "said"),
+    [
+        (odd_files.pipe, "cannot read it: it is a named pipe, no regular file"),
+        (odd_files.folder, "cannot read it: it is a folder, no regular file"),
+        (odd_files.device, "cannot read it: it is a device, no regular file"),
+    ],
+)
+def test_what_is_no_file_is_not_opened(
+    describer: Describer, tmp_path: Path, odd: Callable[[Path], None], said: str
+) -> None:
+    (tmp_path / "needed").touch()
+    odd(tmp_path / "odd.so")
+    assert asyncio.run(describer.describe(tmp_path / "odd.so", "pkg")).problem == said
+    assert not (tmp_path / "runs").exists()
