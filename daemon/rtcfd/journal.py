@@ -5,6 +5,7 @@ import os
 import sys
 import time
 
+from rtcfd import journal_socket
 from rtcfd.log_thread import LogThread
 
 _JOURNAL_PRIORITIES = (
@@ -23,18 +24,17 @@ class JournalHandler(logging.Handler):
     CODE_FILE, CODE_LINE, CODE_FUNC; the journal drops names that are not in capitals.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, address: str = journal_socket.ADDRESS) -> None:
         super().__init__()
-        import systemd.journal
-
-        self._send = systemd.journal.send
+        self._journal = journal_socket.JournalSocket(address)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Send one record."""
-        try:
-            self._send(standing_alone(record, self.format(record)), **fields(record))
-        except Exception:  # logging must not end the daemon
-            self.handleError(record)
+        """Send one record; waits for a journal that does not read.
+
+        Raises OSError, if there is no journal.
+        """
+        message = standing_alone(record, self.format(record))
+        self._journal.send({"MESSAGE": message, **fields(record)})
 
 
 class LineFormatter(logging.Formatter):
@@ -67,16 +67,15 @@ def standing_alone(record: logging.LogRecord, message: str) -> str:
     return message
 
 
-def fields(record: logging.LogRecord) -> dict[str, str | int]:
+def fields(record: logging.LogRecord) -> dict[str, str]:
     """Return the journal's fields of a record, besides its message."""
     priority = next(
         (value for level, value in _JOURNAL_PRIORITIES if record.levelno >= level), _DEBUG_PRIORITY
     )
-    result: dict[str, str | int] = {"PRIORITY": str(priority), "SYSLOG_IDENTIFIER": "rtcfd"}
+    result = {"PRIORITY": str(priority), "SYSLOG_IDENTIFIER": "rtcfd"}
     if record.pathname:
         result["CODE_FILE"] = record.pathname
-        # A number: systemd.journal.send() takes no other, alone of all fields.
-        result["CODE_LINE"] = record.lineno
+        result["CODE_LINE"] = str(record.lineno)
     if record.funcName:
         result["CODE_FUNC"] = record.funcName
     if runner := getattr(record, "runner", ""):

@@ -20,7 +20,7 @@ class LogThread(logging.Handler):
         super().__init__()
         self._handler = handler
         self._queue: queue.Queue[logging.LogRecord] = queue.Queue(most)
-        self._lost = 0
+        self._no_room = 0  # since the start
         threading.Thread(target=self._work, name="rtcfd-log", daemon=True).start()
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -31,7 +31,7 @@ class LogThread(logging.Handler):
         try:
             self._queue.put_nowait(kept)
         except queue.Full:
-            self._lost += 1
+            self._no_room += 1
 
     def flush(self) -> None:
         """Wait a while until all is written."""
@@ -45,15 +45,25 @@ class LogThread(logging.Handler):
         super().close()
 
     def _work(self) -> None:
+        failed = told = 0
         while True:
             record = self._queue.get()
             try:
-                self._handler.handle(record)
-                if self._lost and self._queue.empty():
-                    lost, self._lost = self._lost, 0
-                    self._handler.handle(_report(lost))
+                failed += not self._written(record)
+                lost = self._no_room + failed - told
+                if lost and self._queue.empty() and self._written(_report(lost)):
+                    told += lost
             finally:
                 self._queue.task_done()
+
+    def _written(self, record: logging.LogRecord) -> bool:
+        try:
+            # Without its lock: the end of the process would wait for that, and no other thread
+            # writes.
+            self._handler.emit(record)
+        except Exception:  # logging must not end the daemon
+            return False
+        return True
 
 
 def _report(lost: int) -> logging.LogRecord:

@@ -40,7 +40,7 @@ def test_journal_fields_are_in_capitals() -> None:
         "PRIORITY": "4",
         "SYSLOG_IDENTIFIER": "rtcfd",
         "CODE_FILE": "/src/a.cpp",
-        "CODE_LINE": 12,
+        "CODE_LINE": "12",
         "CODE_FUNC": "update",
         "RTCF_RUNNER": "rt_runner",
         "RTCF_COMPONENT": "/H1",
