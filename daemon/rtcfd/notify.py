@@ -6,6 +6,7 @@ Does nothing where rtcfd was not started by systemd (no NOTIFY_SOCKET).
 import asyncio
 import contextlib
 import os
+import socket
 from collections.abc import Callable
 
 from rtcfd.common.tasks import looked_at
@@ -36,14 +37,17 @@ async def machine_goes_down() -> bool:
 
 
 def _sender() -> Callable[[str], object]:
-    if not os.environ.get("NOTIFY_SOCKET"):
+    address = os.environ.get("NOTIFY_SOCKET", "")
+    if not address:
         return lambda _: None
-    import systemd.daemon
+    # The kernel's name of an abstract socket begins with a zero.
+    to = "\0" + address[1:] if address.startswith("@") else address
+    to_systemd = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
 
     def send(text: str) -> None:
         # Nobody listens any more: that is no reason to end.
         with contextlib.suppress(OSError):
-            systemd.daemon.notify(text)
+            to_systemd.sendto(text.encode(), to)
 
     return send
 
