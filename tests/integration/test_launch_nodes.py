@@ -10,12 +10,19 @@ import pytest
 import rosgraph
 import rtcf
 from daemon_process import Daemon, wait_for, with_ros
-from launch_processes import Launching, Process
+from launch_processes import Launching, Process, left_over
 from ros_processes import Master
 from rtcf.v1 import runner_pb2
 from values import iteration, wait_until_after
 
 DONE, REFUSED, USAGE, FAILED, LOST = range(5)
+
+_RUNNER_OF_A_TREE = """
+import sys
+from pathlib import Path
+from rtcf_launch.runner_node import main
+sys.exit(main([], Path(sys.argv[1])))
+"""
 
 
 @pytest.fixture
@@ -233,3 +240,23 @@ def test_a_launcher_waits_for_its_runner_and_ends_at_once_if_it_is_asked_to(
     waiting = launcher(alone, "waiting")
     waiting.wait_for_output("for runner /rt_runner")
     assert waiting.end() == DONE
+
+
+def test_a_runner_that_is_to_end_does_not_wait_for_its_private_daemon(
+    alone: Launching, tmp_path: Path
+) -> None:
+    runtime = tmp_path / "runtime"
+    runtime.mkdir()
+    never_serves = tmp_path / "tree" / "bin" / "rtcfd"
+    never_serves.parent.mkdir(parents=True)
+    never_serves.write_text("#!/usr/bin/python3\nimport time\ntime.sleep(1000)\n")
+    never_serves.chmod(0o755)
+    runner = alone.start(
+        *("/usr/bin/python3", "-c", _RUNNER_OF_A_TREE, str(tmp_path / "tree")),
+        XDG_RUNTIME_DIR=str(runtime),
+        ROS_LOG_DIR=str(tmp_path),
+    )
+    wait_for(lambda: left_over(f"{runtime}/rtcf-"), "the private daemon")
+    assert runner.end(signal.SIGTERM) == DONE
+    assert not left_over(f"{runtime}/rtcf-")
+    assert not list(runtime.iterdir())

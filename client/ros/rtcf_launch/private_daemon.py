@@ -11,6 +11,7 @@ import socket
 import subprocess
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
@@ -40,8 +41,11 @@ class PrivateDaemon:
         self.log_file = Path(log_file.removesuffix(".log") + ".rtcfd.log")
         self._process: subprocess.Popen[bytes] | None = None
 
-    def start(self) -> None:
-        """Start it and wait until it serves."""
+    def start(self, pause: Callable[[float], bool]) -> None:
+        """Start it and wait until it serves.
+
+        `pause` waits for some seconds, and returns true if we are asked to end.
+        """
         if not os.access(self._program, os.X_OK):
             raise Ending(
                 Code.REFUSED, f"no rtcfd at {self._program}: install it (apt install rtcfd)"
@@ -65,7 +69,8 @@ class PrivateDaemon:
                 raise Ending(Code.REFUSED, f"rtcfd did not start: {self.last_words()}")
             if time.monotonic() > deadline:
                 raise Ending(Code.REFUSED, f"rtcfd does not serve {self.socket}")
-            time.sleep(_POLL_S)
+            if pause(_POLL_S):
+                raise Ending(Code.DONE)
 
     def _listens(self) -> bool:
         # The file is there a moment before anybody listens.

@@ -155,7 +155,7 @@ class RunnerNode:
         if wanted == "private":
             log_file = self._given.log_file or f"{_log_folder()}/{self._runner}.log"
             self._daemon = PrivateDaemon(self._build_tree, log_file)
-            self._daemon.start()
+            self._daemon.start(self._inbox.pause)
             socket = str(self._daemon.socket)
             self._screen.info(f"private daemon at {socket}, log in {self._daemon.log_file} ({why})")
         else:
