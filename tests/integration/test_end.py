@@ -53,6 +53,20 @@ def test_a_signal_ends_loop_and_executor_in_order(
     assert not daemon.socket.with_name(daemon.socket.name + ".d").exists()
 
 
+def test_an_executor_that_was_killed_leaves_no_folder(tmp_path: Path) -> None:
+    daemon = Daemon(tmp_path)
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        executor = _executor(client)
+    # It cannot end in order, nor come back: rtcfd is ending.
+    os.kill(executor, signal.SIGSTOP)
+    os.kill(daemon.pid, signal.SIGTERM)
+    wait_for(lambda: "stopping all loops" in daemon.log(), "the end to begin")
+    os.kill(executor, signal.SIGKILL)
+    assert daemon.end() == 0
+    assert not daemon.socket.with_name(daemon.socket.name + ".d").exists()
+
+
 def test_stop_ends_the_loop_in_order_and_keeps_the_executor(
     daemon: Daemon, client: rtcf.Client
 ) -> None:

@@ -55,6 +55,11 @@ class ExecutorCommand:
         """Return the path of the socket that a runner's executor listens on."""
         return _checked(self.folder / f"{runner}.sock")
 
+    def sockets(self, runner: str) -> list[Path]:
+        """Return the paths of all sockets that a runner's executor listens on."""
+        stop = [self.stop_folder / runner] if self.stop_folder is not None else []
+        return [self.socket(runner), *stop]
+
     def arguments(self, runner: str) -> list[str]:
         """Return the command line."""
         line = [str(self.binary), "--runner", runner, "--socket", str(self.socket(runner))]

@@ -49,7 +49,12 @@ class Executor:
     """A running executor.  `on_end` is called once, with how it ended."""
 
     def __init__(
-        self, runner: str, process: Process, socket: Path, on_unasked: Unasked, on_end: OnEnd
+        self,
+        runner: str,
+        process: Process,
+        command: ExecutorCommand,
+        on_unasked: Unasked,
+        on_end: OnEnd,
     ) -> None:
         self.pid = process.pid
         self.expected = False  # its end was asked for
@@ -61,7 +66,7 @@ class Executor:
         self._runner = runner
         self._peer = f"executor of {runner} (pid {process.pid})"
         self._process = process
-        self._socket = socket
+        self._socket, *_ = self._sockets = command.sockets(runner)
         self._on_unasked = on_unasked
         self._on_end = on_end
         self._link: Link | None = None
@@ -91,7 +96,7 @@ class Executor:
                 f"cannot run {command.binary}: {error.strerror}", errors_pb2.REASON_EXECUTOR_FAILED
             ) from None
         process = Child(started)
-        executor = cls(runner, process, command.socket(runner), on_unasked, on_end)
+        executor = cls(runner, process, command, on_unasked, on_end)
         try:
             await executor._attach()
             if executor.foreign:
@@ -102,19 +107,21 @@ class Executor:
         except BaseException:
             process.signal(signal.SIGKILL)
             await process.wait()
+            executor._remove_sockets()
             raise
         executor._begin_to_watch()
         return executor
 
     @classmethod
     async def adopt(
-        cls, runner: str, socket: Path, on_unasked: Unasked, on_end: OnEnd
+        cls, runner: str, command: ExecutorCommand, on_unasked: Unasked, on_end: OnEnd
     ) -> "Executor | None":
         """Take over an executor that an earlier rtcfd left at its socket.
 
         None if there is none: a dead socket is removed.  One whose protocol is
         not ours is `foreign`: its loop goes on, and can be stopped.
         """
+        socket = command.socket(runner)
         try:
             link = await Link.connect(f"left-over executor of {runner}", socket, on_unasked)
         except FileNotFoundError:
@@ -128,7 +135,7 @@ class Executor:
             await link.close()  # it has just ended
             _remove_dead(socket)
             return None
-        executor = cls(runner, process, socket, on_unasked, on_end)
+        executor = cls(runner, process, command, on_unasked, on_end)
         try:
             link.peer = executor._peer
             await executor._greet(link, QUERY_TIMEOUT_S)
@@ -303,12 +310,17 @@ class Executor:
         end = await ending
         if self._link is not None:
             await self._link.close()
-        self._socket.unlink(missing_ok=True)
+        self._remove_sockets()
         self._on_end(self, end)
         if self._recorder is not None:
             self._recorder.close()
             self._recorder = None
         self.ended.set()
+
+    def _remove_sockets(self) -> None:
+        """Of an executor that has ended: by force, it has left them."""
+        for socket in self._sockets:
+            socket.unlink(missing_ok=True)
 
 
 def _belongs(pid: int, to: int) -> bool:

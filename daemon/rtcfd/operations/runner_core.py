@@ -198,10 +198,7 @@ class RunnerCore(ABC):
         try:
             async with self._changing_executor:
                 executor = await Executor.adopt(
-                    self.name,
-                    self.shared.command.socket(self.name),
-                    self.take_unasked,
-                    self._ended,
+                    self.name, self.shared.command, self.take_unasked, self._ended
                 )
                 adopted = executor is not None
                 if executor is None and only_left_over:
