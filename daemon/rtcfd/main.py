@@ -5,6 +5,7 @@ import contextlib
 import logging
 import os
 import signal
+import socket
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -125,6 +126,17 @@ class Daemon:
             loop.add_signal_handler(signal.SIGUSR1, self._leave, end)
         if self._options.end_with_stdin:
             _when_stdin_ends(end.set)
+        # Before anything is made: the folders of a daemon that answers there are its own.
+        listener = self._endpoint.listen()
+        try:
+            await self._serve(listener, end)
+        finally:
+            await self._end_servers(None)
+            self._clean_up()
+        log.info("ended")
+
+    async def _serve(self, listener: socket.socket, end: asyncio.Event) -> None:
+        """Do all that run() does with the control socket."""
         self._command.prepare()
         try:
             self._store.prepare()
@@ -134,7 +146,6 @@ class Daemon:
                 errors_pb2.REASON_DAEMON_FAILED,
             ) from None
         self._options.settings.keep()
-        listener = self._endpoint.listen()
         self._serve_privately()
         self._shared.rules = await self._reloads.rules()
         self._left_over = left_overs(self._command.folder)
@@ -159,8 +170,8 @@ class Daemon:
         await (self._let_go() if self._leaving else self._stop())
         starting.cancel()
         await asyncio.gather(starting, return_exceptions=True)
-        self._clean_up()
-        log.info("ended")
+        if not self._leaving:
+            handover.remove(self._command.folder)
 
     def _leave(self, end: asyncio.Event) -> None:
         self._leaving = True
@@ -228,8 +239,6 @@ class Daemon:
     def _clean_up(self) -> None:
         self._notify.close()
         self._endpoint.remove()
-        if not self._leaving:
-            handover.remove(self._command.folder)
         # What is not empty or not there stays as it is.
         self._command.remove_folders()
         if self._options.own_runtime_dir:

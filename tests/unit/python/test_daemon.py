@@ -79,6 +79,31 @@ def test_no_executor_binary_is_one_line(stopped_daemon: DaemonUnderTest) -> None
     )
 
 
+def test_a_refused_start_leaves_nothing(stopped_daemon: DaemonUnderTest) -> None:
+    stopped_daemon.state = Path("/proc/none")
+    stopped_daemon.start()
+    assert stopped_daemon.process is not None
+    assert stopped_daemon.process.wait() == 1
+    assert "cannot make the state folder /proc/none" in stopped_daemon.log()
+    assert not stopped_daemon.socket.exists()
+    assert not Path(f"{stopped_daemon.socket}.d").exists()
+
+
+def test_a_refused_start_leaves_the_folder_of_the_daemon_that_serves(
+    daemon: DaemonUnderTest, client: rtcf.Client, tmp_path: Path
+) -> None:
+    client.remove_runner("rt_runner")
+    folder = tmp_path / "second"
+    folder.mkdir()
+    second = DaemonUnderTest(folder)
+    second.socket = daemon.socket
+    second.start()
+    assert second.process is not None
+    assert second.process.wait() == 1
+    client.add_runner("other", runner_pb2.RunnerSettings())
+    assert daemon.executor_pid("other")
+
+
 def test_an_executor_that_ends_at_once_shows_in_the_status(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
