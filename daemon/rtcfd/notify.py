@@ -12,7 +12,7 @@ from collections.abc import Callable
 from rtcfd.common.tasks import looked_at
 
 _EXTEND_EVERY_S = 10
-_ASKING_TIMEOUT_S = 2.0
+_ASKING_TIMEOUT_S = 10.0  # while all that runs is being ended
 
 
 async def machine_goes_down() -> bool:

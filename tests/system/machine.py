@@ -67,6 +67,13 @@ class Machine:
 
         wait_for(up, "the boot")
 
+    def reboot(self) -> None:
+        """Reboot it as an administrator does; returns when it is up again."""
+        assert self._process is not None
+        self.run("systemctl", "reboot", check=False)
+        self._process.wait(DEADLINE_S)
+        self.boot()
+
     def stop(self) -> None:
         """Shut it down as by its power button, by force if need be."""
         if self._process is None:
