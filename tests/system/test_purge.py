@@ -1,10 +1,31 @@
 """Removal and purge; the last file, as nothing is left for others."""
 
-from machine import Machine
+from machine import Machine, wait_for
 from rtcf_service import Service
 
 PACKAGES = ("librtcf-dev", "python3-rtcf", "ros-rtcf", "rtcf-check", "rtcf-components", "rtcf-doc",
             "rtcf-python", "rtcfctl", "rtcfd")  # fmt: skip
+
+
+def test_removal_in_the_moment_after_rtcfd_died_ends_its_loops(machine: Machine) -> None:
+    drop_in = machine.path("/etc/systemd/system/rtcfd.service.d/slow.conf")
+    drop_in.parent.mkdir(parents=True, exist_ok=True)
+    # The moment is as long as the test needs it.
+    drop_in.write_text("[Service]\nRestartSec=infinity\n")
+    service = Service(machine)
+    try:
+        service.systemctl("daemon-reload")
+        service.reset()
+        service.load_and_start()
+        service.kill("KILL", service.pid)
+        wait_for(lambda: service.unit_property("SubState") == "auto-restart", "rtcfd to be dead")
+        assert machine.run("pgrep", "-u", "rtcf").stdout
+        machine.run("apt-get", "remove", "--yes", "--quiet", *PACKAGES)
+        assert machine.run("pgrep", "-u", "rtcf", check=False).stdout == ""
+    finally:
+        drop_in.unlink()
+        service.systemctl("daemon-reload")
+        machine.shell("apt-get install --yes --quiet /debs/*.deb")
 
 
 def test_removal_ends_everything_and_keeps_settings_and_state(machine: Machine) -> None:
