@@ -44,6 +44,30 @@ def test_the_watchdog_replaces_an_rtcfd_that_hangs(service: Service) -> None:
         service.systemctl("daemon-reload")
 
 
+def test_a_journal_that_does_not_read_holds_up_nothing(service: Service) -> None:
+    before = service.load_and_start()
+    journald = int(service.unit_property("MainPID", "systemd-journald.service"))
+    # More records than a socket of datagrams holds.
+    script = (
+        "import rtcf\n"
+        "with rtcf.Client() as client:\n"
+        "    for number in range(400):\n"
+        "        client.load(rtcf.component('rtcf_examples', 'Identity', name='late'))\n"
+        "        client.unload(['late'])\n"
+    )
+    service.kill("STOP", journald)
+    try:
+        service.machine.run("python3", "-c", script)
+        after = service.status()
+    finally:
+        service.kill("CONT", journald)
+    assert (after["pid"], after["state"]) == (before["pid"], "running")
+    wait_for(
+        lambda: sum("/late unloaded" in str(e.get("MESSAGE")) for e in service.journal()) == 400,
+        "the records that waited",
+    )
+
+
 def test_a_killed_executor_comes_back_with_its_graph(service: Service) -> None:
     before = service.load_and_start()
     service.kill("KILL", before["pid"])
