@@ -24,6 +24,15 @@ from rtcf_launch.runner_node import main
 sys.exit(main([], Path(sys.argv[1])))
 """
 
+_NEVER_SERVES = """#!/usr/bin/python3
+import sys, time
+from pathlib import Path
+Path(sys.argv[0]).with_name("began").touch()
+sys.stdin.read()
+time.sleep(0.2)  # as an end in order takes
+Path(sys.argv[0]).with_name("ended").touch()
+"""
+
 
 @pytest.fixture
 def system(tmp_path: Path, master: Master) -> Iterator[Daemon]:
@@ -249,14 +258,15 @@ def test_a_runner_that_is_to_end_does_not_wait_for_its_private_daemon(
     runtime.mkdir()
     never_serves = tmp_path / "tree" / "bin" / "rtcfd"
     never_serves.parent.mkdir(parents=True)
-    never_serves.write_text("#!/usr/bin/python3\nimport time\ntime.sleep(1000)\n")
+    never_serves.write_text(_NEVER_SERVES)
     never_serves.chmod(0o755)
     runner = alone.start(
         *("/usr/bin/python3", "-c", _RUNNER_OF_A_TREE, str(tmp_path / "tree")),
         XDG_RUNTIME_DIR=str(runtime),
         ROS_LOG_DIR=str(tmp_path),
     )
-    wait_for(lambda: left_over(f"{runtime}/rtcf-"), "the private daemon")
+    wait_for(never_serves.with_name("began").exists, "the private daemon")
     assert runner.end(signal.SIGTERM) == DONE
     assert not left_over(f"{runtime}/rtcf-")
     assert not list(runtime.iterdir())
+    assert never_serves.with_name("ended").exists()  # in order, not by force

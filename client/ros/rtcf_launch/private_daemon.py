@@ -104,9 +104,10 @@ class PrivateDaemon:
         """End it, by force if it must be; remove its folder."""
         process = self._process
         if process is not None:
+            # By its input alone: a signal would end one that has just begun without its own
+            # cleaning up, and who waits for it here may be killed.
             if process.stdin is not None:
                 process.stdin.close()
-            process.terminate()
             try:
                 process.wait(_END_S)
             except subprocess.TimeoutExpired:
