@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from daemon_under_test import DEADLINE_S
+from daemon_under_test import DEADLINE_S, wait_for
 from rtcfd.journal import JournalHandler
 from rtcfd.log_thread import LogThread
 
@@ -152,7 +152,10 @@ def test_a_journal_that_comes_back_is_told_what_it_missed(
     journal.close()
     os.unlink(journal.address)
     logger.info("into nothing")
-    logger.handlers[0].flush()
+    (handler,) = logger.handlers
+    assert isinstance(handler, LogThread)
+    waiting = handler._queue
+    wait_for(lambda: not waiting.unfinished_tasks, "the record to be lost")
     again = Journal(Path(journal.address))
     logger.info("second")
     assert again.read()["MESSAGE"] == "second"
