@@ -86,6 +86,7 @@ RealtimeProblems Loop::start(const LoopSettings& settings, std::uint64_t stops_k
         if (!idle_guard_->problem().empty()) problems.push_back({idle_guard_->problem(), false});
     }
 
+    thread_locals_.emplace();
     running_.store(true, std::memory_order_release);
     joinable_.store(true, std::memory_order_release);
     const RealtimeSettings realtime = placed(settings.realtime, problems);
@@ -94,6 +95,7 @@ RealtimeProblems Loop::start(const LoopSettings& settings, std::uint64_t stops_k
         error != 0) {
         running_.store(false, std::memory_order_release);
         joinable_.store(false, std::memory_order_release);
+        thread_locals_.reset();
         idle_guard_.reset();
         leaveCpu();
         throw Refusal(RefusalKind::NoRealtime,
@@ -116,6 +118,7 @@ bool Loop::join(std::int64_t timeout_ns) {
     // Not running any more is the last thing it does, so that this takes no time.
     if (pthread_join(thread_, nullptr) != 0) return false;
     joinable_.store(false, std::memory_order_release);
+    thread_locals_.reset();
     idle_guard_.reset();
     leaveCpu();
     thread_id_.store(0, std::memory_order_relaxed);
@@ -228,6 +231,7 @@ void Loop::run() noexcept {
     thread_id_.store(static_cast<int>(syscall(SYS_gettid)), std::memory_order_relaxed);
     setFloatingPointDefaults();
     prefaultStack(stack_bytes_);
+    thread_locals_->touch();
     recorder_.setRunning(true);
     if (simulation_ == nullptr) {
         followRealTime();

@@ -11,6 +11,8 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <string>
 
 #include "faults/flight_recorder.hpp"
 #include "loop/cpu_claim.hpp"
@@ -18,6 +20,7 @@
 #include "loop/probe.hpp"
 #include "loop/realtime.hpp"
 #include "loop/schedule.hpp"
+#include "loop/thread_locals.hpp"
 
 namespace rtcf::executor {
 
@@ -87,6 +90,11 @@ class Loop {
     /// New settings for a running loop (CPU, priority, spin, overrun policy); the period goes by
     /// adopt().
     RealtimeProblems retune(const LoopSettings& settings);
+    /// The file of a library that `library`, of dlopen(), is or links against, and of whose
+    /// thread_local variables the thread that runs in real time has no memory; empty = none.
+    std::string lackingThreadLocals(void* library) const {
+        return inRealTime() && thread_locals_ ? thread_locals_->lacking(library) : std::string();
+    }
     /// After join().
     const LoopFault& fault() const noexcept { return cycle_.fault(); }
     /// @}
@@ -164,6 +172,8 @@ class Loop {
     std::atomic<int> cpu_{-1};
     std::shared_ptr<SimulatedClock> simulation_;  // that the thread follows; null = real time
     std::size_t stack_bytes_ = 0;
+    std::optional<ThreadLocals> thread_locals_;  // that the thread has, as long as there is one
+    unsigned long long stepped_loads_ = 0;       // whose thread_locals a step has
 
     // Of whoever runs cycles.
     std::uint64_t stops_known_ = 0;  // when the present cycles were asked for

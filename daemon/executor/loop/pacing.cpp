@@ -29,6 +29,10 @@ void Loop::beginStepping(const LoopSettings& settings, std::uint64_t stops_known
 
 std::uint64_t Loop::step(std::uint64_t cycles) noexcept {
     std::uint64_t done = 0;
+    if (const auto loads = ThreadLocals::loads(); loads != stepped_loads_) {
+        ThreadLocals().touch();
+        stepped_loads_ = loads;
+    }
     const FloatingPointDefaults floating_point;
     // Components log as in any cycle; there is no other thread that runs one.
     Log::setRealtimeThread(true);

@@ -88,9 +88,9 @@ class OpenCopy {
     void* handle() const noexcept { return handle_; }
     // The descriptor stays open for the life of the process: debuggers and
     // sanitizers find the symbols by this name, and it keeps the name unique.
-    void keep() noexcept {
-        handle_ = nullptr;
+    void* keep() noexcept {
         (void)copy_.release();
+        return std::exchange(handle_, nullptr);
     }
 
    private:
@@ -148,7 +148,7 @@ Library::Library(const std::string& path, int file) : path_(path) {
          record = record->next) {
         types_.push_back(record);
     }
-    copy.keep();
+    handle_ = copy.keep();
     std::sort(types_.begin(), types_.end(),
               [](const auto* a, const auto* b) { return std::strcmp(a->type, b->type) < 0; });
 }

@@ -24,6 +24,8 @@ class Library {
     Library(const std::string& path, int file);
 
     const std::string& path() const noexcept { return path_; }
+    /// Of dlopen().
+    void* handle() const noexcept { return handle_; }
     /// The library's types, by name.
     const std::vector<const ComponentRecord*>& types() const noexcept { return types_; }
     /// @return null if the library has no such type
@@ -31,6 +33,7 @@ class Library {
 
    private:
     std::string path_;
+    void* handle_ = nullptr;
     std::vector<const ComponentRecord*> types_;
 };
 

@@ -31,6 +31,7 @@ std::shared_ptr<Instance> Runner::makeInstance(ComponentDefinition definition,
     progress("loading " + full_name);
     note(full_name + ".constructor");
     const std::shared_ptr<const Library> code = libraries_.open(library);
+    requireThreadLocals(*code);
     auto instance =
         std::make_shared<Instance>(std::move(definition), code, name_, loop_.clock(), log_,
                                    recorder_, bridge_ ? bridge_->hooks() : nullptr);
@@ -42,6 +43,20 @@ std::shared_ptr<Instance> Runner::makeInstance(ComponentDefinition definition,
     note(full_name + ".configure");
     instance->configure();
     return instance;
+}
+
+// What is refused stays loaded, as all libraries do: it is judged anew whenever it is wanted.
+void Runner::requireThreadLocals(const Library& library) {
+    noticeEnd();
+    const std::string lacking = loop_.lackingThreadLocals(library.handle());
+    if (lacking.empty()) return;
+    const bool own = lacking.rfind("/proc/", 0) == 0;  // our copy of it
+    throw Refusal(
+        RefusalKind::LoopRuns,
+        fmt::format("library {0}: {1} has thread_local variables, and the loop of {2} began "
+                    "without their memory: stop the loop first (rtcfctl -r {2} stop), or load it "
+                    "before the loop starts",
+                    library.path(), own ? "it" : lacking + ", which it links against,", name_));
 }
 
 void Runner::requireNoReplay() const {

@@ -227,6 +227,7 @@ class Runner final : private RunnerView {
     void noticeEnd();
     void requireNoLoop();
     void requireNoReplay() const;
+    void requireThreadLocals(const Library& library);
     std::string whatDoesNotReturn() const;
     /// Hands it to the loop. @throws Refusal if that does not take it
     void adoptAtBoundary(Adoption& adoption);

@@ -1,0 +1,15 @@
+// A library that knows nothing of rtcf. Most of its variants have more than the loader would put
+// beside each thread.
+#include "thread_locals.hpp"
+
+#ifndef NUMBERS
+#define NUMBERS 8192
+#endif
+
+namespace {
+
+thread_local double of_this_thread[NUMBERS];
+
+}  // namespace
+
+double rtcf_unit_test_count() { return ++of_this_thread[0]; }
