@@ -2,6 +2,7 @@
 
 import json
 import os
+import random
 import signal
 import socket
 import subprocess
@@ -17,18 +18,41 @@ from daemon_process import DEADLINE_S, clean_environment, wait_for
 _PEER = Path(__file__).with_name("peer.py")
 
 
-def free_port() -> int:
-    """Return a TCP port that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind(("localhost", 0))
-        return int(probe.getsockname()[1])
+_RANGE = Path("/proc/sys/net/ipv4/ip_local_port_range")
+_reserved: list[socket.socket] = []  # until this process ends
+
+
+def reserve_port() -> int:
+    """Return a TCP port that is this process's, also while nobody listens on it.
+
+    The kernel gives it to no connection, as it is outside of the range for these; other tests on
+    this machine see that its name is taken.
+    """
+    lowest, highest = map(int, _RANGE.read_text().split())
+    ports: list[int] = [*range(10_000, lowest), *range(highest + 1, 65_536)]
+    random.shuffle(ports)
+    for port in ports:
+        name = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            with socket.socket() as probe:
+                name.bind(f"\0rtcf-test-port-{port}")
+                # What has ended there may linger, as for a server that is started again.
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                probe.bind(("", port))
+                probe.listen()
+        except OSError:
+            name.close()
+            continue
+        _reserved.append(name)
+        return port
+    raise AssertionError(f"no port outside of {lowest} to {highest} ({_RANGE}) is free")
 
 
 class Master:
     """roscore; all its files are in `folder`."""
 
-    def __init__(self, folder: Path, port: int = 0) -> None:
-        self.port = port or free_port()
+    def __init__(self, folder: Path) -> None:
+        self.port = reserve_port()
         self.uri = f"http://localhost:{self.port}"
         self._folder = folder
         self._log = folder / "roscore.log"

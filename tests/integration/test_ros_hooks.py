@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import rtcf
 from daemon_process import Daemon, wait_for, with_ros
-from ros_processes import Master, free_port
+from ros_processes import Master
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 from values import iteration, port_value
 
@@ -27,7 +27,7 @@ def user(hook: str = "configure") -> graph_pb2.ComponentSpec:
 @pytest.fixture
 def lonely(tmp_path: Path) -> Iterator[tuple[Daemon, rtcf.Client, Master]]:
     """Give a daemon and the master that it looks for, which is not started."""
-    master = Master(tmp_path, free_port())
+    master = Master(tmp_path)
     daemon = Daemon(tmp_path, with_ros(master.uri, ""))
     daemon.start()
     with rtcf.Client(daemon.socket) as client:

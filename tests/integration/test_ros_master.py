@@ -6,13 +6,13 @@ from pathlib import Path
 import fig_1
 import rtcf
 from daemon_process import Daemon, wait_for, with_ros
-from ros_processes import Master, free_port
+from ros_processes import Master
 from rtcf.v1 import runner_pb2
 from values import iteration
 
 
 def test_topics_appear_once_a_master_is_there(tmp_path: Path) -> None:
-    master = Master(tmp_path, free_port())
+    master = Master(tmp_path)
     daemon = Daemon(tmp_path, with_ros(master.uri, fig_1.WHITELIST))
     daemon.start()
     try:

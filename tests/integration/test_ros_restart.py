@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import rtcf
 from daemon_process import DEADLINE_S, Daemon, wait_for, with_ros
-from ros_processes import Master, free_port
+from ros_processes import Master
 from rtcf.v1 import runner_pb2
 from values import iteration, port_value, wait_until_after
 
@@ -33,7 +33,7 @@ def _registered(master: Master, node: str) -> bool:
 def test_everything_is_registered_again_with_each_new_master(
     tmp_path: Path, restarts: int, limit_s: float
 ) -> None:
-    master = Master(tmp_path, free_port())
+    master = Master(tmp_path)
     master.start()
     daemon = Daemon(tmp_path, with_ros(master.uri, "/t/.*"))
     daemon.start()
@@ -89,7 +89,7 @@ def test_several_masters_at_once_do_not_meet(tmp_path: Path) -> None:
         for index in range(2):
             folder = tmp_path / str(index)
             folder.mkdir()
-            masters.append(Master(folder, free_port()))
+            masters.append(Master(folder))
             masters[-1].start()
             daemons.append(Daemon(folder, with_ros(masters[-1].uri, "/t/.*")))
             daemons[-1].start()

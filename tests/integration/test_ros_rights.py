@@ -8,7 +8,7 @@ import pytest
 import rosgraph
 import rtcf
 from daemon_process import Daemon, clean_environment, wait_for, with_ros
-from ros_processes import Master, free_port
+from ros_processes import Master, reserve_port
 from rtcf.v1 import runner_pb2
 from values import iteration
 
@@ -66,7 +66,7 @@ def test_peers_may_do_what_the_setting_says(tmp_path: Path, master: Master, peer
 @pytest.fixture
 def strangers_master(tmp_path: Path) -> Iterator[str]:
     """Give the URI of a master that another user of this machine has started."""
-    port = free_port()
+    port = reserve_port()
     uri = f"http://localhost:{port}"
     home = tmp_path / "stranger"
     home.mkdir()

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from daemon_process import DEADLINE_S, clean_environment, wait_for
-from ros_processes import free_port
+from ros_processes import reserve_port
 
 _PORT = "cable"  # name of the interface, of both machines
 
@@ -68,7 +68,7 @@ class Machine:
 
     def start_master(self, folder: Path) -> str:
         """Start a ROS master there that the other machine reaches; return its URI."""
-        port = free_port()
+        port = reserve_port()
         uri = f"http://{self.address}:{port}"
         self.start(
             folder,
