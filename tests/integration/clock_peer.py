@@ -17,11 +17,17 @@ from rosgraph_msgs.msg import Clock
 _POLL_S = 0.01
 
 
+def _say(line: object) -> None:
+    # In one piece, as several threads do it.
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
 def _tick() -> None:
     publisher = rospy.Publisher("/clock", Clock, queue_size=100000)
     while publisher.get_num_connections() < max(1, _subscribers()):
         time.sleep(_POLL_S)
-    print("connected", flush=True)
+    _say("connected")
     for line in sys.stdin:
         publisher.publish(Clock(clock=rospy.Time(0, int(line))))
 
@@ -32,12 +38,10 @@ def _subscribers() -> int:
 
 
 def _record() -> None:
-    subscriber = rospy.Subscriber(
-        "/clock", Clock, lambda tick: print(tick.clock.to_nsec(), flush=True)
-    )
+    subscriber = rospy.Subscriber("/clock", Clock, lambda tick: _say(tick.clock.to_nsec()))
     while not rospy.is_shutdown() and subscriber.get_num_connections() == 0:
         time.sleep(_POLL_S)
-    print("connected", flush=True)
+    _say("connected")
     while not rospy.is_shutdown():
         time.sleep(_POLL_S)
 

@@ -41,7 +41,13 @@ def _cycles(topic: str, kind: Any, count: int) -> None:
             full.set()
 
     peer = rospy.Subscriber(topic, kind, take, tcp_nodelay=True)
-    while peer.get_num_connections() == 0 and not rospy.is_shutdown():
+
+    def met() -> bool:
+        # rospy counts connections that it is about to make as well; the publisher's header, which
+        # names it, comes when it has accepted us.
+        return any(each.callerid_pub != "unknown" for each in peer.impl.connections)
+
+    while not met() and not rospy.is_shutdown():
         full.wait(_POLL_S)
     print("connected", flush=True)
     if not full.wait(_DEADLINE_S):
@@ -57,7 +63,9 @@ def _diagnostics(name: str, level: int) -> None:
             if found.is_set():
                 return
             pairs = [f"{pair.key}={pair.value}" for pair in status.values]
-            print("|".join([status.name, str(status.level), status.message, *pairs]))
+            # In one piece: several nodes are heard by as many threads.
+            line = "|".join([status.name, str(status.level), status.message, *pairs])
+            sys.stdout.write(f"{line}\n")
         found_now = any(each.name == name and each.level == level for each in message.status)
         if found_now:
             found.set()

@@ -18,6 +18,7 @@ Others print `connected` when they have met their peers.
 """
 
 import json
+import os
 import sys
 import time
 from typing import Any
@@ -33,6 +34,7 @@ _POLL_S = 0.01
 
 
 def _print(message: Any) -> None:
+    # In one piece, as several threads do it: print() writes the end of a line for itself.
     # Messages come in bursts; flushed by _stay() instead of one by one.
     sys.stdout.write(f"{float(message.data).hex()}\n")
 
@@ -59,12 +61,12 @@ def _graph() -> None:
     graph = rosgraph.impl.graph.Graph()
     graph.update()
     edges = sorted([edge.start, edge.label, edge.end] for edge in graph.nn_edges)
-    print(json.dumps({"bad": sorted(graph.bad_nodes), "edges": edges}), flush=True)
+    sys.stdout.write(json.dumps({"bad": sorted(graph.bad_nodes), "edges": edges}) + "\n")
+    sys.stdout.flush()
 
 
 def _tune(node: str, change: str) -> None:
     def show(**what: Any) -> None:
-        # One write: two threads do it.
         sys.stdout.write(json.dumps(what) + "\n")
         sys.stdout.flush()
 
@@ -82,26 +84,26 @@ def _tune(node: str, change: str) -> None:
     rospy.spin()
 
 
-class _Records:
-    """The records of one node; every node publishes on /rosout, we too."""
-
-    def __init__(self, node: str) -> None:
-        self._node = node
-        self._subscriber = rospy.Subscriber("/rosout", Log, _print_record, node, tcp_nodelay=True)
-
-    def get_num_connections(self) -> int:
-        """Return 1 when that node is connected."""
-        impl = self._subscriber.impl
-        return sum(each.callerid_pub == self._node for each in impl.connections if impl)
+def _connections(peer: Any, publisher: str = "") -> int:
+    """Return how many connections carry messages; of a subscriber, those to one node if named."""
+    if isinstance(peer, rospy.Publisher):
+        return int(peer.get_num_connections())
+    # rospy counts those that it is about to make as well. The publisher's header, which names it,
+    # comes when it has accepted us.
+    met = [each.callerid_pub for each in peer.impl.connections if each.callerid_pub != "unknown"]
+    return sum(not publisher or name == publisher for name in met)
 
 
-def _stay(*peers: Any) -> None:
-    while not rospy.is_shutdown() and any(peer.get_num_connections() == 0 for peer in peers):
+def _stay(*peers: Any, publisher: str = "") -> None:
+    while not rospy.is_shutdown() and any(_connections(peer, publisher) == 0 for peer in peers):
         time.sleep(_POLL_S)
-    print("connected", flush=True)
+    sys.stdout.write("connected\n")
     while not rospy.is_shutdown():
-        time.sleep(_POLL_S)
         sys.stdout.flush()
+        time.sleep(_POLL_S)
+    sys.stdout.flush()
+    # At once: threads that still write would make Python abort.
+    os._exit(0)
 
 
 def main() -> None:
@@ -118,7 +120,9 @@ def main() -> None:
     elif action == "count":
         _stay(rospy.Subscriber(topic, Int64, lambda _: sys.stdout.write("0x0p0\n")))
     elif action == "rosout":
-        _stay(_Records(topic))
+        # Every node publishes on /rosout, we too.
+        records = rospy.Subscriber("/rosout", Log, _print_record, topic, tcp_nodelay=True)
+        _stay(records, publisher=topic)
     elif action == "console":
         _stay(rospy.Subscriber("/rosout_agg", Log, _print_of_logger, topic))
     elif action == "graph":

@@ -22,7 +22,9 @@ from roslib.message import get_message_class
 def show(message: Any) -> None:
     """Prints a message's value on a line of its own."""
     stamp = f"{message.header.stamp.to_nsec()} " if message._has_header else ""
-    print(f"{stamp}{message.data}", flush=True)
+    # In one piece: each publisher is heard by a thread of its own.
+    sys.stdout.write(f"{stamp}{message.data}\n")
+    sys.stdout.flush()
 
 
 def look_at_loggers(node: str) -> None:
