@@ -4,7 +4,8 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,34 @@ def wait_for(condition: Callable[[], Any], what: str, deadline_s: float = DEADLI
         assert time.monotonic() < deadline, f"waited {deadline_s:g} s for {what}"
         time.sleep(_POLL_S)
     return result
+
+
+def wait_until_it_is(wanted: Any, ask: Callable[[], Any], what: str) -> None:
+    """Return when the answer is the one wanted; fail after the deadline, and show the last one."""
+    deadline = time.monotonic() + DEADLINE_S
+    while (found := ask()) != wanted:
+        assert time.monotonic() < deadline, f"{what}: {found!r} is not {wanted!r}"
+        time.sleep(_POLL_S)
+
+
+@contextmanager
+def stopped(pid: int) -> Iterator[None]:
+    """Stop a process as a debugger does: inside, none of its threads runs any more."""
+
+    def stands() -> bool:
+        try:
+            threads = [each.read_text() for each in Path(f"/proc/{pid}/task").glob("*/stat")]
+        except OSError:
+            return False  # one has just ended
+        return all(text.rpartition(")")[2].split()[0] == "T" for text in threads)
+
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        # The signal stops the thread that takes it first, and that one the others.
+        wait_for(stands, f"process {pid} to stand still")
+        yield
+    finally:
+        os.kill(pid, signal.SIGCONT)
 
 
 def clean_environment() -> dict[str, str]:

@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import time
+import xmlrpc.client
 from pathlib import Path
 from typing import Any
 
@@ -126,13 +127,27 @@ class Master:
 
     def parameter(self, name: str) -> Any:
         """Return a parameter's value; None if there is none."""
-        master = rosgraph.Master("/test", self.uri)
-        return master.getParam(name) if master.hasParam(name) else None
+        try:
+            return rosgraph.Master("/test", self.uri).getParam(name)
+        except rosgraph.MasterError:
+            return None
 
     def topics(self) -> tuple[set[str], set[str]]:
         """Return the topics that are published and those that are subscribed."""
         state = rosgraph.Master("/test", self.uri).getSystemState()
         return {topic for topic, _ in state[0]}, {topic for topic, _ in state[1]}
+
+    def subscribers(self, topic: str) -> set[str]:
+        """Return the nodes that have told the master that they subscribe a topic."""
+        _, subscribed, _ = rosgraph.Master("/test", self.uri).getSystemState()
+        return {node for name, nodes in subscribed if name == topic for node in nodes}
+
+    def listeners(self, node: str, topic: str) -> set[str]:
+        """Return the nodes to which what a node publishes on a topic goes now, as it says."""
+        uri = rosgraph.Master("/test", self.uri).lookupNode(node)
+        asked: Any = xmlrpc.client.ServerProxy(uri)
+        _, _, connections = asked.getBusInfo("/test")
+        return {each[1] for each in connections if (each[2], each[4]) == ("o", topic)}
 
     def node(self, *arguments: str) -> "Node":
         """Start a node of peer.py."""

@@ -1,6 +1,7 @@
 """What a client sees at the ports of a component."""
 
 import re
+from collections.abc import Iterable
 
 import rtcf
 from daemon_process import wait_for
@@ -18,6 +19,12 @@ def number(text: str) -> float:
     match = re.fullmatch(r"data: (\S+)", text)
     assert match, f"{text!r} is not one number"
     return float(match[1])
+
+
+def is_among(received: Iterable[float], wanted: Iterable[float]) -> bool:
+    """Tell whether values that were received are some of those wanted, in their order."""
+    rest = iter(wanted)
+    return all(value in rest for value in received)
 
 
 def state(client: rtcf.Client, runner: str = "rt_runner") -> runner_pb2.RunnerStatus:
