@@ -345,8 +345,8 @@ def test_services_and_topics_are_there_again_after_a_restart_of_the_master(
         master.end()
         master.start()
         _wait_for_services(master)
-        published, _ = master.topics()
-        assert {"/rt_runner/cycles", "/rt_runner/iteration_info", "/diagnostics"} <= published
+        topics = {"/rt_runner/cycles", "/rt_runner/iteration_info", "/diagnostics"}
+        wait_for(lambda: topics <= master.topics()[0], "the topics")
         assert _call(master, "activate_rt_loop")["success"] is True
     finally:
         daemon.end()
@@ -356,4 +356,4 @@ def test_services_and_topics_are_there_again_after_a_restart_of_the_master(
 def test_services_leave_with_the_daemon(daemon: Daemon, master: Master) -> None:
     _wait_for_services(master)
     daemon.end()
-    assert not master.services() & SERVICES
+    wait_for(lambda: not master.services() & SERVICES, "the master to have heard of it")

@@ -180,6 +180,7 @@ def test_a_runner_that_died_may_come_back_to_the_system_daemon(
 def test_launchers_end_when_their_runner_has_died(alone: Launching) -> None:
     runner = alone.node("rt_runner", "_num_components_expected:=1")
     first = loaded(alone, "first")
+    runner.wait_for_output("the loop runs with 1 components")
     match = re.search(r"private daemon at (\S+)/control.sock", runner.output())
     assert match is not None
     socket = Path(match[1], "control.sock")

@@ -38,7 +38,8 @@ def text(tmp_path: Path, master: Master) -> Iterator[rtcf.Client]:
                            parameters=["size:=200000"])
         )  # fmt: skip
         client.start()
-        wait_for(lambda: "/t/heard" in master.topics()[1], "the topics")
+        wait_for(lambda: "/t/said" in master.topics()[0], "the topic that it writes")
+        wait_for(lambda: "/t/heard" in master.topics()[1], "the topic that it reads")
         yield client
     daemon.end()
 

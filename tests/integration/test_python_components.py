@@ -159,7 +159,8 @@ def test_a_fault_names_file_line_and_text(client: rtcf.Client, daemon: Daemon, w
     assert found, fault
     line = SOURCE.read_text().splitlines()[int(found[1]) - 1].strip()
     assert f"`{line}`" in fault
-    assert f"controllers.py:{found[1]}" in daemon.log()
+    told = f"controllers.py:{found[1]}"
+    wait_for(lambda: told in daemon.log(), "the log")
     assert "666" not in _ports(client, "bad")["out"].value
 
 

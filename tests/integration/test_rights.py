@@ -113,9 +113,10 @@ def test_a_full_bucket_does_not_stop_a_loop_that_runs_degraded(tmp_path: Path) -
         wait_for(lambda: client.get_statistics().overruns > 50, "overruns")
         status = client.get_status("rt_runner").runners[0]
         assert status.state == runner_pb2.RUNNER_STATE_RUNNING
-        wait_for(lambda: "ended late" in daemon.log(), "the log")
-        assert "max_overruns ends no loop that runs degraded" in daemon.log()
+        for said in ("ended late", "max_overruns ends no loop that runs degraded"):
+            wait_for(lambda: said in daemon.log(), said)  # noqa: B023
         client.stop()
+        wait_for(lambda: "most of them in /Sleeps" in daemon.log(), "the last line")
         lines = [line for line in daemon.log().splitlines() if "ended late" in line]
         assert len(lines) < 10, "one line for many overruns"
         assert any("most of them in /Sleeps" in line for line in lines)
@@ -127,11 +128,12 @@ def test_a_loop_that_keeps_being_late_is_shouted_with_its_cause(tmp_path: Path) 
         client.load(rtcf.component("rtcf_faults", "Sleeps", parameters=["after:=0"]))
         client.start()
 
-        # It is told each 10 s; the second time tells that it goes on.
+        # It is told each 10 s; the second time tells that it goes on. A busy machine may be the
+        # cause once, but not each time.
         def late() -> str:
             said = daemon.ctl("status").stdout.splitlines()
-            return next((each for each in said if "IS LATE" in each), "")
+            late = (each for each in said if "IS LATE" in each)
+            return next((each for each in late if "most of them in /Sleeps" in each), "")
 
         line = wait_for(late, "the alarm")
         assert line.startswith("!! rt_runner IS LATE: ")
-        assert "most of them in /Sleeps" in line

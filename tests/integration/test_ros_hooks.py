@@ -54,9 +54,8 @@ def test_hooks_have_node_handles_with_the_components_names(tmp_path: Path, maste
             assert listener.values() == [2.5]
             listener.end()
             client.unload(["/arm/user"])
-            published, subscribed = master.topics()
-            assert "/answer" not in published
-            assert "/voice" not in subscribed
+            wait_for(lambda: "/answer" not in master.topics()[0], "the end of what it published")
+            wait_for(lambda: "/voice" not in master.topics()[1], "the end of what it heard")
     finally:
         daemon.end()
 

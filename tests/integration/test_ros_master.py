@@ -20,9 +20,9 @@ def test_topics_appear_once_a_master_is_there(tmp_path: Path) -> None:
             fig_1.load(client)
             client.start()
             wait_for(lambda: iteration(client) > 100, "a loop that runs without a master")
+            wait_for(lambda: master.uri in _ros(client).problem, "the node to look for a master")
             ros = _ros(client)
             assert (ros.connected, ros.publications, ros.subscriptions) == (False, 0, 0)
-            assert master.uri in ros.problem
 
             master.start()
             begin = time.monotonic()

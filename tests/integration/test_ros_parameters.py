@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import rtcf
 import yaml
-from daemon_process import Daemon, wait_for, with_ros
+from daemon_process import Daemon, stopped, wait_for, wait_until_it_is, with_ros
 from ros_processes import Master
 from rtcf.v1 import runner_pb2
 from values import port_value
@@ -50,7 +50,7 @@ def test_dynparam_sets_parameters_of_all_types_in_a_running_loop(
 ) -> None:
     daemon, client = knobs
     assert _NAME in dynparam(master, "list").split()
-    assert port_value(client, _NAME, "product") == 3.0
+    wait_for(lambda: port_value(client, _NAME, "product") == 3.0, "a cycle")
 
     change = {"count": 4, "rate": 2.5, "label": "abcdef", "enabled": True, "mode": "run"}
     dynparam(master, "set", _NAME, json.dumps(change))
@@ -58,11 +58,15 @@ def test_dynparam_sets_parameters_of_all_types_in_a_running_loop(
     assert values(client) == change
     wait_for(lambda: port_value(client, _NAME, "product") == 10.0, "the loop to use them")
     assert port_value(client, _NAME, "length") == 6
-    shown = yaml.safe_load(dynparam(master, "get", _NAME))
-    assert {name: shown[name] for name in change} == change
+
+    def shown(*names: str) -> dict[str, Any]:
+        found = yaml.safe_load(dynparam(master, "get", _NAME))
+        return {name: found[name] for name in names}
+
+    assert shown(*change) == change
     # The parameter server follows, and so does the saved state.
     wait_for(lambda: master.parameter(f"{_NAME}/rate") == 2.5, "the parameter server")
-    assert master.parameter(f"{_NAME}/label") == "abcdef"
+    wait_for(lambda: master.parameter(f"{_NAME}/label") == "abcdef", "the parameter server")
     state = wait_for(
         lambda: [
             file
@@ -86,10 +90,8 @@ def test_dynparam_sets_parameters_of_all_types_in_a_running_loop(
 
     # And the other way round.
     daemon.ctl("set", _NAME, "rate:=7", "mode:=idle")
-    shown = yaml.safe_load(dynparam(master, "get", _NAME))
-    assert (shown["rate"], shown["mode"]) == (7.0, "idle")
+    wait_until_it_is({"rate": 7.0, "mode": "idle"}, lambda: shown("rate", "mode"), "dynparam")
     wait_for(lambda: master.parameter(f"{_NAME}/mode") == "idle", "the parameter server")
-    assert master.parameter(f"{_NAME}/rate") == 7.0
     wait_for(lambda: master.parameter(f"{_NAME}/rate") == 7.0, "the parameter server")
 
 
@@ -122,6 +124,8 @@ def test_a_value_out_of_range_is_brought_into_it_with_a_warning(
 ) -> None:
     _, client = knobs
     client.set_runner(runner_pb2.RunnerSettings(ros=runner_pb2.RosSettings(whitelist="/arm/.*")))
+    topics = {"/arm/length", "/arm/product"}
+    wait_for(lambda: topics <= master.topics()[0], "the topics")
     listener = master.node("rosout", client.get_status("rt_runner").runners[0].ros.node)
     listener.wait_until_connected()
     request = "{config: {doubles: [{name: rate, value: 2.0}], ints: [{name: count, value: 11}]}}"
@@ -178,13 +182,17 @@ def test_the_loop_follows_the_parameter_server_within_its_bounds(
     master.run("rosparam", "set", f"{_NAME}/count", "5")
     wait_for(lambda: values(client)["count"] == 5, "the loop to follow")
     assert values(client)["rate"] == 0.30000000000000004
-    shown = yaml.safe_load(dynparam(master, "get", _NAME))
-    assert (shown["count"], shown["rate"]) == (5, 0.30000000000000004)
+
+    def shown() -> tuple[Any, Any]:
+        found = yaml.safe_load(dynparam(master, "get", _NAME))
+        return found["count"], found["rate"]
+
+    wait_until_it_is((5, 0.30000000000000004), shown, "dynparam")
 
     # Several at once; what is none of the component's parameters is left alone.
     master.run("rosparam", "set", _NAME, "{rate: 2, mode: idle, other: 1}")
     wait_for(lambda: values(client)["mode"] == "idle", "the loop to follow")
-    assert values(client)["rate"] == 2.0
+    wait_for(lambda: values(client)["rate"] == 2.0, "the loop to follow")
     wait_for(lambda: master.parameter(f"{_NAME}/count") == 5, "what was thrown away to return")
     assert master.parameter(f"{_NAME}/other") == 1
 
@@ -205,9 +213,14 @@ def test_the_loop_follows_the_parameter_server_within_its_bounds(
     master.run("rosparam", "set", f"{_NAME}/mode", "run")
     wait_for(lambda: values(client)["mode"] == "run", "the loop to follow")
     wait_for(lambda: master.parameter(f"{_NAME}/count") == 5, "the value that holds")
-    assert sum("= 12 is above" in each["msg"] for each in listener.records()) == 1
+
+    def refused() -> int:
+        return sum("= 12 is above" in each["msg"] for each in listener.records())
+
+    wait_for(refused, "the reason")
     master.run("rosparam", "delete", f"{_NAME}/count")
     wait_for(lambda: master.parameter(f"{_NAME}/count") == 5, "the value to return")
+    assert refused() == 1
     listener.end()
 
 
@@ -284,8 +297,9 @@ def test_a_new_master_s_values_win_over_those_of_the_loop(tmp_path: Path) -> Non
                 lambda: not client.get_status("rt_runner").runners[0].ros.connected, "its absence"
             )
             # A launch file sets its parameters before anything else is there.
-            master.start()
-            master.run("rosparam", "set", f"{_NAME}/rate", "9.0")
+            with stopped(client.get_status("rt_runner").runners[0].pid):
+                master.start()
+                master.run("rosparam", "set", f"{_NAME}/rate", "9.0")
             _holds(client, master, 9.0)
             wait_for(lambda: master.parameter(f"{_NAME}/count") == 3, "what it did not have")
     finally:
@@ -298,6 +312,7 @@ def test_a_text_that_xml_cannot_carry_stays_off_the_parameter_server(
 ) -> None:
     daemon, client = knobs
     wait_for(lambda: master.parameter(f"{_NAME}/rate") == 1.5, "the parameter server")
+    wait_for(lambda: master.parameter(f"{_NAME}/label") is not None, "the parameter server")
     before = master.parameter(f"{_NAME}/label")
     daemon.ctl("set", _NAME, "label:=a\x01b")
     wait_for(lambda: values(client)["label"] == "a\x01b", "the value")

@@ -26,7 +26,8 @@ def loop(tmp_path: Path, master: Master) -> Iterator[tuple[Daemon, rtcf.Client, 
         client.load(rtcf.component("rtcf_test_ros", "Text", name="text", ns="/t"))
         client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", ns="/k"))
         node = client.get_status("rt_runner").runners[0].ros.node
-        wait_for(lambda: "/k/knobs/set_parameters" in master.services(), "the services")
+        services = {"/k/knobs/set_parameters", "/t/text/set_parameters"}
+        wait_for(lambda: services <= master.services(), "the services")
         yield daemon, client, node
     daemon.end()
 
@@ -65,7 +66,7 @@ def test_rqt_reconfigure_finds_shows_and_changes_parameters(
 
     wait_for(lambda: shows(rate=2.5, mode="run"), "the change to be shown")
     assert lines(peer, "found") == [["/k/knobs", "/t/text"]]
-    assert lines(peer, "described")[0] == {
+    assert wait_for(lambda: lines(peer, "described"), "the description")[0] == {
         "enabled": "bool", "count": "int", "rate": "double", "label": "str", "mode": "str",
     }  # fmt: skip
     # What others change appears in its window.
@@ -80,6 +81,8 @@ def test_rqt_console_and_rqt_logger_level_work_together(
     _, client, node = loop
     console = master.node("console", "/s")
     console.wait_until_connected()
+    # Which passes on what it hears.
+    wait_for(lambda: "/rosout" in master.listeners(node, "/rosout"), "rosout to hear the loop")
     client.load(rtcf.component("rtcf_test_ros", "Speaker", name="s"))
     client.start()
     wait_for(lambda: _WARN in lines(console, "level"), "a warning out of the cycle")

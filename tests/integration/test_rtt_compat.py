@@ -48,9 +48,8 @@ def test_listing_1_of_the_paper_runs(daemon: Daemon, master: Master) -> None:
             writer.terminate()
             writer.wait()
         client.stop()
-    log = daemon.log()
-    assert "Fetched param with value 4.25" in log
-    assert "Update hook called!" in log
+    for said in ("Fetched param with value 4.25", "Update hook called!"):
+        wait_for(lambda: said in daemon.log(), said)  # noqa: B023
 
 
 @pytest.fixture(scope="module")
