@@ -80,9 +80,8 @@ def test_a_dead_executor_comes_back_with_its_graph(daemon: Daemon, client: rtcf.
     client.start()
     wait_for(lambda: iteration(client) > 0, "a cycle")
     os.kill(client.get_status().runners[0].pid, signal.SIGKILL)
-    wait_for(
-        lambda: client.get_status().runners[0].state == runner_pb2.RUNNER_STATE_DOWN, "its death"
-    )
+    # That it is down may be too short to be seen.
+    wait_for(lambda: "executor restarted in" in daemon.log(), "its recovery")
     assert "was killed by SIGKILL" in daemon.log()
     client.start()
     assert client.get_order() == fig_1.ORDER
@@ -108,8 +107,9 @@ def test_runners_are_independent(client: rtcf.Client) -> None:
     client.start()
     client.start("arm")
     os.kill(client.get_status("arm").runners[0].pid, signal.SIGKILL)
+    # It is down, and soon is there again and does not run.
     wait_for(
-        lambda: client.get_status("arm").runners[0].state == runner_pb2.RUNNER_STATE_DOWN,
+        lambda: client.get_status("arm").runners[0].state != runner_pb2.RUNNER_STATE_RUNNING,
         "its death",
     )
     before = client.get_status("rt_runner").runners[0]

@@ -8,12 +8,11 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_process import BUILD_TREE, NO_ROS, Daemon, wait_for
+from daemon_process import BUILD_TREE, NO_ROS, Daemon, stopped, wait_for
 from rtcf.v1 import runner_pb2
 from values import iteration
 
@@ -51,16 +50,6 @@ def begin(client: rtcf.Client) -> None:
     wait_for(lambda: iteration(client) > 10, "cycles")
 
 
-@contextmanager
-def frozen(daemon: Daemon) -> Iterator[None]:
-    """Stop rtcfd as a debugger does."""
-    os.kill(daemon.pid, signal.SIGSTOP)
-    try:
-        yield
-    finally:
-        os.kill(daemon.pid, signal.SIGCONT)
-
-
 def mark(daemon: Daemon) -> Path:
     """Return the file by which the loop would be resumed."""
     return daemon.folder / "state" / "rt_runner.running"
@@ -71,7 +60,7 @@ def test_a_frozen_daemon_holds_up_no_stop_and_is_right_when_it_lives_again(
 ) -> None:
     begin(client)
     assert mark(daemon).exists()
-    with frozen(daemon):
+    with stopped(daemon.pid):
         done = daemon.ctl("stop")
         assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
         assert "at its executor, as rtcfd does not answer within 0.5 s" in done.stderr
@@ -91,7 +80,7 @@ def test_a_start_that_was_asked_before_the_stop_starts_nothing(
 ) -> None:
     begin(client)
     with (
-        frozen(daemon),
+        stopped(daemon.pid),
         subprocess.Popen(
             [BUILD_TREE / "bin" / "rtcfctl", "start"],
             env=daemon.environment(),

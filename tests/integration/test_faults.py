@@ -216,7 +216,9 @@ def test_faults_beyond_those_that_are_told_are_counted(daemon: Daemon, client: r
     client.start()
     wait_for(lambda: client.get_component("bad").faults > 20, "the faults")
     # Told once, and counted wherever one looks.
-    assert daemon.log().count("is not finite: readers keep its last value") == 1
+    told = "is not finite: readers keep its last value"
+    wait_for(lambda: told in daemon.log(), "the log")
+    assert daemon.log().count(told) == 1
     assert re.search(r"is not finite: .* \(\d+ in all\)", daemon.ctl("list").stdout)
     assert re.search(r"fault: .* \(\d+ in all\)", daemon.ctl("info", "bad").stdout)
     assert re.search(r"rt_runner: \d+ faults of components", daemon.ctl("status").stdout)
@@ -268,8 +270,8 @@ def test_each_orderly_end_makes_all_safe_once(
         client.load(faulty("Sleeps"))
     client.load(rtcf.component("rtcf_test", "Witness", name="second"))
     client.start()
-    wait_for(lambda: state(client).iteration > 10, "some cycles")
     if end == "stop":
+        wait_for(lambda: state(client).iteration > 10, "some cycles")
         client.stop()
     else:
         wait_for(lambda: state(client).state == runner_pb2.RUNNER_STATE_FAULTED, "its end")
@@ -280,7 +282,7 @@ def test_each_orderly_end_makes_all_safe_once(
         assert re.search(
             r"loop stopped in iteration \d+: more than 10 overruns", state(client).status
         )
-        assert "ended late" in daemon.log()
+        wait_for(lambda: "ended late" in daemon.log(), "the log")
 
 
 def test_a_crash_makes_nothing_safe(daemon: Daemon, client: rtcf.Client) -> None:

@@ -78,13 +78,18 @@ def test_overruns_are_counted_for_the_component_that_was_running(
     client.load(rtcf.component("rtcf_test", "Counter", name="quick"))
     client.load(_slow("slow"))
     client.start()
-    wait_for(lambda: client.get_statistics().overruns > 100, "overruns")
+
+    def overruns() -> dict[str, int]:
+        return {each.component: each.overruns for each in client.get_statistics().components}
+
+    wait_for(lambda: overruns()["/slow"] > 100, "overruns")
+    assert overruns()["/quick"] < overruns()["/slow"] / 2
     figures = client.get_statistics()
-    overruns = {each.component: each.overruns for each in figures.components}
-    assert overruns["/slow"] > 50 > overruns["/quick"]
     assert figures.missed >= figures.overruns - 1
     status = client.get_status("rt_runner").runners[0]
     assert status.overruns >= figures.overruns
+    # There are hardly more from here on, however long the next lines take.
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=10.0))
     client.reset_statistics()
     assert client.get_statistics().overruns < figures.overruns
 
