@@ -75,9 +75,9 @@ class Process:
         self._process.send_signal(number)
         return self.wait()
 
-    def wait(self) -> int:
+    def wait(self, deadline_s: float = DEADLINE_S) -> int:
         """Return the exit status."""
-        return self._process.wait(DEADLINE_S)
+        return self._process.wait(deadline_s)
 
     def make_sure(self) -> None:
         """End it in any case."""
@@ -117,7 +117,8 @@ class Launching:
     def roslaunch(self, *words: str) -> Process:
         """Start roslaunch with its words: a package and a file, or a file."""
         self.forget()
-        return self.start("/usr/bin/roslaunch", *words)
+        # It gives nodes 15 s to end, of which a busy machine may need more.
+        return self.start("/usr/bin/roslaunch", f"--sigint-timeout={DEADLINE_S / 2}", *words)
 
     def forget(self) -> None:
         """Remove what an earlier launch has left on the parameter server."""

@@ -13,6 +13,7 @@ from ros_processes import Master
 
 SOURCES = Path(__file__).with_name("old_workspace")
 BUILD_S = 900.0
+TEST_S = 300.0
 DONE = 0
 
 
@@ -123,7 +124,7 @@ def test_its_rostest_passes(workspace: Path, tmp_path: Path) -> None:
     given["PATH"] = f"/usr/bin:{given['PATH']}"
     test = Process(["/usr/bin/rostest", "old_components", "old.test"], given, tmp_path)
     try:
-        assert test.wait() == DONE, test.output()
+        assert test.wait(TEST_S) == DONE, test.output()
         assert "RESULT: SUCCESS" in test.output()
     finally:
         test.make_sure()

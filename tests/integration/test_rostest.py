@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from daemon_process import DEADLINE_S, clean_environment
+from daemon_process import DEADLINE_S, clean_environment, wait_for
 from launch_processes import Process, build_tree_environment, left_over
 
 # Node and topic names are the same in all; `wave` is published only by a loop that runs.
@@ -15,7 +15,7 @@ TEST = """
   <node name="generator" pkg="rtcf" type="rt_launcher" args="rtcf_examples Wave">
     <remap from="wave" to="wave{index}"/>
   </node>
-  <test test-name="wave{index}" pkg="rostest" type="publishtest">
+  <test test-name="wave{index}" pkg="rostest" type="publishtest" time-limit="{limit}">
     <rosparam>
       topics:
         - {{name: /wave{index}, timeout: {timeout}, negative: False}}
@@ -33,7 +33,8 @@ def test_rostests_at_random_ports_run_side_by_side(tmp_path: Path) -> None:
         folder.mkdir()
         file = folder / "wave.test"
         other = (index + 1) % 3
-        file.write_text(TEST.format(index=index, other=other, timeout=DEADLINE_S))
+        text = TEST.format(index=index, other=other, timeout=DEADLINE_S, limit=2 * DEADLINE_S)
+        file.write_text(text)
         environment = build_tree_environment(
             clean_environment() | {"ROS_HOME": str(folder), "ROS_HOSTNAME": "localhost"}
         )
@@ -43,7 +44,7 @@ def test_rostests_at_random_ports_run_side_by_side(tmp_path: Path) -> None:
         tests.append(Process(command, environment, folder))
     try:
         for test in tests:
-            assert test.wait() == 0, test.output()
+            assert test.wait(5 * DEADLINE_S) == 0, test.output()
             assert "RESULT: SUCCESS" in test.output()
             assert "TESTS: 1\n" in test.output()
     finally:
@@ -52,4 +53,5 @@ def test_rostests_at_random_ports_run_side_by_side(tmp_path: Path) -> None:
     # Each has ended its private daemon.
     sockets = [each.output().partition("private daemon at ")[2].partition(",")[0] for each in tests]
     assert len(set(sockets)) == 3
-    assert not [line for socket in sockets for line in left_over(socket)]
+    for socket in sockets:
+        wait_for(lambda: not left_over(socket), "the private daemon to end")  # noqa: B023
