@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from collections.abc import Iterable
 from typing import Any
 
 import rtcf
@@ -68,15 +69,22 @@ def load(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Load a component."""
     if args.watch and not python_source.is_one(args.package):
         raise ValueError("--watch is for a Python source: rtcfctl load FILE.py COMPONENT --watch")
+    saves = python_source.saved(args.package) if args.watch else None
     result = client.load(_spec(args, output), args.runner, output.progress, wait=args.wait)
     output.changed(f"loaded {result.component}", result)
-    if args.watch:
+    if saves is not None:
         sys.stdout.flush()
-        _watch(client, args, output, result.component)
+        _watch(client, args, output, result.component, saves)
 
 
-def _watch(client: rtcf.Client, args: argparse.Namespace, output: Output, name: str) -> None:
-    for _ in python_source.saved(args.package):
+def _watch(
+    client: rtcf.Client,
+    args: argparse.Namespace,
+    output: Output,
+    name: str,
+    saves: Iterable[None],
+) -> None:
+    for _ in saves:
         try:
             spec = _spec(args, output)
             result = client.replace(name, spec, args.runner, output.progress)

@@ -55,9 +55,13 @@ def compiled(source: str, build_tree: Path | None, progress: Callable[[str], Non
 
 
 def saved(source: str) -> Iterator[None]:
-    """Yield whenever a source, or a Python file beside it, has been saved with other content."""
+    """Yield whenever a source, or a Python file beside it, has been saved with other content; of
+    what is saved from this call on nothing is missed, while the source is compiled for instance."""
     file = Path(source).resolve()
-    last = fingerprint(file)
+    return _changes(file, fingerprint(file))
+
+
+def _changes(file: Path, last: str) -> Iterator[None]:
     while True:
         time.sleep(_LOOK_S)
         now = fingerprint(file)

@@ -2,12 +2,14 @@
 
 import re
 import subprocess
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_process import BUILD_TREE, Daemon, wait_for
+from daemon_process import BUILD_TREE, DEADLINE_S, Daemon, wait_for
+from rtcfctl import python_source
 
 COMPILE_DEADLINE_S = 900.0
 
@@ -84,6 +86,17 @@ def test_a_source_is_loaded_swapped_when_it_is_saved_and_kept(
     done = daemon.ctl("load", str(source), "Counts")
     assert done.returncode == 0, done.stderr
     assert library.stat().st_mtime_ns == second
+
+
+def test_what_is_saved_while_a_source_is_compiled_is_seen(tmp_path: Path) -> None:
+    source = tmp_path / "counts.py"
+    source.write_text(COUNTS)
+    saves = python_source.saved(str(source))
+    source.write_text(COUNTS + "\n")
+    seeing = threading.Thread(target=lambda: next(saves), daemon=True)
+    seeing.start()
+    seeing.join(DEADLINE_S)
+    assert not seeing.is_alive()
 
 
 def test_a_source_that_is_wrong_is_refused_in_one_line(own_cache: Path, daemon: Daemon) -> None:
