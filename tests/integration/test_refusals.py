@@ -152,9 +152,9 @@ def picture(client: rtcf.Client) -> list[Any]:
     """Return all that a refusal must not change, as `rtcfctl -o json` would print it."""
     runners = client.get_status().runners
     for runner in runners:
-        # These go on by themselves.
-        for counter in ("iteration", "overruns", "missed"):
-            runner.ClearField(counter)
+        # These go on by themselves, or with what else the machine does.
+        for figure in ("iteration", "overruns", "missed", "late", "log_dropped"):
+            runner.ClearField(figure)
     return [
         client.get_order(),
         [plain(each) for each in client.list_components()],
