@@ -54,4 +54,7 @@ class Screen:
             line = f"{_COLOURS[word]}{line}\033[0m"
         # The terminal may have gone; the journal has it all the same.
         with contextlib.suppress(OSError):
-            print(line, file=stream, flush=True)
+            # In one piece, as other nodes of a launch write to the same terminal: where Python does
+            # not buffer, print() writes the end of the line by itself.
+            stream.write(f"{line}\n")
+            stream.flush()
