@@ -10,7 +10,7 @@ import pytest
 import rtcf
 from daemon_process import Daemon
 from rtcf.v1 import runner_pb2
-from values import iteration, number, port_value
+from values import iteration, number, port_value, state, wait_until_after
 
 CYCLES = 10_000
 
@@ -72,6 +72,27 @@ def test_time_advances_by_a_period_each_cycle(client: rtcf.Client) -> None:
     client.step(10)
     (out,) = (port for port in client.get_component("sink").ports if port.name == "out")
     assert (out.count, out.age_ns) == (10, 1_000_000_000)
+
+
+def test_the_highest_frequency_is_stepped_and_runs(client: rtcf.Client) -> None:
+    """At whatever pace: late cycles are counted, and the loop goes on."""
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=50_000.0, max_overruns=0))
+    client.load(rtcf.component("rtcf_examples", "Mimo", name="source", remaps=["out1:=/x"]))
+    client.load(rtcf.component("rtcf_examples", "Identity", name="sink", remaps=["in:=/x"]))
+    client.step(1000)
+    client.unload(["source"])
+    client.step(10)
+    assert iteration(client) == 1010
+    (out,) = (port for port in client.get_component("sink").ports if port.name == "out")
+    assert (out.count, out.age_ns) == (1000, 10 * 20_000)
+    client.start()
+    wait_until_after(client, 1000)
+    client.stop()
+    status = state(client)
+    assert (status.state, status.settings.frequency_hz) == (
+        runner_pb2.RUNNER_STATE_STOPPED,
+        50_000.0,
+    )
 
 
 @pytest.mark.parametrize("cycles", ["0", "-1", "x", str(2**64)])
