@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "support/built_plans.hpp"
 #include "support/runner_fixture.hpp"
 
 namespace rtcf::test {
@@ -79,6 +80,17 @@ TEST_F(Change, ReplacementTakesOverAtTheBoundary) {
               (std::vector<std::string>{"/A configure", "/A start", "/A update", "/A configure",
                                         "/A start", "/A takeOver", "/A safe", "/A stop",
                                         "/A cleanup", "/A safe", "/A stop"}));
+}
+
+// Of what it replaces it has no state: its first update() is noted as such.
+TEST_F(Change, ReplacementTakesOverBeforeItsFirstUpdate) {
+    load(definition("Ticker", "T"));
+    start();
+    ASSERT_TRUE(runs());
+    replace("/T", recorder("A"));
+    ASSERT_TRUE(runs());
+    EXPECT_EQ(journal().notes(),
+              (std::vector<std::string>{"/A configure", "/A start", "/A takeOver", "/A update"}));
 }
 
 TEST_F(Change, ReplacementByAnotherNameTakesOverToo) {
@@ -205,6 +217,17 @@ TEST_F(Change, BatchOfParametersIsSetInOneCycle) {
     ASSERT_TRUE(runs());
     stop();
     EXPECT_EQ(value("/A", "out"), 2.0 * static_cast<double>(iteration()));
+}
+
+// A graph of thousands is not planned anew for a number.
+TEST_F(Change, ValuesOfParametersNeedNoNewSchedule) {
+    startWithA();
+    const std::size_t before = builtPlans().count;
+    setParameters("/A", {{"gain", 2.0}});
+    setParameters("/A", {{"gain", 3.0}, {"limit", 4.0}});
+    EXPECT_EQ(builtPlans().count, before);
+    load(recorder("B"));
+    EXPECT_EQ(builtPlans().count, before + 1) << "which is how one sees it";
 }
 
 TEST_F(Change, BatchWithABadValueSetsNothing) {

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "rtcf/port.hpp"
+#include "support/built_plans.hpp"
 #include "support/runner_fixture.hpp"
 
 namespace rtcf::test {
@@ -227,6 +228,26 @@ TEST_F(Safe, OptionalControllerThatThrowsMakesSafeInTheSameCycle) {
     stop();
     EXPECT_EQ(journal().count("/C safe"), 1U) << "when it was taken out";
     EXPECT_EQ(journal().count("/D safe"), 1U);
+}
+
+// What most components do not have costs a cycle only while one of them has it.
+TEST_F(Safe, OnceAnOptionalComponentIsUnloadedCyclesTakeTheShortWayAgain) {
+    ComponentDefinition plain = definition("Ticker", "T");
+    load(plain);
+    EXPECT_FALSE(builtPlans().selective);
+    ComponentDefinition throwing = definition("Recorder", "C");
+    throwing.optional = true;
+    throwing.remaps = {{"in", "C_in"}, {"out", "C_out"}};
+    throwing.parameters = {{"throws_at", std::int64_t{15}}};
+    load(throwing);
+    EXPECT_TRUE(builtPlans().selective);
+    step(20);
+    ASSERT_EQ(journal().count("/C safe"), 1U) << "it is taken out";
+    unload("/C");
+    EXPECT_FALSE(builtPlans().selective);
+    step(5);
+    EXPECT_EQ(state(), RunnerState::Stepping);
+    EXPECT_EQ(value("/T", "out"), 24.0);
 }
 
 // What it had written before it threw is never seen: `other` by write(), `effort` in place.
