@@ -7,7 +7,7 @@ import pytest
 import rtcf
 from daemon_process import Daemon, wait_for
 from rtcf.v1 import graph_pb2, runner_pb2
-from values import iteration
+from values import iteration, state
 
 
 def _slow(name: str) -> graph_pb2.ComponentSpec:
@@ -92,6 +92,53 @@ def test_overruns_are_counted_for_the_component_that_was_running(
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=10.0))
     client.reset_statistics()
     assert client.get_statistics().overruns < figures.overruns
+
+
+@pytest.mark.parametrize(
+    "policy", [runner_pb2.OVERRUN_POLICY_SKIP, runner_pb2.OVERRUN_POLICY_CATCH_UP]
+)
+def test_a_reset_is_one_instant_of_all_figures_of_a_loop_that_is_always_late(
+    daemon: Daemon, client: rtcf.Client, policy: runner_pb2.OverrunPolicy
+) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=20000.0, overrun=policy))
+    for name in ("a", "b", "c"):
+        client.load(rtcf.component("rtcf_test", "Counter", name=name, remaps=["out:=~out"]))
+    client.load(_slow("slow"))
+    client.start()
+    for _ in range(10):
+        wait_for(lambda: client.get_statistics().overruns > 20, "overruns")
+        total = state(client).iteration
+        assert daemon.ctl("stats", "--reset").returncode == 0
+        more = state(client)
+        # Below 0 they would be large.
+        assert more.overruns <= more.iteration
+        assert client.get_statistics().overruns <= iteration(client)
+        assert more.iteration >= total, "cycles are numbered on"
+    wait_for(lambda: client.get_statistics().overruns > 20, "overruns")
+    client.stop()
+    status, figures = state(client), client.get_statistics()
+    assert (status.overruns, status.missed) == (figures.overruns, figures.missed)
+    assert (figures.missed > 0) == (policy == runner_pb2.OVERRUN_POLICY_SKIP)
+    causes = figures.late_wake_ups + figures.exchange_overruns + figures.catching_up
+    assert causes + sum(each.overruns for each in figures.components) == figures.overruns
+    counts = [each.duration.count for each in figures.components]
+    assert counts == [figures.iterations] * 4
+    assert 0 < figures.overruns <= figures.iterations == figures.latency.count
+
+
+def test_cycles_of_a_stopped_loop_are_the_same_in_status_and_statistics(
+    client: rtcf.Client,
+) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(warmup_cycles=0))
+    client.load(rtcf.component("rtcf_test", "Counter"))
+    client.step(100)
+    before = iteration(client)
+    client.reset_statistics()
+    assert client.get_statistics().iterations == 0
+    client.step(30)
+    figures = client.get_statistics()
+    assert iteration(client) - before == figures.iterations == 30
+    assert figures.components[0].duration.count == 30
 
 
 def test_figures_are_watched_while_they_grow(daemon: Daemon, client: rtcf.Client) -> None:

@@ -25,6 +25,22 @@ class HookNote {
     const FlightRecorder::RealtimeNotes& notes_;
 };
 
+// Lends a component other figures of its device, or none (null), for one update.
+class DeviceLoan {
+   public:
+    DeviceLoan(ComponentContext& context, DeviceFigures* figures) noexcept
+        : context_(context), own_(context.device) {
+        if (figures != nullptr) context.device = figures;
+    }
+    ~DeviceLoan() { context_.device = own_; }
+    DeviceLoan(const DeviceLoan&) = delete;
+    DeviceLoan& operator=(const DeviceLoan&) = delete;
+
+   private:
+    ComponentContext& context_;
+    DeviceFigures* own_;
+};
+
 }  // namespace
 
 Cycle::Cycle(FlightRecorder& recorder)
@@ -71,7 +87,8 @@ void Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     }
     notes_.setIteration(iteration);
     if (schedule.selective) total_elapsed_ns_ += clock_.elapsed_ns;
-    if (iteration >= warmup_cycles_) {
+    counted_ = iteration >= warmup_cycles_ && figures_.counting.counts();
+    if (counted_) {
         for (const Stretch& stretch : schedule.stretches) {
             before = stretch.plain ? update<true>(stretch.begin, stretch.end, before)
                                    : updateSelected(stretch.begin, stretch.end, before);
@@ -88,7 +105,7 @@ void Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     FrameRing* const frames = frames_;
     if (frames != nullptr) frames->take();
     const std::int64_t duration = readCycleCounter() - begin;
-    if (iteration >= warmup_cycles_) {
+    if (counted_) {
         figures_.duration.add(duration);
         figures_.latency.add(latency_ns);
     }
@@ -115,14 +132,18 @@ template <bool Plain>
             for (; next != end; ++next) {
                 if (!Plain && !due(*next)) continue;
                 notes.enterComponent(next->slot);
-                next->component->update();
+                if (Plain) {
+                    next->component->update();
+                } else {
+                    const DeviceLoan loan(*next->context, counted_ ? nullptr : &uncounted_);
+                    next->component->update();
+                }
                 if (!Plain) commit(*next->component, *next->figures, OnBadOutput::End);
                 const std::int64_t after = readCycleCounter();
                 const std::int64_t duration = after - before;
                 before = after;
                 next->ended_ticks = after;
-                if (Plain || clock_.iteration >= warmup_cycles_)
-                    next->figures->duration.add(duration);
+                if (Plain || counted_) next->figures->duration.add(duration);
             }
             return before;
         } catch (const std::exception& error) {

@@ -16,6 +16,7 @@
 #include "loop/faults.hpp"
 #include "loop/schedule.hpp"
 #include "spsc_ring.hpp"
+#include "statistics/counting.hpp"
 #include "statistics/histogram.hpp"
 
 namespace rtcf::executor {
@@ -26,6 +27,7 @@ struct LoopFigures {
     Histogram latency;   ///< ns
     Histogram adoption;  ///< ticks; what a change took of the cycle that adopted it
     Histogram wake_up;   ///< ns after the end of the sleep, which is `spin` before the deadline
+    Counting counting;   ///< what belongs together of these, and of components'
     std::atomic<std::uint64_t> iteration{0};  ///< cycles completed since the loop started
     Counter faults;                           ///< of components, while the loop went on
     std::atomic<std::uint64_t> overruns{0};
@@ -70,7 +72,8 @@ class Cycle {
     void apply(Adoption& adoption) noexcept;
     /// Copies what the next cycle depends on.
     void capture(Capture& capture) noexcept;
-    /// One cycle. @param time_ns of the loop @param latency_ns of its wake-up
+    /// One cycle, in a turn of the figures. @param time_ns of the loop @param latency_ns of its
+    /// wake-up
     void run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NONBLOCKING;
     /// The last cycle: safe() in place of update(). Once until the next begin().
     void makeSafe(std::int64_t time_ns) noexcept;
@@ -124,6 +127,7 @@ class Cycle {
     bool exchanges_ = false;       // the schedule has feeds, latches or taps
     bool active_ = false;          // between begin() and the last cycle
     FrameRing* frames_ = nullptr;  // while somebody watches
+    bool counted_ = false;         // the present cycle's durations
     // Shared.
     std::atomic<std::int64_t> stamp_offset_ns_{0};  // CLOCK_REALTIME minus CLOCK_MONOTONIC
     Boundary boundary_;
@@ -135,6 +139,7 @@ class Cycle {
     std::uint64_t exchanged_at_ = UINT64_MAX;  // and its iteration
     LoopFault fault_;
     LoopFigures figures_;
+    DeviceFigures uncounted_;  // what components' devices cost in cycles that are not counted
     SpscRing<CycleRecord, 16384> records_;
     const Schedule empty_{};
 };

@@ -129,6 +129,11 @@ class Loop {
     int cpu() const noexcept { return cpu_.load(std::memory_order_relaxed); }
     int threadId() const noexcept { return thread_id_.load(std::memory_order_relaxed); }
     const LoopFigures& figures() const noexcept { return cycle_.figures(); }
+    /// Keeps cycles that begin from here on out of the figures, so that they can be read as of one
+    /// instant, or goes on. One thread.
+    void holdFigures(bool held) noexcept {
+        held ? cycle_.figures().counting.hold() : cycle_.figures().counting.release();
+    }
     const CycleCounter& counter() const noexcept { return cycle_.counter(); }
     /// Cycle records lost as nobody took them.
     std::uint64_t recordsDropped() const noexcept { return cycle_.records().dropped(); }
@@ -143,6 +148,7 @@ class Loop {
         bool cycle = false;  // one is to begin,
         std::int64_t deadline_ns = 0;
         std::int64_t wake_ns = 0;
+        std::int64_t missed = 0;  ///< beats of a device before it
     };
 
     void reset(const LoopSettings& settings, std::uint64_t stops_known);
@@ -158,6 +164,9 @@ class Loop {
     WakeUp waitForSource(Source& device) noexcept;
     Source* source() const noexcept;
     std::int64_t nextStep() const noexcept;
+    void noteMissed(std::int64_t periods) noexcept RTCF_NONBLOCKING;
+    void countOverrun(const WakeUp& wake_up, std::int64_t begin_ticks, std::int64_t end_ns,
+                      bool behind) noexcept RTCF_NONBLOCKING;
     void noteOverrun(const WakeUp& wake_up, std::int64_t begin_ticks, std::int64_t end_ns,
                      bool behind) noexcept RTCF_NONBLOCKING;
     std::int64_t nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) noexcept

@@ -37,6 +37,7 @@ std::uint64_t Loop::step(std::uint64_t cycles) noexcept {
     // Components log as in any cycle; there is no other thread that runs one.
     Log::setRealtimeThread(true);
     for (; done < cycles && goesOn(); ++done) {
+        const Counting::Turn turn(cycle_.figures().counting);
         cycle_.run(nextStep(), 0);
         cycle_.setElapsed(cycle_.clock().period_ns);  // also if a snapshot said otherwise
     }
@@ -75,6 +76,8 @@ void Loop::followRealTime() noexcept {
             deadline = wake_up.wake_ns + cycle_.clock().period_ns;
             continue;
         }
+        const Counting::Turn turn(cycle_.figures().counting);
+        noteMissed(wake_up.missed);
         const std::int64_t begin = readCycleCounter();
         cycle_.run(device != nullptr ? wake_up.wake_ns : wake_up.deadline_ns,
                    wake_up.wake_ns - wake_up.deadline_ns);
@@ -107,6 +110,7 @@ void Loop::followClock() noexcept {
         }
         const std::int64_t now = nextStep();
         cycle_.setStampOffset(due->time_ns - now);
+        const Counting::Turn turn(cycle_.figures().counting);
         cycle_.run(now, 0);
     }
 }
@@ -130,9 +134,8 @@ Loop::WakeUp Loop::waitForSource(Source& device) noexcept {
     const std::int64_t last = std::exchange(beat_ns_, now);
     if (last == 0) return {true, now, now};
     const std::int64_t periods = std::max<std::int64_t>(1, (now - last + period / 2) / period);
-    if (periods > 1) bump(cycle_.figures().missed, static_cast<std::uint64_t>(periods - 1));
     cycle_.setElapsed(periods * period);
-    return {true, last + periods * period, now};
+    return {true, last + periods * period, now, periods - 1};
 }
 
 Loop::WakeUp Loop::waitForClock(std::int64_t deadline_ns) noexcept {
@@ -149,10 +152,23 @@ Loop::WakeUp Loop::waitForClock(std::int64_t deadline_ns) noexcept {
     return {true, deadline_ns, now};
 }
 
-// Counts an overrun where it belongs. A cycle that took less than a period would have been in time,
-// had it begun so.
+void Loop::noteMissed(std::int64_t periods) noexcept RTCF_NONBLOCKING {
+    if (periods > 0 && cycle_.figures().counting.counts())
+        bump(cycle_.figures().missed, static_cast<std::uint64_t>(periods));
+}
+
 void Loop::noteOverrun(const WakeUp& wake_up, std::int64_t begin_ticks, std::int64_t end_ns,
                        bool behind) noexcept RTCF_NONBLOCKING {
+    if (cycle_.figures().counting.counts()) countOverrun(wake_up, begin_ticks, end_ns, behind);
+    const std::uint32_t limit = max_overruns_.load(std::memory_order_relaxed);
+    if (limit != 0 && ++bucket_ > limit && !cycle_.faulted())
+        cycle_.endLoop(LoopFault::Kind::Overruns, nullptr, "too many overruns");
+}
+
+// Counts an overrun where it belongs. A cycle that took less than a period would have been in time,
+// had it begun so.
+void Loop::countOverrun(const WakeUp& wake_up, std::int64_t begin_ticks, std::int64_t end_ns,
+                        bool behind) noexcept RTCF_NONBLOCKING {
     LoopFigures& figures = cycle_.figures();
     bump(figures.overruns);
     const std::int64_t period = cycle_.clock().period_ns;
@@ -163,9 +179,6 @@ void Loop::noteOverrun(const WakeUp& wake_up, std::int64_t begin_ticks, std::int
     } else {
         figures.late_wake_ups.add(1);
     }
-    const std::uint32_t limit = max_overruns_.load(std::memory_order_relaxed);
-    if (limit != 0 && ++bucket_ > limit && !cycle_.faulted())
-        cycle_.endLoop(LoopFault::Kind::Overruns, nullptr, "too many overruns");
 }
 
 std::int64_t Loop::nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) noexcept
@@ -188,7 +201,7 @@ std::int64_t Loop::nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) n
             break;
     }
     const std::int64_t dropped = (end_ns - next) / period + 1;
-    bump(cycle_.figures().missed, static_cast<std::uint64_t>(dropped));
+    noteMissed(dropped);
     cycle_.setElapsed((dropped + 1) * period);
     return next + dropped * period;
 }

@@ -191,6 +191,8 @@ class Runner final : private RunnerView {
     /// Is called, on the graph thread, when there are so many frames that cycles which run as fast
     /// as they go wait for somebody to take them.
     void onFramesWaiting(std::function<void()> tell);
+    /// See Loop. One thread, whichever.
+    void holdFigures(bool held) noexcept { loop_.holdFigures(held); }
     /// Name of the hook that the graph thread is in, and since when; empty = none.
     std::pair<std::string, std::int64_t> activity() const;
     /// @}

@@ -29,7 +29,7 @@ namespace {
 
 // Of rtcfd and executor the newer asks for nothing that the older does not know:
 // see link.py of rtcfd. Hello, stop and exit stay as they are for good.
-constexpr std::uint32_t kProtocol = 3;
+constexpr std::uint32_t kProtocol = 4;
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kHookTimeout = 10 * kSecond;
 constexpr std::int64_t kProbeTimeout = kSecond / 2;
@@ -213,7 +213,8 @@ void Server::serve(Runner& runner, Log& log, Access& access, const DirectStop& d
             polled.push_back({connection->fd(), events, 0});
             ids.push_back(id);
         }
-        ::poll(polled.data(), polled.size(), waiting_.empty() ? 1000 : kPortsInterval);
+        const int patience_ms = waiting_.empty() ? 1000 : kPortsInterval;
+        ::poll(polled.data(), polled.size(), resets_.empty() ? patience_ms : 1);
         if ((polled[1].revents & POLLIN) != 0) exiting_ = true;
         if ((polled[2].revents & POLLIN) != 0) {
             std::uint64_t count = 0;
@@ -232,6 +233,7 @@ void Server::serve(Runner& runner, Log& log, Access& access, const DirectStop& d
         if ((polled[0].revents & POLLIN) != 0) accept();
         deliver();
         servePorts();
+        goOnWithResets();
         expire();
         if (orphaned()) exiting_ = true;
     }
@@ -279,6 +281,12 @@ void Server::drop(std::uint64_t id) {
     endWatches(ports_.endAll(id));
     for (auto it = waiting_.begin(); it != waiting_.end();)
         it = it->first.first == id ? waiting_.erase(it) : std::next(it);
+    // Those of others are gone on with; if there are none, the figures go on.
+    const auto gone = std::remove_if(resets_.begin(), resets_.end(),
+                                     [id](const Reset& each) { return each.connection == id; });
+    if (gone == resets_.end()) return;
+    resets_.erase(gone, resets_.end());
+    if (resets_.empty()) runner_->holdFigures(false);
 }
 
 void Server::respond(std::uint64_t connection, const v1::Response& response) {
@@ -409,9 +417,8 @@ bool Server::answerQuery(std::uint64_t connection, const v1::Request& request) {
             *response.mutable_statistics() = statistics();
             break;
         case v1::Request::kResetStatistics:
-            resetStatistics();
-            response.mutable_done();
-            break;
+            resetStatistics(connection, request.id());
+            return true;
         case v1::Request::kGetStatus:
             setState(response, runner_->numberedState());
             *response.mutable_status() = status();
@@ -460,7 +467,9 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
                         ((request.kind_case() == v1::Request::kStep ||
                           request.kind_case() == v1::Request::kRestoreSnapshot) &&
                          runner_->picture().state != RunnerState::Stepping);
-    if (begins && !runner_->loop().running()) resetStatistics();
+    if (begins && !runner_->loop().running() && !takeBaseline()) {
+        setBaseline(figures(*runner_->snapshot()));  // in a step, which this one waits for
+    }
     // Steps take as long as they take; they report progress.
     const bool endless =
         request.kind_case() == v1::Request::kStep || request.kind_case() == v1::Request::kReplay;
@@ -687,8 +696,10 @@ pb::RunnerStatus Server::status() const {
     status.set_realtime_tid(loop.threadId());
     if (loop.cpu() >= 0) status.set_loop_cpu(loop.cpu());
     status.set_iteration(loop.figures().iteration.load(std::memory_order_relaxed));
-    status.set_overruns(loop.figures().overruns.load(std::memory_order_relaxed));
-    status.set_missed(loop.figures().missed.load(std::memory_order_relaxed));
+    const std::shared_ptr<const Figures> baseline = this->baseline();
+    status.set_overruns(loop.figures().overruns.load(std::memory_order_relaxed) -
+                        baseline->overruns);
+    status.set_missed(loop.figures().missed.load(std::memory_order_relaxed) - baseline->missed);
     status.set_components(static_cast<std::uint32_t>(graph->components.size()));
     status.set_generation(graph->generation);
     std::uint64_t faults = 0;
@@ -708,43 +719,40 @@ pb::RunnerStatus Server::status() const {
     std::uint64_t passed_over = 0;
     for (const auto& injector : graph->injectors) passed_over += injector->passedOver();
     ros.set_passed_over(passed_over);
-    status.set_log_dropped(log_->dropped());
-    std::uint64_t dropped = 0;
-    for (const auto& tap : graph->taps) dropped += tap->dropped();
-    status.set_tap_dropped(dropped);
+    status.set_log_dropped(log_->dropped() - baseline->log_dropped);
+    status.set_tap_dropped(tapDropped(*graph, *baseline));
     return status;
 }
 
+// Of the same cycles, unless the loop leaves no time between them.
 pb::RunnerStatistics Server::statistics() const {
     const std::shared_ptr<const GraphSnapshot> graph = runner_->snapshot();
     const Loop& loop = runner_->loop();
     const double ns_per_tick = loop.counter().nsPerTick();
+    const std::shared_ptr<const Figures> baseline = this->baseline();
+    Figures now;
+    if (!loop.figures().counting.read([&] { now = figures(*graph); })) now = figures(*graph);
     pb::RunnerStatistics message;
     message.set_runner(runner_->name());
-    const HistogramSnapshot duration =
-        difference(loop.figures().duration.snapshot(), baseline_.duration);
+    const HistogramSnapshot duration = difference(now.duration, baseline->duration);
     message.set_iterations(duration.count);
     setDistribution(*message.mutable_duration(), summarize(duration, ns_per_tick));
-    setDistribution(
-        *message.mutable_latency(),
-        summarize(difference(loop.figures().latency.snapshot(), baseline_.latency), 1.0));
-    setDistribution(
-        *message.mutable_adoption(),
-        summarize(difference(loop.figures().adoption.snapshot(), baseline_.adoption), ns_per_tick));
-    message.set_overruns(loop.figures().overruns.load(std::memory_order_relaxed) -
-                         baseline_.overruns);
-    message.set_missed(loop.figures().missed.load(std::memory_order_relaxed) - baseline_.missed);
-    message.set_late_wake_ups(loop.figures().late_wake_ups.value() - baseline_.late_wake_ups);
-    message.set_exchange_overruns(loop.figures().exchange_overruns.value() -
-                                  baseline_.exchange_overruns);
-    message.set_catching_up(loop.figures().catching_up.value() - baseline_.catching_up);
+    setDistribution(*message.mutable_latency(),
+                    summarize(difference(now.latency, baseline->latency), 1.0));
+    setDistribution(*message.mutable_adoption(),
+                    summarize(difference(now.adoption, baseline->adoption), ns_per_tick));
+    message.set_overruns(now.overruns - baseline->overruns);
+    message.set_missed(now.missed - baseline->missed);
+    message.set_late_wake_ups(now.late_wake_ups - baseline->late_wake_ups);
+    message.set_exchange_overruns(now.exchange_overruns - baseline->exchange_overruns);
+    message.set_catching_up(now.catching_up - baseline->catching_up);
     for (const auto& component : graph->components) {
         pb::ComponentStatistics& statistics = *message.add_components();
         statistics.set_component(component->full_name);
-        Baseline::Component present = figuresOf(*component->figures);
-        if (const auto found = baseline_.components.find(component->figures);
-            found != baseline_.components.end()) {
-            const Baseline::Component& past = found->second;
+        Figures::Component& present = now.components[component->figures];
+        if (const auto found = baseline->components.find(component->figures);
+            found != baseline->components.end()) {
+            const Figures::Component& past = found->second;
             present.duration = difference(present.duration, past.duration);
             present.overruns -= past.overruns;
             present.device_calls -= past.device_calls;
@@ -759,37 +767,109 @@ pb::RunnerStatistics Server::statistics() const {
                                           static_cast<double>(present.device_calls));
         }
     }
-    const ThreadUsage usage = readThreadUsage(loop.threadId());
-    message.set_minor_faults(usage.minor_faults);
-    message.set_major_faults(usage.major_faults);
-    message.set_involuntary_switches(usage.involuntary_switches);
-    message.set_log_dropped(log_->dropped());
-    std::uint64_t dropped = 0;
-    for (const auto& tap : graph->taps) dropped += tap->dropped();
-    message.set_tap_dropped(dropped);
+    // The kernel counts of each thread from its beginning.
+    const ThreadUsage before = now.thread == baseline->thread ? baseline->usage : ThreadUsage{};
+    message.set_minor_faults(now.usage.minor_faults - before.minor_faults);
+    message.set_major_faults(now.usage.major_faults - before.major_faults);
+    message.set_involuntary_switches(now.usage.involuntary_switches - before.involuntary_switches);
+    message.set_log_dropped(now.log_dropped - baseline->log_dropped);
+    message.set_tap_dropped(tapDropped(*graph, *baseline));
     return message;
 }
 
-Server::Baseline::Component Server::figuresOf(const ComponentFigures& figures) {
-    const auto relaxed = std::memory_order_relaxed;
-    return {figures.duration.snapshot(), figures.overruns.load(relaxed),
-            figures.device.calls.load(relaxed), figures.device.time_ns.load(relaxed)};
+std::uint64_t Server::tapDropped(const GraphSnapshot& graph, const Figures& baseline) {
+    std::uint64_t dropped = 0;
+    for (const auto& tap : graph.taps) {
+        const auto found = baseline.tap_dropped.find(tap);
+        dropped += tap->dropped() - (found == baseline.tap_dropped.end() ? 0 : found->second);
+    }
+    return dropped;
 }
 
-void Server::resetStatistics() {
-    const Loop& loop = runner_->loop();
-    baseline_.components.clear();
-    for (const auto& component : runner_->snapshot()->components) {
-        baseline_.components[component->figures] = figuresOf(*component->figures);
+Server::Figures Server::figures(const GraphSnapshot& graph) const {
+    const auto relaxed = std::memory_order_relaxed;
+    const LoopFigures& loop = runner_->loop().figures();
+    Figures figures;
+    for (const auto& component : graph.components) {
+        const ComponentFigures& each = *component->figures;
+        figures.components[component->figures] = {
+            each.duration.snapshot(), each.overruns.load(relaxed), each.device.calls.load(relaxed),
+            each.device.time_ns.load(relaxed)};
     }
-    baseline_.duration = loop.figures().duration.snapshot();
-    baseline_.latency = loop.figures().latency.snapshot();
-    baseline_.adoption = loop.figures().adoption.snapshot();
-    baseline_.overruns = loop.figures().overruns.load(std::memory_order_relaxed);
-    baseline_.missed = loop.figures().missed.load(std::memory_order_relaxed);
-    baseline_.late_wake_ups = loop.figures().late_wake_ups.value();
-    baseline_.exchange_overruns = loop.figures().exchange_overruns.value();
-    baseline_.catching_up = loop.figures().catching_up.value();
+    figures.duration = loop.duration.snapshot();
+    figures.latency = loop.latency.snapshot();
+    figures.adoption = loop.adoption.snapshot();
+    figures.overruns = loop.overruns.load(relaxed);
+    figures.missed = loop.missed.load(relaxed);
+    figures.late_wake_ups = loop.late_wake_ups.value();
+    figures.exchange_overruns = loop.exchange_overruns.value();
+    figures.catching_up = loop.catching_up.value();
+    figures.log_dropped = log_->dropped();
+    for (const auto& tap : graph.taps) figures.tap_dropped[tap] = tap->dropped();
+    figures.thread = runner_->loop().threadId();
+    figures.usage = readThreadUsage(figures.thread);
+    return figures;
+}
+
+// At once, or when the cycle has ended that is being counted: those after it are not, until then.
+void Server::resetStatistics(std::uint64_t connection, std::uint64_t request) {
+    constexpr std::int64_t kPeriods = 10;
+    const std::int64_t period_ns = runner_->picture().settings.loop.period_ns;
+    resets_.push_back({connection, request, monotonicNow() + kSecond + kPeriods * period_ns});
+    goOnWithResets();
+}
+
+// @return whether it could be taken: not while a cycle is being counted
+bool Server::takeBaseline() {
+    runner_->holdFigures(true);
+    const std::shared_ptr<const GraphSnapshot> graph = runner_->snapshot();
+    Figures now;
+    if (!runner_->loop().figures().counting.read([&] { now = figures(*graph); })) return false;
+    setBaseline(std::move(now));
+    return true;
+}
+
+void Server::setBaseline(Figures figures) {
+    {
+        const auto next = std::make_shared<const Figures>(std::move(figures));
+        const std::lock_guard<std::mutex> lock(baseline_mutex_);
+        baseline_ = next;
+    }
+    runner_->holdFigures(false);
+}
+
+std::shared_ptr<const Server::Figures> Server::baseline() const {
+    const std::lock_guard<std::mutex> lock(baseline_mutex_);
+    return baseline_;
+}
+
+void Server::goOnWithResets() {
+    if (resets_.empty()) return;
+    v1::Response answer;
+    std::vector<Reset> answered;
+    if (takeBaseline()) {
+        answer.mutable_done();
+        answered.swap(resets_);
+    } else {
+        const std::int64_t now = monotonicNow();
+        const auto late =
+            std::stable_partition(resets_.begin(), resets_.end(),
+                                  [now](const Reset& each) { return now < each.until_ns; });
+        if (late == resets_.end()) return;
+        answered.assign(late, resets_.end());
+        resets_.erase(late, resets_.end());
+        if (resets_.empty()) runner_->holdFigures(false);
+        const std::string activity = runner_->recorder().realtimeActivity();
+        answer = errorResponse(
+            0, RefusalKind::Unavailable,
+            fmt::format("the loop of {} reaches no cycle boundary: {} does not return; its figures "
+                        "go on",
+                        runner_->name(), activity.empty() ? "a component" : activity + "()"));
+    }
+    for (const Reset& each : answered) {
+        answer.set_id(each.request);
+        respond(each.connection, answer);
+    }
 }
 
 }  // namespace rtcf::executor

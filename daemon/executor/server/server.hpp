@@ -21,6 +21,7 @@
 #include "server/outside_calls.hpp"
 #include "server/port_streams.hpp"
 #include "statistics/histogram.hpp"
+#include "statistics/thread_usage.hpp"
 
 namespace rtcf::executor {
 
@@ -55,7 +56,7 @@ class Server {
         v1::Response response;
         bool last;  // ends its request
     };
-    struct Baseline {  // what statistics count from
+    struct Figures {  // all that is counted, since the beginning
         struct Component {
             HistogramSnapshot duration;
             std::uint64_t overruns = 0;
@@ -72,9 +73,19 @@ class Server {
         std::uint64_t late_wake_ups = 0;
         std::uint64_t exchange_overruns = 0;
         std::uint64_t catching_up = 0;
+        std::uint64_t log_dropped = 0;
+        // Not held, as their rings are large.
+        std::map<std::weak_ptr<const Tap>, std::uint64_t, std::owner_less<>> tap_dropped;
+        int thread = 0;
+        ThreadUsage usage;
+    };
+    struct Reset {  // one that waits for the end of a cycle
+        std::uint64_t connection;
+        std::uint64_t request;
+        std::int64_t until_ns;
     };
 
-    static Baseline::Component figuresOf(const ComponentFigures& figures);
+    Figures figures(const GraphSnapshot& graph) const;
     void post(std::uint64_t connection, v1::Response response, bool last);
     void wakeUp() const;
     void handOn(const v1::Response& call);
@@ -97,7 +108,12 @@ class Server {
     ChangeOutcome change(const v1::Request& request, const Runner::Progress& progress);
     ::rtcf::v1::RunnerStatus status() const;
     ::rtcf::v1::RunnerStatistics statistics() const;
-    void resetStatistics();
+    static std::uint64_t tapDropped(const GraphSnapshot& graph, const Figures& baseline);
+    void resetStatistics(std::uint64_t connection, std::uint64_t request);
+    bool takeBaseline();
+    void setBaseline(Figures figures);
+    std::shared_ptr<const Figures> baseline() const;
+    void goOnWithResets();
     std::string stuck() const;
 
     std::string path_;
@@ -113,7 +129,11 @@ class Server {
     const DirectStop* direct_stop_ = nullptr;
     std::uint64_t next_id_ = 1;
     std::map<std::uint64_t, std::unique_ptr<Connection>> connections_;
-    Baseline baseline_;
+    std::vector<Reset> resets_;
+
+    // What status and statistics count from. The graph thread tells a status, too.
+    mutable std::mutex baseline_mutex_;
+    std::shared_ptr<const Figures> baseline_ = std::make_shared<Figures>();
 
     // Requests that the graph thread has, by connection and id: when to give up on them.
     struct Waiting {

@@ -24,6 +24,7 @@ from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.flight_recorder import FlightRecorder, Note
 from rtcfd.executor.link import (
     ACCESS_PROTOCOL,
+    FIGURES_PROTOCOL,
     LIMITS_PROTOCOL,
     PROTOCOL,
     Link,
@@ -188,6 +189,11 @@ class Executor:
         if self.foreign:
             raise FailedPrecondition(self.foreign, errors_pb2.REASON_EXECUTOR_FOREIGN)
         await self._link.watch_ports(request, on_ports)
+
+    @property
+    def resets_all_at_once(self) -> bool:
+        """Its status counts from where its statistics do; else we see to that."""
+        return self._protocol >= FIGURES_PROTOCOL
 
     async def limit(self, limits: Limits) -> None:
         """Tell it what its graph may have; one that does not know of limits goes without."""

@@ -23,9 +23,10 @@ from rtcfd.executor import frames
 # The protocol that this rtcfd speaks.  A number is added for what a peer cannot do without
 # knowing of it, so that rtcfd and an executor of neighbouring numbers work together: the newer
 # asks the older for nothing that it does not know.  Hello, Stop and Exit stay as they are for good.
-PROTOCOL = 3
+PROTOCOL = 4
 LIMITS_PROTOCOL = 2  # from it on executors keep [limits]
 ACCESS_PROTOCOL = 3  # from it on they are stopped past rtcfd by who may, and tell
+FIGURES_PROTOCOL = 4  # from it on status and statistics count from one reset
 _CREDENTIALS = struct.Struct("3i")  # struct ucred, unix(7)
 
 Progress = Callable[[str], None]

@@ -1,8 +1,8 @@
 """From when on a loop's figures count, and whether its cycles keep ending late.
 
-Owned by a RunnerCore.  An executor counts overruns from its own start and
-statistics from their last reset: both are told from one moment, the start of
-the loop or the reset.
+Owned by a RunnerCore.  All are told from one moment, the start of the loop or
+the last reset.  An executor of protocol 3 counts only its statistics from there,
+and the overruns of its status from its own start: here these are left out.
 """
 
 import time
@@ -23,7 +23,7 @@ class _Told:
 
 
 class Figures:
-    """What was counted before the moment, and what was told last of late cycles."""
+    """What is left out of the status, and what was told last of late cycles."""
 
     def __init__(self) -> None:
         self.overruns = 0
@@ -31,11 +31,17 @@ class Figures:
         self._last: _Told | None = None
         self._late = ""
 
-    def begin(self, status: runner_pb2.RunnerStatus, counted: runner_pb2.RunnerStatistics) -> None:
+    def begin(self) -> None:
+        """Tell what the executor does; forget what it has said of late cycles."""
+        self.overruns = self.missed = 0
+        self._last, self._late = None, ""
+
+    def leave_out(
+        self, status: runner_pb2.RunnerStatus, counted: runner_pb2.RunnerStatistics
+    ) -> None:
         """Count from where the statistics do."""
         self.overruns = max(status.overruns - counted.overruns, 0)
         self.missed = max(status.missed - counted.missed, 0)
-        self._last, self._late = None, ""
 
     def told_of_late_cycles(self, status: runner_pb2.RunnerStatus, message: str) -> None:
         """Note that cycles ended late, with cause and component."""

@@ -304,9 +304,12 @@ class RunnerCore(ABC):
         """Count from here on (`reset`), or from where the executor's statistics do."""
         if reset:
             await self.ask(wire.Request(reset_statistics=wire.ResetStatistics()))
+        self.figures.begin()
+        if self.alive().resets_all_at_once:
+            return
         status = (await self.ask(wire.Request(get_status=wire.GetStatus()))).status
         counted = await self.ask(wire.Request(get_statistics=wire.GetStatistics()))
-        self.figures.begin(status, counted.statistics)
+        self.figures.leave_out(status, counted.statistics)
 
     def alive(self) -> Executor:
         """Return the executor, or refuse."""

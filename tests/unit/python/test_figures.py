@@ -1,8 +1,15 @@
 """From when on figures count, and when a loop is said to be late."""
 
+import asyncio
+from collections.abc import Callable
+
 import pytest
+from peer_executor import Peer
+from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import runner_pb2
+from rtcfd.executor.link import FIGURES_PROTOCOL
 from rtcfd.operations.figures import Figures
+from rtcfd_in_process import Rtcfd, SlowPeer, control_pb2
 
 
 def status(iteration: int, overruns: int, missed: int = 0) -> runner_pb2.RunnerStatus:
@@ -17,13 +24,53 @@ def shown(counts: Figures, found: runner_pb2.RunnerStatus) -> tuple[int, int, st
     return found.overruns, found.missed, found.late
 
 
-def test_status_counts_from_where_statistics_do() -> None:
+def test_status_of_an_older_executor_counts_from_where_statistics_do() -> None:
     counts = Figures()
-    counts.begin(status(0, 7, 9), runner_pb2.RunnerStatistics(overruns=0, missed=0))
+    counts.leave_out(status(0, 7, 9), runner_pb2.RunnerStatistics(overruns=0, missed=0))
     assert shown(counts, status(100, 8, 12))[:2] == (1, 3)
     # Of an executor that is adopted, its statistics tell.
-    counts.begin(status(100, 8, 12), runner_pb2.RunnerStatistics(overruns=3, missed=5))
+    counts.leave_out(status(100, 8, 12), runner_pb2.RunnerStatistics(overruns=3, missed=5))
     assert shown(counts, status(200, 9, 12))[:2] == (4, 5)
+
+
+@pytest.mark.parametrize("protocol", [FIGURES_PROTOCOL - 1, FIGURES_PROTOCOL])
+def test_a_reset_is_one_request_of_who_can_do_it_in_one(
+    rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch, protocol: int
+) -> None:
+    """Cycles end late between any two requests; what an older executor's status counts from its
+    start is left out here."""
+    monkeypatch.setenv("PEER_PROTOCOL", str(protocol))
+    asked: list[str] = []
+    late = [7]
+
+    async def answer(peer: SlowPeer, request: wire.Request) -> None:
+        asked.append(request.WhichOneof("kind") or "")
+        await Peer.answer(peer, request)
+
+    get_status = Peer.get_status
+
+    async def get_late_status(peer: Peer, request: wire.GetStatus, id_: int) -> wire.Response:
+        response = await get_status(peer, request, id_)
+        response.status.overruns = late[0]
+        return response
+
+    async def play() -> None:
+        life = rtcfd()
+        await life.start()
+        runner = life.runners.get("rt_runner")
+        asked.clear()
+        await life.call("ResetStatistics", control_pb2.ResetStatisticsRequest())
+        one = ["reset_statistics"]
+        old = [*one, "get_status", "get_statistics"]  # by which there was one more
+        assert asked == (old if protocol < FIGURES_PROTOCOL else one)
+        late[0] += 3
+        left_out = 7 - 1 if protocol < FIGURES_PROTOCOL else 0
+        assert (await runner.status()).overruns == 10 - left_out
+        await life.runners.close(in_order=False)
+
+    monkeypatch.setattr(SlowPeer, "answer", answer)
+    monkeypatch.setattr(Peer, "get_status", get_late_status)
+    asyncio.run(play())
 
 
 def test_a_loop_that_keeps_being_late_is_late_and_one_late_cycle_is_not(

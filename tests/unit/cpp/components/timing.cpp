@@ -62,6 +62,16 @@ class SlowSuccessor final : public rtcf::Component {
     }
 };
 
+// Its updates wait until the journal's gate is open.
+class Gated final : public rtcf::Component {
+    void update() override {
+        const timespec pause{0, 50'000};
+        if (rtcf_unit_test_journal()->gate_open.load()) return;
+        rtcf_unit_test_journal()->note(fullName(), "waits");
+        while (!rtcf_unit_test_journal()->gate_open.load()) nanosleep(&pause, nullptr);
+    }
+};
+
 // A number below those that are normal, if it is not flushed to zero.
 class Subnormal final : public rtcf::Component {
     rtcf::Output<double> out{this, "out"};
@@ -73,6 +83,7 @@ class Subnormal final : public rtcf::Component {
 
 }  // namespace
 
+RTCF_COMPONENT(Gated, "Has an update that waits for the test")
 RTCF_COMPONENT(SlowSuccessor, "Takes long to take over")
 RTCF_COMPONENT(Subnormal, "Writes a subnormal number")
 RTCF_COMPONENT(Device, "Paces the loop")

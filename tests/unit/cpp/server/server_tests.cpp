@@ -95,7 +95,7 @@ TEST_F(ServerTest, HelloTellsRunnerAndProtocol) {
     Request request;
     request.mutable_hello()->set_protocol(1);
     const Response response = client.ask(request);
-    EXPECT_EQ(response.hello().protocol(), 3U);
+    EXPECT_EQ(response.hello().protocol(), 4U);
     EXPECT_EQ(response.hello().runner(), "rt_runner");
     EXPECT_EQ(response.hello().pid(), ::getpid());
 }
@@ -414,6 +414,121 @@ TEST_F(ServerTest, ResetStatisticsCountFromThere) {
     const Response response = client.ask(statistics);
     EXPECT_EQ(response.statistics().iterations(), 10U);
     EXPECT_EQ(response.statistics().components(0).duration().count(), 10U);
+    EXPECT_EQ(client.ask(getStatus()).status().iteration(), 1010U);
+}
+
+// Its cycles leave no time between them: what is read is never of one cycle by chance.
+TEST_F(ServerTest, ResetIsOneInstantOfALoopThatIsAlwaysLate) {
+    ExecutorClient client(socket_);
+    client.hello();
+    Request spinner = load("Spinner", "S");
+    for (const auto& [name, value] : {std::pair("busy_us", 300), {"busy_cycles", 1'000'000'000}}) {
+        auto& parameter = *spinner.mutable_load()->mutable_component()->add_parameters();
+        parameter.set_name(name);
+        parameter.mutable_value()->set_int_value(value);
+    }
+    ASSERT_TRUE(client.ask(spinner).has_change());
+    for (int i = 0; i < 20; ++i) {
+        const std::string name = "T" + std::to_string(i);
+        Request ticker = load("Ticker", name);
+        auto& remap = *ticker.mutable_load()->mutable_component()->add_remaps();
+        remap.set_source("out");
+        remap.set_target(name);
+        ASSERT_TRUE(client.ask(ticker).has_change());
+    }
+    Request reset;
+    reset.mutable_reset_statistics();
+    Request statistics;
+    statistics.mutable_get_statistics();
+    Request stop;
+    stop.mutable_stop();
+    const auto total = [this] { return runner_.loop().figures().overruns.load(); };
+    for (const auto policy : {rtcf::v1::OVERRUN_POLICY_CATCH_UP, rtcf::v1::OVERRUN_POLICY_SKIP}) {
+        Request configure;
+        configure.mutable_configure()->set_frequency_hz(10000.0);
+        configure.mutable_configure()->set_overrun(policy);
+        ASSERT_TRUE(client.ask(configure).has_status());
+        ASSERT_TRUE(client.ask(start()).has_change());
+        for (int i = 0; i < 10; ++i) {
+            const std::uint64_t before = total();
+            ASSERT_TRUE(eventually([&] { return total() > before; }));
+            ASSERT_TRUE(client.ask(reset).has_done());
+            // None is below 0, which would be a large number.
+            ASSERT_LE(client.ask(getStatus()).status().overruns(), total());
+            ASSERT_LE(client.ask(statistics).statistics().overruns(), total());
+        }
+        const std::uint64_t before = total();
+        ASSERT_TRUE(eventually([&] { return total() > before + 20; }));
+        ASSERT_TRUE(client.ask(stop).has_change());
+        const rtcf::v1::RunnerStatus status = client.ask(getStatus()).status();
+        const rtcf::v1::RunnerStatistics figures = client.ask(statistics).statistics();
+        EXPECT_GT(figures.overruns(), 20U);
+        EXPECT_LE(figures.overruns(), figures.iterations());
+        EXPECT_EQ(status.overruns(), figures.overruns());
+        EXPECT_EQ(status.missed(), figures.missed());
+        EXPECT_EQ(figures.latency().count(), figures.iterations());
+        std::uint64_t causes =
+            figures.late_wake_ups() + figures.exchange_overruns() + figures.catching_up();
+        for (const auto& component : figures.components()) {
+            EXPECT_EQ(component.duration().count(), figures.iterations()) << component.component();
+            causes += component.overruns();
+        }
+        EXPECT_EQ(causes, figures.overruns());
+    }
+}
+
+// The reset is refused, or nobody waits for it any more: then the figures go on.
+TEST_F(ServerTest, ResetWaitsForTheEndOfACycleInWhichAComponentDoesNotReturn) {
+    ExecutorClient client(socket_);
+    client.hello();
+    Request configure;
+    configure.mutable_configure()->set_stall_timeout_ms(0);
+    ASSERT_TRUE(client.ask(configure).has_status());
+    ASSERT_TRUE(client.ask(load("Gated", "G")).has_change());
+    ASSERT_TRUE(client.ask(start()).has_change());
+    const auto& figures = runner_.loop().figures();
+    const auto counted = [&] { return figures.duration.snapshot().count; };
+    const auto counts_again = [&] {
+        const std::uint64_t before = counted();
+        return eventually([&] { return counted() > before; });
+    };
+    const auto shut = [&] {
+        const std::size_t before = journal().count("/G waits");
+        journal().gate_open = false;
+        return eventually([&] { return journal().count("/G waits") > before; });
+    };
+    ASSERT_TRUE(counts_again());
+    Request reset;
+    reset.mutable_reset_statistics();
+
+    ASSERT_TRUE(shut());
+    const Response response = client.ask(reset);
+    ASSERT_TRUE(response.has_error());
+    EXPECT_EQ(response.error().message(),
+              "the loop of rt_runner reaches no cycle boundary: /G.update() does not return; its "
+              "figures go on");
+    journal().gate_open = true;
+    EXPECT_TRUE(counts_again());
+
+    ASSERT_TRUE(shut());
+    {
+        ExecutorClient leaving(socket_);
+        leaving.hello();
+        leaving.send(reset);
+        leaving.send(getStatus());
+        ASSERT_TRUE(leaving.receive().has_value()) << "queries are answered meanwhile";
+    }
+    // By the second answer it has been seen who left before the first was asked for.
+    for (int i = 0; i < 2; ++i) ASSERT_TRUE(client.ask(getStatus()).has_status());
+    journal().gate_open = true;
+    EXPECT_TRUE(counts_again());
+
+    ASSERT_TRUE(shut());
+    const std::uint64_t waiting = client.send(reset);
+    ASSERT_TRUE(client.ask(getStatus()).has_status()) << "it has been taken";
+    journal().gate_open = true;
+    EXPECT_TRUE(client.answerTo(waiting).has_done());
+    EXPECT_TRUE(counts_again());
 }
 
 // A thread of the ROS node that asks for something, as long as it waits.
