@@ -290,6 +290,22 @@ void Server::drop(std::uint64_t id) {
 }
 
 void Server::respond(std::uint64_t connection, const v1::Response& response) {
+    if (const std::size_t size = response.ByteSizeLong(); size > Connection::kLargestFrame) {
+        // The daemon would hang up on it, and ask for the same when it is connected again.
+        const std::string kind = v1::Response::descriptor()
+                                     ->FindFieldByNumber(static_cast<int>(response.kind_case()))
+                                     ->name();
+        const std::string text = fmt::format(
+            "{} of runner {} take {} bytes, {} at most: spread its components over more runners, "
+            "or give them smaller values",
+            kind, runner_->name(), size, Connection::kLargestFrame);
+        if (response.id() == 0) {
+            log_->write(LogLevel::Error, {}, text);
+        } else {
+            respond(connection, errorResponse(response.id(), RefusalKind::ResourceExhausted, text));
+        }
+        return;
+    }
     const auto found = connections_.find(connection);
     if (found != connections_.end() && !found->second->send(response)) drop(connection);
 }

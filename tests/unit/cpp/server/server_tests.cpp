@@ -109,6 +109,27 @@ TEST_F(ServerTest, NothingIsAnsweredBeforeHello) {
     EXPECT_TRUE(client.ask(getStatus()).has_status());
 }
 
+// Whoever reads frames hangs up on one that is larger than any may be.
+TEST_F(ServerTest, AnswerThatIsLargerThanAFrameIsRefused) {
+    ExecutorClient client(socket_);
+    client.hello();
+    Request large = load("Recorder", "L");
+    auto& parameter = *large.mutable_load()->mutable_component()->add_parameters();
+    parameter.set_name("refuses");
+    parameter.mutable_value()->set_string_value(std::string(9 * 1024 * 1024, 'x'));
+    ASSERT_TRUE(client.ask(large).has_change());
+    Request list;
+    list.mutable_list_components();
+    const Response response = client.ask(list);
+    ASSERT_TRUE(response.has_error());
+    EXPECT_EQ(response.error().code(), executor::v1::Error::CODE_RESOURCE_EXHAUSTED);
+    EXPECT_NE(response.error().message().find("components of runner rt_runner take"),
+              std::string::npos)
+        << response.error().message();
+    ASSERT_TRUE(client.ask(unload("L")).has_change());
+    EXPECT_TRUE(client.ask(list).has_components());
+}
+
 TEST_F(ServerTest, FrameMayComeInPieces) {
     ExecutorClient client(socket_);
     client.hello();
