@@ -99,6 +99,7 @@ TEST_F(LoopTiming, LateWakeUpIsACauseOfItsOwn) {
         waitpid(helper, nullptr, 0);
         return runs(2) && late() > 0;
     }));
+    stop();  // figures that do not change between one look and the next
     EXPECT_LE(late() + runner().snapshot()->get("/A").figures->overruns.load(), overruns());
 }
 
@@ -124,7 +125,7 @@ TEST_F(LoopTiming, FullBucketStopsTheLoopUnlessItRunsDegraded) {
         EXPECT_TRUE(runs(60));
         EXPECT_EQ(state(), RunnerState::Running);
     }
-    EXPECT_FALSE(linesOnOverruns().empty());
+    EXPECT_TRUE(eventually([this] { return !linesOnOverruns().empty(); }));
 }
 
 TEST_F(LoopTiming, ManyOverrunsAreOneLine) {
@@ -133,7 +134,10 @@ TEST_F(LoopTiming, ManyOverrunsAreOneLine) {
     const std::vector<std::string> lines = linesOnOverruns();
     ASSERT_LE(lines.size(), 2U) << "the first one, and what came after it at the end of the loop";
     EXPECT_NE(lines.back().find("ended late"), std::string::npos) << lines.back();
-    EXPECT_NE(lines.back().find("in /S"), std::string::npos) << lines.back();
+    // Of the two, one may tell of nothing but cycles that the machine was late with.
+    EXPECT_TRUE(std::any_of(lines.begin(), lines.end(), [](const std::string& line) {
+        return line.find("in /S") != std::string::npos;
+    })) << lines.front();
 }
 
 TEST_F(LoopTiming, SpinFollowsTheWakeUpLatencyUpToATenthOfThePeriod) {

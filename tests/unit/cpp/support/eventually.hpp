@@ -8,9 +8,9 @@
 
 namespace rtcf::test {
 
-/// Asks until it is so, for at most 20 s. @return whether it came to be
+/// Asks until it is so, for at most a minute. @return whether it came to be
 inline bool eventually(const std::function<bool()>& condition) {
-    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::minutes(1);
     while (!condition()) {
         if (std::chrono::steady_clock::now() > deadline) return false;
         std::this_thread::sleep_for(std::chrono::milliseconds(1));

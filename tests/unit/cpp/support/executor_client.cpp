@@ -15,7 +15,7 @@ namespace rtcf::test {
 
 namespace {
 
-constexpr int kPatience = 20000;  // ms
+constexpr int kPatience = 60'000;  // ms
 
 }  // namespace
 

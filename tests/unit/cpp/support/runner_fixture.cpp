@@ -125,7 +125,12 @@ void RunnerFixture::configure(const std::function<void(RunnerSettings&)>& change
 double RunnerFixture::value(const std::string& component, const std::string& port) {
     const auto snapshot = runner_->snapshot();
     const auto& ports = snapshot->get(component).ports;
-    const auto values = onGraphThread([&] { return runner_->probe(component); });
+    std::vector<executor::Probe::Value> values;
+    // A look waits 0.1 s for the loop, which others may hold up for longer.
+    EXPECT_TRUE(eventually([&] {
+        values = onGraphThread([&] { return runner_->probe(component); });
+        return !values.empty();
+    })) << component;
     for (std::size_t i = 0; i < values.size(); ++i) {
         if (ports[i].name != port || !values[i].text) continue;
         const std::string& text = *values[i].text;  // "data: 1.5"
