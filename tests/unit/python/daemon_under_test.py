@@ -13,7 +13,10 @@ from typing import Any
 import rtcf
 
 BUILD_TREE = Path(str(rtcf.__file__)).parents[2]
-DEADLINE_S = 20.0
+DEADLINE_S = 60.0
+# Before a command that is to mind Ctrl-C: one that was started by nohup or in the background has
+# inherited to ignore it.
+MINDS_CTRL_C = ("env", "--default-signal=INT")
 _POLL_S = 0.01
 
 
@@ -24,6 +27,15 @@ def wait_for(condition: Callable[[], Any], what: str) -> Any:
         assert time.monotonic() < deadline, f"waited {DEADLINE_S:g} s for {what}"
         time.sleep(_POLL_S)
     return result
+
+
+def is_alive(pid: int) -> bool:
+    """Tell whether a process runs; one that has ended does not, though nobody has reaped it."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    return state not in "ZX"
 
 
 class DaemonUnderTest:
@@ -70,7 +82,7 @@ class DaemonUnderTest:
     def start(self, *options: str, foreground: bool = True) -> "DaemonUnderTest":
         """Start rtcfd and wait until it is ready."""
         with self.log_file.open("ab") as log:
-            begin = log.tell()
+            begin = len(self.log())
             self.process = subprocess.Popen(
                 [
                     str(BUILD_TREE / "bin" / "rtcfd"),
@@ -107,7 +119,7 @@ class DaemonUnderTest:
     def ctl_process(self, *arguments: str) -> subprocess.Popen[str]:
         """Begin a call of rtcfctl."""
         return subprocess.Popen(
-            [str(BUILD_TREE / "bin" / "rtcfctl"), *arguments],
+            [*MINDS_CTRL_C, str(BUILD_TREE / "bin" / "rtcfctl"), *arguments],
             env={**os.environ, "RTCF_SOCKET": str(self.socket)},
             stdout=subprocess.PIPE,
             text=True,

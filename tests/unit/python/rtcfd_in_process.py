@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import grpc
+from daemon_under_test import DEADLINE_S
 from peer_executor import Peer
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
@@ -35,8 +36,6 @@ from rtcfd.runners.runners import Runners
 from rtcfd.service.control import Control
 from rtcfd.state.desired import Desired
 from rtcfd.state.store import Store
-
-_DEADLINE_S = 20.0
 
 
 class Machine:
@@ -236,9 +235,9 @@ class _Descriptions(Describer):
 async def until(condition: Callable[[], Any], what: str) -> Any:
     """Return the condition's result when it is true; fail after the deadline."""
     loop = asyncio.get_running_loop()
-    deadline = loop.time() + _DEADLINE_S
+    deadline = loop.time() + DEADLINE_S
     while not (result := condition()):
-        assert loop.time() < deadline, f"waited {_DEADLINE_S:g} s for {what}"
+        assert loop.time() < deadline, f"waited {DEADLINE_S:g} s for {what}"
         await asyncio.sleep(0.001)
     return result
 

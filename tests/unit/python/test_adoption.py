@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_under_test import DaemonUnderTest, wait_for
+from daemon_under_test import DaemonUnderTest, is_alive, wait_for
 from peer_executor import Peer
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
@@ -23,10 +23,6 @@ from rtcfd.state.desired import Desired
 from rtcfd_in_process import Rtcfd, SlowPeer, until
 
 LONG = runner_pb2.RunnerSettings(orphan_timeout_s=60.0)
-
-
-def is_alive(pid: int) -> bool:
-    return Path(f"/proc/{pid}").exists()
 
 
 @pytest.fixture

@@ -50,6 +50,8 @@ def test_who_asks_at_once_waits_for_one_process(
 def test_what_did_not_load_is_looked_at_again_though_its_file_is_the_same(
     describer: Describer, library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(describe, "FAILURE_KEPT_S", 3600.0)
+
     async def work() -> None:
         for _ in range(3):
             found = await describer.describe(library, "pkg")

@@ -12,7 +12,7 @@ KIND = control_pb2.Event.KIND_GRAPH
 
 
 @seed(3)
-@settings(max_examples=300, deadline=None, database=None)
+@settings(max_examples=300)
 @given(
     st.integers(1, 12),
     st.lists(st.one_of(st.integers(1, 20).map(lambda n: ("add", n)), st.just(("read", 0))),

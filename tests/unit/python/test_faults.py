@@ -2,11 +2,10 @@
 
 import os
 import signal
-from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_under_test import DaemonUnderTest, wait_for
+from daemon_under_test import DaemonUnderTest, is_alive, wait_for
 from flight_writer import FlightWriter
 from rtcf.v1 import graph_pb2, runner_pb2
 from rtcfd.executor.flight_recorder import FlightRecorder, Note
@@ -191,7 +190,7 @@ def test_a_loop_after_a_restart_of_both(
         running.stop()
     pid = daemon.executor_pid()
     daemon.end(signal.SIGKILL)
-    wait_for(lambda: not Path(f"/proc/{pid}").exists(), "the end of the executor")
+    wait_for(lambda: not is_alive(pid), "the end of the executor")
     daemon.start()
     with daemon.client() as again:
         assert state(again).state == expected

@@ -9,7 +9,7 @@ from pathlib import Path
 import grpc
 import pytest
 import rtcf
-from daemon_under_test import BUILD_TREE, DaemonUnderTest, wait_for
+from daemon_under_test import BUILD_TREE, DEADLINE_S, DaemonUnderTest, wait_for
 from rtcf.v1 import control_pb2
 
 TIMES = [300, pytest.param(10_000, marks=pytest.mark.long)]
@@ -64,9 +64,9 @@ def test_a_socket_that_was_passed_is_adopted_and_left_behind(tmp_path: Path) -> 
             pass_fds=(listener.fileno(), 3) if listener.fileno() != 3 else (3,),
             stderr=subprocess.DEVNULL,
         )  # fmt: skip
-    assert early.communicate(timeout=60)[0].startswith("rtcfd ")
+    assert early.communicate(timeout=DEADLINE_S)[0].startswith("rtcfd ")
     process.send_signal(signal.SIGTERM)
-    assert process.wait(60) == 0
+    assert process.wait(DEADLINE_S) == 0
     assert path.is_socket()
 
 
@@ -123,7 +123,7 @@ def test_malformed_requests_change_nothing_and_end_nothing(
             # Never a valid message: there is no wire type 7.
             data = b"\x0f" + noise.randbytes(noise.randrange(64))
             with pytest.raises(grpc.RpcError) as refused:
-                list(call(data, timeout=60))
+                list(call(data, timeout=DEADLINE_S))
             assert refused.value.code().name in ("INVALID_ARGUMENT", "UNIMPLEMENTED")
     with daemon.client() as client:
         status = client.get_status().runners[0]

@@ -123,7 +123,7 @@ TEXTS = st.one_of(
 
 
 @seed(SEED)
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=500)
 @given(TEXTS)
 @example("9" * 20)
 @example('"a\\q"')

@@ -209,7 +209,7 @@ def test_a_change_whose_caller_left_is_noted_with_who_made_it(
         (held / "set_parameters").unlink()
         wait_for(lambda: client.get_history("pid"), "the note")
         assert client.get_history("pid")[0].who == "root"
-    assert "/pid: kp = 2.5 set by root" in stopped_daemon.log()
+    wait_for(lambda: "/pid: kp = 2.5 set by root" in stopped_daemon.log(), "the log")
     assert stopped_daemon.end(signal.SIGTERM) == 0
 
 

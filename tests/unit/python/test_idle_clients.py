@@ -7,12 +7,11 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
+from daemon_under_test import DEADLINE_S
 from rtcfd.access import clients
 from rtcfd.access.calls import Level
 from rtcfd.access.clients import Clients, Doors
 from rtcfd.common.limits import Limits
-
-DEADLINE_S = 30.0
 
 
 @pytest.fixture(autouse=True)

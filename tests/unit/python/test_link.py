@@ -5,6 +5,7 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
+from daemon_under_test import DEADLINE_S
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcfd.common import refusals
 from rtcfd.executor import frames
@@ -51,7 +52,7 @@ def test_answers_find_their_requests_in_any_order(tmp_path: Path) -> None:
         async def ask(name: str) -> str:
             request = wire.Request()
             request.get_component.component = name
-            return str((await link.request(request, 5.0)).component.full_name)
+            return str((await link.request(request, DEADLINE_S)).component.full_name)
 
         answers = await asyncio.gather(ask("a"), ask("b"), ask("c"))
         assert list(answers) == ["a", "b", "c"]
@@ -88,10 +89,10 @@ def test_a_peer_that_breaks_off_fails_what_waits(tmp_path: Path, reply: bytes) -
 
     async def test(link: Link) -> None:
         with pytest.raises(refusals.Unavailable, match="the peer"):
-            await link.request(wire.Request(get_status=STATUS), 5.0)
+            await link.request(wire.Request(get_status=STATUS), DEADLINE_S)
         assert link.ended.is_set()
         with pytest.raises(refusals.Unavailable, match="the peer"):
-            await link.request(wire.Request(get_status=STATUS), 5.0)
+            await link.request(wire.Request(get_status=STATUS), DEADLINE_S)
 
     against(tmp_path, peer, test)
 
@@ -104,6 +105,6 @@ def test_both_say_which_protocol_they_speak(tmp_path: Path) -> None:
         writer.write(frames.pack(response.SerializeToString()))
 
     async def test(link: Link) -> None:
-        assert (await link.hello(5.0)).protocol == PROTOCOL + 7
+        assert (await link.hello(DEADLINE_S)).protocol == PROTOCOL + 7
 
     against(tmp_path, peer, test)

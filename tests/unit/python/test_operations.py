@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 import rtcf
-from daemon_under_test import BUILD_TREE, DaemonUnderTest, wait_for
+from daemon_under_test import BUILD_TREE, DEADLINE_S, DaemonUnderTest, wait_for
 from rtcf.v1 import control_pb2, runner_pb2
 from rtcfd_in_process import Rtcfd
 
@@ -57,7 +57,7 @@ class Call(threading.Thread):
                 self.refusal = str(error)
 
     def end(self) -> str:
-        self.join(30)
+        self.join(DEADLINE_S)
         assert not self.is_alive()
         return self.refusal
 
@@ -175,7 +175,8 @@ def test_the_end_of_a_loop_is_not_overtaken_by_the_answer_to_its_start(
     wait_for(lambda: service.saved()["running"] is False, "the state on disk")
     service.environment.clear()
     service.end(signal.SIGUSR1)
-    assert "rt_runner stopped" in service.start_service().log().splitlines()[-1]
+    ready = [line for line in service.start_service().log().splitlines() if " ready; " in line]
+    assert "rt_runner stopped" in ready[-1]
 
 
 def test_a_runner_whose_holder_dies_while_it_is_taken_is_given_back(
@@ -328,7 +329,7 @@ def test_systemd_waits_for_a_slow_start(
 
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
         listener.bind(str(tmp_path / "notify"))
-        listener.settimeout(20)
+        listener.settimeout(DEADLINE_S)
         stopped_daemon.environment["NOTIFY_SOCKET"] = str(tmp_path / "notify")
         with held.back("serve"):
             starting = threading.Thread(target=stopped_daemon.start_service)
@@ -342,7 +343,7 @@ def reload(service: DaemonUnderTest) -> str:
     return subprocess.run(
         [str(BUILD_TREE / "bin" / "rtcfd"), "--reload", "--config", str(service.settings)],
         env={key: value for key, value in os.environ.items() if key != "RTCF_SOCKET"},
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=30,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=DEADLINE_S,
     ).stdout  # fmt: skip
 
 

@@ -26,7 +26,7 @@ def whole(names: list[str], size: int) -> tuple[list[str], int]:
 
 
 @seed(11)
-@settings(max_examples=200, deadline=None, database=None)
+@settings(max_examples=200)
 @given(st.lists(st.text(max_size=30), max_size=60), st.integers(0, 70))
 def test_pages_make_up_the_list(names: list[str], size: int) -> None:
     found, count = whole(names, size)

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from daemon_under_test import DEADLINE_S
 from hypothesis import HealthCheck, Phase, example, given, seed, settings
 from hypothesis import strategies as st
 from rtcf.v1 import control_pb2, runner_pb2
@@ -155,7 +156,7 @@ class Sequence:
 
     async def _quiet(self) -> None:
         """Wait until rtcfd has nothing to do."""
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(DEADLINE_S):
             for _ in range(3):
                 await self.rtcfd.runners.operations.drain()
                 for runner in self.rtcfd.runners.all():
@@ -224,8 +225,6 @@ def drawn(number: int) -> Any:
         test = given(st.lists(steps, min_size=1, max_size=12))(test)
         test = settings(
             max_examples=number,
-            deadline=None,
-            database=None,
             suppress_health_check=health,
             phases=[Phase.explicit, Phase.generate, Phase.shrink],
         )(test)

@@ -82,7 +82,7 @@ def test_details_that_are_damaged_leave_the_line(
 
 
 @seed(7)
-@settings(max_examples=200, deadline=None, database=None)
+@settings(max_examples=200)
 @given(
     st.text(max_size=20_000),
     st.dictionaries(

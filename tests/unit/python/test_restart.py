@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_under_test import DaemonUnderTest, wait_for
+from daemon_under_test import DEADLINE_S, DaemonUnderTest, is_alive, wait_for
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 from rtcfd_in_process import Refused, Rtcfd
 
@@ -39,11 +39,11 @@ class SlowLoad:
         self._outcome: list[str] = []
         self._thread = threading.Thread(target=self._load)
         self._thread.start()
-        assert self._under_way.wait(20)
+        assert self._under_way.wait(DEADLINE_S)
 
     def outcome(self) -> list[str]:
         """Wait for the component that was loaded, or the refusal."""
-        self._thread.join(20)
+        self._thread.join(DEADLINE_S)
         return self._outcome
 
     def _load(self) -> None:
@@ -77,7 +77,7 @@ def test_a_stop_still_ends_it(service: DaemonUnderTest) -> None:
     pid = service.executor_pid()
     restart(service)
     assert service.end() == 0
-    wait_for(lambda: not Path(f"/proc/{pid}").exists(), "its end")
+    wait_for(lambda: not is_alive(pid), "its end")
     assert list((service.folder / "run").iterdir()) == []
 
 
@@ -143,7 +143,7 @@ def test_a_change_that_is_under_way_is_finished_first(service: DaemonUnderTest) 
     service.process.send_signal(signal.SIGUSR1)
     wait_for(lambda: "leaving all loops" in service.log(), "the signal's effect")
     until.touch()
-    assert service.process.wait(20) == 0
+    assert service.process.wait(DEADLINE_S) == 0
     assert slow.outcome() == ["/s"]
     service.start_service()
     with service.client() as client:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import rtcf
 import yaml
-from daemon_under_test import BUILD_TREE, DaemonUnderTest, wait_for
+from daemon_under_test import BUILD_TREE, MINDS_CTRL_C, DaemonUnderTest, wait_for
 from rtcf.v1 import graph_pb2, runner_pb2
 from rtcfctl.main import parser, verb_of
 from rtcfctl.plain import plain
@@ -78,7 +78,7 @@ def test_ctrl_c_is_exit_code_1_and_what_had_begun_goes_on(
 ) -> None:
     go_on = tmp_path / "go on"
     with subprocess.Popen(
-        [str(BUILD_TREE / "bin" / "rtcfctl"), "-v", "load", "demo", "Slow",
+        [*MINDS_CTRL_C, str(BUILD_TREE / "bin" / "rtcfctl"), "-v", "load", "demo", "Slow",
          "--param", f"until:={go_on}"],
         env={**os.environ, "RTCF_SOCKET": str(daemon.socket)}, stderr=subprocess.PIPE, text=True,
     ) as process:  # fmt: skip
@@ -151,9 +151,7 @@ def test_ctrl_c_before_all_is_imported_ends_it_without_a_word(tmp_path: Path) ->
         file.parent.mkdir(parents=True)
     shutil.copy(BUILD_TREE / "bin" / "rtcfctl", script)
     module.write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nmain = print\n")
-    done = subprocess.run(
-        ["env", "--default-signal=INT", str(script)], capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([*MINDS_CTRL_C, str(script)], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
 
 
