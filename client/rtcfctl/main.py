@@ -7,8 +7,12 @@ import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import rtcf
+
+if TYPE_CHECKING:
+    from rtcfctl.output import Output
 
 DONE, REFUSED, USAGE, UNREACHABLE = range(4)
 
@@ -66,9 +70,29 @@ def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None)
     from rtcfctl.output import Output
 
     output = Output(args.output, args.verbose)
+    # By the command, until here and after us.
+    minds = signal.getsignal(signal.SIGINT) is signal.SIG_DFL
     try:
-        if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:  # by the command, until here
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+        if minds:
+            signal.signal(signal.SIGINT, _interrupt)
+        try:
+            return _run(args, output)
+        finally:
+            if minds:
+                signal.signal(signal.SIGINT, signal.SIG_DFL)
+    except KeyboardInterrupt:
+        return _fail("interrupted; a change that had begun goes on", REFUSED)
+
+
+def _interrupt(number: int, _: object) -> None:
+    """Take Ctrl-C once: the next one ends us at once, whatever we are doing then."""
+    signal.signal(number, signal.SIG_DFL)
+    raise KeyboardInterrupt
+
+
+def _run(args: argparse.Namespace, output: "Output") -> int:
+    """Do what a command line says; return the exit code."""
+    try:
         with rtcf.Client(args.socket) as client:
             # What a verb returns is its own verdict, e.g. doctor's.
             code = args.run(client, args, output)
@@ -80,8 +104,6 @@ def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None)
         return _fail(error, REFUSED)
     except ValueError as error:
         return _fail(error, USAGE)
-    except KeyboardInterrupt:
-        return _fail("interrupted; a change that had begun goes on", REFUSED)
     except BrokenPipeError:
         # The reader has seen enough; Python would complain once more at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -155,6 +155,33 @@ def test_ctrl_c_before_all_is_imported_ends_it_without_a_word(tmp_path: Path) ->
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
 
 
+# A second Ctrl-C while the first is being minded, and one between the end of all work and that of
+# Python.
+LATE = {
+    "the second": "main._fail = main.rtcf.Client = interrupt\n",
+    "the last moment": "atexit.register(interrupt)\n",
+}
+
+
+@pytest.mark.parametrize("when", LATE)
+def test_ctrl_c_while_it_ends_ends_it_without_a_trace(tmp_path: Path, when: str) -> None:
+    command = str(BUILD_TREE / "bin" / "rtcfctl")
+    program = (
+        "import atexit, os, runpy, signal, sys\n"
+        f"sys.path.insert(0, {str(BUILD_TREE / 'python')!r})\n"
+        "from rtcfctl import main\n"
+        "interrupt = lambda *_: os.kill(os.getpid(), signal.SIGINT)\n"
+        f"sys.argv = [{command!r}, '--socket', {str(tmp_path / 'none')!r}, 'status']\n"
+        f"{LATE[when]}"
+        f"runpy.run_path({command!r}, run_name='__main__')\n"
+    )
+    done = subprocess.run(
+        [*MINDS_CTRL_C, sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == -signal.SIGINT
+    assert "Traceback" not in done.stderr and "KeyboardInterrupt" not in done.stderr
+
+
 def test_options_become_settings_and_nothing_else() -> None:
     line = "runner set --cpu -1 --spin 5 --overrun catch_up --no-lock-memory --whitelist a"
     args = parser().parse_args(line.split())
