@@ -7,6 +7,7 @@ from typing import Any
 
 import grpc
 from rtcf_shared.errors import RtcfError
+from rtcf_shared.spec import several
 
 from rtcf import direct_stop, failures
 from rtcf.closing import Closing
@@ -53,7 +54,8 @@ class Client(Closing):
 
     `runner` in the methods names one; empty is rt_runner.  All methods raise
     RefusedError, DaemonUnreachableError (the constructor too, of a path that no
-    socket can have) or RtcfError.  `on_progress` is called with a line for each
+    socket can have) or RtcfError; TypeError, before anything is asked, where a text
+    stands for several names.  `on_progress` is called with a line for each
     step of a long call.
     """
 
@@ -211,7 +213,9 @@ class Client(Closing):
         on_progress: OnProgress | None = None,
     ) -> control_pb2.ChangeResult:
         """Unload components, all at one cycle boundary."""
-        request = control_pb2.UnloadRequest(runner=runner, components=components)
+        request = control_pb2.UnloadRequest(
+            runner=runner, components=several("components", components)
+        )
         return self._changed(self._stub.Unload, request, on_progress)
 
     def replace(
@@ -253,7 +257,7 @@ class Client(Closing):
         """
         request = control_pb2.ApplyRequest(
             runner=runner,
-            components=components,
+            components=several("components", components),
             settings=settings,
             dry_run=dry_run,
             rebuilt=rebuilt,
@@ -267,7 +271,9 @@ class Client(Closing):
         on_progress: OnProgress | None = None,
     ) -> control_pb2.ChangeResult:
         """Load components again that were left out of the loop after a fault."""
-        request = control_pb2.ReleaseRequest(runner=runner, components=components)
+        request = control_pb2.ReleaseRequest(
+            runner=runner, components=several("components", components)
+        )
         return self._changed(self._stub.Release, request, on_progress)
 
     def set_breaks(
@@ -278,7 +284,9 @@ class Client(Closing):
         on_progress: OnProgress | None = None,
     ) -> control_pb2.ChangeResult:
         """Set (or remove) loop breaks on inputs, all at one cycle boundary."""
-        request = control_pb2.SetBreaksRequest(runner=runner, ports=ports, broken=broken)
+        request = control_pb2.SetBreaksRequest(
+            runner=runner, ports=several("ports", ports), broken=broken
+        )
         return self._changed(self._stub.SetBreaks, request, on_progress)
 
     def set_parameters(
@@ -290,7 +298,7 @@ class Client(Closing):
     ) -> control_pb2.ChangeResult:
         """Change parameters of a component, all at one cycle boundary."""
         request = control_pb2.SetParametersRequest(
-            runner=runner, component=component, parameters=parameters
+            runner=runner, component=component, parameters=several("parameters", parameters)
         )
         return self._changed(self._stub.SetParameters, request, on_progress)
 
@@ -325,7 +333,9 @@ class Client(Closing):
         on_progress: OnProgress | None = None,
     ) -> control_pb2.ChangeResult:
         """Set values of a component's declared state, of a loop that does not run."""
-        request = control_pb2.SetStateRequest(runner=runner, component=component, states=states)
+        request = control_pb2.SetStateRequest(
+            runner=runner, component=component, states=several("states", states)
+        )
         return self._changed(self._stub.SetState, request, on_progress)
 
     def take_snapshot(self, runner: str = "") -> control_pb2.TakeSnapshotResponse:
@@ -414,7 +424,9 @@ class Client(Closing):
         Begins behind `after`, the `place` of a stream of before; Place() is where what rtcfd keeps
         begins, None is now.  With `until_now` it ends with what has happened so far.
         """
-        return EventStream(self._stub.WatchEvents, self.socket, runners, after, until_now)
+        return EventStream(
+            self._stub.WatchEvents, self.socket, several("runners", runners), after, until_now
+        )
 
     def watch_ports(
         self, selection: Iterable[str] = (), runner: str = "", every: int = 1

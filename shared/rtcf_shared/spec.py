@@ -7,8 +7,11 @@ string of anything.
 
 import re
 from collections.abc import Iterable
+from typing import TypeVar
 
 from rtcf.v1 import control_pb2, graph_pb2
+
+Item = TypeVar("Item")
 
 _INT = re.compile(r"[-+]?[0-9]+")
 _HEX_OR_OCTAL = re.compile(r"0x[0-9a-fA-F]+|0o[0-7]+")
@@ -20,6 +23,13 @@ _BOOLS = {
 }  # fmt: skip
 _INT_RANGE = range(-(2**63), 2**63)
 _LONGEST_INT = 100  # characters, with zeros in front
+
+
+def several(what: str, given: Iterable[Item]) -> Iterable[Item]:
+    """Return what is given as several; raises TypeError of a text, whose letters would be taken."""
+    if isinstance(given, str | bytes):
+        raise TypeError(f"{what} are several, in a list: [{given!r}], not {given!r}")
+    return given
 
 
 def component(
@@ -40,18 +50,19 @@ def component(
     """Return a component to load.
 
     `remaps` are "from:=to", `parameters` are "name:=value", `breaks` are input
-    ports; the other arguments are fields of ComponentSpec.  Raises ValueError.
+    ports; the other arguments are fields of ComponentSpec.  Raises ValueError, and TypeError
+    where a text stands for several.
     """
     return graph_pb2.ComponentSpec(
         name=name,
         ns=ns,
         package=package,
         type=type_name,
-        remaps=[parse_remap(text) for text in remaps],
-        parameters=[parse_parameter(text) for text in parameters],
+        remaps=[parse_remap(text) for text in several("remaps", remaps)],
+        parameters=[parse_parameter(text) for text in several("parameters", parameters)],
         first=first,
         ignore=ignore,
-        breaks=breaks,
+        breaks=several("breaks", breaks),
         every=every,
         phase=phase,
         optional=optional,

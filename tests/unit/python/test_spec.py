@@ -1,6 +1,9 @@
 """Parameters, remaps and ports from the words of a command line."""
 
 import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 import rtcf
@@ -66,6 +69,32 @@ def test_a_parameter_without_a_sign_is_refused(text: str) -> None:
 def test_half_a_remap_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="a remap is from:=to"):
         rtcf.parse_remap(text)
+
+
+@pytest.mark.parametrize("name", ["remaps", "parameters", "breaks"])
+def test_a_text_is_not_taken_for_several_letters(name: str) -> None:
+    given: dict[str, Any] = {name: "in:=/x"}
+    with pytest.raises(TypeError, match=rf"{name} are several, in a list: \['in:=/x'\], not 'in"):
+        rtcf.component("p", "T", **given)
+
+
+TEXT: Any = "/x"
+CALLS: dict[str, Callable[[rtcf.Client], object]] = {
+    "components to unload": lambda client: client.unload(TEXT),
+    "components to release": lambda client: client.release(TEXT),
+    "components of a graph": lambda client: client.apply(TEXT),
+    "ports": lambda client: client.set_breaks(TEXT, True),
+    "parameters": lambda client: client.set_parameters("a", TEXT),
+    "states": lambda client: client.set_state("a", TEXT),
+    "runners": lambda client: client.watch_events(TEXT),
+}
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_a_text_is_not_taken_for_several_of_a_calls_names(tmp_path: Path, call: str) -> None:
+    said = rf"{call.split()[0]} are several, in a list: \['/x'\], not '/x'"
+    with rtcf.Client(tmp_path / "none") as client, pytest.raises(TypeError, match=said):
+        CALLS[call](client)
 
 
 def test_a_port_is_what_follows_the_last_dot() -> None:
