@@ -402,7 +402,8 @@ class Client(Closing):
     def watch_statistics(
         self, runner: str = "", interval_s: float = 1.0
     ) -> Iterator[runner_pb2.RunnerStatistics]:
-        """Yield the figures now and after each interval (at least 0.1 s), without end."""
+        """Yield the figures now and after each interval (at least 0.1 s), without end but by a
+        refusal, as when the runner is removed."""
         request = control_pb2.WatchStatisticsRequest(
             runner=runner, interval_ms=round(interval_s * 1000)
         )
@@ -422,7 +423,8 @@ class Client(Closing):
         """Watch what happens to some runners, or all, and to rtcfd itself.
 
         Begins behind `after`, the `place` of a stream of before; Place() is where what rtcfd keeps
-        begins, None is now.  With `until_now` it ends with what has happened so far.
+        begins, None is now.  With `until_now` it ends with what has happened so far; without, it
+        ends with a refusal when none of the runners is there.
         """
         return EventStream(
             self._stub.WatchEvents, self.socket, several("runners", runners), after, until_now

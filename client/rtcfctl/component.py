@@ -12,6 +12,7 @@ from rtcfctl import python_source, words
 from rtcfctl.output import Output
 from rtcfctl.plain import enumerator
 
+_LOOKS_PER_CHECK = 5  # at a source that is watched, until one whether its component is there
 _STYLES = {
     graph_pb2.COMPONENT_STATE_FAULTED: "bold red",
     graph_pb2.COMPONENT_STATE_LEFT_OUT: "bold red",
@@ -69,22 +70,27 @@ def load(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Load a component."""
     if args.watch and not python_source.is_one(args.package):
         raise ValueError("--watch is for a Python source: rtcfctl load FILE.py COMPONENT --watch")
-    saves = python_source.saved(args.package) if args.watch else None
+    looks = python_source.looks(args.package) if args.watch else None
     result = client.load(_spec(args, output), args.runner, output.progress, wait=args.wait)
     output.changed(f"loaded {result.component}", result)
-    if saves is not None:
+    if looks is not None:
         sys.stdout.flush()
-        _watch(client, args, output, result.component, saves)
+        watch(client, args, output, result.component, looks)
 
 
-def _watch(
+def watch(
     client: rtcf.Client,
     args: argparse.Namespace,
     output: Output,
     name: str,
-    saves: Iterable[None],
+    looks: Iterable[bool],
 ) -> None:
-    for _ in saves:
+    """Put a Python source in the place of a component whenever it is saved."""
+    for at, saved in enumerate(looks):
+        if at % _LOOKS_PER_CHECK == 0:
+            _require(client, args.runner, name)
+        if not saved:
+            continue
         try:
             spec = _spec(args, output)
             result = client.replace(name, spec, args.runner, output.progress)
@@ -94,6 +100,17 @@ def _watch(
         else:
             output.changed(f"replaced {name} by {args.package} as it is now", result)
             sys.stdout.flush()
+
+
+def _require(client: rtcf.Client, runner: str, name: str) -> None:
+    """Refuse to go on with a component that is not there any more, or whose runner is not."""
+    try:
+        client.get_component(name, runner)
+    except rtcf.DaemonUnreachableError:
+        pass  # rtcfd is being restarted
+    except rtcf.RefusedError as refused:
+        if refused.code == "NOT_FOUND":
+            raise
 
 
 def unload(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:

@@ -54,20 +54,20 @@ def compiled(source: str, build_tree: Path | None, progress: Callable[[str], Non
     return package
 
 
-def saved(source: str) -> Iterator[None]:
-    """Yield whenever a source, or a Python file beside it, has been saved with other content; of
-    what is saved from this call on nothing is missed, while the source is compiled for instance."""
+def looks(source: str) -> Iterator[bool]:
+    """Yield again and again whether a source, or a Python file beside it, has been saved with other
+    content since the last time; of what is saved from this call on nothing is missed, while the
+    source is compiled for instance."""
     file = Path(source).resolve()
     return _changes(file, fingerprint(file))
 
 
-def _changes(file: Path, last: str) -> Iterator[None]:
+def _changes(file: Path, last: str) -> Iterator[bool]:
     while True:
         time.sleep(_LOOK_S)
         now = fingerprint(file)
-        if now != last:
-            last = now
-            yield
+        yield now != last
+        last = now
 
 
 def fingerprint(source: Path) -> str:

@@ -91,9 +91,9 @@ def test_a_source_is_loaded_swapped_when_it_is_saved_and_kept(
 def test_what_is_saved_while_a_source_is_compiled_is_seen(tmp_path: Path) -> None:
     source = tmp_path / "counts.py"
     source.write_text(COUNTS)
-    saves = python_source.saved(str(source))
+    looks = python_source.looks(str(source))
     source.write_text(COUNTS + "\n")
-    seeing = threading.Thread(target=lambda: next(saves), daemon=True)
+    seeing = threading.Thread(target=lambda: next(saved for saved in looks if saved), daemon=True)
     seeing.start()
     seeing.join(DEADLINE_S)
     assert not seeing.is_alive()

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 from rtcf.v1 import control_pb2, errors_pb2, runner_pb2
 from rtcf_shared.naming import closest, listing, suggestion
@@ -97,6 +97,11 @@ class Runners:
                 suggestion=closest(wanted, self._runners),
             )
         return runner
+
+    def require_some(self, names: Sequence[str]) -> None:
+        """Refuse names of which none is that of a runner."""
+        if names and not any((name or DEFAULT_RUNNER) in self._runners for name in names):
+            self.get(names[0])
 
     def all(self) -> list[Runner]:
         """Return the runners by name."""

@@ -7,6 +7,7 @@ import asyncio
 import os
 import time
 from collections.abc import AsyncIterator
+from functools import partial
 from typing import Any, Protocol
 
 from rtcf.executor.v1 import executor_pb2 as wire
@@ -342,7 +343,8 @@ class Control(control_pb2_grpc.ControlServicer):
     ) -> AsyncIterator[control_pb2.WatchEventsResponse]:
         """What happens."""
         try:
-            async for response in watch(self._events, request):
+            require_some = partial(self._runners.require_some, request.runners)
+            async for response in watch(self._events, request, require_some):
                 yield response
         except Exception as error:
             await abort(context, error, request)

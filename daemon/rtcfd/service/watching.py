@@ -1,6 +1,6 @@
 """Watching events: from a number on, or from now on, for one caller."""
 
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Callable
 
 from rtcf.v1 import control_pb2
 
@@ -10,9 +10,12 @@ _BATCH = 200
 
 
 async def watch(
-    log: EventLog, request: control_pb2.WatchEventsRequest
+    log: EventLog, request: control_pb2.WatchEventsRequest, require_some: Callable[[], None]
 ) -> AsyncGenerator[control_pb2.WatchEventsResponse, None]:
-    """Yield where the caller stands, then what happens; without end unless asked for."""
+    """Yield where the caller stands, then what happens; without end unless asked for.
+
+    `require_some` refuses to wait when none of the runners that are watched is there.
+    """
     number = log.last
     if request.HasField("after"):
         # Numbers of another log say nothing about this one.
@@ -31,4 +34,6 @@ async def watch(
         first = False
         if request.until_now and number >= until:
             return
+        if number >= log.last:
+            require_some()
         await log.beyond(number)

@@ -122,6 +122,7 @@ class DaemonUnderTest:
             [*MINDS_CTRL_C, str(BUILD_TREE / "bin" / "rtcfctl"), *arguments],
             env={**os.environ, "RTCF_SOCKET": str(self.socket)},
             stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
             text=True,
         )
 

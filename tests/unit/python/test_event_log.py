@@ -2,10 +2,12 @@
 
 import asyncio
 
+import pytest
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
-from rtcf.v1 import control_pb2
+from rtcf.v1 import control_pb2, errors_pb2
 from rtcfd.common.event_log import EventLog
+from rtcfd.common.refusals import NotFound
 from rtcfd.service.watching import watch
 
 KIND = control_pb2.Event.KIND_GRAPH
@@ -45,7 +47,7 @@ def test_events_read_and_lost_make_up_all(
 def test_a_slow_watcher_is_told_how_many_it_missed_and_holds_up_nobody() -> None:
     async def run() -> list[control_pb2.WatchEventsResponse]:
         log = EventLog(kept=3)
-        watching = watch(log, control_pb2.WatchEventsRequest())
+        watching = watch(log, control_pb2.WatchEventsRequest(), lambda: None)
         found = [await anext(watching)]
         for number in range(10):
             log.add(KIND, f"event {number}", runner="arm")
@@ -70,7 +72,7 @@ def test_a_place_in_another_log_begins_with_all_that_is_kept() -> None:
         for number in range(5):
             log.add(KIND, f"event {number}", runner="arm" if number % 2 else "leg")
         found: list[int] = []
-        async for response in watch(log, request):
+        async for response in watch(log, request, lambda: None):
             found += [each.sequence for each in response.events]
         return found
 
@@ -80,6 +82,25 @@ def test_a_place_in_another_log_begins_with_all_that_is_kept() -> None:
     assert asyncio.run(run(request(after=99, log_id="this", until_now=True))) == []
     assert asyncio.run(run(request(until_now=True))) == []
     assert asyncio.run(run(request(after=0, runners=["arm"], until_now=True))) == [2, 4]
+
+
+def test_a_watch_of_runners_that_are_gone_ends_after_all_that_is_kept_of_them() -> None:
+    async def run() -> list[int]:
+        log = EventLog()
+        for _ in range(1000):
+            log.add(KIND, "something", runner="arm")
+
+        def nobody_there() -> None:
+            raise NotFound("no runner", errors_pb2.REASON_RUNNER_NOT_FOUND)
+
+        found: list[int] = []
+        request = control_pb2.WatchEventsRequest(after=0, log_id=log.log_id, runners=["arm"])
+        with pytest.raises(NotFound):
+            async for response in watch(log, request, nobody_there):
+                found += [each.sequence for each in response.events]
+        return found
+
+    assert asyncio.run(run()) == list(range(1, 1001))
 
 
 def test_a_message_is_one_line_of_bounded_length() -> None:

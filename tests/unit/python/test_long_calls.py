@@ -1,5 +1,7 @@
 """Calls that last: each of their messages is looked at, and who loses a right meanwhile is told."""
 
+from collections.abc import Iterator
+from pathlib import Path
 from queue import SimpleQueue
 
 import grpc
@@ -7,6 +9,9 @@ import pytest
 import rtcf
 from daemon_under_test import DEADLINE_S, DaemonUnderTest, wait_for
 from rtcf.v1 import control_pb2
+from rtcfctl import component
+from rtcfctl.main import parser
+from rtcfctl.output import Output
 from strangers import open_to_strangers, root_only, stranger
 
 WATCH = """
@@ -40,6 +45,54 @@ with rtcf.Client(sys.argv[1]) as client:
 
 def rules(default: str) -> str:
     return f"[access]\ndefault = '{default}'\n"
+
+
+LASTING = ["events -f", "stats --watch 0.1"]
+
+
+@pytest.mark.parametrize("command", LASTING)
+def test_who_watches_a_runner_that_never_was_is_told(daemon: DaemonUnderTest, command: str) -> None:
+    done = daemon.ctl("-r", "nobody", *command.split())
+    assert done.returncode == 1
+    assert done.stderr == (
+        'rtcfctl: no runner "nobody" (runners: rt_runner); `rtcfctl runner add nobody` makes it\n'
+    )
+
+
+@pytest.mark.parametrize("command", LASTING)
+def test_who_watches_a_runner_is_told_when_it_is_removed(
+    daemon: DaemonUnderTest, client: rtcf.Client, command: str
+) -> None:
+    client.add_runner("arm")
+    process = daemon.ctl_process("-r", "arm", *command.split())
+    try:
+        assert process.stdout is not None and process.stdout.readline()
+        client.remove_runner("arm")
+        shown, said = process.communicate(timeout=DEADLINE_S)
+    finally:
+        process.kill()
+        process.communicate()
+    assert (process.returncode, said.count("\n")) == (1, 1)
+    assert said.startswith("rtcfctl: ") and "arm" in said
+    if command.startswith("events"):
+        assert " arm runner_removed: runner removed" in shown.splitlines()[-1]
+
+
+def test_a_source_is_watched_as_long_as_its_component_is_there(
+    client: rtcf.Client, tmp_path: Path
+) -> None:
+    source = tmp_path / "source.py"
+    source.touch()
+    client.load(rtcf.component("demo", "Fine", name="a"))
+    args = parser().parse_args(["load", str(source), "Fine", "--watch"])
+
+    def looks() -> Iterator[bool]:
+        yield from [False] * 20
+        client.unload(["a"])
+        yield from [False] * 20
+
+    with pytest.raises(rtcf.RefusedError, match="no component /a"):
+        component.watch(client, args, Output("table"), "/a", looks())
 
 
 @root_only
