@@ -136,7 +136,7 @@ auto RunnerFixture::begin(Work work) -> Pending<decltype(work())> {
     using Result = decltype(work());
     auto promise = std::make_shared<std::promise<Answer<Result>>>();
     Pending<Result> pending(promise->get_future());
-    runner_->post([promise, work] {
+    runner_->post([promise, work = std::move(work)] {
         Answer<Result> answer;
         try {
             answer.result = work();
