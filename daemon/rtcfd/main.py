@@ -185,6 +185,7 @@ class Daemon:
         await self._runners.close(in_order=not await machine_goes_down())
         await asyncio.wait({serving}, timeout=_LAST_WORDS_S)
         await self._end_servers(None)
+        await self._clients.read(_LAST_ANSWERS_S)
         self._clients.close()
 
     async def _let_go(self) -> None:
@@ -198,7 +199,9 @@ class Daemon:
         self._clients.close_door()
         serving = asyncio.create_task(self._end_servers(_GRACE_S))
         await self._runners.leave()
-        await asyncio.wait({serving}, timeout=_LAST_ANSWERS_S)
+        done, _ = await asyncio.wait({serving}, timeout=_LAST_ANSWERS_S)
+        if done:
+            await self._clients.read(_LAST_ANSWERS_S)
         # Holders see a connection that is lost, and come back.
         self._clients.close()
         await self._end_servers(None)

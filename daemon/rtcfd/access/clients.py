@@ -45,6 +45,7 @@ _MOST_REFUSED_OF_A_USER = 8
 _FIRST_CALL_S = 20.0  # from the connection on
 _IDLE_S = 900.0  # without a call; gRPC's clients connect again by themselves
 _LOOK_S = 5.0
+_LINGER_S = 5.0  # for who was hung up on to hang up too
 _OUT_OF_DESCRIPTORS_S = 0.1
 _SHOWN_PREFIX = "unix-abstract:"  # of an abstract name, as grpcio shows it
 
@@ -120,6 +121,11 @@ class Clients:
             asyncio.get_running_loop().remove_reader(self._listener)
             self._listener.close()
             self._listener = None
+
+    async def read(self, timeout_s: float) -> None:
+        """Wait until all clients have read what they were answered, of servers that have ended."""
+        if self._relays:
+            await asyncio.wait(self._relays, timeout=timeout_s)
 
     def close(self) -> None:
         """Take no more clients, and let go those that are there."""
@@ -263,10 +269,9 @@ class Clients:
             inner.bind("\0" + client.name)
             await asyncio.get_running_loop().sock_connect(inner, str(door))
             # When one side ends so does the other: gRPC never closes only half.
-            ways = {
-                asyncio.create_task(_pump(client.connection, inner, client)),
-                asyncio.create_task(_pump(inner, client.connection)),
-            }
+            there = asyncio.create_task(_pump(client.connection, inner, client))
+            back = asyncio.create_task(_pump(inner, client.connection))
+            ways = {there, back}
             try:
                 while not (
                     await asyncio.wait(ways, timeout=_LOOK_S, return_when=asyncio.FIRST_COMPLETED)
@@ -274,10 +279,16 @@ class Clients:
                     if reason := client.overdue(time.monotonic()):
                         log.debug("a client of %s is hung up on: %s", client.peer, reason)
                         break
+                if there.done() and not there.result():
+                    # gRPC has hung up on who still talks: what it had answered comes first.
+                    await asyncio.wait({back}, timeout=_LINGER_S)
             finally:
+                hung_up = back.done()
                 for way in ways:
                     way.cancel()
                 await asyncio.gather(*ways, return_exceptions=True)
+            if hung_up:
+                await _linger(client.connection)
 
     def _warn(self, text: str, *arguments: object) -> None:
         """Say what may happen a thousand times a second, once in a while."""
@@ -287,8 +298,20 @@ class Clients:
             log.warning(text, *arguments)
 
 
-async def _pump(source: socket.socket, sink: socket.socket, client: Client | None = None) -> None:
-    """Hand on what comes; of a `client` that may only look, so much a second."""
+async def _linger(connection: socket.socket) -> None:
+    """Let a client read to the end: with its first word that fails, gRPC throws away what it has
+    not read yet."""
+    loop = asyncio.get_running_loop()
+    with contextlib.suppress(OSError, TimeoutError):
+        connection.shutdown(socket.SHUT_WR)
+        async with asyncio.timeout(_LINGER_S):
+            while await loop.sock_recv(connection, _CHUNK):
+                pass
+
+
+async def _pump(source: socket.socket, sink: socket.socket, client: Client | None = None) -> bool:
+    """Hand on what comes; of a `client` that may only look, so much a second.  Tell whether it
+    was all taken."""
     loop = asyncio.get_running_loop()
     with contextlib.suppress(OSError):
         while data := await loop.sock_recv(source, _CHUNK):
@@ -296,4 +319,8 @@ async def _pump(source: socket.socket, sink: socket.socket, client: Client | Non
                 wait_s = client.usage.bytes.take(len(data))
                 if wait_s:
                     await asyncio.sleep(wait_s)
-            await loop.sock_sendall(sink, data)
+            try:
+                await loop.sock_sendall(sink, data)
+            except OSError:
+                return False
+    return True

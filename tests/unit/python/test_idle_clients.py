@@ -1,5 +1,5 @@
 """Connections that nobody uses end: those that never made a call, and those that made none for
-long; a call that lasts is no idleness."""
+long; a call that lasts is no idleness.  Who is hung up on is let read to the end."""
 
 import asyncio
 import socket
@@ -20,24 +20,26 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class Front:
-    """Clients in front of a server that says nothing."""
+    """Clients in front of a server that hangs up on who talks to it, with some last words."""
 
-    def __init__(self, folder: Path, level: Level) -> None:
+    def __init__(self, folder: Path, level: Level, last_words: bytes) -> None:
         self._folder = folder
+        self._last_words = last_words
         self.clients = Clients(
             Doors(folder / "trusted", folder / "others"), Limits(), lambda _: level
         )
         self.shown: list[str] = []  # of each connection, as gRPC shows it
 
     async def serve(self) -> None:
-        async def silent(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
             name = writer.get_extra_info("socket").getpeername()
             self.shown.append("unix-abstract:" + name[1:].decode())
-            await reader.read()
+            if await reader.read(1):
+                writer.write(self._last_words)
             writer.close()
 
         for door in ("trusted", "others"):
-            await asyncio.start_unix_server(silent, self._folder / door)
+            await asyncio.start_unix_server(answer, self._folder / door)
         listener = socket.socket(socket.AF_UNIX)
         listener.bind(str(self._folder / "s"))
         listener.listen()
@@ -46,17 +48,20 @@ class Front:
     async def connect(self) -> asyncio.StreamReader:
         """Return what a new client reads; it is kept as long as the front is."""
         number = len(self.shown)
-        reader, self._writer = await asyncio.open_unix_connection(self._folder / "s")
+        reader, self.writer = await asyncio.open_unix_connection(self._folder / "s")
         while len(self.shown) == number:
             await asyncio.sleep(0.001)
         return reader
 
 
 def with_front(
-    folder: Path, work: Callable[[Front], Awaitable[None]], level: Level = Level.OBSERVE
+    folder: Path,
+    work: Callable[[Front], Awaitable[None]],
+    level: Level = Level.OBSERVE,
+    last_words: bytes = b"",
 ) -> None:
     async def run() -> None:
-        front = Front(folder, level)
+        front = Front(folder, level, last_words)
         await front.serve()
         try:
             async with asyncio.timeout(DEADLINE_S):
@@ -97,3 +102,46 @@ def test_a_connection_that_makes_no_more_calls_ends_and_not_before_its_last_does
         assert await lasting.read() == b""
 
     with_front(tmp_path, work)
+
+
+def test_who_was_hung_up_on_may_still_talk_until_it_has_read_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(clients, "_LINGER_S", DEADLINE_S)
+
+    async def work(front: Front) -> None:
+        reader = await front.connect()
+        front.writer.write(b"?")
+        assert await reader.read() == b""
+        for _ in range(3):
+            front.writer.write(b"?")
+            await front.writer.drain()
+        front.writer.close()
+
+    with_front(tmp_path, work)
+
+
+def test_what_was_answered_is_handed_on_though_its_reader_still_talks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    last_words = b"x" * 1000
+    monkeypatch.setattr(clients, "_CHUNK", 1)
+    monkeypatch.setattr(clients, "_LINGER_S", DEADLINE_S)
+
+    async def work(front: Front) -> None:
+        loop = asyncio.get_running_loop()
+        send = loop.sock_sendall
+
+        async def send_slowly(to: socket.socket, data: bytes) -> None:
+            await asyncio.sleep(0)
+            await send(to, data)
+
+        monkeypatch.setattr(loop, "sock_sendall", send_slowly)
+        reader = await front.connect()
+        front.writer.write(b"?")
+        await reader.readexactly(10)
+        front.writer.write(b"?" * 10)
+        assert await reader.read() == last_words[10:]
+        front.writer.close()
+
+    with_front(tmp_path, work, last_words=last_words)
