@@ -438,7 +438,9 @@ class Client(Closing):
         `selection` names them with the wildcards of a shell, e.g. "/arm/*.effort"; all without.
         Nothing is missed from here on; what the caller does not take in time is counted.
         """
-        return PortStream(self._stub.WatchPorts, self.socket, runner, selection, every)
+        return PortStream(
+            self._stub.WatchPorts, self.socket, runner, several("selection", selection), every
+        )
 
     def reset_statistics(self, runner: str = "") -> None:
         """Begin the figures anew."""
