@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 from rtcf.component import Fault
 
+# Not the hashes beside them (.sha1), which are any bytes.
 _CONSTANT = re.compile(
-    r'^@"?\.const\.pickledata\.[\w.]+"? = [^\n]*constant \[\d+ x i8\] c"([^"\n]*)"', re.M
+    r'^@"?\.const\.pickledata\.[\d.]+"? = [^\n]*constant \[\d+ x i8\] c"([^"\n]*)"', re.M
 )
 _WORDS = {
     "division by zero": "division by zero",
@@ -36,7 +37,7 @@ def raises_in(assembly: str, file: str) -> dict[int, Raise]:
         try:
             exception, arguments, place = pickle.loads(data)[:3]
         except (pickle.UnpicklingError, ValueError, TypeError, EOFError):
-            continue  # numba's own: a hash, an environment
+            continue  # numba's own: an environment
         text = str(arguments[0]) if arguments else ""
         text = _WORDS.get(text, text)
         if exception is not Fault:
@@ -55,5 +56,10 @@ def hash_of(data: bytes) -> int:
 
 
 def _bytes(text: str) -> bytes:
-    plain = re.sub(r"\\([0-9A-Fa-f]{2})", lambda found: chr(int(found[1], 16)), text)
+    """Return what LLVM has written: a backslash as two, what is not printed by its number."""
+    plain = re.sub(
+        r"\\(\\|[0-9A-Fa-f]{2})",
+        lambda found: found[1] if found[1] == "\\" else chr(int(found[1], 16)),
+        text,
+    )
     return plain.encode("latin-1")
