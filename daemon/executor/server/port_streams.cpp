@@ -147,11 +147,12 @@ void PortStreams::chooseColumns(Stream& stream) {
 }
 
 void PortStreams::serve(Stream& stream, const Send& send) {
+    const Id id = stream.id;  // which may go with a peer that has gone
     while (!stream.tables.empty()) {
         if (!stream.told) {
             stream.told = true;
             const v1::Response schema = schemaOf(stream);
-            if (!send(stream.id, schema)) return;
+            if (!send(id, schema)) return;
         }
         if (!sendFrames(stream, send)) return;
         if (stream.tables.size() == 1) return;
