@@ -101,12 +101,14 @@ void PortStreams::retire(Stream& stream) {
 }
 
 std::vector<PortStreams::Table> PortStreams::serve(const std::vector<Table>& tables,
-                                                   const Send& send) {
+                                                   const Room& room, const Send& send) {
     std::vector<Id> ids;
     for (auto& [id, stream] : streams_) {
         for (const Table& table : tables) {
             if (table->watches.count(stream.watch) == 0) continue;
             stream.tables.push_back(table);
+            // Its reader has not read for long.
+            if (stream.tables.size() > kMostTables) goOn(stream);
             if (stream.begun) continue;
             stream.begun = true;
             stream.next = table->ring->end();  // others may have watched before
@@ -118,7 +120,7 @@ std::vector<PortStreams::Table> PortStreams::serve(const std::vector<Table>& tab
     for (const Id& id : ids) {
         // Sending may end streams of a peer that has gone.
         const auto found = streams_.find(id);
-        if (found != streams_.end()) serve(found->second, send);
+        if (found != streams_.end() && room(id)) serve(found->second, send);
     }
     for (const auto& [id, stream] : streams_) {
         if (!stream.tables.empty()) noteTaken(*stream.tables.front()->ring);
@@ -156,17 +158,19 @@ void PortStreams::serve(Stream& stream, const Send& send) {
         }
         if (!sendFrames(stream, send)) return;
         if (stream.tables.size() == 1) return;
-        retired_.push_back(std::move(stream.tables.front()));
-        stream.tables.pop_front();
-        // Its reader has not read for long.
-        while (stream.tables.size() > kMostTables) {
-            retired_.push_back(std::move(stream.tables.front()));
-            stream.tables.pop_front();
-        }
-        if (stream.tables.front()->ring == retired_.back()->ring) continue;
-        stream.next = 0;
-        chooseColumns(stream);
+        goOn(stream);
     }
+}
+
+// Leaves the first of several tables.
+void PortStreams::goOn(Stream& stream) {
+    retired_.push_back(std::move(stream.tables.front()));
+    stream.tables.pop_front();
+    const FrameRing& left = *retired_.back()->ring;
+    if (stream.tables.front()->ring.get() == &left) return;
+    stream.lost += (left.end() - stream.next + stream.every - 1) / stream.every;
+    stream.next = 0;
+    chooseColumns(stream);
 }
 
 // @return whether all that is in the ring has been sent; if not, the stream may be gone

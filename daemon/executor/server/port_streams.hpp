@@ -21,7 +21,9 @@ class PortStreams {
     /// Of connection and request.
     using Id = std::pair<std::uint64_t, std::uint64_t>;
     using Table = std::shared_ptr<const FrameTable>;
-    /// Takes what is to be sent. @return false if the peer has enough to read for now, or has gone
+    /// Whether the peer has room for more; not if it has enough to read for now, or has gone.
+    using Room = std::function<bool(const Id& id)>;
+    /// Takes what is to be sent. @return whether there is room for more
     using Send = std::function<bool(const Id& id, const v1::Response& response)>;
 
     static constexpr std::size_t kMost = 64;
@@ -37,7 +39,7 @@ class PortStreams {
 
     /// Takes new tables, packs what has come since, and sends it. @return tables that nobody needs
     /// any more, to be let go of on the graph thread
-    std::vector<Table> serve(const std::vector<Table>& tables, const Send& send);
+    std::vector<Table> serve(const std::vector<Table>& tables, const Room& room, const Send& send);
 
    private:
     struct Stream {
@@ -57,6 +59,7 @@ class PortStreams {
 
     void chooseColumns(Stream& stream);
     void serve(Stream& stream, const Send& send);
+    void goOn(Stream& stream);
     void retire(Stream& stream);
     void noteTaken(FrameRing& ring) const;
     bool sendFrames(Stream& stream, const Send& send);

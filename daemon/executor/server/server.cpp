@@ -685,12 +685,15 @@ void Server::endWatches(const std::vector<std::uint64_t>& watches) {
 }
 
 void Server::servePorts() {
-    const auto send = [this](const PortStreams::Id& id, const v1::Response& response) {
-        respond(id.first, response);
+    const auto room = [this](const PortStreams::Id& id) {
         const auto found = connections_.find(id.first);
         return found != connections_.end() && found->second->waiting() < kMostPorts;
     };
-    std::vector<PortStreams::Table> done = ports_.serve(runner_->takeFrameTables(), send);
+    const auto send = [this, &room](const PortStreams::Id& id, const v1::Response& response) {
+        respond(id.first, response);
+        return room(id);
+    };
+    std::vector<PortStreams::Table> done = ports_.serve(runner_->takeFrameTables(), room, send);
     if (!done.empty()) runner_->post([done = std::move(done)]() mutable { done.clear(); });
 }
 
