@@ -14,7 +14,6 @@ _NUMBERS = {
     "uint16": "<u2", "int32": "<i4", "uint32": "<u4", "int64": "<i8", "uint64": "<u8",
     "float32": "<f4", "float64": "<f8",
 }  # fmt: skip
-_SIZES = {"?": 1, "i1": 1, "u1": 1, "<i2": 2, "<u2": 2, "<i4": 4, "<u4": 4, "<f4": 4, "<i8": 8}
 _TIMES = {"time": "<u4", "duration": "<i4"}
 _FIELD = re.compile(r"^([\w/]+)(\[(\d*)\])?\s+(\w+)\s*$")
 _LENGTH = struct.Struct("<I")
@@ -32,7 +31,7 @@ class Leaf:
 
 def size_of(form: str) -> int:
     """Return the bytes of one number."""
-    return _SIZES.get(form, 8)
+    return 1 if form == "?" else int(form[-1])
 
 
 def leaves(definition: str, sample: bytes) -> list[Leaf]:

@@ -1,0 +1,64 @@
+"""Columns of values, as streams tell them and recordings keep them, without a loop."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rtcf
+from rtcf.mcap_writer import McapWriter
+from rtcf.ports import PortBatch, PortSchema, _schema
+from rtcf.recorder import Recorder
+from rtcf.v1 import ports_pb2
+
+STATE = ports_pb2.PortColumn.KIND_STATE
+OUTPUT = ports_pb2.PortColumn.KIND_OUTPUT
+
+
+def state(type_name: str, size: int) -> ports_pb2.PortColumn:
+    return ports_pb2.PortColumn(component="/c", name="s", kind=STATE, type=type_name, size=size)
+
+
+def output(definition: str, md5: str, value: bytes) -> ports_pb2.PortColumn:
+    return ports_pb2.PortColumn(
+        component="/c", name="o", kind=OUTPUT, type="p/M", ros_type="p/M", ros_md5=md5,
+        ros_definition=definition, sample=value, size=len(value),
+    )  # fmt: skip
+
+
+def schema(*columns: ports_pb2.PortColumn) -> PortSchema:
+    return _schema(ports_pb2.PortSchema(columns=columns))
+
+
+def batch(of: PortSchema, first: int, *values: bytes) -> PortBatch:
+    """Return a batch of two cycles."""
+    message = ports_pb2.PortBatch(
+        first_cycle=first, stamps_ns=[1, 2], latencies_ns=[0, 0], durations_ns=[5, 6],
+        values=values,
+    )  # fmt: skip
+    return PortBatch(of, 1, first, 0, False, message)
+
+
+def recorded(file: Path, *batches: PortBatch) -> rtcf.Recording:
+    with file.open("wb") as out:
+        writer = McapWriter(out)
+        recorder = Recorder(writer, "r")
+        for each in batches:
+            recorder.add(each)
+        recorder.flush()
+        writer.close()
+    return rtcf.read_recording(file)
+
+
+def test_arrays_of_bytes_are_read_byte_by_byte(tmp_path: Path) -> None:
+    cases: list[tuple[str, Any]] = [
+        ("uint8[3]", np.array([[0, 1, 2], [253, 254, 255]], "u1")),
+        ("int8[3]", np.array([[0, 1, 2], [-3, -2, -1]], "i1")),
+        ("bool[3]", np.array([[True, False, True], [False, False, True]])),
+        ("uint8[2x3]", np.arange(12, dtype="u1").reshape(2, 3, 2).swapaxes(1, 2)),
+    ]
+    for type_name, expected in cases:
+        data = (expected.swapaxes(1, 2) if expected.ndim == 3 else expected).tobytes()
+        told = batch(schema(state(type_name, len(data) // 2)), 0, data)
+        assert told["/c.s"].tolist() == expected.tolist(), type_name
+        with recorded(tmp_path / "x.mcap", told) as recording:
+            assert recording["/c.s"].tolist() == expected.reshape(2, -1).tolist(), type_name
