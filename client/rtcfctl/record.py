@@ -51,9 +51,7 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     with client.watch_ports(args.selection, args.runner) as stream:
         for note in stream.schema.notes:
             _note(output, note)
-        file = _opened(args.file, args.force)
-        with file:
-            recorder = _record(stream, file, args, output)
+        recorder = _record(stream, _opened(args.file, args.force), args, output)
     size_mb = args.file.stat().st_size / 1e6
     lost = f"{counted(recorder.lost, 'cycle')} lost" if recorder.lost else "none lost"
     if output.for_people:
@@ -81,13 +79,15 @@ def _record(
     stream: PortStream, file: BinaryIO, args: argparse.Namespace, output: Output
 ) -> Recorder:
     try:
-        writer = McapWriter(file)
-        recorder = Recorder(writer, args.runner or "rt_runner")
-        try:
-            _follow(stream, writer, recorder, args.duration, output)
-        finally:
-            recorder.flush()
-            writer.close()
+        # Closing writes what is left, and may find no room either.
+        with file:
+            writer = McapWriter(file)
+            recorder = Recorder(writer, args.runner or "rt_runner")
+            try:
+                _follow(stream, writer, recorder, args.duration, output)
+            finally:
+                recorder.flush()
+                writer.close()
     except OSError as error:
         raise rtcf.RtcfError(
             f"{args.file}: {error.strerror}: what was written before can be read"
@@ -109,7 +109,8 @@ def _follow(
             for note in recorder.add(batch):
                 _note(output, note)
             now = time.monotonic()
-            if now - flushed >= _KEPT_S:
+            # After its last cycle a loop tells nothing more.
+            if now - flushed >= _KEPT_S or batch.last_of_loop:
                 recorder.flush()
                 flushed = now
             if now - told >= _TOLD_S and sys.stderr.isatty():

@@ -220,6 +220,36 @@ def test_a_full_disk_ends_it_with_a_line_and_what_was_written_can_be_read(
         subprocess.run(["umount", disk], check=True)
 
 
+def test_where_there_is_no_room_at_all_it_is_said_in_one_line(running: Daemon) -> None:
+    done = running.ctl("record", "-o", "/dev/full", "--force")
+    assert done.returncode == 1
+    assert done.stderr.splitlines() == [
+        "rtcfctl: /dev/full: No space left on device: what was written before can be read"
+    ]
+
+
+def test_the_last_cycles_of_a_loop_are_in_the_file_at_once(
+    running: Daemon, client: rtcf.Client, tmp_path: Path
+) -> None:
+    file = tmp_path / "run.mcap"
+    process = subprocess.Popen(
+        [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "record", "-o", file],
+        env=clean_environment(),
+    )
+
+    def last() -> int:
+        with rtcf.read_recording(file) as recording:
+            return int(recording.cycles[-1])
+
+    wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a chunk in the file")
+    client.stop()
+    end = client.get_status().runners[0].iteration
+    # That in which components made safe; nothing comes after it that would have it written.
+    wait_for(lambda: last() == end, "the last cycle in the file")
+    process.kill()
+    process.wait()
+
+
 def test_what_is_no_recording_is_said(tmp_path: Path) -> None:
     file = tmp_path / "x.mcap"
     with pytest.raises(rtcf.RecordingError, match="No such file"):
