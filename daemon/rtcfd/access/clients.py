@@ -306,7 +306,8 @@ async def _linger(connection: socket.socket) -> None:
         connection.shutdown(socket.SHUT_WR)
         async with asyncio.timeout(_LINGER_S):
             while await loop.sock_recv(connection, _CHUNK):
-                pass
+                # Who talks on and on gets no turn of all others.
+                await asyncio.sleep(0)
 
 
 async def _pump(source: socket.socket, sink: socket.socket, client: Client | None = None) -> bool:

@@ -145,3 +145,23 @@ def test_what_was_answered_is_handed_on_though_its_reader_still_talks(
         front.writer.close()
 
     with_front(tmp_path, work, last_words=last_words)
+
+
+def test_who_was_hung_up_on_and_talks_on_holds_nobody_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(clients, "_LINGER_S", 0.01)
+
+    class Talker(socket.socket):
+        """One that always has something more to say, as seen by who listens."""
+
+        words = 0
+
+        def recv(self, size: int, flags: int = 0) -> bytes:
+            self.words += 1
+            assert self.words < 1_000_000, "nothing else has its turn"
+            return b"x"
+
+    ours, theirs = socket.socketpair()
+    with theirs, Talker(fileno=ours.detach()) as talker:
+        talker.setblocking(False)
+        asyncio.run(clients._linger(talker))
+        assert talker.words
