@@ -26,6 +26,7 @@ from rtcfd.executor.link import (
     ACCESS_PROTOCOL,
     FIGURES_PROTOCOL,
     LIMITS_PROTOCOL,
+    PORTS_PROTOCOL,
     PROTOCOL,
     Link,
     OnAnswer,
@@ -188,6 +189,12 @@ class Executor:
             raise Unavailable(f"{self._peer} is not connected", errors_pb2.REASON_EXECUTOR_DOWN)
         if self.foreign:
             raise FailedPrecondition(self.foreign, errors_pb2.REASON_EXECUTOR_FOREIGN)
+        if self._protocol < PORTS_PROTOCOL:
+            raise FailedPrecondition(
+                f"{self._peer} is of rtcf {self.version}, which tells no values of ports: `rtcfctl "
+                f"runner restart {self._runner}` stops the loop and starts one that does",
+                errors_pb2.REASON_EXECUTOR_FOREIGN,
+            )
         await self._link.watch_ports(request, on_ports)
 
     @property

@@ -27,6 +27,7 @@ PROTOCOL = 4
 LIMITS_PROTOCOL = 2  # from it on executors keep [limits]
 ACCESS_PROTOCOL = 3  # from it on they are stopped past rtcfd by who may, and tell
 FIGURES_PROTOCOL = 4  # from it on status and statistics count from one reset
+PORTS_PROTOCOL = 4  # from it on values of ports can be watched
 _CREDENTIALS = struct.Struct("3i")  # struct ucred, unix(7)
 
 Progress = Callable[[str], None]

@@ -32,10 +32,10 @@ from pathlib import Path
 from flight_writer import FlightWriter
 from google.protobuf import json_format
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+from rtcf.v1 import control_pb2, graph_pb2, ports_pb2, runner_pb2
 from rtcfd import VERSION
 from rtcfd.executor import frames
-from rtcfd.executor.link import ACCESS_PROTOCOL, LIMITS_PROTOCOL, PROTOCOL
+from rtcfd.executor.link import ACCESS_PROTOCOL, LIMITS_PROTOCOL, PORTS_PROTOCOL, PROTOCOL
 
 POLL_S = 0.005
 CHATTER = 100  # records at once
@@ -172,6 +172,11 @@ class Peer:
         if self.protocol < ACCESS_PROTOCOL:
             os._exit(9)
         return wire.Response(done=wire.Done())
+
+    async def watch_ports(self, _: ports_pb2.WatchPortsRequest, __: int) -> wire.Response:
+        if self.protocol < PORTS_PROTOCOL:
+            os._exit(9)
+        raise Refused(wire.Error.CODE_NOT_FOUND, "this peer has no ports")
 
     async def configure(self, change: runner_pb2.RunnerSettings, _: int) -> wire.Response:
         if change.ros.whitelist == "(":

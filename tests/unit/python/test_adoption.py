@@ -17,7 +17,7 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 from rtcfd import VERSION
 from rtcfd.common.runner_settings import defaults
-from rtcfd.executor.link import PROTOCOL
+from rtcfd.executor.link import PORTS_PROTOCOL, PROTOCOL
 from rtcfd.recovery.follow import follow_components, follow_settings
 from rtcfd.state.desired import Desired
 from rtcfd_in_process import Rtcfd, SlowPeer, until
@@ -162,6 +162,20 @@ def test_an_executor_of_a_neighbouring_protocol_is_as_good_as_ours(
         )
         client.load(rtcf.component("demo", "Fine", name="b"))
         assert client.get_order() == ["/a", "/b"]
+
+
+def test_an_executor_that_knows_of_no_values_is_asked_for_none(
+    stopped_daemon: DaemonUnderTest,
+) -> None:
+    stopped_daemon.environment = {
+        "PEER_PROTOCOL": str(PORTS_PROTOCOL - 1), "PEER_VERSION": "0.0.9",
+    }  # fmt: skip
+    stopped_daemon.start()
+    with stopped_daemon.client() as client:
+        with pytest.raises(rtcf.RefusedError) as refused:
+            client.watch_ports()
+        assert "is of rtcf 0.0.9, which tells no values of ports" in str(refused.value)
+        assert client.get_status().runners[0].pid
 
 
 @pytest.mark.parametrize("number", [PROTOCOL - 2, PROTOCOL + 2])
