@@ -4,15 +4,18 @@ import asyncio
 from collections import deque
 from collections.abc import AsyncGenerator
 
-from rtcf.v1 import ports_pb2
+from rtcf.v1 import errors_pb2, ports_pb2
 
+from rtcfd.common.refusals import InvalidArgument
 from rtcfd.runners.runner import Runner
 
 _MOST = 8 * 1024 * 1024  # bytes that wait for the caller
+_MOST_NAMES = 256  # each is compared with each output and state, whenever the graph changes
 
 
 class _Waiting:
-    """What the caller has not taken yet.  Schemas are never lost: batches mean nothing without."""
+    """What the caller has not taken yet.  Of schemas only such are lost of which nothing waits:
+    batches mean nothing without."""
 
     def __init__(self, every: int) -> None:
         self._every = max(every, 1)
@@ -31,6 +34,11 @@ class _Waiting:
             if self._lost is not None:
                 batch.lost += self._lost.lost
                 self._lost = None
+        elif self._responses and self._responses[-1][0].WhichOneof("kind") == "schema":
+            # Nothing waits of the one before.
+            self._bytes -= self._responses.pop()[1]
+            if self._lost is not None:
+                self._lost.values[:] = [b""] * len(response.schema.columns)
         elif self._lost is not None:
             # Of the schema before.
             self._responses.append((ports_pb2.WatchPortsResponse(batch=self._lost), 0))
@@ -64,6 +72,12 @@ async def watch_ports(
     runner: Runner, request: ports_pb2.WatchPortsRequest
 ) -> AsyncGenerator[ports_pb2.WatchPortsResponse, None]:
     """Yield schemas and batches, without end; raises the executor's refusal, or what ended it."""
+    if len(request.selection) > _MOST_NAMES:
+        raise InvalidArgument(
+            f"{len(request.selection)} selections of ports are too many, {_MOST_NAMES} at most: "
+            "use wildcards",
+            errors_pb2.REASON_REQUEST_TOO_LARGE,
+        )
     waiting = _Waiting(request.every)
     telling = asyncio.ensure_future(runner.watch_ports(request, waiting.put))
     telling.add_done_callback(lambda _: waiting.some.set())

@@ -1,0 +1,80 @@
+"""Values of ports on their way to one caller who reads late: what waits is bounded."""
+
+import asyncio
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import pytest
+from rtcf.v1 import ports_pb2
+from rtcfd.common.refusals import InvalidArgument
+from rtcfd.service import ports
+
+Response = ports_pb2.WatchPortsResponse
+
+
+class Teller:
+    """A runner that tells all at once, and then ends."""
+
+    def __init__(self, responses: Sequence[Response]) -> None:
+        self._responses = responses
+
+    async def watch_ports(
+        self, _: ports_pb2.WatchPortsRequest, on_ports: Callable[[Response], None]
+    ) -> None:
+        for response in self._responses:
+            on_ports(response)
+
+
+def read(responses: Sequence[Response], selection: Sequence[str] = ()) -> list[Response]:
+    """Return what a caller reads who begins when all has been told."""
+
+    async def run() -> list[Response]:
+        runner: Any = Teller(responses)
+        request = ports_pb2.WatchPortsRequest(selection=selection)
+        return [each async for each in ports.watch_ports(runner, request)]
+
+    return asyncio.run(run())
+
+
+def schema(note: str, columns: int = 1) -> Response:
+    several = [ports_pb2.PortColumn(component="/c", name=f"p{i}") for i in range(columns)]
+    return Response(schema=ports_pb2.PortSchema(columns=several, notes=[note]))
+
+
+def batch(first: int, cycles: int, columns: int = 1) -> Response:
+    values = [bytes(8 * cycles)] * columns
+    stamps = range(cycles)
+    return Response(batch=ports_pb2.PortBatch(first_cycle=first, stamps_ns=stamps, values=values))
+
+
+def test_who_reads_in_time_reads_all() -> None:
+    told = [schema("a"), batch(0, 2), schema("b"), batch(2, 3)]
+    assert read(told) == told
+
+
+def test_of_graphs_of_which_nothing_is_told_only_the_last_waits() -> None:
+    told = [schema("x" * 1000, columns) for columns in range(1, 50)]
+    assert read(told) == told[-1:]
+
+
+def test_what_is_lost_is_counted_over_graphs_of_which_nothing_waits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    first, kept = schema("a"), batch(0, 2)
+    monkeypatch.setattr(ports, "_MOST", first.ByteSize() + kept.ByteSize())
+    told = [first, kept]
+    for number in range(20):
+        told += [schema(str(number), number + 1), batch(2 + 3 * number, 3, number + 1)]
+    *before, last, lost = read(told)
+    assert before == told[:2]
+    assert last == told[-2]
+    assert lost.batch.lost == 60
+    assert lost.batch.first_cycle == 62
+    assert list(lost.batch.values) == [b""] * 20
+
+
+def test_so_many_names_are_refused() -> None:
+    names = [f"/c{number}" for number in range(257)]
+    assert read([schema("a")], names[:-1])
+    with pytest.raises(InvalidArgument, match="257 selections of ports are too many, 256 at most"):
+        read([schema("a")], names)
