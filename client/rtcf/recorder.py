@@ -57,7 +57,7 @@ class Recorder:
     def __init__(self, writer: McapWriter, runner: str) -> None:
         self._writer = writer
         self._schema: PortSchema | None = None
-        self._channels: dict[tuple[str, str, str], int] = {}
+        self._channels: dict[tuple[str, ...], int] = {}
         self._cycle_channel = writer.channel(
             f"/{runner}/cycles", "rtcf_msgs/Cycle", _CYCLE, {"runner": runner, "kind": "cycle"}
         )
@@ -86,7 +86,7 @@ class Recorder:
         self._schema = schema
         notes = []
         for column in schema.columns:
-            key = (column.component, column.name, column.type)
+            key = _key(column)
             if key in self._channels:
                 continue
             ros_type, definition = column.ros_type, column.ros_definition
@@ -119,7 +119,7 @@ class Recorder:
         cycles, stamps = batch.cycles, batch.stamps_ns
         self._put(self._cycle_channel, cycles, stamps, _cycle_rows(batch))
         for number, column in enumerate(batch.schema.columns):
-            channel = self._channels.get((column.component, column.name, column.type))
+            channel = self._channels.get(_key(column))
             if channel is None:
                 continue
             if column.kind == ports_pb2.PortColumn.KIND_OUTPUT:
@@ -142,6 +142,12 @@ class Recorder:
     ) -> None:
         self._columns.append(Column(channel, cycles, stamps, data))
         self._bytes += data.nbytes + 31 * len(data)
+
+
+def _key(column: ports_pb2.PortColumn) -> tuple[str, ...]:
+    """Return what the values of a channel have in common: a type may be rebuilt meanwhile."""
+    kind = str(column.kind)
+    return column.component, column.name, kind, column.type, column.unit, column.ros_md5
 
 
 def _cycle_rows(batch: PortBatch) -> "NDArray[Any]":

@@ -155,7 +155,7 @@ class Recording(Closing):
 
         shape = () if leaf.count is None else (leaf.count,)
         size = ros_layout.size_of(leaf.format) * (1 if leaf.count is None else leaf.count)
-        sequences, stamps, values = [], [], []
+        cycles, stamps, values = [], [], []
         for number, chunk in enumerate(self._chunks):
             if channel not in chunk.offsets:
                 continue
@@ -172,16 +172,34 @@ class Recording(Closing):
             index = index[keep]
             records = np.frombuffer(self._records(number), "u1")
             at = index["offset"].astype("i8")[:, None]
-            sequences.append(records[at + 11 + np.arange(4)].reshape(-1).view("<u4"))
+            low = records[at + 11 + np.arange(4)].reshape(-1).view("<u4").astype("i8")
+            cycles.append(self._cycles_of(chunk, records, low))
             stamps.append(index["time"].astype("i8"))
             data = records[at + mcap.MESSAGE_HEAD + leaf.offset + np.arange(size)]
             values.append(data.reshape(-1).view(leaf.format).reshape(len(index), *shape))
         none = np.zeros((0, *shape), leaf.format)
         return RecordedColumn(
-            np.concatenate(sequences or [np.zeros(0, "<u4")]).astype("i8"),
+            np.concatenate(cycles or [np.zeros(0, "i8")]),
             np.concatenate(stamps or [np.zeros(0, "i8")]),
             np.concatenate(values or [none]),
         )
+
+    def _cycles_of(
+        self, chunk: _Chunk, records: "NDArray[Any]", low: "NDArray[Any]"
+    ) -> "NDArray[np.int64]":
+        """Return the numbers of cycles of which messages tell the low 32 bits."""
+        import numpy as np
+
+        if self._cycle_channel not in chunk.offsets:
+            return low
+        at = self._index(chunk, self._cycle_channel)["offset"].astype("i8")[:, None]
+        leaf = self._leaf_of_cycles("iteration")
+        data = records[at + mcap.MESSAGE_HEAD + leaf.offset + np.arange(8)]
+        numbers = np.unique(data.reshape(-1).view(leaf.format))
+        numbers = numbers[np.argsort(numbers & 0xFFFFFFFF, kind="stable")]
+        place = np.searchsorted(numbers & 0xFFFFFFFF, low).clip(max=len(numbers) - 1)
+        found: NDArray[np.int64] = numbers[place]
+        return found
 
     def _index(self, chunk: _Chunk, channel: int) -> "NDArray[Any]":
         import numpy as np

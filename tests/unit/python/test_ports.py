@@ -62,3 +62,28 @@ def test_arrays_of_bytes_are_read_byte_by_byte(tmp_path: Path) -> None:
         assert told["/c.s"].tolist() == expected.tolist(), type_name
         with recorded(tmp_path / "x.mcap", told) as recording:
             assert recording["/c.s"].tolist() == expected.reshape(2, -1).tolist(), type_name
+
+
+def test_numbers_of_cycles_are_whole_however_long_a_loop_runs(tmp_path: Path) -> None:
+    of = schema(state("double", 8))
+    batches = [batch(of, first, bytes(16)) for first in (2**32 - 2, 2**32, 5 * 2**32 + 7, 0)]
+    expected = [first + i for first in (2**32 - 2, 2**32, 5 * 2**32 + 7, 0) for i in (0, 1)]
+    for number, each in enumerate(batches):
+        with recorded(tmp_path / "x.mcap", each) as recording:
+            assert recording.cycles.tolist() == expected[2 * number : 2 * number + 2]
+    with recorded(tmp_path / "x.mcap", batches[0], *batches[2:]) as recording:
+        assert recording.cycles.tolist() == expected[:2] + expected[4:]
+        assert recording.read("/c.s").cycles.tolist() == expected[:2] + expected[4:]
+
+
+def test_a_type_that_is_rebuilt_while_it_is_recorded_has_a_topic_of_its_own(
+    tmp_path: Path,
+) -> None:
+    before = batch(schema(output("float64 x\n", "1", bytes(8))), 0, bytes(16))
+    after = batch(schema(output("float32 y\nint32 z\nint8 w\n", "2", bytes(9))), 2, bytes(18))
+    with recorded(tmp_path / "x.mcap", before, after) as recording:
+        assert {name: len(recording[name]) for name in recording.signals} == {
+            "/c.o.x": 2, "/c.o.y": 2, "/c.o.z": 2, "/c.o.w": 2,
+        }  # fmt: skip
+        assert recording.read("/c.o.x").cycles.tolist() == [0, 1]
+        assert recording.read("/c.o.w").cycles.tolist() == [2, 3]
