@@ -1,5 +1,6 @@
 """Reads recordings: MCAP files of `rtcfctl record`, also one whose writer was killed."""
 
+import contextlib
 import os
 import struct
 from collections.abc import Iterable, Iterator
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 _RECORD = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQI")
+# Of a file that is damaged.
+_NONSENSE = (ArithmeticError, LookupError, MemoryError, RuntimeError, ValueError, struct.error)
 
 
 class RecordingError(RtcfError):
@@ -81,7 +84,8 @@ class Recording(Closing):
         except OSError as error:
             raise RecordingError(f"{self.path}: {error.strerror}") from None
         try:
-            self._scan()
+            with self._whole_only():
+                self._scan()
         except BaseException:
             self._file.close()
             raise
@@ -118,7 +122,8 @@ class Recording(Closing):
         if signal is None:
             known = ", ".join(list(self.signals)[:8])
             raise RecordingError(f"{self.path} has no signal {name}; it has {known or 'none'}")
-        return self._read(signal.channel, signal.leaf, begin_ns, end_ns)
+        with self._whole_only():
+            return self._read(signal.channel, signal.leaf, begin_ns, end_ns)
 
     def to_pandas(self, names: Iterable[str] | None = None) -> Any:
         """Return a pandas.DataFrame of signals that are numbers, by cycle."""
@@ -134,11 +139,19 @@ class Recording(Closing):
     def _cycles(self) -> RecordedColumn:
         if not self._cycle_channel:
             raise RecordingError(f"{self.path} tells no cycles: rtcfctl record has not written it")
-        return self._read(self._cycle_channel, self._leaf_of_cycles("iteration"))
+        with self._whole_only():
+            return self._read(self._cycle_channel, self._leaf_of_cycles("iteration"))
 
     def _of_cycles(self, name: str) -> "NDArray[np.int64]":
         self._cycles()
         return self._read(self._cycle_channel, self._leaf_of_cycles(name)).values
+
+    @contextlib.contextmanager
+    def _whole_only(self) -> Iterator[None]:
+        try:
+            yield
+        except _NONSENSE as error:
+            raise RecordingError(f"{self.path} is damaged: {error}") from None
 
     def _leaf_of_cycles(self, path: str) -> ros_layout.Leaf:
         offsets = {"iteration": 16, "duration_ns": 24, "latency_ns": 32}
@@ -227,7 +240,10 @@ class Recording(Closing):
             raise RecordingError(
                 f"{self.path} is compressed: install python3-zstandard to read it"
             ) from None
-        return bytes(zstandard.ZstdDecompressor().decompress(data))
+        try:
+            return bytes(zstandard.ZstdDecompressor().decompress(data))
+        except zstandard.ZstdError as error:
+            raise ValueError(error) from None
 
     def _scan(self) -> None:
         """Find channels and chunks, up to the end or to where the writer was killed."""

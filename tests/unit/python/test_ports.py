@@ -87,3 +87,19 @@ def test_a_type_that_is_rebuilt_while_it_is_recorded_has_a_topic_of_its_own(
         }  # fmt: skip
         assert recording.read("/c.o.x").cycles.tolist() == [0, 1]
         assert recording.read("/c.o.w").cycles.tolist() == [2, 3]
+
+
+def test_a_recording_that_is_damaged_is_said_to_be(tmp_path: Path) -> None:
+    file = tmp_path / "x.mcap"
+    recorded(file, batch(schema(state("double", 8)), 0, bytes(16))).close()
+    whole = file.read_bytes()
+    damaged = 0
+    for at in range(len(whole)):
+        file.write_bytes(whole[:at] + bytes([whole[at] ^ 0x55]) + whole[at + 1 :])
+        try:
+            with rtcf.read_recording(file) as recording:
+                for name in recording.signals:
+                    recording.read(name)
+        except rtcf.RecordingError as error:
+            damaged += f"{file} is damaged: " in str(error)
+    assert damaged
