@@ -1,11 +1,17 @@
 """Values of every cycle, as a client sees them."""
 
+import asyncio
+from contextlib import ExitStack
+from pathlib import Path
+
 import numpy as np
 import pytest
 import rtcf
-from daemon_process import Daemon, wait_for
+from daemon_process import DEADLINE_S, Daemon, stopped, wait_for
+from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.ports import PortBatch, PortStream
-from rtcf.v1 import graph_pb2
+from rtcf.v1 import graph_pb2, runner_pb2
+from rtcfd.executor.link import Link
 
 
 def _wave(name: str = "wave") -> graph_pb2.ComponentSpec:
@@ -119,6 +125,47 @@ def test_who_does_not_read_loses_cycles_that_are_counted(client: rtcf.Client) ->
             if taken + lost == cycles:
                 break
     assert lost > 0
+
+
+async def _pass(executor: int, cycles: int) -> None:
+    """Ask an executor itself until its loop has gone on for so many cycles."""
+    words = Path(f"/proc/{executor}/cmdline").read_text().split("\0")
+    link = await Link.connect("it", Path(words[words.index("--socket") + 1]), lambda _: None)
+
+    async def cycle() -> int:
+        asked = await link.request(wire.Request(get_status=wire.GetStatus()), DEADLINE_S)
+        return int(asked.status.iteration)
+
+    try:
+        await link.hello(DEADLINE_S)
+        until = await cycle() + cycles
+        async with asyncio.timeout(DEADLINE_S):
+            while await cycle() < until:
+                await asyncio.sleep(0.01)
+    finally:
+        await link.close()
+
+
+def test_an_executor_keeps_an_rtcfd_that_stands_still_and_loses_cycles(
+    client: rtcf.Client, daemon: Daemon
+) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=2000.0))
+    for number in range(20):
+        client.load(_wave(f"wave{number}"))
+    client.start()
+    executor = client.get_status().runners[0].pid
+    with ExitStack() as stack:
+        streams = [stack.enter_context(client.watch_ports()) for _ in range(40)]
+        with stopped(daemon.pid):
+            # More than an executor keeps of answers for somebody who does not read.
+            asyncio.run(_pass(executor, 12_000))
+        for stream in streams:
+            expected = None
+            for batch in stream:
+                assert expected is None or batch.first_cycle == expected + batch.lost
+                if batch.lost:
+                    break
+                expected = batch.first_cycle + len(batch)
 
 
 def test_a_stream_ends_when_its_executor_does(client: rtcf.Client) -> None:
