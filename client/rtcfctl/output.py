@@ -10,7 +10,7 @@ from typing import Any, TextIO
 
 from rtcf.v1 import control_pb2
 
-from rtcfctl.plain import plain
+from rtcfctl.plain import number, plain
 from rtcfctl.table import Cell, format_table
 
 _ANSI = {"bold": "1", "red": "31", "green": "32", "yellow": "33"}
@@ -131,4 +131,4 @@ def _plain(value: Any) -> Any:
         return [_plain(each) for each in value]
     if isinstance(value, dict):
         return {key: _plain(each) for key, each in value.items()}
-    return plain(value) if hasattr(value, "DESCRIPTOR") else value
+    return plain(value) if hasattr(value, "DESCRIPTOR") else number(value)

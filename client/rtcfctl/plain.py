@@ -20,7 +20,7 @@ def plain(message: Any) -> Any:
     """Return a message as a dict, or the value if it is a parameter's value."""
     if message.DESCRIPTOR.full_name == _VALUE_MESSAGE:
         kind = message.WhichOneof("kind")
-        return None if kind is None else _number(getattr(message, kind))
+        return None if kind is None else number(getattr(message, kind))
     result = {field.name: _field(message, field) for field in message.DESCRIPTOR.fields}
     for name in _TEXTS.get(message.DESCRIPTOR.full_name, ()):
         if result[name]:
@@ -52,10 +52,11 @@ def _single(field: FieldDescriptor, value: Any) -> Any:
         return plain(value)
     if field.enum_type is not None:
         return word(field.enum_type, value)
-    return _number(value)
+    return number(value)
 
 
-def _number(value: Any) -> Any:
+def number(value: Any) -> Any:
+    """Return a number as JSON can hold it, anything else as it is."""
     # JSON has no words for these.
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)

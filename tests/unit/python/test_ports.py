@@ -1,14 +1,20 @@
 """Columns of values, as streams tell them and recordings keep them, without a loop."""
 
+import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 import rtcf
+import yaml
 from rtcf.mcap_writer import McapWriter
 from rtcf.ports import PortBatch, PortSchema, _schema
 from rtcf.recorder import Recorder
 from rtcf.v1 import ports_pb2
+from rtcfctl import echo
+from rtcfctl.output import Output
 
 STATE = ports_pb2.PortColumn.KIND_STATE
 OUTPUT = ports_pb2.PortColumn.KIND_OUTPUT
@@ -103,3 +109,13 @@ def test_a_recording_that_is_damaged_is_said_to_be(tmp_path: Path) -> None:
         except rtcf.RecordingError as error:
             damaged += f"{file} is damaged: " in str(error)
     assert damaged
+
+
+@pytest.mark.parametrize(("kind", "read"), [("json", json.loads), ("yaml", yaml.safe_load)])
+def test_what_is_no_finite_number_is_a_word_for_machines(
+    capsys: pytest.CaptureFixture[str], kind: str, read: Callable[[str], Any]
+) -> None:
+    told = batch(schema(state("double[3]", 24)), 0, np.array([1, np.nan, -np.inf] * 2).tobytes())
+    echo._print(told, 1, Output(kind))
+    printed = capsys.readouterr().out.removeprefix("---\n")
+    assert read(printed) == {"cycle": 1, "stamp_ns": 2, "values": {"/c.s": [1.0, "nan", "-inf"]}}
