@@ -377,6 +377,14 @@ std::string Server::stuck() const {
     return !activity.empty() && monotonicNow() - since_ns > kHookTimeout ? activity : std::string();
 }
 
+void Server::requireNotStuck() const {
+    const std::string where = stuck();
+    if (where.empty()) return;
+    throw Refusal(RefusalKind::Unavailable,
+                  fmt::format("runner {} is stuck in {}(): only stop and restart it",
+                              runner_->name(), where));
+}
+
 void Server::handle(Connection& connection, const v1::Request& request) {
     const std::uint64_t id = connection.id();
     if (request.kind_case() == v1::Request::kHello) {
@@ -470,12 +478,7 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
     const std::uint64_t id = request.id();
     // Stop never queues behind a hook.
     if (request.kind_case() == v1::Request::kStop) runner_->requestStop();
-    if (const std::string where = stuck();
-        !where.empty() && request.kind_case() != v1::Request::kStop) {
-        throw Refusal(RefusalKind::Unavailable,
-                      fmt::format("runner {} is stuck in {}(): only stop and restart it",
-                                  runner_->name(), where));
-    }
+    if (request.kind_case() != v1::Request::kStop) requireNotStuck();
     requireStopsKnown(request);
     // Statistics are of one run of the loop, which has not begun yet.
     const bool begins = request.kind_case() == v1::Request::kStart ||
@@ -658,6 +661,7 @@ void Server::submitProbe(std::uint64_t connection, const v1::Request& request) {
 
 // Its values begin once the graph thread has the loop keep them.
 void Server::beginWatch(std::uint64_t connection, const v1::Request& request) {
+    requireNotStuck();
     const std::uint64_t id = request.id();
     const std::uint64_t watch = next_watch_++;
     const auto& patterns = request.watch_ports().selection();

@@ -115,6 +115,7 @@ class Server {
     std::shared_ptr<const Figures> baseline() const;
     void goOnWithResets();
     std::string stuck() const;
+    void requireNotStuck() const;
 
     std::string path_;
     int listener_ = -1;
