@@ -1,5 +1,6 @@
 """Each fault, by a component that really does it: what is said, and what goes on."""
 
+import contextlib
 import os
 import re
 import signal
@@ -103,11 +104,34 @@ def test_take_over_that_does_not_return_is_named(daemon: Daemon, client: rtcf.Cl
     assert "because a cycle made no progress while /bad.takeOver was running" in daemon.log()
 
 
+def test_take_over_that_crashes_is_named(daemon: Daemon, client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter", name="bad"))
+    client.start()
+    wait_for(lambda: state(client).iteration > 20, "20 cycles")
+    crash = r"killed by SIGABRT \(.*\) while /bad\.takeOver was running"
+    with pytest.raises(rtcf.RefusedError, match=crash):
+        client.replace("bad", rtcf.component("rtcf_faults", "CrashesInTakeOver"))
+    wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
+    assert re.search(crash, daemon.log())
+
+
 def test_a_device_whose_wait_does_not_return_is_named(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_faults", "HangsInWait", name="bad"))
     client.start()
     wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
     assert "because a cycle made no progress while /bad.wait was running" in daemon.log()
+
+
+def test_a_device_whose_wait_crashes_is_named(daemon: Daemon, client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_faults", "CrashesInWait", name="bad"))
+    # It may crash before the start is answered.
+    with contextlib.suppress(rtcf.RefusedError):
+        client.start()
+    wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
+    crash = r"killed by SIGABRT \(.*\) while /bad\.wait was running"
+    assert re.search(crash, state(client).status), state(client).status
+    assert re.search(crash, daemon.log())
+    assert client.get_order() == []
 
 
 def test_a_device_that_is_polled_may_be_silent_for_long(client: rtcf.Client) -> None:

@@ -112,6 +112,21 @@ class CrashesInSafe final : public rtcf::Component {
     void safe() noexcept override { std::abort(); }
 };
 
+class CrashesInTakeOver final : public rtcf::Component {
+    void update() override {}
+    void takeOver(const rtcf::Predecessor& /*previous*/) noexcept override { std::abort(); }
+};
+
+class CrashesInWait final : public rtcf::Source {
+    void update() override { ++updates_; }
+    bool wait(std::int64_t /*deadline_ns*/) noexcept override {
+        if (updates_ > kCycles) std::abort();
+        return true;
+    }
+    static constexpr int kCycles = 20;
+    int updates_ = 0;
+};
+
 class CrashingConfigure final : public rtcf::Component {
     bool configure() override {
         volatile int* volatile nowhere = nullptr;
@@ -144,5 +159,7 @@ RTCF_COMPONENT(HangsInTakeOver, "Does not return from takeOver()")
 RTCF_COMPONENT(HangsInWait, "Does not return from wait()")
 RTCF_COMPONENT(PollsSilence, "Polls a device that is never ready")
 RTCF_COMPONENT(CrashesInSafe, "Aborts in safe()")
+RTCF_COMPONENT(CrashesInTakeOver, "Aborts in takeOver()")
+RTCF_COMPONENT(CrashesInWait, "Aborts in wait()")
 RTCF_COMPONENT(CrashingConfigure, "Crashes in configure()")
 RTCF_COMPONENT(CrashingStop, "Crashes in stop()")
