@@ -12,13 +12,17 @@ Tap::Tap(std::string topic, const TypeInfo& type, std::shared_ptr<const SlotHead
       source_(std::move(source)),
       passed_over_(UINT32_MAX - 1),  // the first value is taken
       largest_(type.fixed_size ? SIZE_MAX : largest) {
+    ring_.resize(ringBytes(type, capacity));
+    mask_ = ring_.size() - 1;
+}
+
+std::size_t Tap::ringBytes(const TypeInfo& type, std::size_t capacity) {
     // Of a value of its own: the loop may be writing the source's.
-    const std::size_t one = kHead + padded(type_.length(*type_.make_slot(nullptr)));
+    const std::size_t one = kHead + padded(type.length(*type.make_slot(nullptr)));
     // A power of two, so that a place in the ring is found without a division.
     std::size_t size = kHead;
     while (size < std::max(capacity, 2 * one)) size *= 2;
-    ring_.resize(size);
-    mask_ = size - 1;
+    return size;
 }
 
 std::uint32_t Tap::lengthAt(std::size_t offset) const noexcept {

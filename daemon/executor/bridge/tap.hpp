@@ -31,6 +31,10 @@ class Tap {
     const TypeInfo& type() const noexcept { return type_; }
     const SlotHeader* source() const noexcept { return source_.get(); }
 
+    /// Bytes that the ring of a tap takes that is made with this type and capacity.
+    static std::size_t ringBytes(const TypeInfo& type, std::size_t capacity);
+    /// Bytes of the ring.
+    std::size_t ringBytes() const noexcept { return ring_.size(); }
     /// Bytes that a value may have.
     std::size_t largest() const noexcept { return largest_; }
     /// Of the values that are written, takes each n-th from now on. Any thread.

@@ -1,9 +1,12 @@
 #include "graph/plan.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <set>
 
 #include "graph/footprint.hpp"
+#include "refusal.hpp"
 
 namespace rtcf::executor {
 
@@ -14,7 +17,9 @@ namespace {
 constexpr double kTapSeconds = 0.5;
 constexpr std::size_t kVariableTapValues = 2;  // of the largest
 // Of larger types it holds fewer, at least two: rings are locked memory.
-constexpr std::size_t kLargestTap = 8 * 1024 * 1024;
+constexpr std::size_t kMiB = 1024 * 1024;
+constexpr std::size_t kLargestTap = 8 * kMiB;
+constexpr std::size_t kAllTaps = 256 * kMiB;
 
 std::size_t tapCapacity(const TypeInfo& type, double frequency_hz, std::size_t largest) {
     if (!type.fixed_size) return kVariableTapValues * (largest + 24);
@@ -85,20 +90,33 @@ class Builder {
 
     void addTap(const std::string& key, const std::string& name, const Writer& writer) {
         const OutputBase& output = *writer.output;
+        const std::size_t capacity =
+            tapCapacity(output.type(), frequency_hz_, bridge_.largest_message);
         std::shared_ptr<Tap> tap;
         if (const auto found = previous_.taps.find(key);
             found != previous_.taps.end() && found->second->source() == output.slot().get() &&
             (output.type().fixed_size || found->second->largest() == bridge_.largest_message)) {
             tap = found->second;
         } else {
-            tap = std::make_shared<Tap>(
-                name, output.type(), output.slot(),
-                tapCapacity(output.type(), frequency_hz_, bridge_.largest_message),
-                bridge_.largest_message);
+            tap = std::make_shared<Tap>(name, output.type(), output.slot(), capacity,
+                                        bridge_.largest_message);
         }
+        // One that stays may be of another frequency: what runs is to be taken anew, too.
+        requireRoom(std::max(tap->ringBytes(), Tap::ringBytes(output.type(), capacity)));
         tap->setDecimation(decimated_.matches(name) ? bridge_.decimation : 1);
         plan_.schedule.taps.push_back(tap.get());
         plan_.taps.emplace(key, std::move(tap));
+    }
+
+    void requireRoom(std::size_t ring_bytes) {
+        tap_bytes_ += ring_bytes;
+        if (tap_bytes_ <= kAllTaps) return;
+        throw Refusal(
+            RefusalKind::ResourceExhausted,
+            fmt::format("the rings of all published outputs (taps) would take more than the {} MiB "
+                        "of locked memory allowed: let the whitelist match fewer, or set a lower "
+                        "frequency or a smaller largest message",
+                        kAllTaps / kMiB));
     }
 
     void addFeed(const std::string& name, const ConnectionPlan& connection) {
@@ -216,6 +234,7 @@ class Builder {
     const BridgeSettings& bridge_;
     NamePattern decimated_;
     std::vector<std::size_t> positions_;  // in the order, by node
+    std::size_t tap_bytes_ = 0;           // of the rings so far
 };
 
 }  // namespace

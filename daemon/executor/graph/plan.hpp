@@ -46,6 +46,7 @@ struct Plan {
 /// @param frequency_hz of the loop; sizes the taps' rings
 /// @param adoption gets the schedule and the inputs to rewire
 /// @param bridge decimation and sizes of what leaves and enters the loop
+/// @throws Refusal if the taps' rings would take too much memory
 std::unique_ptr<Plan> buildPlan(Graph graph, Wiring wiring, const Plan& previous,
                                 double frequency_hz, Adoption& adoption,
                                 const BridgeSettings& bridge = {});

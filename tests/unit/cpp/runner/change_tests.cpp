@@ -327,5 +327,33 @@ TEST_F(Change, RingOfALargeTypeIsBoundedInBytes) {
     }));
 }
 
+// 8 MiB each.
+TEST_F(Change, RingsAreBoundedTogether) {
+    configure([](RunnerSettings& settings) {
+        settings.whitelist = ".*";
+        settings.frequency_hz = 2000.0;
+    });
+    const auto camera = [](int number) {
+        ComponentDefinition each = definition("Camera", "C" + std::to_string(number));
+        each.remaps = {{"picture", "picture_" + std::to_string(number)}};
+        return each;
+    };
+    for (int number = 1; number <= 32; ++number) load(camera(number));
+    try {
+        load(camera(33));
+        FAIL() << "it is not refused";
+    } catch (const Refusal& refused) {
+        EXPECT_EQ(refused.kind(), executor::RefusalKind::ResourceExhausted);
+        const std::string text = refused.what();
+        EXPECT_NE(text.find("more than the 256 MiB of locked memory"), std::string::npos) << text;
+        EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+    }
+    EXPECT_EQ(order().size(), 32U);
+    EXPECT_EQ(bridge().tap("/picture_33"), nullptr);
+    unload("/C1");
+    load(camera(33));
+    EXPECT_NE(bridge().tap("/picture_33"), nullptr);
+}
+
 }  // namespace
 }  // namespace rtcf::test
