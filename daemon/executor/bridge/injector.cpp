@@ -39,15 +39,17 @@ void Injector::setQueueing(bool queueing) {
     if (!queueing) deliverUntil(INT64_MAX);
 }
 
-void Injector::deliverUntil(std::int64_t arrived_ns) {
+void Injector::deliverUntil(std::int64_t arrived_ns, double rate) {
     const std::lock_guard<std::mutex> lock(mutex_);
     const auto ready = [&](std::size_t at) {
         return waiting_.size() > at && waiting_[at].arrived_ns <= arrived_ns;
     };
     while (ready(1)) dropOldest();
     if (!ready(0)) return;
-    const std::vector<std::uint8_t>& bytes = waiting_.front().bytes;
-    store(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+    const auto& [came_ns, bytes] = waiting_.front();
+    const double age_ns = rate * static_cast<double>(arrived_ns - came_ns);
+    store(bytes.data(), static_cast<std::uint32_t>(bytes.size()),
+          static_cast<std::int64_t>(age_ns));
     waiting_bytes_ -= bytes.size();
     waiting_.pop_front();
 }
@@ -58,11 +60,12 @@ void Injector::dropOldest() {
     passed_over_.fetch_add(1, std::memory_order_relaxed);
 }
 
-bool Injector::store(const std::uint8_t* bytes, std::uint32_t size) {
+bool Injector::store(const std::uint8_t* bytes, std::uint32_t size, std::int64_t age_ns) {
     if (!type_.deserialize(*slots_[back_], bytes, size)) {
         refused_.fetch_add(1, std::memory_order_relaxed);
         return false;
     }
+    slots_[back_]->time_ns = age_ns;
     const std::uint32_t before = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel);
     if ((before & kFresh) != 0) passed_over_.fetch_add(1, std::memory_order_relaxed);
     back_ = before & ~kFresh;

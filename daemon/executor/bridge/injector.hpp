@@ -50,7 +50,8 @@ class Injector {
 
     /// Delivers the newest message that came until then, if any; the older ones are passed over.
     /// Any thread; not real-time safe.
-    void deliverUntil(std::int64_t arrived_ns);
+    /// @param rate of the loop's time in real time; what came earlier is older by so much
+    void deliverUntil(std::int64_t arrived_ns, double rate = 0.0);
     /// Bytes that a message of a type of variable size may have. Any thread.
     void setLargest(std::uint32_t bytes) noexcept {
         largest_.store(bytes, std::memory_order_relaxed);
@@ -79,15 +80,15 @@ class Injector {
         sequence_ = sequence;
     }
 
-    /// Makes the newest delivered value the front, stamped with `clock`. Loop side only; real-time
-    /// safe.
+    /// Makes the newest delivered value the front, stamped with `clock` less its age then. Loop
+    /// side only; real-time safe.
     /// @return true if there was a new one; the inputs are then to be told by InputBase::inject()
     bool adopt(const LoopClock& clock) noexcept RTCF_NONBLOCKING {
         if ((middle_.load(std::memory_order_relaxed) & kFresh) == 0) return false;
         front_ = middle_.exchange(front_, std::memory_order_acq_rel) & ~kFresh;
         SlotHeader& slot = *slots_[front_];
         slot.sequence = ++sequence_;
-        slot.time_ns = clock.time_ns;
+        slot.time_ns = clock.time_ns - slot.time_ns;
         return true;
     }
 
@@ -102,13 +103,14 @@ class Injector {
     static constexpr std::size_t kMaxWaitingBytes = 1024 * 1024;
 
     void dropOldest();
-    bool store(const std::uint8_t* bytes, std::uint32_t size);
+    bool store(const std::uint8_t* bytes, std::uint32_t size, std::int64_t age_ns = 0);
 
     static constexpr std::uint32_t kFresh =
         4;  // set in middle_ by deliver(), beside an index 0 to 2
 
     std::string topic_;
     const TypeInfo& type_;
+    // Until it is adopted, the time of a delivered one is its age.
     std::array<std::shared_ptr<SlotHeader>, 3> slots_;
     std::uint32_t fixed_size_ = 0;  // bytes of each message of a type of fixed size
     std::uint32_t front_ = 0;       // loop side

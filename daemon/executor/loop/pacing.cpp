@@ -106,7 +106,7 @@ void Loop::followClock() noexcept {
             continue;
         }
         for (const Feed& feed : cycle_.schedule().feeds) {
-            feed.injector->deliverUntil(due->arrived_ns);
+            feed.injector->deliverUntil(due->arrived_ns, due->rate);
         }
         const std::int64_t now = nextStep();
         cycle_.setStampOffset(due->time_ns - now);

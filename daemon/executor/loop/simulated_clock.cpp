@@ -30,8 +30,7 @@ std::optional<SimulatedCycle> SimulatedClock::next(std::int64_t period_ns,
     std::unique_lock<std::mutex> lock(mutex_);
     while (true) {
         if (tick_ && tick_->time_ns - cycle_ns_ >= period_ns) {
-            cycle_ns_ += period_ns;
-            return cycle();
+            return goOn(period_ns);
         }
         if (!ticked_.wait_until(lock, until, [this] { return !ticks_.empty(); })) return {};
         const Tick tick = ticks_.front();
@@ -45,18 +44,27 @@ std::optional<SimulatedCycle> SimulatedClock::next(std::int64_t period_ns,
         }
         before_ = tick;
         cycle_ns_ = tick.time_ns;
-        return cycle();
+        arrived_ns_ = tick.arrived_ns;
+        return SimulatedCycle{cycle_ns_, arrived_ns_, 0.0};
     }
 }
 
 // Between two ticks time is taken to have gone on evenly: what came halfway between them, came
 // halfway between their times.
-SimulatedCycle SimulatedClock::cycle() const {
+std::int64_t SimulatedClock::arrival() const {
     const std::int64_t span = tick_->time_ns - before_.time_ns;
-    if (span <= 0) return {cycle_ns_, tick_->arrived_ns};
+    if (span <= 0) return tick_->arrived_ns;
     const double left = static_cast<double>(tick_->time_ns - cycle_ns_) / static_cast<double>(span);
     const auto wait = static_cast<double>(tick_->arrived_ns - before_.arrived_ns);
-    return {cycle_ns_, tick_->arrived_ns - static_cast<std::int64_t>(left * wait)};
+    return tick_->arrived_ns - static_cast<std::int64_t>(left * wait);
+}
+
+SimulatedCycle SimulatedClock::goOn(std::int64_t period_ns) {
+    cycle_ns_ += period_ns;
+    const std::int64_t last = std::exchange(arrived_ns_, arrival());
+    const std::int64_t wait = arrived_ns_ - last;
+    return {cycle_ns_, arrived_ns_,
+            wait > 0 ? static_cast<double>(period_ns) / static_cast<double>(wait) : 0.0};
 }
 
 std::optional<ClockJump> SimulatedClock::takeJump() {

@@ -18,6 +18,7 @@ namespace rtcf::executor {
 struct SimulatedCycle {
     std::int64_t time_ns = 0;     ///< simulated
     std::int64_t arrived_ns = 0;  ///< CLOCK_MONOTONIC; what came until then is older than the cycle
+    double rate = 0.0;  ///< at which it went on since the last cycle; 0 = it began or leapt
 };
 
 /// A tick from which the cycles are counted anew: the clock began, went back, or leapt.
@@ -65,14 +66,16 @@ class SimulatedClock {
         std::int64_t arrived_ns;
     };
 
-    SimulatedCycle cycle() const;
+    std::int64_t arrival() const;
+    SimulatedCycle goOn(std::int64_t period_ns);
 
     mutable std::mutex mutex_;
     std::condition_variable ticked_;
-    std::deque<Tick> ticks_;     // to be worked off
-    std::optional<Tick> tick_;   // that is being worked off
-    Tick before_{};              // the one before it, or itself
-    std::int64_t cycle_ns_ = 0;  // time of the last cycle
+    std::deque<Tick> ticks_;       // to be worked off
+    std::optional<Tick> tick_;     // that is being worked off
+    Tick before_{};                // the one before it, or itself
+    std::int64_t cycle_ns_ = 0;    // time of the last cycle
+    std::int64_t arrived_ns_ = 0;  // and when that was
     std::int64_t max_jump_ns_ = INT64_MAX;
     std::deque<ClockJump> jumps_;
 };

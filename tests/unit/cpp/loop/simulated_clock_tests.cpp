@@ -114,6 +114,34 @@ TEST(SimulatedClock, SpreadsWhatCameBetweenTwoTicksOverTheirCycles) {
     EXPECT_EQ(arrivals(), Times{9500});
 }
 
+TEST(SimulatedClock, TellsTheRateAtWhichItGoesOnBetweenCycles) {
+    SimulatedClock clock;
+    clock.reset(1000);
+    using Rates = std::vector<double>;
+    const auto rates = [&] {
+        Rates all;
+        while (const auto cycle = clock.next(10, std::chrono::milliseconds(0)))
+            all.push_back(cycle->rate);
+        return all;
+    };
+    clock.tick(100, 7000);
+    EXPECT_EQ(rates(), Rates{0.0}) << "it begins";
+    clock.tick(120, 7040);
+    EXPECT_EQ(rates(), (Rates{0.5, 0.5}));
+    clock.tick(125, 7050);
+    clock.tick(125, 9000);  // it stands still
+    clock.tick(135, 9010);
+    EXPECT_EQ(rates(), Rates{10.0 / (9005 - 7040)}) << "on the whole";
+    clock.tick(140, 9010);  // two ticks at once
+    EXPECT_EQ(rates(), Rates{10.0 / (9010 - 9005)});
+    clock.tick(150, 9010);
+    EXPECT_EQ(rates(), Rates{0.0}) << "nothing can come in no time";
+    clock.tick(20, 9500);
+    EXPECT_EQ(rates(), Rates{0.0}) << "it leapt";
+    clock.tick(30, 9520);
+    EXPECT_EQ(rates(), Rates{0.5});
+}
+
 class QueueingInjector : public ::testing::Test {
    protected:
     void deliver(double value, std::int64_t arrived_ns) {
@@ -122,8 +150,8 @@ class QueueingInjector : public ::testing::Test {
         injector_.deliver(bytes.data(), sizeof value, arrived_ns);
     }
     // What a cycle sees; nothing if it is nothing new.
-    std::optional<double> cycle(std::int64_t arrived_ns) {
-        injector_.deliverUntil(arrived_ns);
+    std::optional<double> cycle(std::int64_t arrived_ns, double rate = 0.0) {
+        injector_.deliverUntil(arrived_ns, rate);
         if (!injector_.adopt(clock_)) return {};
         return static_cast<const Slot<double>*>(injector_.front())->value;
     }
@@ -153,6 +181,29 @@ TEST_F(QueueingInjector, IsNoDelayLineForATopicThatIsFasterThanTheLoop) {
         EXPECT_EQ(cycle(round * 100 + 50), round + 0.75);
     }
     EXPECT_EQ(injector_.passedOver(), 3000);
+}
+
+TEST_F(QueueingInjector, ValuesAreAsOldAsTheMessageInSimulatedTime) {
+    const auto time = [&] { return injector_.front()->time_ns; };
+    injector_.setQueueing(true);
+    deliver(1.0, 50);
+    deliver(2.0, 80);
+    clock_.time_ns = 1000;
+    EXPECT_EQ(cycle(100, 2.0), 2.0);
+    EXPECT_EQ(time(), 1000 - 40);
+    deliver(3.0, 104);
+    deliver(4.0, 120);
+    clock_.time_ns = 1010;
+    EXPECT_EQ(cycle(110, 0.5), 3.0);
+    EXPECT_EQ(time(), 1010 - 3);
+    clock_.time_ns = 1020;
+    EXPECT_EQ(cycle(120, 0.5), 4.0);
+    EXPECT_EQ(time(), 1020) << "it came with the cycle";
+    injector_.setQueueing(false);
+    deliver(5.0, 130);
+    clock_.time_ns = 1030;
+    EXPECT_EQ(cycle(200), 5.0);
+    EXPECT_EQ(time(), 1030) << "in real time it is as old as the cycle that takes it";
 }
 
 TEST_F(QueueingInjector, GivesTheNewestOnceItQueuesNoMore) {
