@@ -71,6 +71,7 @@ void Loop::reset(const LoopSettings& settings, std::uint64_t stops_known) {
     cycle_.begin(settings.period_ns, settings.warmup_cycles);
     bucket_ = 0;
     cycles_on_time_ = 0;
+    caught_up_ = 0;
     beat_ns_ = 0;
     stack_bytes_ = settings.realtime.stack_bytes;
 }

@@ -188,7 +188,8 @@ class Loop {
     std::uint64_t stops_known_ = 0;  // when the present cycles were asked for
     std::uint32_t bucket_ = 0;       // of overruns
     std::uint64_t cycles_on_time_ = 0;
-    std::int64_t beat_ns_ = 0;  // when a Source was last ready; 0 = not yet
+    std::uint32_t caught_up_ = 0;  // cycles since the last one on time
+    std::int64_t beat_ns_ = 0;     // when a Source was last ready; 0 = not yet
 
     // Shared.
     std::atomic<std::uint64_t> stops_{0};

@@ -17,7 +17,8 @@ namespace rtcf::executor {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::uint64_t kBucketLeak = 1000;  // cycles on time that make good one overrun
+constexpr std::uint64_t kBucketLeak = 1000;   // cycles on time that make good one overrun
+constexpr std::uint32_t kMostCaughtUp = 100;  // cycles in a row; after a freeze there are many
 
 }  // namespace
 
@@ -187,11 +188,13 @@ std::int64_t Loop::nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) n
     const std::int64_t next = deadline_ns + period;
     if (end_ns < next) {
         cycle_.setElapsed(period);
+        caught_up_ = 0;
         if (bucket_ > 0 && ++cycles_on_time_ % kBucketLeak == 0) --bucket_;
         return next;
     }
     switch (overrun_policy_.load(std::memory_order_relaxed)) {
         case OverrunPolicy::CatchUp:
+            if (++caught_up_ > kMostCaughtUp) break;
             cycle_.setElapsed(period);
             return next;
         case OverrunPolicy::Relative:
@@ -200,6 +203,7 @@ std::int64_t Loop::nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) n
         case OverrunPolicy::Skip:
             break;
     }
+    caught_up_ = 0;
     const std::int64_t dropped = (end_ns - next) / period + 1;
     noteMissed(dropped);
     cycle_.setElapsed((dropped + 1) * period);

@@ -16,14 +16,16 @@ using executor::OverrunPolicy;
 
 class LoopTiming : public RunnerFixture {
    protected:
-    // Runs a loop in which `cycles` cycles take 6 ms, and stops it some time after.
-    void overrun(OverrunPolicy policy, std::int64_t cycles = 1) {
+    // Runs a loop in which `cycles` cycles take 6 ms, and stops it some time after, in cycle
+    // `until`.
+    void overrun(OverrunPolicy policy, std::int64_t cycles = 1, std::int64_t busy_us = 6000,
+                 std::uint64_t until = 60) {
         configure([policy](RunnerSettings& settings) { settings.loop.overrun = policy; });
         ComponentDefinition spinner = definition("Spinner", "S");
-        spinner.parameters = {{"busy_us", std::int64_t{6000}}, {"busy_cycles", cycles}};
+        spinner.parameters = {{"busy_us", busy_us}, {"busy_cycles", cycles}};
         load(spinner);
         start();
-        EXPECT_TRUE(eventually([this] { return iteration() > 60; }));
+        EXPECT_TRUE(eventually([&] { return iteration() > until; }));
         stop();
     }
 
@@ -49,10 +51,22 @@ TEST_F(LoopTiming, SkipDropsTheMissedCyclesAndTellsTheNextOne) {
 }
 
 TEST_F(LoopTiming, CatchUpDropsNothing) {
+    // Of a period that the machine does not hold up a hundred times in a row.
+    configure([](RunnerSettings& settings) { settings.frequency_hz = 200.0; });
     overrun(OverrunPolicy::CatchUp);
     EXPECT_GE(overruns(), 1U);
     EXPECT_EQ(missed(), 0U);
     EXPECT_EQ(periods(), static_cast<double>(iteration()));
+}
+
+// As after a freeze: 500 cycles are missed at once.
+TEST_F(LoopTiming, CatchUpRunsNoMoreThanAHundredCyclesInARow) {
+    configure([](RunnerSettings& settings) { settings.loop.warmup_cycles = 0; });
+    overrun(OverrunPolicy::CatchUp, 1, 500'000, 200);
+    EXPECT_GE(overruns(), 1U);
+    EXPECT_GE(missed(), 400U) << "the rest";
+    EXPECT_GE(periods(), static_cast<double>(iteration() + 400));
+    EXPECT_LE(periods(), static_cast<double>(iteration() + missed()));
 }
 
 TEST_F(LoopTiming, RelativeBeginsThePeriodAnew) {
