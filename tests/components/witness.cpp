@@ -1,7 +1,10 @@
 // Says in the log which hook is called; and, for whoever looks when nobody takes logs any more,
-// in a file.
+// in a file. And one whose start waits for the test.
+#include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <string>
+#include <thread>
 
 #include <rtcf/component.hpp>
 
@@ -47,6 +50,22 @@ class Witness final : public rtcf::Component {
     }
 };
 
+class StartsOnceThereIs final : public rtcf::Component {
+    rtcf::Parameter<std::string> file{this, "file", "", rtcf::Doc("start() waits for it")};
+
+    bool start() override {
+        RTCF_INFO(this, "waits for {}", "a file");
+        const auto until = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+        while (!std::filesystem::exists(file.value())) {
+            if (std::chrono::steady_clock::now() > until) return fail("it does not come");
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        }
+        return true;
+    }
+    void update() override {}
+};
+
 }  // namespace
 
+RTCF_COMPONENT(StartsOnceThereIs, "Waits in start() for a file")
 RTCF_COMPONENT(Witness, "Tells of each hook")

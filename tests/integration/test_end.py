@@ -3,6 +3,7 @@
 import os
 import signal
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -96,6 +97,36 @@ def test_the_executor_ends_by_a_signal_of_its_own_in_order(
     wait_for(lambda: "its loop is down" in daemon.log(), "rtcfd's word on it")
     assert _is_gone(executor)
     assert _hooks(daemon) == HOOKS
+
+
+def test_a_signal_while_start_hooks_run_lets_no_cycle_begin(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    gate = daemon.folder / "gate"
+    client.load(rtcf.component("rtcf_test", "Witness"))
+    client.load(
+        rtcf.component(
+            "rtcf_test", "StartsOnceThereIs", name="last", parameters=[f"file:='{gate}'"]
+        )
+    )
+    assert client.get_order() == ["/Witness", "/last"]
+    stop_socket = Path(f"{daemon.socket}.d/stop/rt_runner")
+    assert stop_socket.exists()
+    executor = _executor(client)
+    with ThreadPoolExecutor() as beside:
+        starting = beside.submit(client.start)
+        try:
+            wait_for(lambda: "waits for a file" in daemon.log(), "the start hook")
+            os.kill(executor, signal.SIGTERM)
+            # Nobody can ask it to stop any more once it does so.
+            wait_for(lambda: not stop_socket.exists(), "the executor to take the signal")
+        finally:
+            gate.touch()
+        with pytest.raises(rtcf.RefusedError):
+            starting.result()
+    wait_for(lambda: _is_gone(executor), "its end")
+    wait_for(lambda: "hook cleanup" in daemon.log(), "its last records")
+    assert _hooks(daemon) == [hook for hook in HOOKS if hook not in ("update", "safe")]
 
 
 def test_exit_codes(daemon: Daemon) -> None:
