@@ -1,6 +1,7 @@
 """Nonsense on an executor's socket: it is hung up on, and the loop does not notice."""
 
 import random
+import re
 import socket
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from daemon_process import Daemon, wait_for
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import runner_pb2
 
+MIB = 1024 * 1024
 TIMES = [300, pytest.param(10_000, marks=pytest.mark.long)]
 
 
@@ -63,3 +65,50 @@ def test_nonsense_changes_nothing(daemon: Daemon, client: rtcf.Client, times: in
     assert after.state == runner_pb2.RUNNER_STATE_RUNNING
     assert client.get_order() == ["/steady"]
     wait_for(lambda: client.get_status().runners[0].iteration > after.iteration, "cycles")
+
+
+def _answer(peer: socket.socket) -> wire.Response:
+    """Read the next answer; what comes unasked is passed over."""
+    while True:
+        size = int.from_bytes(_read(peer, 4), "little")
+        response = wire.Response.FromString(_read(peer, size))
+        if response.id:
+            return response
+
+
+def _read(peer: socket.socket, size: int) -> bytes:
+    read = bytearray()
+    while len(read) < size:
+        got = peer.recv(size - len(read))
+        assert got, "it hung up"
+        read += got
+    return bytes(read)
+
+
+def _resident_bytes(pid: int) -> int:
+    found = re.search(r"^VmRSS:\s+(\d+) kB$", Path(f"/proc/{pid}/status").read_text(), re.MULTILINE)
+    assert found
+    return int(found[1]) * 1024
+
+
+def test_a_peer_that_never_catches_up_costs_what_it_has_not_taken(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    for number in range(50):
+        client.load(rtcf.component("rtcf_test", "Counter", name=f"c{number}"))
+    pid = client.get_status().runners[0].pid
+    with socket.socket(socket.AF_UNIX) as peer:
+        peer.settimeout(60)
+        peer.connect(f"{daemon.socket}.d/executors/rt_runner.sock")
+        peer.sendall(hello())
+        _answer(peer)
+        ask = frame(wire.Request(id=2, list_components=wire.ListComponents()).SerializeToString())
+        peer.sendall(ask)
+        size = _answer(peer).ByteSize()
+        # More than the socket takes, at any time.
+        peer.sendall(ask * (4 * MIB // size))
+        before = _resident_bytes(pid)
+        for _ in range(128 * MIB // size):
+            assert _answer(peer).id == 2
+            peer.sendall(ask)
+        assert _resident_bytes(pid) - before < 64 * MIB
