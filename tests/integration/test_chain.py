@@ -4,22 +4,33 @@ import random
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import fig_1
 import pytest
 import rtcf
-from daemon_process import Daemon, wait_for
-from rtcf.v1 import runner_pb2
+from daemon_process import NO_ROS, Daemon, wait_for
+from rtcf.v1 import graph_pb2, runner_pb2
 from values import iteration, port_value
 
 COUNT = 1000
 
 
-def _names() -> list[str]:
+def _names(count: int = COUNT) -> list[str]:
     """Return names whose alphabet has nothing to do with their place in the chain."""
-    names = [f"c{index}" for index in range(1, COUNT)]
+    names = [f"c{index}" for index in range(1, count)]
     random.Random(1).shuffle(names)
     return ["one", *names]
+
+
+def _specs(names: list[str]) -> list[graph_pb2.ComponentSpec]:
+    """Return Mimo in a chain, each of which adds the 1 that the first one sends to all."""
+    first = fig_1.mimo(names[0], {"out1": "/one"})
+    rest = (
+        fig_1.mimo(name, {"in1": f"/link{place - 1}", "in2": "/one", "out1": f"/link{place}"})
+        for place, name in enumerate(names[1:], 1)
+    )
+    return sorted([first, *rest], key=lambda spec: spec.name)
 
 
 @dataclass(frozen=True)
@@ -33,22 +44,14 @@ class Chain:
 
 @pytest.fixture(scope="module")
 def chain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chain]:
-    """Load Mimo in a chain, each of which adds the 1 that `one` sends to all."""
+    """Load the chain, one component after the other."""
     names = _names()
-    wires: dict[str, dict[str, str]] = {
-        "one": {"out1": "/one"},
-        **{
-            name: {"in1": f"/link{place - 1}", "in2": "/one", "out1": f"/link{place}"}
-            for place, name in enumerate(names)
-            if place > 0
-        },
-    }
     daemon = Daemon(tmp_path_factory.mktemp("chain"))
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
         client.set_runner(runner_pb2.RunnerSettings(frequency_hz=100.0))
-        for name in sorted(names):
-            client.load(fig_1.mimo(name, wires[name]))
+        for spec in _specs(names):
+            client.load(spec)
         yield Chain(daemon, client, names)
     daemon.end()
 
@@ -88,3 +91,46 @@ def test_a_ring_of_a_thousand_is_refused_in_a_line_that_can_be_read(chain: Chain
     (port, *_) = re.findall(r"`rtcfctl break (\S+)`", line)
     assert chain.daemon.ctl("break", port).returncode == 0
     client.replace(names[-1], last)
+
+
+@pytest.mark.parametrize("count", [200, pytest.param(10_000, marks=pytest.mark.long)])
+def test_as_many_components_run_as_the_settings_allow(tmp_path: Path, count: int) -> None:
+    daemon = Daemon(tmp_path, f"[limits]\ncomponents = {count}\n{NO_ROS}")
+    daemon.start()
+    names = _names(count)
+    with rtcf.Client(daemon.socket) as client:
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=10.0))
+        client.apply(_specs(names))
+        with pytest.raises(rtcf.RefusedError, match=f"{count}"):
+            client.load(rtcf.component("rtcf_test", "Counter", name="more"))
+        client.start()
+        wait_for(lambda: iteration(client) >= 20, "20 cycles")
+        assert port_value(client, names[-1], "out1") == count
+        client.stop()
+        assert client.get_order() == [f"/{name}" for name in names]
+    daemon.end()
+
+
+@pytest.mark.long
+def test_one_parameter_costs_a_cycle_what_it_costs_among_a_few(tmp_path: Path) -> None:
+    shortest = {}
+    for count in (5, 4000):
+        folder = tmp_path / f"{count}"
+        folder.mkdir()
+        daemon = Daemon(folder)
+        daemon.start()
+        with rtcf.Client(daemon.socket) as client:
+            client.set_runner(runner_pb2.RunnerSettings(frequency_hz=100.0))
+            knobs = rtcf.component("rtcf_test", "Knobs", name="knobs")
+            client.apply([*_specs(_names(count)), knobs])
+            client.start()
+            client.reset_statistics()
+            for change in range(100):
+                client.set_parameters("knobs", [rtcf.parse_parameter(f"rate:={change}")])
+            taken = client.get_statistics().adoption
+            assert taken.count >= 100
+            shortest[count] = taken.min_ns
+            print(f"{count} components: {taken.min_ns} ns at least, {taken.p50_ns} ns as a rule")
+        daemon.end()
+    # Of 100 each, so that nothing is said of the machine; all components' would be 800 fold.
+    assert shortest[4000] < 20 * shortest[5]
