@@ -71,7 +71,7 @@ def _answer(peer: socket.socket) -> wire.Response:
     """Read the next answer; what comes unasked is passed over."""
     while True:
         size = int.from_bytes(_read(peer, 4), "little")
-        response = wire.Response.FromString(_read(peer, size))
+        response: wire.Response = wire.Response.FromString(_read(peer, size))
         if response.id:
             return response
 
