@@ -171,8 +171,8 @@ def table(topic: str, numbers: dict[str, Any]) -> str:
     rows = (("calculation duration", "duration_us"), ("scheduling jitter", "jitter_us"))
     names = list(numbers["duration_us"])
     lines = [
-        f"{topic}: {numbers['cycles']} cycles, {numbers['lost']} messages lost, "
-        f"{numbers['overruns']} overruns",
+        f"{topic}: {_counted(numbers['cycles'], 'cycle')}, "
+        f"{_counted(numbers['lost'], 'message')} lost, {_counted(numbers['overruns'], 'overrun')}",
         "µs".ljust(22) + "".join(f"{name:>10}" for name in names),
     ]
     lines += [
@@ -180,6 +180,10 @@ def table(topic: str, numbers: dict[str, Any]) -> str:
         for label, key in rows
     ]
     return "\n".join(lines)
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def _frequency(text: str) -> float:

@@ -97,6 +97,13 @@ def test_people_get_a_table(tmp_path: Path) -> None:
     ]
 
 
+def test_one_of_each_is_said_in_the_singular(tmp_path: Path) -> None:
+    # The first takes longer than a period; the third of four was lost.
+    cycles = [_cycle(0, PERIOD_NS + 1, 0), _cycle(1, 1000, 0), _cycle(3, 1000, 0)]
+    done = _run(str(_record(tmp_path / "a.bag", cycles)), "2000")
+    assert done.stdout.splitlines()[0] == f"{TOPIC}: 3 cycles, 1 message lost, 1 overrun"
+
+
 def test_one_of_several_loops_is_chosen(tmp_path: Path) -> None:
     bag = _record(tmp_path / "a.bag", [_cycle(i, 1000, 0) for i in range(10)])
     _record(bag, [_cycle(i, 2000, 0) for i in range(10)], "/other/cycles")
