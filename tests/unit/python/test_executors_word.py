@@ -5,6 +5,7 @@ import os
 import signal
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 import rtcf
@@ -139,3 +140,59 @@ def test_what_ros_loads_is_not_in_the_name_of_who_started_the_executor(
         await daemon.runners.close(in_order=True)
 
     asyncio.run(play())
+
+
+def test_parameters_that_ros_changes_one_after_the_other_are_noted_in_one_turn(
+    rtcfd: Callable[[], Rtcfd], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held = tmp_path / "held"
+    held.mkdir()
+    monkeypatch.setenv("PEER_HELD", str(held))
+    names = [f"/x{number}" for number in range(10)]
+
+    async def play() -> int:
+        daemon = rtcfd()
+        peer = await started_by_alice(daemon)
+        for name in ["before", *(name.lstrip("/") for name in names)]:
+            load = control_pb2.LoadRequest(runner="rt_runner", component=spec(name))
+            await called_by("alice", daemon.call("Load", load))
+        saved: list[str] = []
+        save = daemon.store.save
+        monkeypatch.setattr(
+            daemon.store, "save", lambda *state: (saved.append(state[0]), save(*state))
+        )
+        # While a change is under way, ROS makes many.
+        (held / "set_parameters").touch()
+        parameters = [rtcf.parse_parameter("kp:=2.0")]
+        change = control_pb2.SetParametersRequest(
+            runner="rt_runner", component="/before", parameters=parameters
+        )
+        under_way = asyncio.create_task(called_by("alice", daemon.call("SetParameters", change)))
+        await until((held / "set_parameters waits").exists, "the change")
+        for name in names:
+            peer.live[name] = {"kp": rtcf.parse_parameter("kp:=3.0").value}
+            changed = wire.ParametersChanged(component=name, parameters=["kp"])
+            peer.send(wire.Response(parameters_changed=changed))
+        events = daemon.runners._shared.events
+        begin = events.last
+        last = wire.Event(kind=wire.Event.KIND_LOOP_ENDED, message="all of them are told")
+        peer.send(wire.Response(event=last))
+        await until(
+            lambda: [each for each in events.after(begin, 100)[0] if each.message == last.message],
+            "the last word",
+        )
+        (held / "set_parameters").unlink()
+        await under_way
+        history = daemon.runners.get("rt_runner").desired.history
+        await until(lambda: all(history.of(name) for name in names), "the notes")
+        for name in names:
+            (noted,) = history.of(name)
+            assert (noted.parameter, noted.how) == ("kp", "dynamic_reconfigure")
+        # In its turn after all of them.
+        await called_by("alice", daemon.call("SetParameters", change))
+        count = len(saved)
+        await daemon.runners.close(in_order=True)
+        return count
+
+    # For the changes before and after, for the loop's end; and once for all of ROS.
+    assert asyncio.run(play()) <= 4
