@@ -119,6 +119,34 @@ def test_levels_are_set_as_rqt_logger_level_does(
     assert client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_RUNNING
 
 
+def test_how_often_one_line_is_handed_on_is_a_setting(
+    speaking: tuple[Daemon, rtcf.Client, Node, str], master: Master
+) -> None:
+    daemon, client, listener, node = speaking
+    assert daemon.ctl("runner", "set", "--log-limit", "2").returncode == 0
+    client.load(rtcf.component("rtcf_test_ros", "Speaker", name="speaker"))
+    client.start()
+    master.call(f"{node}/set_logger_level", "{logger: ros.rtcf.speaker, level: debug}")
+
+    def between() -> list[int]:
+        """Return how many records of the line there were up to each count, and since the last."""
+        found = [0]
+        for each in listener.records():
+            if "more of this line within a second" in each["msg"]:
+                found.append(0)
+            elif each["msg"] == "each cycle":
+                found[-1] += 1
+        return found
+
+    # A second in which the loop did a few cycles at least: 50 of them, on a machine with time.
+    wait_for(lambda: any(count <= 2 for count in between()[1:-1]), "what is more to be left out")
+    assert daemon.ctl("runner", "set", "--log-limit", "0").returncode == 0
+    # All are handed on. Of what was left out before, one count may still be on its way.
+    seconds = len(between())
+    wait_for(lambda: between()[-1] > 120, "every record")
+    assert len(between()) <= seconds + 1
+
+
 def test_levels_of_a_rosconsole_config_file_are_honoured(tmp_path: Path, master: Master) -> None:
     config = tmp_path / "rosconsole.conf"
     config.write_text(
