@@ -1,6 +1,7 @@
 """rt_runner and rt_launcher as processes: which daemon they take, what they do when something
 ends, and the statuses they exit with."""
 
+import os
 import re
 import signal
 from collections.abc import Iterator
@@ -100,6 +101,26 @@ def test_the_system_daemon_is_taken_where_it_may_be_and_given_back(
         assert runner.end() == DONE
         (status,) = client.get_status("rt_runner").runners
         assert (status.settings.frequency_hz, status.holder) == (1000.0, "")
+
+
+def test_a_runner_prints_what_it_took(alone: Launching) -> None:
+    cpu = max(os.sched_getaffinity(0))
+    chosen = alone.node(
+        "rt_runner", "__name:=chosen", "_frequency:=250", f"_cpu:={cpu}", "_priority:=42",
+        "_overrun:=Catch_Up",
+    )  # fmt: skip
+    plain = alone.node("rt_runner", "__name:=plain")
+    chosen.wait_for_output(
+        f"runner chosen at 250 Hz, CPU {cpu}, priority 42, overrun catch_up: starting"
+    )
+    plain.wait_for_output(
+        "runner plain at 1000 Hz, a CPU with the fewest loops, priority 80, overrun skip: starting"
+    )
+    # Which may be a thousand times what somebody's components were written for.
+    plain.wait_for_output("no ~frequency is set; RTCF 2021 took 1 Hz then")
+    assert chosen.end() == DONE
+    assert plain.end() == DONE
+    assert "no ~frequency" not in chosen.output()
 
 
 def test_a_private_daemon_is_taken_where_the_systems_has_another_master(

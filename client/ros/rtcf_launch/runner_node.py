@@ -327,7 +327,7 @@ class RunnerNode:
 
 def _shown(settings: runner_pb2.RunnerSettings) -> str:
     """Return what the loop is, with the defaults that were taken."""
-    cpu = "the last CPU" if settings.cpu < 0 else f"CPU {settings.cpu}"
+    cpu = "a CPU with the fewest loops" if settings.cpu < 0 else f"CPU {settings.cpu}"
     return (
         f"{settings.frequency_hz:g} Hz, {cpu}, priority {settings.priority}, "
         f"overrun {word(runner_pb2.OverrunPolicy.DESCRIPTOR, settings.overrun)}"
