@@ -26,14 +26,14 @@ std::int32_t narrowed(double value) {
     return static_cast<std::int32_t>(std::clamp(value, kLowest, kHighest));
 }
 
-// An integer of dynamic_reconfigure has 32 bits. One that is declared to go beyond is a double
-// there, which is exact up to 2^53.
+// An integer of dynamic_reconfigure has 32 bits. One that is not declared to stay within them is a
+// double there, which is exact up to 2^53.
 bool isWide(const ParameterDeclaration& declaration) {
     const auto* normal = std::get_if<std::int64_t>(&declaration.default_value);
     if (normal == nullptr) return false;
     const auto beyond = [](double value) { return value < kLowest || value > kHighest; };
-    return beyond(static_cast<double>(*normal)) || beyond(declaration.minimum.value_or(0.0)) ||
-           beyond(declaration.maximum.value_or(0.0));
+    return !declaration.minimum || !declaration.maximum || beyond(static_cast<double>(*normal)) ||
+           beyond(*declaration.minimum) || beyond(*declaration.maximum);
 }
 
 std::string typeOf(const ParameterDeclaration& declaration) {
