@@ -56,6 +56,8 @@ const std::vector<Dependence>& dependences() {
     constexpr const char* kRoscpp = "libroscpp.so";
     constexpr const char* kRosconsole = "librosconsole";
     constexpr const char* kLevels = "levels of loggers, ROS_* messages in the log";
+    constexpr const char* kRefusals = "telling of connections that were refused";
+    constexpr const char* kNetworkMemory = "bounds to the memory that the network takes";
     constexpr auto kFunction = Dependence::Kind::Function;
     static const std::vector<Dependence> list{
         {kFunction,
@@ -68,12 +70,45 @@ const std::vector<Dependence>& dependences() {
          "noticing within seconds that a cable was cut"},
         {kFunction, "_ZN3ros22TransportPublisherLink12onRetryTimerERKNS_16SteadyTimerEventE",
          kRoscpp, "connecting again within seconds after a cable was cut"},
+        {kFunction,
+         "_ZN3ros10Connection4readEjRKN5boost8functionIFvRKNS1_10shared_ptrIS0_EERKNS1_12shared_"
+         "arrayIhEEjbEEE",
+         kRoscpp, kNetworkMemory},
+        {kFunction,
+         "_ZN3ros10Connection18onHeaderLengthReadERKN5boost10shared_ptrIS0_EERKNS1_12shared_"
+         "arrayIhEEjb",
+         kRoscpp, kNetworkMemory},
+        {kFunction,
+         "_ZN3ros22TransportPublisherLink15onMessageLengthERKN5boost10shared_ptrINS_10ConnectionEEE"
+         "RKNS1_12shared_arrayIhEEjb",
+         kRoscpp, "passing over messages that are too large"},
+        {kFunction, "_ZN3ros23TransportSubscriberLink14enqueueMessageERKNS_17SerializedMessageEbb",
+         kRoscpp, "a bound to what waits for slow subscribers"},
+        {kFunction,
+         "_ZN6XmlRpc12XmlRpcSocket6nbReadEiRNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEEPb",
+         "libxmlrpcpp.so", kNetworkMemory},
+        {kFunction, "_ZN3ros7console4impl10initializeEv", kRosconsole, kLevels},
+        {kFunction, "_ZN3ros7console4impl8shutdownEv", kRosconsole, kLevels},
+        {kFunction,
+         "_ZN3ros7console4impl9getHandleERKNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEE",
+         kRosconsole, kLevels},
+        {kFunction, "_ZN3ros7console4impl7getNameB5cxx11EPv", kRosconsole, kLevels},
         {kFunction, "_ZN3ros7console4impl5printEPvNS0_6levels5LevelEPKcS6_S6_i", kRosconsole,
          kLevels},
         {kFunction, "_ZN3ros7console4impl12isEnabledForEPvNS0_6levels5LevelE", kRosconsole,
          kLevels},
+        {kFunction,
+         "_ZN3ros7console4impl11get_loggersERSt3mapINSt7__cxx1112basic_stringIcSt11char_traitsIcES"
+         "aIcEEENS0_6levels5LevelESt4lessIS8_ESaISt4pairIKS8_SA_EEE",
+         kRosconsole, kLevels},
+        {kFunction,
+         "_ZN3ros7console4impl16set_logger_levelERKNSt7__cxx1112basic_stringIcSt11char_traitsIcESaI"
+         "cEEENS0_6levels5LevelE",
+         kRosconsole, kLevels},
         {kFunction, "_ZN3ros7console4impl17register_appenderEPNS0_11LogAppenderE", kRosconsole,
-         "telling of connections that were refused"},
+         kRefusals},
+        {kFunction, "_ZN3ros7console4impl19deregister_appenderEPNS0_11LogAppenderE", kRosconsole,
+         kRefusals},
         // Refusals::log() looks for these; there is no other way to hear of a refusal.
         {Dependence::Kind::Text, "error message in header", kRoscpp,
          "telling that a peer refused a subscription"},
