@@ -84,6 +84,10 @@ void Runner::threadMain() {
     loop_.join(INT64_MAX);
     if (state_ == RunnerState::Stepping) loop_.endStepping();
     stopAll();
+    guarded("telling the end", [this] {  // to those that hear of it by the bridge
+        if (state_ != RunnerState::Faulted) setState(RunnerState::Stopped);
+        publishPicture();
+    });
     if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>());
     // Components may reach for ROS until they are gone.
     plan_ = std::make_unique<Plan>();

@@ -4,8 +4,9 @@
 #include <unistd.h>
 
 #include <array>
-#include <chrono>
+#include <new>
 #include <utility>
+#include <vector>
 
 #include "ros/roscpp/handles.hpp"
 #include "ros/roscpp/quiet_thread.hpp"
@@ -58,25 +59,51 @@ void Introspection::close() {
     if (!open_) return;
     open_ = false;
     services_.close();
+    tellLast();
     shutDown(mutex_, diagnostics_);
     cycles_.close();
 }
 
 void Introspection::watchHealth() {
-    using Clock = std::chrono::steady_clock;
     constexpr auto kLook = std::chrono::milliseconds(20);
-    executor::RunnerState published = executor::RunnerState::Stopped;
     Clock::time_point due = Clock::now();
     for (; !stop_; std::this_thread::sleep_for(kLook)) {
-        const executor::RunnerState state = runner_.picture().state;
-        if (state == published && Clock::now() < due) continue;
         const std::lock_guard lock(mutex_);
+        if (runner_.picture().state == told_ && Clock::now() < due) continue;
         if (!diagnostics_) continue;
-        diagnostic_msgs::DiagnosticArray array = report_.take();
-        array.header.stamp = ros::Time::now();
-        diagnostics_.publish(array);
-        published = state;
+        tell();
         due = Clock::now() + std::chrono::seconds(1);
+    }
+}
+
+void Introspection::tell() {
+    told_ = runner_.picture().state;
+    diagnostic_msgs::DiagnosticArray array = report_.take();
+    array.header.stamp = ros::Time::now();
+    std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(array));
+    const auto size = static_cast<std::uint32_t>(bytes.size());
+    ros::serialization::OStream stream(bytes.data(), size);
+    ros::serialization::serialize(stream, array);
+    try {
+        diagnostics_.publish(RawView{bytes.data(), size, &departures_});
+    } catch (const std::bad_alloc&) {  // the network has all the memory that is for it
+        told_.reset();
+    }
+}
+
+// A topic that closes drops what waits in roscpp.
+void Introspection::tellLast() {
+    constexpr auto kPatience = std::chrono::milliseconds(500);
+    constexpr auto kPause = std::chrono::milliseconds(1);
+    std::unique_lock lock(mutex_);
+    if (!diagnostics_) return;
+    if (runner_.picture().state != told_) tell();
+    const Departures::Until last = departures_.mark();
+    const auto deadline = Clock::now() + kPatience;
+    while (!departures_.gone(last) && Clock::now() < deadline) {
+        lock.unlock();
+        std::this_thread::sleep_for(kPause);
+        lock.lock();
     }
 }
 

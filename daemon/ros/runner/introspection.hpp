@@ -6,14 +6,21 @@
 #include <ros/publisher.h>
 
 #include <atomic>
+#include <chrono>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 
 #include "bridge/outside_call.hpp"
+#include "ros/roscpp/raw_message.hpp"
 #include "ros/runner/cycle_topic.hpp"
 #include "ros/runner/runner_report.hpp"
 #include "ros/runner/runner_services.hpp"
+
+namespace rtcf::executor {
+enum class RunnerState;
+}
 
 namespace rtcf::ros1 {
 
@@ -38,7 +45,11 @@ class Introspection {
     Introspection& operator=(const Introspection&) = delete;
 
    private:
+    using Clock = std::chrono::steady_clock;
+
     void watchHealth();
+    void tell();      // under the lock, with a topic
+    void tellLast();  // the state that the node goes with
 
     executor::RunnerView& runner_;
     CycleTopic cycles_;
@@ -47,9 +58,11 @@ class Introspection {
     bool serves_ = false;
     bool open_ = false;
     std::atomic<bool> stop_{false};
-    std::mutex mutex_;  // diagnostics_
+    std::mutex mutex_;  // all down to report_
     ros::Publisher diagnostics_;
-    DiagnosticReport report_;  // the health's thread's
+    Departures departures_{false};
+    std::optional<executor::RunnerState> told_;
+    DiagnosticReport report_;
     std::thread health_;
 };
 

@@ -3,6 +3,7 @@
 
 peer.py listen TOPIC TYPE   prints the value of each message, of a stamped one its stamp (ns) before
 peer.py send TOPIC VALUE    publishes one latched std_msgs/Float64 and stays
+peer.py health TOPIC        prints `name|message` of each diagnostic status
 peer.py count TOPIC         publishes 1.0, 2.0, ... as std_msgs/Float64, 20 a second
 peer.py node NAME           only has that name; ends when its master says so
 peer.py loggers NODE        does what rqt_logger_level does to a node, prints `done` and ends
@@ -13,6 +14,7 @@ import os
 import sys
 from typing import Any
 
+import diagnostic_msgs.msg
 import roscpp.srv
 import rospy
 import std_msgs.msg
@@ -24,6 +26,12 @@ def show(message: Any) -> None:
     stamp = f"{message.header.stamp.to_nsec()} " if message._has_header else ""
     # In one piece: each publisher is heard by a thread of its own.
     sys.stdout.write(f"{stamp}{message.data}\n")
+    sys.stdout.flush()
+
+
+def show_health(message: Any) -> None:
+    """Prints each status on a line of its own."""
+    sys.stdout.write("".join(f"{each.name}|{each.message}\n" for each in message.status))
     sys.stdout.flush()
 
 
@@ -48,6 +56,8 @@ def main() -> None:
         rospy.init_node("peer", anonymous=True, disable_signals=True)
     if action == "listen":
         rospy.Subscriber(argument, get_message_class(sys.argv[3]), show, tcp_nodelay=True)
+    if action == "health":
+        rospy.Subscriber(argument, diagnostic_msgs.msg.DiagnosticArray, show_health)
     if action == "send":
         publisher = rospy.Publisher(argument, std_msgs.msg.Float64, latch=True, queue_size=1)
         publisher.publish(float(sys.argv[3]))

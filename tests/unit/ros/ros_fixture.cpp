@@ -97,6 +97,12 @@ std::unique_ptr<ChildProcess> RosFixture::count(const std::string& topic) {
         std::vector<std::string>{"/usr/bin/python3", RTCF_PEER, "count", topic}, environment());
 }
 
+std::unique_ptr<ChildProcess> RosFixture::health() {
+    return std::make_unique<ChildProcess>(
+        std::vector<std::string>{"/usr/bin/python3", RTCF_PEER, "health", "/diagnostics"},
+        environment());
+}
+
 std::unique_ptr<ChildProcess> RosFixture::node(const std::string& name) {
     return std::make_unique<ChildProcess>(
         std::vector<std::string>{"/usr/bin/python3", RTCF_PEER, "node", name}, environment());
@@ -113,8 +119,8 @@ std::string RosFixture::lookAtLoggers() {
     return run({"/usr/bin/python3", RTCF_PEER, "loggers", node_->status().node});
 }
 
-void RosFixture::startNode() {
-    node_ = std::make_unique<rtcf::ros1::RosNode>(
+std::unique_ptr<rtcf::ros1::RosNode> RosFixture::makeNode() {
+    return std::make_unique<rtcf::ros1::RosNode>(
         "", "rt_runner", access_,
         [this](const std::string& message) {
             const std::lock_guard lock(mutex_);
@@ -124,6 +130,10 @@ void RosFixture::startNode() {
         [](const rtcf::executor::OutsideCall&, const std::atomic<bool>&) {
             return rtcf::executor::OutsideAnswer{};
         });
+}
+
+void RosFixture::startNode() {
+    node_ = makeNode();
     rtcf::executor::BridgeSettings settings;
     settings.master_uri = masterUri();
     settings.peers = rtcf::executor::Right::Admin;

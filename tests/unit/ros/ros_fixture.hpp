@@ -86,6 +86,8 @@ class RosFixture : public ::testing::Test {
     std::unique_ptr<ChildProcess> send(const std::string& topic, double value);
     /// A rospy node that publishes 1, 2, 3...
     std::unique_ptr<ChildProcess> count(const std::string& topic);
+    /// A rospy node that prints `name|message` of all health that is reported, once it is there.
+    std::unique_ptr<ChildProcess> health();
     /// A rospy node of that name.
     std::unique_ptr<ChildProcess> node(const std::string& name);
     /// What a command such as `rosnode` prints.
@@ -96,6 +98,9 @@ class RosFixture : public ::testing::Test {
     /// Starts the node with this master.
     void startNode();
     void stopNode() { node_.reset(); }
+    /// A node for who starts and ends it himself.
+    std::unique_ptr<rtcf::ros1::RosNode> makeNode();
+    rtcf::executor::Log& log() { return log_; }
     /// Ends the node. @return false if it took as long as only waiting for a master does
     bool nodeEnds();
     rtcf::ros1::RosNode& rosNode() { return *node_; }
