@@ -7,7 +7,8 @@ from contextlib import suppress
 
 
 class HoldingMaster:
-    """Relays to a real master; withdrawals of publishers wait between `hold` and `let_go`."""
+    """Relays to a real master, and counts the calls; withdrawals of publishers wait between
+    `hold` and `let_go`."""
 
     def __init__(self, master_port: int) -> None:
         self._real = ("localhost", master_port)
@@ -15,6 +16,7 @@ class HoldingMaster:
         self.uri = f"http://localhost:{self._listener.getsockname()[1]}"
         self._open = threading.Event()
         self._open.set()
+        self._calls: list[bytes] = []
         self._held: set[socket.socket] = set()
         threading.Thread(target=self._accept, daemon=True).start()
 
@@ -30,6 +32,10 @@ class HoldingMaster:
     def holding(self) -> bool:
         """Whether somebody is waiting now for the answer to a withdrawal."""
         return bool(self._held)
+
+    def calls(self, *parts: bytes) -> int:
+        """Return how many calls there were that have all these in them."""
+        return sum(all(part in call for part in parts) for call in list(self._calls))
 
     def close(self) -> None:
         """Take no more calls."""
@@ -53,6 +59,7 @@ class HoldingMaster:
                 if caller in readable:
                     if not (call := caller.recv(65536)):
                         break
+                    self._calls.append(call)
                     if b"unregisterPublisher" in call:
                         waiting = call
                         self._held.add(caller)

@@ -115,3 +115,43 @@ def test_parameters_of_a_components_own_names_reach_it_and_slips_are_said(
     with launching.client() as (client, name):
         wait_for(lambda: client.get_component("/wave", name).spec.every == 2, "the component")
     assert (launcher.end(), runner.end()) == (DONE, DONE)
+
+
+def tuned(launching: Launching, master: Master) -> tuple[Process, Process]:
+    """Return runner and launcher of a /wave whose amplitude dynparam has set to 4, and whose rate
+    rosparam has set to 3."""
+    runner = running(launching)
+    launcher = launching.node("rt_launcher", "rtcf_examples", "Wave", "__name:=wave")
+    launcher.wait_for_output("loaded into runner")
+    wait_for(lambda: master.parameter("/wave/shape") == "sine", "the parameter server")
+    master.run("rosrun", "dynamic_reconfigure", "dynparam", "set", "/wave", "amplitude", "4.0")
+    wait_for(lambda: master.parameter("/wave/amplitude") == 4.0, "the parameter server")
+    master.run("rosparam", "set", "/wave/rate", "3.0")
+    with launching.client() as (client, name):
+
+        def values() -> list[float]:
+            parameters = client.get_component("/wave", name).parameters
+            return [each.value.double_value for each in parameters[:2]]
+
+        wait_for(lambda: values() == [4.0, 3.0], "the loop to follow")
+    return runner, launcher
+
+
+def test_what_is_tuned_goes_with_the_launch_and_what_somebody_wrote_stays(
+    launching: Launching, master: Master
+) -> None:
+    runner, launcher = tuned(launching, master)
+    assert launcher.end() == DONE
+    wait_for(lambda: master.parameter("/wave") == {"rate": 3.0}, "what was tuned to go")
+    assert runner.end() == DONE
+    assert master.parameter("/wave") == {"rate": 3.0}
+
+
+def test_what_was_there_before_is_put_back_when_the_runner_ends_in_order(
+    launching: Launching, master: Master
+) -> None:
+    rosgraph.Master("/test", master.uri).setParam("/wave/amplitude", 2.0)
+    runner, launcher = tuned(launching, master)
+    assert runner.end() == DONE
+    assert launcher.wait() == LOST
+    wait_for(lambda: master.parameter("/wave") == {"amplitude": 2.0, "rate": 3.0}, "what was there")

@@ -6,9 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import rosgraph
 import rtcf
 import yaml
 from daemon_process import Daemon, stopped, wait_for, wait_until_it_is, with_ros
+from holding_master import HoldingMaster
+from launch_processes import Launching
 from ros_processes import Master
 from rtcf.v1 import runner_pb2
 from values import port_value
@@ -305,6 +308,88 @@ def test_a_new_master_s_values_win_over_those_of_the_loop(tmp_path: Path) -> Non
     finally:
         daemon.end()
         master.end()
+
+
+@pytest.fixture
+def waiting(tmp_path: Path) -> Iterator[tuple[rtcf.Client, Master]]:
+    """Give a loop with Knobs whose master has not come yet, and that master."""
+    master = Master(tmp_path)
+    daemon = Daemon(tmp_path, with_ros(master.uri, ""))
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0))
+        _load(client, "rate:=2.0", "count:=3")
+        client.start()
+        wait_for(
+            lambda: "no ROS master" in client.get_status("rt_runner").runners[0].ros.problem,
+            "the node to look for a master",
+        )
+        yield client, master
+    daemon.end()
+
+
+def test_the_first_master_s_values_win_over_those_of_the_loop(
+    waiting: tuple[rtcf.Client, Master],
+) -> None:
+    client, master = waiting
+    with stopped(client.get_status("rt_runner").runners[0].pid):
+        master.start()
+        master.run("rosparam", "set", f"{_NAME}/rate", "9.0")
+    try:
+        _holds(client, master, 9.0)
+        wait_for(lambda: master.parameter(f"{_NAME}/count") == 3, "what it did not have")
+        assert values(client)["count"] == 3
+    finally:
+        master.end()
+
+
+def test_a_launch_file_s_values_win_over_those_of_the_loop(
+    waiting: tuple[rtcf.Client, Master], tmp_path: Path
+) -> None:
+    client, master = waiting
+    launching = Launching(master, tmp_path)
+    file = tmp_path / "values.launch"
+    file.write_text(
+        f'<launch><param name="{_NAME}/rate" value="9.0"/>'
+        '<node name="waits" pkg="rtcf" type="rt_launcher" args="rtcf_examples Wave"/></launch>'
+    )
+    try:
+        # With a master of its own, which has them before anything else.
+        with stopped(client.get_status("rt_runner").runners[0].pid):
+            launch = launching.start("/usr/bin/roslaunch", "-p", str(master.port), str(file))
+            wait_for(lambda: rosgraph.is_master_online(master.uri), "the master")
+            wait_for(lambda: master.parameter(f"{_NAME}/rate") == 9.0, "the launch file's values")
+        _holds(client, master, 9.0)
+        wait_for(lambda: master.parameter(f"{_NAME}/count") == 3, "what it did not have")
+        assert values(client)["count"] == 3
+        launch.end()
+    finally:
+        launching.end()
+
+
+def test_a_text_that_xml_cannot_carry_is_not_sent_again_and_again(
+    tmp_path: Path, master: Master
+) -> None:
+    way = HoldingMaster(master.port)
+    daemon = Daemon(tmp_path, with_ros(way.uri, ""))
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0))
+            _load(client, "label:=abcd", "rate:=2.5")
+            _holds(client, master, 2.5)
+            wait_for(lambda: master.parameter(f"{_NAME}/label") == "abcd", "the text")
+            assert way.calls(b"setParam", f"{_NAME}/label".encode()) == 1
+            daemon.ctl("set", _NAME, "label:=a\x01b")
+            # Turn after turn the others go on, and it stays where it is.
+            for rate in (4.0, 5.0, 6.0):
+                daemon.ctl("set", _NAME, f"rate:={rate}")
+                _holds(client, master, rate)
+            assert values(client)["label"] == "a\x01b"
+            assert way.calls(b"setParam", f"{_NAME}/label".encode()) == 1
+    finally:
+        daemon.end()
+        way.close()
 
 
 def test_a_text_that_xml_cannot_carry_stays_off_the_parameter_server(
