@@ -8,6 +8,7 @@ import pytest
 import rosgraph
 import rtcf
 from daemon_process import Daemon, clean_environment, wait_for, with_ros
+from launch_processes import Launching
 from ros_processes import Master, reserve_port
 from rtcf.v1 import runner_pb2
 from values import iteration
@@ -16,7 +17,7 @@ _NOBODY = 65534
 _KNOBS = "/arm/knobs"
 
 
-@pytest.fixture(params=["observe", "tune", "operate"])
+@pytest.fixture(params=["none", "observe", "tune", "operate"])
 def peers(request: pytest.FixtureRequest) -> str:
     """Give a right of ROS peers."""
     return str(request.param)
@@ -138,3 +139,43 @@ def test_a_strangers_word_that_time_is_simulated_counts_where_it_may_operate(
     finally:
         daemon.end()
         parameters.deleteParam("/use_sim_time")
+
+
+@pytest.mark.parametrize(
+    ("said", "right"),
+    [
+        ((), runner_pb2.RIGHT_ADMIN),
+        (("_ros_peers:=tune",), runner_pb2.RIGHT_TUNE),
+        (("_ros_peers:=observe",), runner_pb2.RIGHT_OBSERVE),
+    ],
+)
+def test_of_a_launch_they_may_what_its_user_may_unless_it_says_otherwise(
+    tmp_path: Path, master: Master, said: tuple[str, ...], right: runner_pb2.Right
+) -> None:
+    daemon = Daemon(tmp_path, with_ros(master.uri, "") + 'peers = "none"\n')
+    daemon.start()
+    launching = Launching(master, tmp_path, daemon.socket)
+    launching.forget()
+    try:
+        runner = launching.node("rt_runner", *said)
+        runner.wait_for_output("the loop runs")
+        assert "system daemon at" in runner.output()
+        with rtcf.Client(daemon.socket) as client:
+            client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", ns="/arm"))
+            wait_for(lambda: f"{_KNOBS}/set_parameters" in master.services(), "the service")
+            answer = master.call(
+                f"{_KNOBS}/set_parameters", "{config: {doubles: [{name: rate, value: 2.5}]}}"
+            )
+            shown = {each["name"]: each["value"] for each in answer["config"]["doubles"]}
+            assert shown["rate"] == (1.5 if right == runner_pb2.RIGHT_OBSERVE else 2.5)
+            wait_for(lambda: "/rt_runner/deactivate_rt_loop" in master.services(), "the services")
+            answer = master.call("/rt_runner/deactivate_rt_loop")
+            assert answer["success"] == (right == runner_pb2.RIGHT_ADMIN), answer
+            assert client.get_status("rt_runner").runners[0].settings.ros.peers == right
+            # Afterwards the runner has its own again.
+            assert runner.end() == 0
+            settings = client.get_status("rt_runner").runners[0].settings
+            assert settings.ros.peers == runner_pb2.RIGHT_NONE
+    finally:
+        launching.end()
+        daemon.end()

@@ -64,6 +64,8 @@ private parameters:
   ros_stamped              regular expression: topics of numbers and bools that have a header with
                            the time of the cycle
   ros_largest_message_kB   of types of variable size, in both directions (default: 256)
+  ros_peers                what ROS peers may do: none, observe, tune, operate, admin (default:
+                           what you may)
   sim_time                 follow /clock: auto (default: if /use_sim_time), never, always
   max_clock_jump           a clock that goes further in one tick begins anew, in s (default: 10)
   on_crash                 hold, or resume without a component that is optional

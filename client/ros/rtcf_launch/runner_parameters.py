@@ -24,6 +24,7 @@ _OVERRUNS = choices(runner_pb2.OverrunPolicy.DESCRIPTOR)
 _REALTIME = choices(runner_pb2.Realtime.DESCRIPTOR)
 _ON_CRASH = choices(runner_pb2.OnCrash.DESCRIPTOR)
 _SIM_TIME = choices(runner_pb2.SimTime.DESCRIPTOR)
+_PEERS = choices(runner_pb2.Right.DESCRIPTOR)
 _LARGEST = 2**31 - 1  # XML-RPC has no larger integers
 
 _NAMES = (
@@ -32,7 +33,7 @@ _NAMES = (
     *("lock_memory", "safe_heap_size_kB", "safe_stack_size_kB", "cpu_affinity_mask", "cpu"),
     *("priority", "spin", "realtime", "stall_timeout", "warmup_cycles", "on_crash"),
     *("daemon", "on_fault", "ros_latch", "ros_decimation", "ros_decimate"),
-    *("ros_stamped", "ros_largest_message_kB", "sim_time", "max_clock_jump"),
+    *("ros_stamped", "ros_largest_message_kB", "ros_peers", "sim_time", "max_clock_jump"),
 )
 
 
@@ -82,6 +83,7 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
     put("stamped", given.text("ros_stamped"), settings.ros)
     largest = given.integer("ros_largest_message_kB", *_whole("largest_message_kb", ROS))
     put("largest_message_kb", largest, settings.ros)
+    put("peers", _value(_PEERS, given.word("ros_peers", _PEERS)), settings.ros)
     put("sim_time", _value(_SIM_TIME, given.word("sim_time", _SIM_TIME)))
     put("max_clock_jump_s", given.number("max_clock_jump", *_range("max_clock_jump_s")))
 

@@ -45,6 +45,7 @@ def test_each_parameter_of_a_runner_is_a_setting() -> None:
             "ros_decimation": 4,
             "ros_decimate": "/d",
             "ros_stamped": "/s",
+            "ros_peers": "Tune",
             "ros_largest_message_kB": 512,
             "sim_time": "never",
             "max_clock_jump": 2.5,
@@ -78,7 +79,7 @@ def test_each_parameter_of_a_runner_is_a_setting() -> None:
         ros=runner_pb2.RosSettings(
             whitelist="/a", blacklist="/b", queue=7,
             latch="/l", decimation=4, decimate="/d", stamped="/s",
-            largest_message_kb=512,
+            largest_message_kb=512, peers=runner_pb2.RIGHT_TUNE,
         ),
     )  # fmt: skip
 
