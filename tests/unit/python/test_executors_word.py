@@ -6,6 +6,7 @@ import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import rtcf
@@ -158,9 +159,12 @@ def test_parameters_that_ros_changes_one_after_the_other_are_noted_in_one_turn(
             await called_by("alice", daemon.call("Load", load))
         saved: list[str] = []
         save = daemon.store.save
-        monkeypatch.setattr(
-            daemon.store, "save", lambda *state: (saved.append(state[0]), save(*state))
-        )
+
+        def counted(name: str, *state: Any) -> None:
+            saved.append(name)
+            save(name, *state)
+
+        monkeypatch.setattr(daemon.store, "save", counted)
         # While a change is under way, ROS makes many.
         (held / "set_parameters").touch()
         parameters = [rtcf.parse_parameter("kp:=2.0")]
