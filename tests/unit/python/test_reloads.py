@@ -1,0 +1,52 @@
+"""Reloads of the settings: asked for by several at once."""
+
+from pathlib import Path
+
+import grpc
+import pytest
+from daemon_under_test import DEADLINE_S, DaemonUnderTest, wait_for
+from rtcf.v1 import control_pb2, control_pb2_grpc
+
+
+@pytest.fixture
+def judged(stopped_daemon: DaemonUnderTest) -> Path:
+    """A file to which is written when the executor begins and ends to judge settings; it does not
+    end while there is another one beside it, `held`."""
+    notes = stopped_daemon.folder / "judged"
+    notes.touch()
+    held = stopped_daemon.folder / "held"
+    peer = stopped_daemon.executor.read_text().partition("\n")[2]
+    stopped_daemon.executor.write_text(
+        "#!/bin/sh\n"
+        f'if [ "$1" = --check-settings ]; then echo begin >> {notes}\n'
+        f"while [ -e {held} ]; do sleep 0.1; done\n"
+        # Whoever begins beside it does so meanwhile.
+        f"sleep 0.5; echo end >> {notes}; fi\n" + peer
+    )
+    return notes
+
+
+def test_reloads_at_once_take_turns(stopped_daemon: DaemonUnderTest, judged: Path) -> None:
+    daemon = stopped_daemon.start_service()
+    held = judged.with_name("held")
+    held.touch()
+    judged.write_text("")
+    calls = []
+    with grpc.insecure_channel(f"unix:{daemon.socket}") as channel:
+        stub = control_pb2_grpc.ControlStub(channel)  # type: ignore[no-untyped-call]
+        for frequency in (300, 400, 500):
+            # Each is asked for while the first one is under way.
+            daemon.settings.write_text(f"[runner]\nfrequency_hz = {frequency}.0\n")
+            call = stub.Reload(control_pb2.ReloadRequest(), timeout=DEADLINE_S)
+            assert next(call).progress
+            wait_for(judged.read_text, "the first reload")
+            calls.append(call)
+        assert judged.read_text() == "begin\n"
+        held.unlink()
+        results = [list(call)[-1].result for call in calls]
+    assert judged.read_text() == "begin\nend\n" * 3
+    # Each finds what the one before it left: the third reads what the second has.
+    changed = ["defaults of runners changed" in result.notes for result in results]
+    assert changed == [True, True, False]
+    with daemon.client() as client:
+        assert client.get_status().runners[0].settings.frequency_hz == 500.0
