@@ -19,8 +19,9 @@ from rtcfd.access.clients import Clients, Doors
 from rtcfd.access.endpoint import Endpoint
 from rtcfd.catalog.catalog import Catalog
 from rtcfd.catalog.describe import Describer
+from rtcfd.common.aside import Aside
 from rtcfd.common.names import DEFAULT_RUNNER
-from rtcfd.common.refusals import FailedPrecondition, Refusal
+from rtcfd.common.refusals import FailedPrecondition, Refusal, Unavailable
 from rtcfd.configuration import options
 from rtcfd.executor import frames
 from rtcfd.executor.command import ExecutorCommand
@@ -46,6 +47,7 @@ _LAST_WORDS_S = 0.1  # for their answers
 _OTHERS_MESSAGE_KB = 1024
 _OTHERS_STREAMS = 16
 _LAST_ANSWERS_S = 1.0  # likewise where all is well: before a restart
+_LAST_LOOK_S = 5.0  # at settings, for a warning only
 
 
 class Daemon:
@@ -193,7 +195,9 @@ class Daemon:
         log.info("leaving all loops to the next rtcfd")
         self._notify.stopping("leaving all loops to the next rtcfd")
         try:
-            self._read_options()
+            await Aside("file of settings").run(self._read_options, _LAST_LOOK_S)
+        except Unavailable as silence:
+            log.error("not known whether the next rtcfd will take the settings: %s", silence)
         except Refusal as refusal:
             log.error("the next rtcfd will take the last good settings: %s", refusal)
         self._clients.close_door()

@@ -1,9 +1,11 @@
 """Settings and graphs of the service: checked, reloaded, and what stands in for bad ones."""
 
+import asyncio
 import logging
 import os
 import signal
 import subprocess
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,6 +17,7 @@ from rtcfd.common.refusals import Refusal
 from rtcfd.configuration import options
 from rtcfd.configuration.last_good import Settings
 from rtcfd.journal import standing_alone
+from rtcfd.main import Daemon
 
 GOOD = "[runner]\nfrequency_hz = 250.0\n"
 BAD = '[runner]\nfrequency_hz = "fast"\n'
@@ -51,6 +54,78 @@ def test_a_start_with_bad_settings_takes_the_last_good_ones_and_says_so(
     with daemon.client() as client:
         status = client.get_status()
     assert (status.runners[0].settings.frequency_hz, list(status.notes)) == (500.0, [])
+
+
+def test_a_restart_warns_of_settings_that_the_next_rtcfd_will_not_take(
+    stopped_daemon: DaemonUnderTest,
+) -> None:
+    daemon = stopped_daemon
+    daemon.settings.write_text(GOOD)
+    daemon.start_service()
+    daemon.settings.write_text(GOOD + "priority = 70\n")
+    assert daemon.end(signal.SIGUSR1) == 0
+    assert "last good settings" not in daemon.log()
+    daemon.start_service()
+    daemon.settings.write_text(BAD)
+    assert daemon.end(signal.SIGUSR1) == 0
+    said = f"{daemon.settings}:2: runner.frequency_hz must be a number"
+    assert f"the next rtcfd will take the last good settings: {said}" in daemon.log()
+    # And so it does.
+    daemon.start_service()
+    with daemon.client() as client:
+        settings = client.get_status().runners[0].settings
+    assert (settings.frequency_hz, settings.priority) == (250.0, 70)
+
+
+def test_settings_that_cannot_be_read_hold_up_no_restart(
+    stopped_daemon: DaemonUnderTest, caplog: pytest.LogCaptureFixture
+) -> None:
+    daemon = stopped_daemon
+    daemon.settings.touch()
+    daemon.graphs.mkdir()
+    given = options.parse(
+        [
+            *("--socket", str(daemon.socket), "--state-dir", str(daemon.state)),
+            *("--path", str(daemon.packages), "--executor", str(daemon.executor)),
+            *("--runtime-dir", str(daemon.folder / "run"), "--config", str(daemon.settings)),
+            *("--graphs-dir", str(daemon.graphs)),
+        ],
+        BUILD_TREE,
+    )
+    hangs, asked = threading.Event(), threading.Event()
+
+    def read_options() -> options.Options:
+        """Read a file on a server that does not answer."""
+        asked.set()
+        hangs.wait()
+        return given
+
+    async def run() -> int:
+        running = asyncio.create_task(Daemon(given, read_options).run())
+
+        def executor() -> int:
+            with daemon.client() as client:
+                pid: int = client.get_status().runners[0].pid
+            return pid
+
+        while "ready; runners" not in caplog.text:
+            await asyncio.sleep(0.01)
+        pid = await asyncio.to_thread(executor)
+        os.kill(os.getpid(), signal.SIGUSR1)
+        await running
+        return pid
+
+    caplog.set_level(logging.INFO)
+    try:
+        with odd_files.deadline():
+            pid = asyncio.run(run())
+    finally:
+        hangs.set()
+    assert asked.is_set()
+    assert "not known whether the next rtcfd will take the settings" in caplog.text
+    # The executor was left in order to the next one.
+    daemon.start_service()
+    assert daemon.executor_pid() == pid
 
 
 def test_the_last_good_settings_are_on_disk_before_they_have_their_name(
