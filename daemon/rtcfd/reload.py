@@ -148,6 +148,7 @@ class Reloads:
             if part.name in _WORDS and (getattr(new, part.name) != getattr(self._given, part.name)):
                 lines.append(f"{_WORDS[part.name]} changed")
         self._catalog.folders = new.folders
+        self._catalog.look_again()
         self._admission.access = new.access
         self._clients.limits = new.limits
         self._shared.limits = new.limits

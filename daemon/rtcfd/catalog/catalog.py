@@ -79,6 +79,10 @@ class Catalog:
         # They may be on a server that does not answer.
         self._aside = Aside("folders of components")
 
+    def look_again(self) -> None:
+        """Forget what is known of libraries that did not load."""
+        self._describer.forget_failures()
+
     async def find(self, package: str, type_name: str) -> Found:
         """Return the library that offers a type, or refuse and say why."""
         check_base_name("package", package)

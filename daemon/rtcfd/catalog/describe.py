@@ -6,6 +6,7 @@ in rtcfd nor in a loop's process: a crash there is a refusal.
 
 import asyncio
 import os
+import signal
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -29,7 +30,18 @@ _LONGEST_COMPLAINT = 64 * 1024
 _CHUNK = 64 * 1024
 
 _File = tuple[str, int | None]  # path, and whose libraries are trusted
-_Identity = tuple[int, int, int]  # inode, time of change, size
+_Identity = tuple[int, ...]  # inode, time of change, size; and whose it is and who may write it
+# Signals by which a library ends its process itself.  SIGKILL and SIGBUS come of short memory, too.
+_CRASHES = (signal.SIGSEGV, signal.SIGILL, signal.SIGFPE, signal.SIGABRT, signal.SIGTRAP,
+            signal.SIGSYS)  # fmt: skip
+
+
+class _Failed(Exception):
+    """There is no description; `own`: for what the library itself did, whatever is around it."""
+
+    def __init__(self, problem: str, own: bool = False) -> None:
+        super().__init__(problem)
+        self.own = own
 
 
 @dataclass
@@ -38,14 +50,15 @@ class _Known:
 
     identity: _Identity
     description: wire.LibraryDescription
+    lasting: bool  # for as long as the file stays as it is
     since: float = field(default_factory=time.monotonic)
 
     def valid(self, identity: _Identity) -> bool:
         """Tell whether it need not be looked at again: what does not load may do so later, when
-        what it links against is there."""
+        what it links against is there; what crashes will not."""
         if identity != self.identity:
             return False
-        return not self.description.problem or time.monotonic() - self.since < FAILURE_KEPT_S
+        return self.lasting or time.monotonic() - self.since < FAILURE_KEPT_S
 
 
 @dataclass
@@ -65,6 +78,12 @@ class Describer:
         """The libraries whose description is kept, one of each."""
         return [path for path, _ in self._known]
 
+    def forget_failures(self) -> None:
+        """Look again at what did not load, whatever the cause."""
+        failed = [file for file, known in self._known.items() if known.description.problem]
+        for file in failed:
+            del self._known[file]
+
     async def describe(
         self, library: Path, package: str, owner: int | None = None
     ) -> wire.LibraryDescription:
@@ -81,7 +100,10 @@ class Describer:
         except Refusal as refusal:
             return _problem(str(refusal))
         file = (str(library), owner)
-        identity = (found.st_ino, found.st_mtime_ns, found.st_size)
+        identity = (
+            *(found.st_ino, found.st_mtime_ns, found.st_size),
+            *(found.st_mode, found.st_uid, found.st_gid),
+        )
         known = self._known.get(file)
         if known is not None and known.valid(identity):
             return known.description
@@ -99,8 +121,12 @@ class Describer:
     ) -> wire.LibraryDescription:
         path, owner = file
         async with self._slots:
-            description = await self._run(Path(path), package, owner)
-        self._known[file] = _Known(identity, description)
+            try:
+                description = await self._run(Path(path), package, owner)
+                lasting = not description.problem
+            except _Failed as failure:
+                description, lasting = _problem(str(failure)), failure.own
+        self._known[file] = _Known(identity, description, lasting)
         return description
 
     async def _run(self, library: Path, package: str, owner: int | None) -> wire.LibraryDescription:
@@ -119,7 +145,7 @@ class Describer:
                 start_new_session=True,
             )
         except OSError as error:
-            return _problem(f"cannot run {self.binary}: {error.strerror}")
+            raise _Failed(f"cannot run {self.binary}: {error.strerror}") from None
         reading = asyncio.gather(
             _until_end(process, process.stdout, _LONGEST_ANSWER),
             _until_end(process, process.stderr, _LONGEST_COMPLAINT),
@@ -129,22 +155,24 @@ class Describer:
                 output, complaint = await asyncio.shield(reading)
                 await process.wait()
         except TimeoutError:
-            return _problem(f"loading it did not end within {TIMEOUT_S:g} s")
+            raise _Failed(f"loading it did not end within {TIMEOUT_S:g} s") from None
         finally:
             if process.returncode is None:
                 process.kill()
                 await process.wait()
         if len(output) > _LONGEST_ANSWER or len(complaint) > _LONGEST_COMPLAINT:
-            return _problem("the process that loaded it wrote without end")
+            raise _Failed("the process that loaded it wrote without end", own=True)
         status = process.returncode or 0
         if status < 0:
-            return _problem(f"the process that loaded it {describe_exit(status)}")
+            raise _Failed(
+                f"the process that loaded it {describe_exit(status)}", own=-status in _CRASHES
+            )
         try:
             description: wire.LibraryDescription = wire.LibraryDescription.FromString(output)
         except DecodeError:
-            return _problem("the process that loaded it did not answer in the protocol")
+            raise _Failed("the process that loaded it did not answer in the protocol") from None
         if status and not description.problem:
-            return _problem(
+            raise _Failed(
                 f"the process that loaded it {describe_exit(status)}{_last_line(complaint)}"
             )
         return description

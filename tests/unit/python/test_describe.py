@@ -7,6 +7,8 @@ from pathlib import Path
 
 import odd_files
 import pytest
+import rtcf
+from daemon_under_test import DaemonUnderTest
 from rtcfd.catalog import describe
 from rtcfd.catalog.describe import Describer
 
@@ -31,6 +33,7 @@ def describer(tmp_path: Path) -> Describer:
 
 
 def runs(folder: Path) -> int:
+    """Return how many processes there were that describe."""
     return len((folder / "runs").read_text())
 
 
@@ -62,6 +65,68 @@ def test_what_did_not_load_is_looked_at_again_though_its_file_is_the_same(
         assert not (await describer.describe(library, "pkg")).problem
 
     asyncio.run(work())
+
+
+@pytest.mark.parametrize(
+    ("does", "said", "kept"),
+    [
+        ("kill -SEGV $$", "was killed by SIGSEGV", True),
+        ("kill -ABRT $$", "was killed by SIGABRT", True),
+        ("exec yes 'a constructor that complains'", "wrote without end", True),
+        # As where memory is short.
+        ("kill -KILL $$", "was killed by SIGKILL", False),
+        ("kill -BUS $$", "was killed by SIGBUS", False),
+        ("echo libneeded.so: cannot open >&2; exit 1", "libneeded.so: cannot open", False),
+        ("echo nonsense", "did not answer in the protocol", False),
+        ("exec sleep 3600", "did not end within", False),
+    ],
+)
+def test_what_a_library_did_is_kept_and_what_may_have_another_cause_is_not(
+    library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, does: str, said: str, kept: bool
+) -> None:
+    binary = tmp_path / "executor"
+    binary.write_text(f"#!/bin/sh\necho >> {tmp_path}/runs\n{does}\n")
+    binary.chmod(0o755)
+    monkeypatch.setattr(describe, "FAILURE_KEPT_S", 0.0)
+    # However slow this machine is, only the one that sleeps takes so long.
+    monkeypatch.setattr(describe, "TIMEOUT_S", 3.0 if "sleep" in does else 600.0)
+    describer = Describer(binary)
+
+    async def work() -> None:
+        for _ in range(2):
+            assert said in (await describer.describe(library, "pkg")).problem
+
+    asyncio.run(work())
+    assert runs(tmp_path) == (1 if kept else 2)
+
+
+def test_what_is_kept_of_a_failure_ends_with_its_file_with_its_rights_and_with_a_reload(
+    stopped_daemon: DaemonUnderTest,
+) -> None:
+    daemon = stopped_daemon
+    library = daemon.package("odd", crash="SIGSEGV")
+    peer = daemon.executor.read_text().partition("\n")[2]
+    daemon.executor.write_text(
+        f'#!/bin/sh\ncase "$*" in *{library}*) echo >> {daemon.folder}/runs ;; esac\n{peer}'
+    )
+    daemon.start_service()
+
+    def look(client: rtcf.Client) -> int:
+        (problem,) = client.list_types("odd").problems
+        assert "was killed by SIGSEGV" in problem
+        return runs(daemon.folder)
+
+    with daemon.client() as client:
+        assert [look(client), look(client)] == [1, 1]
+        daemon.package("odd", crash="SIGSEGV", rebuilt=True)
+        assert [look(client), look(client)] == [2, 2]
+        # Who may write it may have put other code there, or made it trusted.
+        library.chmod(0o600)
+        assert [look(client), look(client)] == [3, 3]
+        client.reload()
+        assert [look(client), look(client)] == [4, 4]
+        # A library that loads is not loaded again for it.
+        assert not client.list_types("demo").problems
 
 
 def test_of_a_file_that_is_rebuilt_again_and_again_the_last_is_kept(
