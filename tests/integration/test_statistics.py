@@ -2,6 +2,8 @@
 
 import itertools
 import json
+import signal
+from typing import Any
 
 import pytest
 import rtcf
@@ -124,6 +126,62 @@ def test_a_reset_is_one_instant_of_all_figures_of_a_loop_that_is_always_late(
     counts = [each.duration.count for each in figures.components]
     assert counts == [figures.iterations] * 4
     assert 0 < figures.overruns <= figures.iterations == figures.latency.count
+
+
+def test_stats_status_and_list_count_from_the_same_moment(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    policy = runner_pb2.OVERRUN_POLICY_SKIP
+    settings = runner_pb2.RunnerSettings(
+        frequency_hz=20000.0, overrun=policy, orphan_timeout_s=600.0
+    )
+    client.set_runner(settings)
+    client.load(_slow("slow"))
+    client.load(rtcf.component("rtcf_faults", "NotFinite", name="odd", parameters=["after:=0"]))
+
+    def told(*verb: str) -> Any:
+        return json.loads(daemon.ctl(*verb, "-o", "json").stdout)
+
+    def late() -> tuple[int, int]:
+        """Return the overruns and missed cycles of a loop that stands still, as all tell them."""
+        found = [told("stats"), *told("status")["runners"], *told("runner", "list")]
+        (same,) = {(each["overruns"], each["missed"]) for each in found}
+        return same
+
+    def faults() -> int:
+        """Return the faults of the loop, as all tell them."""
+        (status,) = told("status")["runners"]
+        by_component = [{each["component"]: each["faults"] for each in told("stats")["components"]},
+                        {each["full_name"]: each["faults"] for each in told("list")}]  # fmt: skip
+        assert by_component == [{"/slow": 0, "/odd": status["faults"]}] * 2
+        return int(status["faults"])
+
+    def run(client: rtcf.Client) -> int:
+        """Run the loop for a while; return how many cycles it ran."""
+        client.start()
+        wait_for(lambda: client.get_statistics().overruns > 20, "overruns")
+        assert daemon.ctl("stats", "--reset").returncode == 0
+        wait_for(lambda: client.get_statistics().overruns > 20, "overruns")
+        client.stop()
+        return iteration(client)
+
+    cycles = run(client)
+    overruns, missed = late()
+    assert 20 < overruns < cycles
+    assert missed > 0
+    # Faults are told since the loop began: a reset of figures makes none undone.
+    assert faults() == cycles
+    # Also by an rtcfd that was not there when the figures began.
+    daemon.end(signal.SIGKILL)
+    daemon.start()
+    assert (late(), faults()) == ((overruns, missed), cycles)
+    assert daemon.ctl("stats", "--reset").returncode == 0
+    assert (late(), faults()) == ((0, 0), cycles)
+    # Another start begins all of them anew.
+    with rtcf.Client(daemon.socket) as another:
+        again = run(another)
+    assert late()[0] < again
+    assert faults() == again
 
 
 def test_cycles_of_a_stopped_loop_are_the_same_in_status_and_statistics(
