@@ -1,7 +1,10 @@
 """What rtcfctl prints for machines: each verb speaks JSON and YAML."""
 
 import json
+import os
+import re
 import shlex
+from pathlib import Path
 
 import pytest
 import yaml
@@ -36,6 +39,37 @@ SESSION = [
     "runner remove arm",
 ]
 
+# What goes on in a loop with faults, and what is refused; each fault is another.
+TROUBLE = [
+    "load rtcf_faults NotFinite --name odd --param after:=3",
+    "load rtcf_faults Throws --name jumps --param after:=3 --optional",
+    "status",
+    "list",
+    "info odd",
+    "info jumps",
+    "stats",
+    "runner list",
+    "step 3",
+    "load rtcf_test Knobs --name other --param nope:=1",
+    "load rtcf_test Knobs --name other --remap nope:=1",
+    "load rtcf_test Knobs --name odd",
+    "load rtcf_test FailingConfigure",
+    "load rtcf_test Unresolved",
+    "load rtcf_test Nothing",
+    "load nothing Nothing",
+    "set odd after:=x",
+    "unload nobody",
+    "runner remove nobody",
+    "stop",
+    "runner set rt_runner --realtime required",
+    "start",
+    "status",
+]
+# Without what makes a loop real time.
+NO_RIGHTS = ("setpriv", "--inh-caps=-all", "--bounding-set=-sys_nice,-ipc_lock,-sys_resource",
+             "prlimit", "--rtprio=0", "--memlock=65536")  # fmt: skip
+CLAUSES = re.compile(r"\n|  +|; |, |(?<=\w): |[()]")
+
 
 @pytest.mark.parametrize("kind", ["json", "yaml"])
 def test_each_verb_speaks_to_machines(daemon: Daemon, kind: str) -> None:
@@ -62,3 +96,20 @@ def test_values_have_the_types_they_were_declared_with(daemon: Daemon) -> None:
     ports = {each["name"]: each for each in found["ports"]}
     assert (ports["product"]["value"], ports["product"]["count"]) == ({"data": 3}, 1)
     assert ports["product"]["direction"] == "output"
+
+
+def test_nothing_is_said_twice_in_one_answer(tmp_path: Path) -> None:
+    daemon = Daemon(tmp_path, wrapper=NO_RIGHTS if os.geteuid() == 0 else NO_RIGHTS[3:])
+    daemon.start()
+    try:
+        # `types` names libraries that lack the same.
+        for command in [each for each in SESSION[:-2] if each != "types"] + TROUBLE:
+            done = daemon.ctl("-v", *shlex.split(command))
+            answer = f"{done.stdout}\n{done.stderr}"
+            clauses = [each.strip(" !") for each in CLAUSES.split(answer)]
+            clauses = [each for each in clauses if len(each.split()) > 3]
+            assert len(clauses) == len(set(clauses)), f"{command}: {answer}"
+            if command == "start" and done.returncode == 0:
+                assert "IS NOT REAL TIME" in answer
+    finally:
+        daemon.end()
