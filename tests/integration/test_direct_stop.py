@@ -1,5 +1,6 @@
 """Stopping loops at their executors: rtcfd is stopped, dead or full, or the disk is full."""
 
+import contextlib
 import os
 import resource
 import signal
@@ -187,6 +188,62 @@ def test_a_full_disk_holds_up_no_stop_and_the_loop_stays_stopped(tmp_path: Path)
     with rtcf.Client(daemon.socket) as client:
         assert not runs(client)
     daemon.end()
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """Give a folder whose `state` is a disk of its own, which holds little."""
+    folder = tmp_path / "d"
+    disk = folder / "state"
+    disk.mkdir(parents=True)
+    mounting = ["mount", "-t", "tmpfs", "-o", "size=256k,mode=0700", "rtcf-test", str(disk)]
+    mounted = subprocess.run(mounting, capture_output=True, text=True, check=False)
+    if mounted.returncode:
+        pytest.skip(f"may not mount here: {mounted.stderr.strip()}")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", "--lazy", str(disk)], check=True)
+
+
+def fill(disk: Path) -> None:
+    """Leave no free byte."""
+    with (disk / "filler").open("wb", buffering=0) as filler:
+        for size in (4096, 1):
+            with contextlib.suppress(OSError):
+                while True:
+                    filler.write(b"x" * size)
+    found = os.statvfs(disk)
+    assert (found.f_bfree, found.f_bavail) == (0, 0)
+
+
+def test_a_disk_without_a_free_byte_holds_up_no_stop(small_disk: Path) -> None:
+    disk = small_disk / "state"
+    daemon = Daemon(small_disk, RESUME)
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            begin(client)
+            fill(disk)
+            result = client.stop()
+            assert any("not saved" in note for note in result.notes), result
+            assert not runs(client)
+            assert not mark(daemon).exists()
+            # Nor where nobody but the executor can stop it.
+            begin(client)
+            with stopped(daemon.pid):
+                done = daemon.ctl("stop")
+                assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
+                assert not mark(daemon).exists()
+            wait_for(lambda: not runs(client), "rtcfd to know")
+        # What is on disk says that it runs, as there was no room to say otherwise.
+        assert '"running": true' in (disk / "rt_runner.json").read_text()
+        daemon.end(signal.SIGKILL)
+        daemon.start()
+        with rtcf.Client(daemon.socket) as client:
+            assert not runs(client)
+    finally:
+        daemon.end()
 
 
 @pytest.fixture
