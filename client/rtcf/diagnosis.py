@@ -75,10 +75,21 @@ def cpus(text: str) -> set[int]:
     return found
 
 
-def last_cpu_of(host: Host, pid: int) -> int | None:
-    """Return the last CPU that a process may use: where a loop runs by default."""
+def cpu_of_next_loop(host: Host, pid: int) -> int | None:
+    """Return the CPU that a loop gets which may choose among those of a process: of those with
+    the fewest loops an isolated one, else the last.  As executors do (cpu_claim.cpp)."""
     match = re.search(r"^Cpus_allowed_list:\s*(\S+)", host.read(f"/proc/{pid}/status") or "", re.M)
-    return max(cpus(match[1]), default=None) if match else None
+    if not match or not (allowed := cpus(match[1])):
+        return None
+    isolated = cpus(host.read("/sys/devices/system/cpu/isolated") or "")
+    best_first = sorted(allowed, key=lambda cpu: (cpu not in isolated, -cpu))
+    # Each loop in real time has the first name of its CPU that no other one has.
+    names = re.findall(r"@rtcf-loop-cpu-(\S+)$", host.read("/proc/net/unix") or "", re.M)
+    for place in range(len(names) + 1):
+        for cpu in best_first:
+            if (f"{cpu}-{place}" if place else str(cpu)) not in names:
+                return cpu
+    return None
 
 
 def _kernel(host: Host, _: Loop) -> Iterator[Finding]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import rtcf
-from rtcf.diagnosis import Finding, Grade, Host, Loop, diagnose, last_cpu_of
+from rtcf.diagnosis import Finding, Grade, Host, Loop, cpu_of_next_loop, diagnose
 from rtcf.v1 import control_pb2, runner_pb2
 
 from rtcfctl.output import Output
@@ -168,7 +168,7 @@ def _cpu_of(host: Host, status: runner_pb2.RunnerStatus) -> int:
         return int(found[1])
     if status.settings.cpu >= 0:
         return int(status.settings.cpu)
-    known = (last_cpu_of(host, pid) for pid in (status.pid, os.getpid()))
+    known = (cpu_of_next_loop(host, pid) for pid in (status.pid, os.getpid()))
     return next((cpu for cpu in known if cpu is not None), 0)
 
 

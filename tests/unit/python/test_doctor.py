@@ -1,11 +1,13 @@
 """`rtcfctl doctor`: each finding follows the machine, here of files made for it; and for real."""
 
 import json
+import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 from daemon_under_test import DaemonUnderTest, wait_for
-from rtcf.diagnosis import Finding, Grade, Host, Loop, cpus, diagnose
+from rtcf.diagnosis import Finding, Grade, Host, Loop, cpu_of_next_loop, cpus, diagnose
 from rtcf.v1 import runner_pb2
 from rtcfctl import doctor
 from rtcfctl.output import Output
@@ -152,6 +154,60 @@ def test_it_measures_and_judges_for_real_and_leaves_nothing_behind(
 def test_the_worst_that_was_found_is_the_exit_code(grades: list[Grade], code: int) -> None:
     found = [Finding(f"topic {at}", grade, "so", "otherwise") for at, grade in enumerate(grades)]
     assert [doctor.report(found, None, Output(kind)) for kind in ("table", "json")] == [code, code]
+
+
+@pytest.mark.parametrize(
+    ("allowed", "isolated", "loops", "cpu"),
+    [
+        ("0-3", "", "", 3),
+        ("0-2", "", "", 2),
+        ("0-3", "1-2", "", 2),
+        ("0-1", "2-3", "", 1),
+        # Of those with the fewest loops.
+        ("0-3", "", "3", 2),
+        ("0-3", "1-2", "2", 1),
+        ("0-3", "1-2", "1 2 13", 3),
+        ("0-1", "", "0 1", 1),
+        ("0-1", "", "0 1 1-1", 0),
+        ("0", "", "0 0-1 0-2", 0),
+    ],
+)
+def test_a_loop_that_may_choose_gets_the_cpu_that_executors_take(
+    tmp_path: Path, allowed: str, isolated: str, loops: str, cpu: int
+) -> None:
+    lines = ["Num RefCount Protocol Flags Type St Inode Path"]
+    lines += [f"00: 2 0 0 0002 01 7 @rtcf-loop-cpu-{each}" for each in loops.split()]
+    # As a bus and others have.
+    lines += ["00: 2 0 0 0001 03 8", "00: 2 0 0 0001 03 9 @/tmp/.X11-unix/X0"]
+    changes = {
+        f"/proc/{PID}/status": f"Name:\tx\nCpus_allowed_list:\t{allowed}\nMems_allowed_list:\t0",
+        f"{CPU}/isolated": isolated,
+        "/proc/net/unix": "\n".join(lines),
+    }
+    findings(tmp_path, changes)
+    assert cpu_of_next_loop(Host(tmp_path), PID) == cpu
+
+
+def test_it_measures_where_the_loop_would_run_and_at_its_priority(
+    daemon: DaemonUnderTest,
+) -> None:
+    cpu = min(os.sched_getaffinity(0))
+    with daemon.client() as client:
+        client.set_runner(runner_pb2.RunnerSettings(cpu=cpu, priority=63))
+        done = daemon.ctl("-o", "json", "doctor", "--seconds", "0.2")
+        found = {each["topic"]: each["found"] for each in json.loads(done.stdout)["findings"]}
+        assert found["wake-up latency"].endswith(f" worst, on CPU {cpu} at priority 63 in 0.2 s")
+        process = daemon.ctl_process("doctor", "--seconds", "3000")
+        name = f"doctor_{process.pid}"
+
+        def measured() -> Any:
+            return next((each for each in client.get_status().runners if each.runner == name), None)
+
+        loop = wait_for(measured, "its loop")
+        assert (loop.settings.cpu, loop.settings.priority) == (cpu, 63)
+        process.terminate()
+        process.communicate()
+        wait_for(lambda: measured() is None, "the end of its loop")
 
 
 def test_without_rtcfd_it_looks_all_the_same(tmp_path: Path, daemon: DaemonUnderTest) -> None:
