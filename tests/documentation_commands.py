@@ -7,6 +7,7 @@ PAGES = [TREE / "README.md", *sorted((TREE / "docs").glob("*.md"))]
 _APT = "installs packages"
 _BOOTED = "types it in a booted Debian: tests/system/test_pages.py"
 _LAUNCH = "has a master and a launch: tests/integration/test_launch_files.py"
+_BY_BLOCK = "is typed with the lines around it: tests/integration/test_docs.py"
 _WORKSPACE = "builds a workspace so: tests/integration/test_old_workspace.py"
 
 # By page: how a line begins, and what else types it, or what it would take.
@@ -35,10 +36,10 @@ ELSEWHERE: dict[str, dict[str, str]] = {
     "ros-setup.md": {
         "sudo apt install ": _APT,
         "roslaunch ": _LAUNCH,
-        "mkdir ": "is of the reader's home",
-        "cd ~/ws": "is of the reader's home",
-        "catkin_make ": _WORKSPACE,
-        ". install/setup.sh": _WORKSPACE,
+        "mkdir ": _BY_BLOCK,
+        "cd ~/ws": _BY_BLOCK,
+        "catkin_make ": _BY_BLOCK,
+        ". install/setup.sh": _BY_BLOCK,
     },
     "ros.md": {
         "rosservice ": "takes two machines and a master: tests/integration/test_ros_names.py",

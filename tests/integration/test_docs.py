@@ -13,8 +13,9 @@ import pytest
 import rosbag
 import rospy
 import rtcf
-from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for
+from daemon_process import BUILD_TREE, NO_ROS, Daemon, clean_environment, wait_for
 from documentation_commands import pages_typed, typed
+from launch_processes import build_tree_environment
 from pages import TREE
 from std_msgs.msg import Float64
 
@@ -116,7 +117,7 @@ def _left_running(
 
 def _block(page: str, language: str, holding: str) -> str:
     """Return the block of a page that has a text in it."""
-    text = (TREE / "docs" / page).read_text()
+    text = (TREE / page if page == "README.md" else TREE / "docs" / page).read_text()
     blocks = re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     (found,) = (str(block) for block in blocks if holding in block)
     return found
@@ -158,3 +159,41 @@ def test_the_component_in_python_of_the_page_is_compiled_and_loaded(tmp_path: Pa
         with _left_running(watch, tmp_path, environment, "loaded /Observer"):
             pass
     _type(verify, tmp_path, environment)
+
+
+def test_the_workspace_of_the_page_is_built_and_a_daemon_loads_from_the_folder_it_names(
+    tmp_path: Path,
+) -> None:
+    page = (TREE / "docs" / "ros-setup.md").read_text()
+    package = tmp_path / "ws" / "src" / "my_package"
+    environment = build_tree_environment(_environment(tmp_path)) | {"HOME": str(tmp_path)}
+    begin, build = (_block("ros-setup.md", "sh", each) for each in ("mkdir -p ~/ws", "catkin_make"))
+    _type("\n".join(begin.splitlines()[1:]), tmp_path, environment)  # without those of apt
+    (package / "package.xml").write_text(_block("ros-setup.md", "xml", "<name>my_package"))
+    (package / "CMakeLists.txt").write_text(_block("ros-setup.md", "cmake", "project(my_package"))
+    (package / "gain.cpp").write_text(_block("README.md", "cpp", "class Gain "))
+    # Nothing to debug or to be fast here; the last line is what a launch is begun in.
+    environment["CXXFLAGS"] = "-O0"
+    _type(f"set -e\n{build}env -0 > ~/given", tmp_path, environment)
+    text = (tmp_path / "given").read_text()
+    sourced = dict(line.split("=", 1) for line in text.split("\0") if "=" in line)
+    assert f"{tmp_path}/ws/install" in sourced["CMAKE_PREFIX_PATH"].split(":")
+    (said,) = re.findall(r"components are in `(\S+)`", page)
+    assert [each.name for each in (tmp_path / "ws" / said).iterdir()] == ["my_package.so"]
+
+    # Where the settings name the folder, and where the workspace is in the environment.
+    (path,) = re.findall(r"`(path = \[.*\])`", page)
+    named = tmp_path / "named"
+    found = tmp_path / "found"
+    daemons = [
+        Daemon(named, f"[daemon]\n{path.replace('/home/alice', str(tmp_path))}\n{NO_ROS}"),
+        Daemon(found, environment={"CMAKE_PREFIX_PATH": sourced["CMAKE_PREFIX_PATH"]}),
+    ]
+    for daemon in daemons:
+        daemon.folder.mkdir()
+        daemon.start()
+        try:
+            done = daemon.ctl("load", "my_package", "Gain", "--param", "gain:=2.5")
+            assert (done.returncode, done.stdout) == (0, "loaded /Gain\n"), done.stderr
+        finally:
+            daemon.end()
