@@ -134,3 +134,43 @@ def test_the_workspace_has_nothing_in_the_way_of_rtcfs_own_programs(workspace: P
     for space in ("devel", "install"):
         assert not (workspace / space / "lib" / "rtcf").exists()
     assert (BUILD_TREE / "devel" / "lib" / "rtcf" / "rt_runner").exists()
+
+
+@pytest.mark.parametrize(
+    ("line", "said", "instead"),
+    [
+        ("orocos_plugin(clock clock.cpp)", "orocos_plugin(clock): rtcf has no plugins",
+         "orocos_library()"),
+        ("orocos_service(clock clock.cpp)", "orocos_service(clock): rtcf has no plugins",
+         "orocos_library()"),
+        ("orocos_executable(deploy main.cpp)", "orocos_executable(deploy): programs on OROCOS",
+         "orocos_component()"),
+        # What has only nothing to do here is no error.
+        ("orocos_typekit(types types.hpp)", "orocos_typekit(types) does nothing", ""),
+        ("orocos_typegen_headers(types.hpp)", "orocos_typegen_headers() does nothing", ""),
+    ],
+    ids=lambda text: str(text).partition("(")[0],
+)  # fmt: skip
+def test_what_has_no_place_in_rtcf_is_said_when_cmake_runs(
+    tmp_path: Path, line: str, said: str, instead: str
+) -> None:
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.0.2)\nproject(old LANGUAGES CXX)\n"
+        "find_package(OROCOS-RTT REQUIRED)\n"
+        f"include(${{OROCOS-RTT_USE_FILE_PATH}}/UseOROCOS-RTT.cmake)\n{line}\n"
+    )
+    done = subprocess.run(
+        ["cmake", "-Wno-dev", "-Wno-deprecated", "-S", str(tmp_path), "-B", str(tmp_path / "b")],
+        env=build_tree_environment(clean_environment()),
+        capture_output=True,
+        text=True,
+        timeout=BUILD_S,
+        check=False,
+    )
+    # CMake folds what is an error.
+    output = " ".join(f"{done.stdout} {done.stderr}".split())
+    assert said in output
+    assert (done.returncode != DONE) == bool(instead), output
+    if instead:
+        assert instead in output
+        assert "CMakeLists.txt:5 (orocos_" in output, "which line it is"

@@ -44,13 +44,16 @@ function(orocos_typegen_headers)
 endfunction()
 
 # What has no place in rtcf is said when CMake runs, not when a component is missing.
-function(orocos_plugin target)
-  message(FATAL_ERROR "orocos_plugin(${target}): rtcf has no plugins and services of OROCOS; "
+function(_rtcf_oro_no_plugins call)
+  message(FATAL_ERROR "${call}: rtcf has no plugins and services of OROCOS; "
                       "build what components share by orocos_library()")
 endfunction()
-macro(orocos_service)
-  orocos_plugin(${ARGV})
-endmacro()
+function(orocos_plugin target)
+  _rtcf_oro_no_plugins("orocos_plugin(${target})")
+endfunction()
+function(orocos_service target)
+  _rtcf_oro_no_plugins("orocos_service(${target})")
+endfunction()
 function(orocos_executable target)
   message(FATAL_ERROR "orocos_executable(${target}): programs on OROCOS do not run with rtcf; "
                       "components do, by orocos_component()")
