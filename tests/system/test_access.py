@@ -56,6 +56,19 @@ def test_an_observer_sees_everything_and_changes_nothing(levels: Service) -> Non
     levels.wait_until_said("Load by alice (uid ")
 
 
+def test_an_observer_wakes_rtcfd_up_and_starts_no_loop(levels: Service) -> None:
+    levels.ctl("runner", "set", "--on-boot", "resume")
+    levels.systemctl("stop", "rtcfd.service")
+    assert levels.unit_property("ActiveState", "rtcfd.socket") == "active"
+    assert levels.ctl("order", user="alice").stdout.split() == ["/M"]
+    wait_for(lambda: levels.unit_property("ActiveState") == "active", "rtcfd to be up")
+    assert levels.status()["state"] == "stopped"
+    assert not levels.said("loop resumed")
+    # Who may operate starts it.
+    levels.ctl("start", user="bob")
+    assert levels.status()["state"] == "running"
+
+
 def test_an_operator_runs_loops_but_loads_no_code(levels: Service) -> None:
     levels.ctl("stop", user="bob")
     levels.ctl("start", user="bob")

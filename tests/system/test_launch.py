@@ -1,7 +1,9 @@
 """roslaunch with the installed packages, by a user who has no right to the system's daemon."""
 
+import shlex
 import signal
 
+import pages
 import pytest
 from machine import Machine, wait_for
 
@@ -33,6 +35,18 @@ def test_the_papers_evaluation_runs_from_the_packages(machine: Machine, user: st
         launch.wait(120.0)
     assert launch.returncode in (0, -signal.SIGINT)
     assert "escalating" not in output.read_text()
+
+
+def test_the_launch_files_that_the_page_names_are_in_the_packages(machine: Machine) -> None:
+    text = (pages.TREE / "docs" / "launching.md").read_text()
+    lines = (shlex.split(line, comments=True) for line in pages.shell_lines(text))
+    named = [words[1:] for words in lines if words[0] == "roslaunch"]
+    assert ["rtcf_examples", "paper_evaluation.launch"] in named
+    for words in named:
+        roslaunch = f"{ROS} export HOME=/root; roslaunch --files {shlex.join(words)}"
+        (file,) = machine.shell(roslaunch).stdout.split()
+        (package,) = machine.shell(f"dpkg-query --search {file} | cut -d: -f1").stdout.split()
+        assert package == "rtcf-components", "as the page says"
 
 
 @pytest.mark.parametrize("program", ["rt_runner", "rt_launcher", "component_list"])

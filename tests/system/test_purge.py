@@ -28,6 +28,19 @@ def test_removal_in_the_moment_after_rtcfd_died_ends_its_loops(machine: Machine)
         machine.shell("apt-get install --yes --quiet /debs/*.deb")
 
 
+def test_an_installation_after_a_removal_starts_no_loop(machine: Machine) -> None:
+    service = Service(machine)
+    service.reset()
+    service.load_and_start()
+    service.ctl("runner", "set", "--on-boot", "resume")
+    machine.run("apt-get", "remove", "--yes", "--quiet", *PACKAGES)
+    machine.shell("apt-get install --yes --quiet /debs/*.deb")
+    # Its graph is there, and was stopped in order.
+    assert service.ctl("order").stdout.split() == ["/M"]
+    assert service.status()["state"] == "stopped"
+    assert not service.said("loop resumed")
+
+
 def test_removal_ends_everything_and_keeps_settings_and_state(machine: Machine) -> None:
     # Not by its fixture: afterwards there is no service to put back.
     service = Service(machine)
