@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t kLargestBatch = std::size_t{512} * 1024;  // bytes of values, about
 constexpr int kMostCycles = 4096;                               // of a batch
-constexpr std::size_t kMostTables = 64;                         // that a stream is behind
+constexpr std::size_t kMostTables = 8;                          // that a stream is behind
 
 // Values of one column, as they travel: of outputs as ROS messages, of states as they lie in
 // memory.
