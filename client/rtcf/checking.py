@@ -68,7 +68,7 @@ def check(
                "--cycles", str(cycles)]  # fmt: skip
     for parameter in parameters:
         command += ["--param", parameter]
-    watched = Watched(command, os.environ | {"RTSAN_OPTIONS": _options()})
+    watched = Watched(command, os.environ | {"RTSAN_OPTIONS": sanitizer_options()})
     status = watched.wait()
     lines = watched.errors
     found = Checked(str(library), list(violations(lines)))
@@ -130,7 +130,7 @@ def _find(executor: Path, folders: Sequence[Path], package: str, type_name: str)
     )
 
 
-def _options() -> str:
+def sanitizer_options() -> str:
     """Return the sanitizer's options: all reports, with source lines by what there is."""
     options = ["halt_on_error=false", "print_stats_on_exit=false"]
     symbolizer = next(filter(None, map(shutil.which, _SYMBOLIZERS)), None)

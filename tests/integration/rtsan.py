@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from daemon_process import BUILD_TREE, Daemon
+from rtcf.checking import sanitizer_options
 from rtcf.sanitizer import Violation, violations
 
 EXECUTOR = BUILD_TREE.with_name(f"{BUILD_TREE.name}-rtsan") / "bin" / "rtcf-executor"
@@ -10,8 +11,9 @@ HOW_TO_BUILD = (
     f"there is no {EXECUTOR}: cmake -S . -B {EXECUTOR.parents[1].name} -G Ninja "
     "-DRTCF_SANITIZE=realtime -DCMAKE_CXX_COMPILER=clang++-22, and build rtcf-executor there"
 )
-# Of all reports, as a loop that was ended at the first would hide the others.
-ENVIRONMENT = {"RTSAN_OPTIONS": "halt_on_error=false:print_stats_on_exit=false"}
+# Of all reports, as a loop that was ended at the first would hide the others; with names by what
+# this machine has for that.
+ENVIRONMENT = {"RTSAN_OPTIONS": sanitizer_options()}
 
 
 def sanitized_daemon(folder: Path, settings: str) -> Daemon:
