@@ -120,7 +120,8 @@ def test_a_reset_is_one_instant_of_all_figures_of_a_loop_that_is_always_late(
     client.stop()
     status, figures = state(client), client.get_statistics()
     assert (status.overruns, status.missed) == (figures.overruns, figures.missed)
-    assert (figures.missed > 0) == (policy == runner_pb2.OVERRUN_POLICY_SKIP)
+    # Catching up drops cycles too, but only after a hundred in a row.
+    assert figures.missed > 0 or policy == runner_pb2.OVERRUN_POLICY_CATCH_UP
     causes = figures.late_wake_ups + figures.exchange_overruns + figures.catching_up
     assert causes + sum(each.overruns for each in figures.components) == figures.overruns
     counts = [each.duration.count for each in figures.components]
@@ -235,15 +236,15 @@ def test_a_component_that_left_leaves_the_figures(client: rtcf.Client) -> None:
 
 
 @pytest.mark.parametrize(
-    ("policy", "misses"),
+    "policy",
     [
-        (runner_pb2.OVERRUN_POLICY_SKIP, True),
-        (runner_pb2.OVERRUN_POLICY_CATCH_UP, False),
-        (runner_pb2.OVERRUN_POLICY_RELATIVE, False),
+        runner_pb2.OVERRUN_POLICY_SKIP,
+        runner_pb2.OVERRUN_POLICY_CATCH_UP,
+        runner_pb2.OVERRUN_POLICY_RELATIVE,
     ],
 )
 def test_the_overrun_policy_changes_while_the_loop_runs(
-    client: rtcf.Client, policy: runner_pb2.OverrunPolicy, misses: bool
+    client: rtcf.Client, policy: runner_pb2.OverrunPolicy
 ) -> None:
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=10000.0))
     client.load(_slow("slow"))
@@ -252,7 +253,12 @@ def test_the_overrun_policy_changes_while_the_loop_runs(
     wait_for(lambda: iteration(client) > 20, "some cycles")
     client.reset_statistics()
     wait_for(lambda: client.get_statistics().overruns > 50, "overruns")
-    assert (client.get_statistics().missed > 0) == misses
+    figures = client.get_statistics()
+    if policy == runner_pb2.OVERRUN_POLICY_CATCH_UP:
+        # It falls behind, and drops cycles only after a hundred in a row.
+        assert figures.latency.max_ns > 100_000
+    else:
+        assert (figures.missed > 0) == (policy == runner_pb2.OVERRUN_POLICY_SKIP)
 
 
 def test_rates_that_do_not_go_together_are_refused_with_what_does(
