@@ -17,12 +17,11 @@ from rtcf_shared import durable
 from rtcfd.common import regular_files
 from rtcfd.common.aside import Aside
 from rtcfd.common.names import absolute, full_name
+from rtcfd.common.nonsense import NONSENSE
 from rtcfd.common.refusals import Unavailable
 
 _Kinds = control_pb2.Difference
 _Identity = tuple[int, int, int]  # inode, time of change, size
-# Of a file that is none of ours.
-_NONSENSE = (ValueError, TypeError, AttributeError, LookupError, OverflowError, RecursionError)
 _TIMEOUT_S = 2.0  # for folders to answer, which may be remote
 
 
@@ -101,7 +100,7 @@ class LoadedCode:
     def restore(self, file: Path) -> None:
         """Take what the rtcfd before this one left."""
         self._files = {}
-        with contextlib.suppress(OSError, *_NONSENSE):
+        with contextlib.suppress(OSError, *NONSENSE):
             found = json.loads(regular_files.read_bytes(file))
             self._files = {
                 str(name): (str(path), (int(then[0]), int(then[1]), int(then[2])))

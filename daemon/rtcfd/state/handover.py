@@ -16,6 +16,7 @@ from rtcf.v1 import runner_pb2
 from rtcf_shared import durable
 
 from rtcfd.common import regular_files
+from rtcfd.common.nonsense import NONSENSE
 
 log = logging.getLogger(__name__)
 
@@ -41,16 +42,7 @@ def read(folder: Path) -> Handover | None:
         return Handover(defaults, {str(k): str(v) for k, v in document["graphs"].items()})
     except FileNotFoundError:
         return None
-    except (
-        OSError,
-        ValueError,
-        TypeError,
-        KeyError,
-        AttributeError,
-        OverflowError,
-        RecursionError,
-        json_format.ParseError,
-    ):
+    except (OSError, *NONSENSE):
         log.warning("%s is of no use: runners are taken as they are", file)
         return None
 

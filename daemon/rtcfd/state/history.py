@@ -15,6 +15,8 @@ from typing import Any
 from google.protobuf import json_format
 from rtcf.v1 import graph_pb2
 
+from rtcfd.common.nonsense import NONSENSE
+
 MOST_OF_A_COMPONENT = 200
 MOST = 4000
 # Texts may be long. The newest that was changed at once stays, however large.
@@ -114,14 +116,7 @@ class History:
             self._bytes_on_disk += len(line)
             try:
                 change = _change(line)
-            except (
-                ValueError,
-                TypeError,
-                KeyError,
-                OverflowError,
-                RecursionError,
-                json_format.ParseError,
-            ):
+            except NONSENSE:
                 continue
             self._put(change)
             self._last = max(self._last, change.number)

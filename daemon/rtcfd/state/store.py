@@ -23,6 +23,7 @@ from rtcf_shared import durable
 
 from rtcfd.common import regular_files
 from rtcfd.common.names import check_base_name, full_name
+from rtcfd.common.nonsense import NONSENSE
 from rtcfd.common.refusals import Refusal
 from rtcfd.state import history
 from rtcfd.state.desired import Desired, HoldTerms, LeaseTerms, this_boot
@@ -94,16 +95,7 @@ class Store:
                 self._set_aside(file, "unreadable", _UNREADABLE.format(error.strerror))
             except _Newer as newer:
                 self._set_aside(file, "newer", str(newer))
-            except (
-                ValueError,
-                TypeError,
-                KeyError,
-                AttributeError,
-                OverflowError,
-                RecursionError,
-                json_format.ParseError,
-                Refusal,
-            ) as error:
+            except (*NONSENSE, Refusal) as error:
                 reason = " ".join(str(error).split())
                 self._set_aside(file, "corrupt", f"it is corrupt ({reason})")
             else:
