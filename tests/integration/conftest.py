@@ -32,6 +32,16 @@ def client(daemon: Daemon) -> Iterator[rtcf.Client]:
         yield client
 
 
+@pytest.fixture
+def running(daemon: Daemon, client: rtcf.Client) -> Iterator[Daemon]:
+    """Give `daemon` with a loop of two components that runs."""
+    client.load(rtcf.component("rtcf_examples", "Wave", name="wave", parameters=["rate:=1.0"]))
+    client.load(rtcf.component("rtcf_examples", "Mimo", name="mimo"))
+    client.start()
+    yield daemon
+    client.stop()
+
+
 @pytest.fixture(scope="module")
 def master(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Master]:
     """Give a ROS master on a port of its own, shared by the tests of a module."""

@@ -3,20 +3,9 @@
 import json
 import signal
 import subprocess
-from collections.abc import Iterator
 
 import pytest
-import rtcf
 from daemon_process import BUILD_TREE, Daemon, clean_environment
-
-
-@pytest.fixture
-def running(daemon: Daemon, client: rtcf.Client) -> Iterator[Daemon]:
-    client.load(rtcf.component("rtcf_examples", "Wave", name="wave", parameters=["rate:=1.0"]))
-    client.load(rtcf.component("rtcf_examples", "Mimo", name="mimo"))
-    client.start()
-    yield daemon
-    client.stop()
 
 
 def test_every_cycle_is_a_line_for_machines(running: Daemon) -> None:

@@ -6,7 +6,6 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -57,19 +56,22 @@ def mcap_python() -> Path:
     return python
 
 
-@pytest.fixture
-def running(daemon: Daemon, client: rtcf.Client) -> Iterator[Daemon]:
-    client.load(rtcf.component("rtcf_examples", "Wave", name="wave", parameters=["rate:=1.0"]))
-    client.load(rtcf.component("rtcf_examples", "Mimo", name="mimo"))
-    client.start()
-    yield daemon
-    client.stop()
-
-
 def _recorded(daemon: Daemon, file: Path, *words: str) -> None:
     done = daemon.ctl("record", "-o", str(file), *words)
     assert done.returncode == 0, done.stderr
     assert f"{file}: " in done.stdout and "none lost" in done.stdout
+
+
+def _begun(daemon: Daemon, file: Path) -> subprocess.Popen[bytes]:
+    """Return a rtcfctl that records, and has written some of it."""
+    process = subprocess.Popen(
+        [BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "record", "-o", file],
+        env=clean_environment(),
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        stdout=subprocess.PIPE,
+    )
+    wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a chunk in the file")
+    return process
 
 
 def test_every_cycle_is_in_the_file(running: Daemon, tmp_path: Path) -> None:
@@ -124,11 +126,7 @@ def test_mcaps_own_reader_reads_it(running: Daemon, tmp_path: Path, mcap_python:
 
 def test_a_file_whose_writer_was_killed_can_be_read(running: Daemon, tmp_path: Path) -> None:
     file = tmp_path / "run.mcap"
-    process = subprocess.Popen(
-        [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "record", "-o", file],
-        env=clean_environment(),
-    )
-    wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a chunk in the file")
+    process = _begun(running, file)
     process.kill()
     process.wait()
     with rtcf.read_recording(file) as recording:
@@ -143,13 +141,7 @@ def test_a_file_whose_writer_was_killed_can_be_read(running: Daemon, tmp_path: P
 
 def test_ctrl_c_ends_the_file_in_order(running: Daemon, tmp_path: Path) -> None:
     file = tmp_path / "run.mcap"
-    process = subprocess.Popen(
-        [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "record", "-o", file],
-        env=clean_environment(),
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-        stdout=subprocess.PIPE,
-    )
-    wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a chunk in the file")
+    process = _begun(running, file)
     process.send_signal(signal.SIGINT)
     said, _ = process.communicate()
     assert process.returncode == 0
@@ -164,13 +156,7 @@ def test_ports_join_while_it_is_recorded(
     client.load(rtcf.component("rtcf_examples", "Wave", name="wave"))
     client.start()
     file = tmp_path / "run.mcap"
-    process = subprocess.Popen(
-        [BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "record", "-o", file],
-        env=clean_environment(),
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-        stdout=subprocess.PIPE,
-    )
-    wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a chunk in the file")
+    process = _begun(daemon, file)
     client.load(rtcf.component("rtcf_examples", "Mimo", name="late"))
     size = file.stat().st_size
     wait_for(lambda: file.stat().st_size > size + 50_000, "chunks with the new component")
