@@ -3,7 +3,7 @@
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import grpc
 from rtcf_shared.errors import RtcfError
@@ -13,10 +13,12 @@ from rtcf import direct_stop, failures
 from rtcf.closing import Closing
 from rtcf.errors import DaemonUnreachableError, RefusedError
 from rtcf.events import EventStream, Place
-from rtcf.ports import PortStream
 from rtcf.replay_call import ReplayCall
 from rtcf.tenancy import Tenancy
 from rtcf.v1 import control_pb2, control_pb2_grpc, graph_pb2, runner_pb2
+
+if TYPE_CHECKING:
+    from rtcf.ports import PortStream
 
 DEFAULT_SOCKET = "/run/rtcfd/control.sock"
 QUERY_TIMEOUT_S = 20.0
@@ -432,12 +434,15 @@ class Client(Closing):
 
     def watch_ports(
         self, selection: Iterable[str] = (), runner: str = "", every: int = 1
-    ) -> PortStream:
+    ) -> "PortStream":
         """Watch values of outputs and declared state, of each `every`-th cycle.
 
         `selection` names them with the wildcards of a shell, e.g. "/arm/*.effort"; all without.
         Nothing is missed from here on; what the caller does not take in time is counted.
         """
+        # Few commands need it, and each import is time.
+        from rtcf.ports import PortStream
+
         return PortStream(
             self._stub.WatchPorts, self.socket, runner, several("selection", selection), every
         )

@@ -110,8 +110,6 @@ class PortStream(Closing):
         self, method: Any, socket: str, runner: str, selection: Iterable[str], every: int
     ) -> None:
         _numpy()
-        if isinstance(selection, str):
-            selection = [selection]
         request = ports_pb2.WatchPortsRequest(runner=runner, selection=selection, every=every)
         self.schema = PortSchema()
         self._socket = socket

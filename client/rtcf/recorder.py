@@ -58,6 +58,7 @@ class Recorder:
         self._writer = writer
         self._schema: PortSchema | None = None
         self._channels: dict[tuple[str, ...], int] = {}
+        self._kept: list[tuple[int, int, _State | None]] = []  # column of the schema, its channel
         self._cycle_channel = writer.channel(
             f"/{runner}/cycles", "rtcf_msgs/Cycle", _CYCLE, {"runner": runner, "kind": "cycle"}
         )
@@ -84,12 +85,10 @@ class Recorder:
 
     def _enter(self, schema: PortSchema) -> list[str]:
         self._schema = schema
+        self._kept.clear()
         notes = []
-        for column in schema.columns:
-            key = _key(column)
-            if key in self._channels:
-                continue
-            ros_type, definition = column.ros_type, column.ros_definition
+        for number, column in enumerate(schema.columns):
+            state = None
             if column.kind == ports_pb2.PortColumn.KIND_STATE:
                 state = _state(schema, column)
                 if state is None:
@@ -98,36 +97,38 @@ class Recorder:
                         "holds: it is left out"
                     )
                     continue
-                ros_type, definition = state.ros_type, state.definition
-            kind = "state" if column.kind == ports_pb2.PortColumn.KIND_STATE else "output"
-            metadata = {
+            key = _key(column)
+            if key not in self._channels:
+                self._channels[key] = self._channel(column, state)
+            self._kept.append((number, self._channels[key], state))
+        return notes
+
+    def _channel(self, column: ports_pb2.PortColumn, state: "_State | None") -> int:
+        return self._writer.channel(
+            f"{column.component}/{column.name}",
+            column.ros_type if state is None else state.ros_type,
+            column.ros_definition if state is None else state.definition,
+            {
                 "component": column.component,
                 "name": column.name,
-                "kind": kind,
+                "kind": "output" if state is None else "state",
                 "type": column.type,
                 "unit": column.unit,
                 "mapped": column.mapped,
                 "md5sum": column.ros_md5,
-            }
-            topic = f"{column.component}/{column.name}"
-            self._channels[key] = self._writer.channel(topic, ros_type, definition, metadata)
-        return notes
+            },
+        )
 
     def _take(self, batch: PortBatch) -> None:
         import numpy as np
 
         cycles, stamps = batch.cycles, batch.stamps_ns
         self._put(self._cycle_channel, cycles, stamps, _cycle_rows(batch))
-        for number, column in enumerate(batch.schema.columns):
-            channel = self._channels.get(_key(column))
-            if channel is None:
-                continue
-            if column.kind == ports_pb2.PortColumn.KIND_OUTPUT:
+        for number, channel, state in self._kept:
+            if state is None:
                 data = np.frombuffer(batch.message.values[number], "u1")
-                self._put(channel, cycles, stamps, data.reshape(len(batch), column.size))
+                self._put(channel, cycles, stamps, data.reshape(len(batch), -1))
                 continue
-            state = _state(batch.schema, column)
-            assert state is not None
             numbers = np.ascontiguousarray(batch[state.signal.name]).reshape(len(batch), -1)
             data = numbers.view("u1").reshape(len(batch), -1)
             if state.prefix:

@@ -97,7 +97,7 @@ class Recording(Closing):
     @property
     def cycles(self) -> "NDArray[np.int64]":
         """The numbers of all cycles, in the order in which they were recorded."""
-        return self._cycles().cycles
+        return self._of_cycles("iteration")
 
     @property
     def durations_ns(self) -> "NDArray[np.int64]":
@@ -136,15 +136,11 @@ class Recording(Closing):
                 columns[name] = pandas.Series(column.values, index=column.cycles)
         return pandas.DataFrame(columns)
 
-    def _cycles(self) -> RecordedColumn:
+    def _of_cycles(self, name: str) -> "NDArray[np.int64]":
         if not self._cycle_channel:
             raise RecordingError(f"{self.path} tells no cycles: rtcfctl record has not written it")
         with self._whole_only():
-            return self._read(self._cycle_channel, self._leaf_of_cycles("iteration"))
-
-    def _of_cycles(self, name: str) -> "NDArray[np.int64]":
-        self._cycles()
-        return self._read(self._cycle_channel, self._leaf_of_cycles(name)).values
+            return self._read(self._cycle_channel, self._leaf_of_cycles(name)).values
 
     @contextlib.contextmanager
     def _whole_only(self) -> Iterator[None]:
