@@ -144,6 +144,33 @@ def test_all_of_it_at_once_with_a_thousand_peers_costs_little_locked_memory(
     assert _locked_kb(text) <= MOST_LOCKED_KB
 
 
+def test_subscribers_that_take_nothing_turn_no_other_away(
+    text: rtcf.Client, master: Master
+) -> None:
+    text.stop()
+    large = runner_pb2.RosSettings(largest_message_kb=1024)
+    text.set_runner(runner_pb2.RunnerSettings(ros=large))
+    text.set_parameters("/t/text", [rtcf.parse_parameter("size:=1000000")])
+    text.start()
+    host, port = _address(text, master, "/t/said")
+    listener = master.node("sizes", "/t/said")
+    listener.wait_for_values(5)
+    with ExitStack() as peers:
+        # Each holds a message that no other does: in turn, until there is no room for more.
+        for _ in range(250):
+            peer = _Subscriber(host, port, "/t/said")
+            peers.callback(peer.close)
+            peer.wait_until_accepted()
+            wait_until_after(text, state(text).iteration + 2)
+        seen = len(listener.values())
+        listener.wait_for_values(seen + 20)
+        late = master.node("sizes", "/t/said")
+        late.wait_for_values(10)
+        late.end()
+    listener.end()
+    assert "slow subscribers" not in state(text).ros.problem
+
+
 def test_a_peer_that_announces_a_huge_header_or_call_is_sent_away(
     text: rtcf.Client, master: Master
 ) -> None:

@@ -7,6 +7,7 @@ namespace rtcf::ros1 {
 Subjects::Subjects(Rosout& rosout, executor::Log& log)
     : rosout_(rosout),
       log_(log),
+      publishing_([&log](const std::string& line) { log.write(LogLevel::Warn, {}, line); }),
       reconfiguring_([&log](const std::string& component, const std::string& line) {
           log.write(LogLevel::Warn, component, line + " (asked for by dynamic_reconfigure)");
       }) {}

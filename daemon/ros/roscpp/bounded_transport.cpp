@@ -17,6 +17,7 @@
 #include <map>
 #include <mutex>
 
+#include "ros/roscpp/idle_subscribers.hpp"
 #include "ros/roscpp/raw_message.hpp"
 
 namespace rtcf::ros1 {
@@ -179,8 +180,14 @@ void TransportSubscriberLink::enqueueMessage(const SerializedMessage& message, b
             return sum;
         }
     };
+    const auto oldest = [this]() -> const void* {
+        return outbox_.empty() ? nullptr : outbox_.front().buf.get();
+    };
+    const bool scarce = rtcf::ros1::IdleSubscribers::scarce();
+    const void* before = nullptr;
     {
         const boost::mutex::scoped_lock lock(outbox_mutex_);
+        before = oldest();
         std::size_t bytes = outbox_.size() > 1 ? Queue::bytes(outbox_) : 0;
         while (outbox_.size() > 1 && bytes + message.num_bytes > rtcf::ros1::kMostWaiting) {
             bytes -= outbox_.front().num_bytes;
@@ -191,6 +198,13 @@ void TransportSubscriberLink::enqueueMessage(const SerializedMessage& message, b
     static const auto original = reinterpret_cast<Function>(dlsym(
         RTLD_NEXT, "_ZN3ros23TransportSubscriberLink14enqueueMessageERKNS_17SerializedMessageEbb"));
     original(this, message, serialized, no_copy);
+    if (!scarce) return;
+    const void* after = nullptr;
+    {
+        const boost::mutex::scoped_lock lock(outbox_mutex_);
+        after = oldest();
+    }
+    rtcf::ros1::IdleSubscribers::ofProcess().note(shared_from_this(), before, after);
 }
 
 }  // namespace ros

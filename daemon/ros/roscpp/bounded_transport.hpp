@@ -7,7 +7,7 @@
 /// - `TransportPublisherLink::onMessageLength`: a message that its input does not take is passed
 ///   over without being kept
 /// - `TransportSubscriberLink::enqueueMessage`: what waits for a slow subscriber is bounded in
-/// bytes
+///   bytes; who takes nothing is noted when memory is scarce
 /// - `XmlRpcSocket::nbRead`: a call or an answer is bounded
 #pragma once
 

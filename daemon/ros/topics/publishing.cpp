@@ -3,8 +3,10 @@
 #include <chrono>
 #include <limits>
 #include <set>
+#include <utility>
 
 #include "graph/name_pattern.hpp"
+#include "ros/roscpp/idle_subscribers.hpp"
 #include "ros/roscpp/quiet_thread.hpp"
 
 namespace rtcf::ros1 {
@@ -33,7 +35,7 @@ class Deliveries {
 
 }  // namespace
 
-Publishing::Publishing() {
+Publishing::Publishing(std::function<void(const std::string&)> warn) : warn_(std::move(warn)) {
     thread_ = quietThread("ros-publish", [this] { run(); });
 }
 
@@ -187,6 +189,19 @@ void Publishing::leave(const std::vector<Stream>& streams, const std::vector<Str
     }
 }
 
+void Publishing::makeRoom() {
+    constexpr auto kPeriod = std::chrono::milliseconds(100);
+    constexpr auto kSilence = std::chrono::seconds(10);
+    const auto now = std::chrono::steady_clock::now();
+    if (now - room_looked_at_ < kPeriod) return;
+    room_looked_at_ = now;
+    disconnected_ += IdleSubscribers::ofProcess().disconnect();
+    if (disconnected_ == 0 || now - room_told_ < kSilence) return;
+    room_told_ = now;
+    warn_(std::to_string(std::exchange(disconnected_, 0)) +
+          " subscribers that took nothing were disconnected, as too much memory waited for them");
+}
+
 void Publishing::run() {
     constexpr auto kPeriod = std::chrono::milliseconds(1);
     std::vector<Stream> serving;
@@ -210,6 +225,7 @@ void Publishing::run() {
             }
         }
         for (const Stream& stream : serving) drain(stream, kMost);
+        makeRoom();
         std::this_thread::sleep_for(kPeriod);
     }
 }

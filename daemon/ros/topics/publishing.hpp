@@ -2,8 +2,10 @@
 /// The way out: takes the values out of all taps and publishes them.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -24,7 +26,8 @@ class Publishing {
    public:
     using Taps = std::vector<std::shared_ptr<executor::Tap>>;
 
-    Publishing();
+    /// @param warn gets a line for the log; any thread
+    explicit Publishing(std::function<void(const std::string&)> warn);
     ~Publishing();
     Publishing(const Publishing&) = delete;
     Publishing& operator=(const Publishing&) = delete;
@@ -57,6 +60,8 @@ class Publishing {
     using Publishers = std::vector<std::shared_ptr<TopicPublisher>>;
 
     void run();
+    // Sends those away who use up the memory for all.
+    void makeRoom();
     static void drain(const Stream& stream, int most);
     static void leave(const std::vector<Stream>& streams, const std::vector<Stream>& next);
     std::vector<Stream> streams() const;
@@ -70,6 +75,11 @@ class Publishing {
     std::uint64_t served_ =
         0;  // the generation that the thread is at; it is done with those before
     bool stop_ = false;
+    std::function<void(const std::string&)> warn_;
+    // The thread's alone.
+    std::chrono::steady_clock::time_point room_looked_at_;
+    std::chrono::steady_clock::time_point room_told_;
+    std::size_t disconnected_ = 0;  // since it was told
     std::thread thread_;
 };
 
