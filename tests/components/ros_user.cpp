@@ -11,11 +11,15 @@ namespace {
 class RosUser final : public rtcf::Component {
     rtcf::Output<double> heard{this, "heard"};
     rtcf::Output<double> gain{this, "gain"};
-    // Which hook calls the master: configure, start, or start without a look at what comes of it.
+    // Which hook calls the master: configure, start, or start without a look at what comes of it;
+    // or configure has a handle, and calls nobody.
     rtcf::Parameter<std::string> in{this, "in", "configure",
-                                    rtcf::Doc("configure, start or careless")};
+                                    rtcf::Doc("configure, start, careless or handle")};
 
-    bool configure() override { return in.value() != "configure" || meet(); }
+    bool configure() override {
+        if (in.value() == "handle") rtcf::nodeHandle(this);
+        return in.value() != "configure" || meet();
+    }
     bool start() override {
         if (in.value() == "start" && !meet()) return false;
         // As it stands in somebody's code: what getParam() says is not looked at.

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import rtcf
 from daemon_process import Daemon, wait_for, with_ros
+from holding_master import HoldingMaster
 from ros_processes import Master
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 from values import iteration, port_value
@@ -58,6 +59,30 @@ def test_hooks_have_node_handles_with_the_components_names(tmp_path: Path, maste
             wait_for(lambda: "/voice" not in master.topics()[1], "the end of what it heard")
     finally:
         daemon.end()
+
+
+def test_handles_of_many_hooks_cost_a_slow_master_no_call_each(
+    tmp_path: Path, master: Master
+) -> None:
+    way = HoldingMaster(master.port)
+    daemon = Daemon(tmp_path, with_ros(way.uri, ""))
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            wait_for(lambda: _ros(client).connected, "the node")
+            before = way.calls(b"getPid")  # by which the node sees whether the master is there
+            client.apply(
+                rtcf.component(
+                    "rtcf_test_ros", "RosUser", name=f"user{index}", parameters=["in:=handle"]
+                )
+                for index in range(40)
+            )
+            asked = way.calls(b"getPid") - before
+            print(f"\n{asked} calls for 40 handles")
+            assert asked < 20
+    finally:
+        daemon.end()
+        way.close()
 
 
 def test_a_component_that_needs_ros_is_refused_without_a_master(

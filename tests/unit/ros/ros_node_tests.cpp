@@ -425,6 +425,19 @@ TEST_F(RosNodeTest, EndsSoonWithAMasterThatHangsInACall) {
     EXPECT_TRUE(nodeEnds());
 }
 
+// Its time goes to one answer that does not come, not to asking again and again.
+TEST_F(RosNodeTest, AsksAMasterThatHangsNoMoreThanOnceInTheTimeItHasToLeave) {
+    startDeafMaster();
+    Source source("/out");
+    startNode();
+    serve({&source}, {});
+    ASSERT_EQ(master().line(10s).value_or(""), "asked");
+    stopNode();
+    int asked = 0;
+    while (master().line(100ms)) ++asked;
+    EXPECT_LE(asked, 1);
+}
+
 TEST_F(RosNodeTest, LeavesNothingAtASlowMaster) {
     startSlowMaster(100ms);
     std::vector<std::unique_ptr<Source>> sources;
