@@ -16,7 +16,6 @@
 #include <system_error>
 
 #include "loop/cycle_counter.hpp"
-#include "server/listen.hpp"
 
 namespace rtcf::executor {
 
@@ -56,21 +55,16 @@ std::vector<gid_t> groupsOf(int fd, gid_t primary) {
 DirectStop::DirectStop(std::string path, std::string mark, const Access& access)
     : path_(std::move(path)), mark_(std::move(mark)), access_(access) {
     if (path_.empty()) return;
-    listener_ = listenOn(path_, 256);
+    listener_.emplace(path_, 256);
     ::chmod(path_.c_str(), kSocketMode);
     wake_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-    if (wake_ < 0) {
-        const int error = errno;
-        ::close(listener_);
-        throw std::system_error(error, std::generic_category(), "eventfd");
-    }
+    if (wake_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
 }
 
 DirectStop::~DirectStop() {
     close();
     if (path_.empty()) return;
     ::close(wake_);
-    ::close(listener_);
     ::unlink(path_.c_str());
 }
 
@@ -98,12 +92,13 @@ void DirectStop::threadMain() {
     while (!ending_.load()) {
         const bool waits = std::any_of(clients_.begin(), clients_.end(),
                                        [](const Client& client) { return client.asked; });
-        std::vector<pollfd> polled{{wake_, POLLIN, 0}, {listener_, POLLIN, 0}};
+        std::vector<pollfd> polled{{wake_, POLLIN, 0}, {listener_->fd(), listener_->events(), 0}};
+        const bool full = polled[1].events == 0;
         // Nobody is kept waiting by those who only connect.
         if (clients_.size() >= kMostClients) polled[1].events = 0;
         for (const Client& client : clients_)
             polled.push_back({client.asked ? -1 : client.fd, POLLIN, 0});  // nothing more is heard
-        const int at_most_ms = clients_.empty() ? -1 : 100;
+        const int at_most_ms = clients_.empty() && !full ? -1 : 100;
         ::poll(polled.data(), polled.size(), waits ? kLookMs : at_most_ms);
         for (std::size_t i = clients_.size(); i-- > 0;) {
             if (attend(clients_[i], polled[i + 2].revents != 0)) continue;
@@ -130,7 +125,7 @@ void DirectStop::threadMain() {
 }
 
 void DirectStop::accept() {
-    const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    const int fd = listener_->accept();
     if (fd < 0) return;
     ucred peer{};
     socklen_t size = sizeof peer;

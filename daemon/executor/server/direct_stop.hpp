@@ -11,11 +11,13 @@
 #include <cstdint>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "access/rights.hpp"
+#include "server/listen.hpp"
 
 namespace rtcf::executor {
 
@@ -71,7 +73,7 @@ class DirectStop {
     const std::string mark_;
     const Access& access_;
     Stoppable what_;
-    int listener_ = -1;
+    std::optional<Listener> listener_;  // none without a path
     int wake_ = -1;
     std::atomic<bool> ending_{false};
     bool unsynced_ = false;  // the mark was removed, and its folder is not on disk yet

@@ -18,7 +18,6 @@
 #include "rtcf/version.hpp"
 #include "server/convert.hpp"
 #include "server/image_file.hpp"
-#include "server/listen.hpp"
 #include "statistics/thread_usage.hpp"
 
 namespace rtcf::executor {
@@ -119,7 +118,7 @@ void setState(v1::Response& response, const NumberedState& state) {
 
 Server::Server(const std::string& socket_path)
     : path_(socket_path),
-      listener_(listenOn(socket_path, kBacklog)),
+      listener_(socket_path, kBacklog),
       signals_(takeSignals()),
       wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
     if (wake_ < 0) fail("eventfd");
@@ -129,7 +128,6 @@ Server::~Server() {
     connections_.clear();
     ::close(wake_);
     ::close(signals_);
-    ::close(listener_);
     ::unlink(path_.c_str());
 }
 
@@ -206,7 +204,7 @@ void Server::serve(Runner& runner, Log& log, Access& access, const DirectStop& d
     runner.onFramesWaiting([this] { wakeUp(); });
     while (!exiting_) {
         std::vector<pollfd> polled{
-            {listener_, POLLIN, 0}, {signals_, POLLIN, 0}, {wake_, POLLIN, 0}};
+            {listener_.fd(), listener_.events(), 0}, {signals_, POLLIN, 0}, {wake_, POLLIN, 0}};
         std::vector<std::uint64_t> ids;
         for (const auto& [id, connection] : connections_) {
             const short events = connection->wantsWrite() ? POLLIN | POLLOUT : POLLIN;
@@ -254,7 +252,7 @@ bool Server::orphaned() {
 }
 
 void Server::accept() {
-    const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    const int fd = listener_.accept();
     if (fd < 0) return;
     if (!trusted(fd) || connections_.size() >= kLargestConnections) {
         ::close(fd);

@@ -18,6 +18,7 @@
 #include "runner/runner.hpp"
 #include "server/connection.hpp"
 #include "server/direct_stop.hpp"
+#include "server/listen.hpp"
 #include "server/outside_calls.hpp"
 #include "server/port_streams.hpp"
 #include "statistics/histogram.hpp"
@@ -118,7 +119,7 @@ class Server {
     void requireNotStuck() const;
 
     std::string path_;
-    int listener_ = -1;
+    Listener listener_;
     int signals_ = -1;
     int wake_ = -1;
     bool exiting_ = false;
