@@ -56,7 +56,8 @@ void Runner::noteFaultsOf(Instance& instance) {
     ComponentFaults& faults = instance.figures()->faults;
     const auto say = [&](const ComponentFault* fault, const char* text) {
         if (fault == nullptr) return;
-        const std::string what = fmt::vformat(text, fmt::make_format_args(fault->text.data()));
+        const char* of = fault->text.data();
+        const std::string what = fmt::vformat(text, fmt::make_format_args(of));
         instance.setFault(fmt::format("iteration {}: {}", fault->iteration, what));
         tell({RunnerEvent::Kind::ComponentFailed,
               fmt::format("{}: iteration {}: {}", instance.fullName(), fault->iteration, what),
