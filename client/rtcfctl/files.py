@@ -136,6 +136,6 @@ def _read(file: str) -> tuple[str, str]:
 def _write(file: str, text: str) -> None:
     """Replace a file at once: half a graph would be another graph."""
     try:
-        durable.replace(file, text.encode())
+        durable.write_named(file, text.encode())
     except OSError as error:
         raise rtcf.RtcfError(f"{file}: {error.strerror}") from None

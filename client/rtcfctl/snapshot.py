@@ -57,6 +57,6 @@ def restore(client: rtcf.Client, args: argparse.Namespace, output: Output) -> No
 def _write(file: Path, snapshot: bytes) -> None:
     """Replace a file at once: half a snapshot is none."""
     try:
-        durable.replace(file, snapshot)
+        durable.write_named(file, snapshot)
     except OSError as error:
         raise rtcf.RtcfError(f"{file}: {error.strerror}") from None

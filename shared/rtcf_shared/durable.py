@@ -2,13 +2,42 @@
 
 import contextlib
 import os
+import stat
+
+# What is opened here is no file of a disk, whatever it leads to.
+_NO_FILES = ("/dev/", "/proc/")
 
 
-def replace(file: str | os.PathLike[str], data: bytes, *, sync: bool = True) -> None:
+def write_named(file: str | os.PathLike[str], data: bytes) -> None:
+    """Make `data` what somebody finds in the file that he named; raises OSError.  Blocks.
+
+    A file is replaced, of a link the one that it leads to, and stays whose it is and as open as
+    it is.  A device or a pipe is never replaced: it is written to.
+    """
+    try:
+        found = os.stat(file)
+    except FileNotFoundError:
+        found = None
+    kind = stat.S_IFREG if found is None else stat.S_IFMT(found.st_mode)
+    own = kind == stat.S_IFREG and not os.path.abspath(file).startswith(_NO_FILES)
+    if not own and kind != stat.S_IFDIR:
+        with open(file, "ab") as out:  # where it stands, if it leads to a file
+            out.write(data)
+        return
+    replace(os.path.realpath(file), data, like=found)
+
+
+def replace(
+    file: str | os.PathLike[str],
+    data: bytes,
+    *,
+    sync: bool = True,
+    like: os.stat_result | None = None,
+) -> None:
     """Make `data` what a file holds, or leave it as it is; raises OSError.  Blocks.
 
     After a power cut it may still hold what it held, until sync_folder(); without
-    `sync` it may hold nothing.
+    `sync` it may hold nothing.  `like`: whose mode it gets, and its owner where that is allowed.
     """
     folder, name = os.path.split(file)
     new = os.path.join(folder, f".{name}.new")
@@ -17,6 +46,10 @@ def replace(file: str | os.PathLike[str], data: bytes, *, sync: bool = True) -> 
         with contextlib.suppress(FileNotFoundError):
             os.unlink(new)
         with open(new, "xb") as out:
+            if like is not None:
+                with contextlib.suppress(PermissionError):
+                    os.fchown(out.fileno(), like.st_uid, like.st_gid)
+                os.fchmod(out.fileno(), like.st_mode & 0o777)
             out.write(data)
             if sync:
                 out.flush()

@@ -1,12 +1,14 @@
 """Graph files: reading, refusing, writing; `rtcfctl apply` and `save`."""
 
 import os
+import stat
+import subprocess
 from pathlib import Path
 
 import pytest
 import rtcf
 import yaml
-from daemon_under_test import DaemonUnderTest
+from daemon_under_test import BUILD_TREE, DaemonUnderTest
 from hypothesis import example, given, seed, settings
 from hypothesis import strategies as st
 from rtcf.v1 import graph_pb2, runner_pb2
@@ -269,3 +271,32 @@ def test_save_writes_what_apply_reads(
         "arm",
         "rt_runner",
     ]
+
+
+def test_save_replaces_no_pipe_and_no_link(daemon: DaemonUnderTest, tmp_path: Path) -> None:
+    text = daemon.ctl("save").stdout
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with subprocess.Popen(["cat", pipe], stdout=subprocess.PIPE, text=True) as reader:
+        done = daemon.ctl("save", str(pipe))
+        assert (done.returncode, reader.communicate()[0]) == (0, text), done.stderr
+    assert pipe.is_fifo()
+    file, link = tmp_path / "repository" / "arm.yaml", tmp_path / "arm.yaml"
+    file.parent.mkdir()
+    link.symlink_to(file)
+    for _ in range(2):  # which leads nowhere at first
+        assert daemon.ctl("save", str(link)).returncode == 0
+        assert link.is_symlink()
+        assert file.read_text() == text
+        file.chmod(0o664)
+    assert stat.S_IMODE(file.stat().st_mode) == 0o664
+    # A name of the kernel's, whatever it leads to.
+    log = tmp_path / "log"
+    log.write_text("before\n")
+    with log.open("a") as out:
+        done = subprocess.run(
+            [BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "save", "/proc/self/fd/1"],
+            stdout=out,
+        )
+    assert done.returncode == 0
+    assert log.read_text() == f"before\n{text}saved rt_runner to /proc/self/fd/1\n"
