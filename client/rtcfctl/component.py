@@ -281,10 +281,12 @@ def _component_options(to: argparse.ArgumentParser, needed: bool = True) -> None
         metavar="PORT",
         help="the connection into this input is a loop break",
     )
-    to.add_argument("--every", type=int, default=0, metavar="N", help="run in each N-th cycle")
+    to.add_argument(
+        "--every", type=words.whole, default=0, metavar="N", help="run in each N-th cycle"
+    )
     to.add_argument(
         "--phase",
-        type=int,
+        type=words.whole,
         metavar="N",
         help="with --every: in which of them, from 0 (default: chosen to spread load)",
     )

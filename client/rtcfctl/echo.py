@@ -1,6 +1,7 @@
 """`rtcfctl echo`: values of outputs and declared state, cycle by cycle."""
 
 import argparse
+import math
 import sys
 import time
 from typing import Any
@@ -12,6 +13,7 @@ from rtcfctl.output import Output
 from rtcfctl.words import amount, counted, figure
 
 _TOLD_HZ = 10.0  # what a person can read
+_MOST_EVERY = 2**32 - 1
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
@@ -42,10 +44,12 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     if args.n is not None and args.n < 1:
         raise ValueError(f"-n {args.n}: at least 1")
     rate_hz = args.rate if args.rate is not None else _TOLD_HZ if output.for_people else 0.0
+    if not 0 <= rate_hz < math.inf:
+        raise ValueError(f"--rate {rate_hz:g}: 0 Hz or more")
     every = 1
     if rate_hz > 0:
         (runner,) = client.get_status(args.runner or "rt_runner").runners
-        every = max(1, round(runner.settings.frequency_hz / rate_hz))
+        every = max(1, round(min(runner.settings.frequency_hz / rate_hz, _MOST_EVERY)))
     left = args.n
     try:
         with client.watch_ports(args.selection, args.runner, every) as stream:

@@ -9,6 +9,8 @@ import rtcf
 from rtcfctl import words
 from rtcfctl.output import Output
 
+_MOST_CYCLES = 10**18
+
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verbs."""
@@ -62,6 +64,8 @@ def step(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Run cycles of a stopped loop."""
     if args.cycles < 1:
         raise ValueError(f"step {args.cycles}: name at least 1 cycle")
+    if args.cycles > _MOST_CYCLES:
+        raise ValueError(f"step {args.cycles}: at most {_MOST_CYCLES} cycles at once")
     result = client.step(args.cycles, args.runner, output.progress)
     if result.cycles < args.cycles:
         output.changed(f"stepped {result.cycles} of {words.counted(args.cycles, 'cycle')}", result)

@@ -105,9 +105,21 @@ def _run(args: argparse.Namespace, output: "Output") -> int:
     except ValueError as error:
         return _fail(error, USAGE)
     except BrokenPipeError:
-        # The reader has seen enough; Python would complain once more at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()  # its reader has seen enough
+    except OSError as error:
+        # Of a file that is not ours to name here, as a disk that is full.
+        try:
+            sys.stdout.flush()
+        except OSError:
+            _drop_output()
+            return _fail(f"standard output: {error.strerror}", REFUSED)
+        return _fail(error, REFUSED)
     return DONE
+
+
+def _drop_output() -> None:
+    """Write nothing more to standard output: Python would complain once more at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def parser(verb: str = "") -> argparse.ArgumentParser:

@@ -15,6 +15,7 @@ from rtcfctl.output import Output
 from rtcfctl.words import amount, counted
 
 _TOLD_S = 1.0
+_LONGEST_S = 1e9
 _KEPT_S = 1.0  # in memory: what a writer that is killed loses at most
 
 
@@ -45,8 +46,8 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 
 def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Record until Ctrl-C, or for a while."""
-    if args.duration is not None and not args.duration > 0:
-        raise ValueError(f"--duration {args.duration:g}: more than 0 s")
+    if args.duration is not None and not 0 < args.duration <= _LONGEST_S:
+        raise ValueError(f"--duration {args.duration:g}: more than 0 s, and {_LONGEST_S:g} at most")
     # Refused before there is a file.
     with client.watch_ports(args.selection, args.runner) as stream:
         for note in stream.schema.notes:

@@ -11,7 +11,7 @@ from rtcfctl.output import Output
 from rtcfctl.words import amount, counted, microseconds
 
 _FIGURES = ("min_ns", "mean_ns", "p50_ns", "p99_ns", "p999_ns", "max_ns")
-_SHORTEST_WATCH_S = 0.1
+_SHORTEST_WATCH_S, _LONGEST_WATCH_S = 0.1, 86400.0
 _COLUMNS = ("count", "min", "mean", "p50", "p99", "p99.9", "max")
 
 
@@ -42,8 +42,10 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 def _watch(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Print the figures until the user has had enough; on a terminal in one place."""
-    if not args.watch >= _SHORTEST_WATCH_S:
-        raise ValueError(f"--watch {args.watch:g}: at least {_SHORTEST_WATCH_S} s")
+    if not _SHORTEST_WATCH_S <= args.watch <= _LONGEST_WATCH_S:
+        raise ValueError(
+            f"--watch {args.watch:g}: at least {_SHORTEST_WATCH_S} s, at most {_LONGEST_WATCH_S:g}"
+        )
     if args.reset:
         client.reset_statistics(args.runner)
     try:

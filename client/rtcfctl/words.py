@@ -36,6 +36,17 @@ def amount(unit: str) -> Callable[[str], float]:
     return value
 
 
+def whole(text: str) -> int:
+    """Read a count, for argparse."""
+    try:
+        number = int(text)
+    except ValueError:
+        number = -1
+    if not 0 <= number < 2**32:
+        raise argparse.ArgumentTypeError(f"{text}: a whole number from 0 to {2**32 - 1}, please")
+    return number
+
+
 def microseconds(nanoseconds: float) -> str:
     """Return a duration in µs, without the unit; of a long one the digits that matter."""
     size = abs(nanoseconds)

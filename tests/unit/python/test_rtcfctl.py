@@ -282,3 +282,37 @@ def test_each_verb_is_found_in_the_module_that_is_said_to_have_it() -> None:
     for verb in whole.choices:
         found = (each for each in parser(verb_of([verb]))._actions if each.choices)
         assert any(verb in (each.choices or ()) for each in found), verb
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("step 99999999999999999999", "at most 1000000000000000000 cycles"),
+        ("load demo Fine --every -1", "-1: a whole number from 0 to 4294967295, please"),
+        ("load demo Fine --phase 99999999999", "99999999999: a whole number from 0 to"),
+        ("echo --rate=-5", "--rate -5: 0 Hz or more"),
+        ("echo --rate nan", "--rate nan: 0 Hz or more"),
+        ("record -o x.mcap --duration 1e300", "--duration 1e+300: more than 0 s, and 1e+09 at"),
+        ("stats --watch inf", "--watch inf: at least 0.1 s, at most 86400"),
+    ],
+)
+def test_a_number_that_is_out_of_range_is_said_with_its_option(
+    daemon: DaemonUnderTest, words: str, said: str
+) -> None:
+    done = daemon.ctl(*words.split())
+    assert done.returncode == 2
+    assert said in done.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize("words", ["status", "-o json status", "stats --watch 0.1", "save"])
+def test_output_that_finds_no_room_is_said_in_a_line(daemon: DaemonUnderTest, words: str) -> None:
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, *words.split()],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+        )
+    said = "rtcfctl: standard output: No space left on device\n"
+    assert (done.returncode, done.stderr) == (1, said)
