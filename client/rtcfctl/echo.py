@@ -9,6 +9,7 @@ from typing import Any
 import rtcf
 from rtcf.ports import PortBatch
 
+from rtcfctl.idle_loop import say_if_ended, say_if_idle
 from rtcfctl.output import Output
 from rtcfctl.words import amount, counted, figure
 
@@ -55,6 +56,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         with client.watch_ports(args.selection, args.runner, every) as stream:
             for note in stream.schema.notes:
                 output.line(f"rtcfctl: note: {note}", to=sys.stderr)
+            say_if_idle(client, args.runner, output)
             for batch in stream:
                 if batch.lost:
                     _say_lost(batch.lost, output)
@@ -64,6 +66,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
                     if left == 0:
                         return
                 sys.stdout.flush()
+                say_if_ended(batch, args.runner, output)
     except KeyboardInterrupt:
         return
 

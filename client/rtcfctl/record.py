@@ -11,6 +11,7 @@ from rtcf.mcap_writer import McapWriter
 from rtcf.ports import PortStream
 from rtcf.recorder import Recorder
 
+from rtcfctl.idle_loop import say_if_ended, say_if_idle
 from rtcfctl.output import Output
 from rtcfctl.words import amount, counted
 
@@ -52,6 +53,7 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     with client.watch_ports(args.selection, args.runner) as stream:
         for note in stream.schema.notes:
             _note(output, note)
+        say_if_idle(client, args.runner, output)
         recorder = _record(stream, _opened(args.file, args.force), args, output)
     size_mb = args.file.stat().st_size / 1e6
     lost = f"{counted(recorder.lost, 'cycle')} lost" if recorder.lost else "none lost"
@@ -85,7 +87,7 @@ def _record(
             writer = McapWriter(file)
             recorder = Recorder(writer, args.runner or "rt_runner")
             try:
-                _follow(stream, writer, recorder, args.duration, output)
+                _follow(stream, writer, recorder, args, output)
             finally:
                 recorder.flush()
                 writer.close()
@@ -100,7 +102,7 @@ def _follow(
     stream: PortStream,
     writer: McapWriter,
     recorder: Recorder,
-    duration_s: float | None,
+    args: argparse.Namespace,
     output: Output,
 ) -> None:
     until_ns = None
@@ -110,7 +112,7 @@ def _follow(
             for note in recorder.add(batch):
                 _note(output, note)
             now = time.monotonic()
-            # After its last cycle a loop tells nothing more.
+            say_if_ended(batch, args.runner, output)
             if now - flushed >= _KEPT_S or batch.last_of_loop:
                 recorder.flush()
                 flushed = now
@@ -123,11 +125,11 @@ def _follow(
                     file=sys.stderr,
                     flush=True,
                 )
-            if duration_s is None or not len(batch):
+            if args.duration is None or not len(batch):
                 continue
             stamps = batch.message.stamps_ns
             if until_ns is None:
-                until_ns = stamps[0] + round(duration_s * 1e9)
+                until_ns = stamps[0] + round(args.duration * 1e9)
             if stamps[-1] >= until_ns:
                 return
     except KeyboardInterrupt:

@@ -3,6 +3,7 @@
 import json
 import signal
 import subprocess
+from pathlib import Path
 
 import pytest
 from daemon_process import BUILD_TREE, Daemon, clean_environment
@@ -58,3 +59,28 @@ def test_ctrl_c_ends_it(running: Daemon) -> None:
     rest = process.stdout.read()
     assert process.wait() == 0
     assert rest.endswith(b"\n")
+
+
+@pytest.mark.parametrize("verb", ["echo", "record"])
+def test_a_loop_that_does_not_run_is_no_silence(running: Daemon, tmp_path: Path, verb: str) -> None:
+    assert running.ctl("stop").returncode == 0
+    words = ["-o", str(tmp_path / "run.mcap")] if verb == "record" else []
+    process = subprocess.Popen(
+        [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, verb, *words],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=clean_environment(),
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    assert process.stderr is not None
+    assert process.stderr.readline() == (
+        "rtcfctl: note: the loop of rt_runner does not run: its values come once it is started "
+        "(`rtcfctl -r rt_runner start`)\n"
+    )
+    assert running.ctl("start").returncode == 0
+    assert running.ctl("stop").returncode == 0
+    said = process.stderr.readline()
+    assert said.startswith("rtcfctl: note: the loop of rt_runner ended in cycle "), said
+    process.send_signal(signal.SIGINT)
+    assert process.wait() == 0

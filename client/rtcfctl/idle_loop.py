@@ -1,0 +1,39 @@
+"""What those are told who look at values of a loop that runs no cycles: none will come."""
+
+import sys
+
+import rtcf
+from rtcf.ports import PortBatch
+from rtcf.v1 import runner_pb2
+
+from rtcfctl.output import Output
+
+_RUNS = (runner_pb2.RUNNER_STATE_RUNNING, runner_pb2.RUNNER_STATE_STEPPING)
+
+
+def say_if_idle(client: rtcf.Client, runner: str, output: Output) -> None:
+    """Say so of a loop that does not run now."""
+    name = runner or "rt_runner"
+    for found in client.get_status(name).runners:
+        if found.state not in _RUNS:
+            _say(
+                f"the loop of {name} does not run: its values come once it is started "
+                f"(`rtcfctl -r {name} start`)",
+                output,
+            )
+
+
+def say_if_ended(batch: PortBatch, runner: str, output: Output) -> None:
+    """Say so of a loop whose last cycle has come."""
+    if batch.last_of_loop:
+        _say(
+            f"the loop of {runner or 'rt_runner'} ended in cycle "
+            f"{batch.first_cycle + (len(batch) - 1) * batch.every}: more values come once it is "
+            "started again",
+            output,
+        )
+
+
+def _say(text: str, output: Output) -> None:
+    sys.stdout.flush()  # what came before
+    output.line(f"rtcfctl: note: {text}", to=sys.stderr)
