@@ -1,8 +1,12 @@
 """`rtcfctl record`: values of every cycle into a file."""
 
 import argparse
+import contextlib
+import signal
 import sys
+import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -87,7 +91,8 @@ def _record(
             writer = McapWriter(file)
             recorder = Recorder(writer, args.runner or "rt_runner")
             try:
-                _follow(stream, writer, recorder, args, output)
+                with _ended_by_signals(stream):
+                    _follow(stream, writer, recorder, args, output)
             finally:
                 recorder.flush()
                 writer.close()
@@ -96,6 +101,33 @@ def _record(
             f"{args.file}: {error.strerror}: what was written before can be read"
         ) from None
     return recorder
+
+
+@contextlib.contextmanager
+def _ended_by_signals(stream: PortStream) -> Iterator[None]:
+    """Let signals end the stream, and break off nothing that is being written.
+
+    The second one ends us at once: the disk may be one that takes nothing any more.
+    """
+
+    def end(number: int, _: object) -> None:
+        signal.signal(number, signal.SIG_DFL)
+        # Whatever locks we hold just now.
+        threading.Thread(target=stream.close, daemon=True).start()
+
+    before = {}
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        found = signal.getsignal(number)
+        if found is not signal.SIG_IGN:  # as by nohup
+            before[number] = found
+            signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            # Who has had enough does not wait for the rest either.
+            if signal.getsignal(number) is end:
+                signal.signal(number, handler)
 
 
 def _follow(
@@ -132,8 +164,6 @@ def _follow(
                 until_ns = stamps[0] + round(args.duration * 1e9)
             if stamps[-1] >= until_ns:
                 return
-    except KeyboardInterrupt:
-        return
     finally:
         if sys.stderr.isatty():
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)

@@ -1,7 +1,10 @@
 """Recordings: what a loop did, in a file that others read, too."""
 
+import fcntl
 import json
 import os
+import re
+import select
 import shutil
 import signal
 import subprocess
@@ -234,6 +237,42 @@ def test_the_last_cycles_of_a_loop_are_in_the_file_at_once(
     wait_for(lambda: last() == end, "the last cycle in the file")
     process.kill()
     process.wait()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_breaks_off_nothing_that_is_being_written(
+    running: Daemon, tmp_path: Path, number: signal.Signals
+) -> None:
+    # A disk that takes a page, and then nothing more for a while.
+    disk = tmp_path / "disk"
+    os.mkfifo(disk)
+    reader = os.open(disk, os.O_RDONLY | os.O_NONBLOCK)
+    fcntl.fcntl(reader, fcntl.F_SETPIPE_SZ, 4096)
+    process = subprocess.Popen(
+        [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "record", "-o", disk,
+         "--force"],
+        env=clean_environment(),
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    writer = os.open(disk, os.O_WRONLY)
+    wait_for(lambda: not select.select([], [writer], [], 0)[1], "a disk that takes nothing more")
+    os.close(writer)
+    process.send_signal(number)
+    pending = Path(f"/proc/{process.pid}/status")
+    wait_for(
+        lambda: re.search(r"^ShdPnd:\s+0+$", pending.read_text(), re.MULTILINE), "its signal's turn"
+    )
+    os.set_blocking(reader, True)
+    file = tmp_path / "run.mcap"
+    with open(reader, "rb") as disk_file:
+        file.write_bytes(disk_file.read())
+    assert process.wait() == 0
+    with rtcf.read_recording(file) as recording:
+        assert recording.whole
+        assert len(recording.cycles) > 0
+        assert np.all(np.diff(recording.cycles) == 1)
+        for name in recording.signals:
+            assert np.array_equal(recording.read(name).cycles, recording.cycles), name
 
 
 def test_what_is_no_recording_is_said(tmp_path: Path) -> None:
