@@ -1,6 +1,7 @@
 """Files that are replaced at once, and outlive a power cut."""
 
 import contextlib
+import errno
 import os
 import stat
 
@@ -12,19 +13,29 @@ def write_named(file: str | os.PathLike[str], data: bytes) -> None:
     """Make `data` what somebody finds in the file that he named; raises OSError.  Blocks.
 
     A file is replaced, of a link the one that it leads to, and stays whose it is and as open as
-    it is.  A device or a pipe is never replaced: it is written to.
+    it is (not in a folder that is everybody's).  A device or a pipe is never replaced: it is
+    written to.
     """
     try:
-        found = os.stat(file)
+        # By the kernel: it follows no stranger's link in a folder that is everybody's.
+        place = os.open(file, os.O_PATH | os.O_CLOEXEC)
     except FileNotFoundError:
-        found = None
-    kind = stat.S_IFREG if found is None else stat.S_IFMT(found.st_mode)
-    own = kind == stat.S_IFREG and not os.path.abspath(file).startswith(_NO_FILES)
-    if not own and kind != stat.S_IFDIR:
-        with open(file, "ab") as out:  # where it stands, if it leads to a file
-            out.write(data)
+        if os.path.islink(file):
+            raise OSError(errno.EINVAL, "a symbolic link that leads nowhere") from None
+        replace(file, data)
         return
-    replace(os.path.realpath(file), data, like=found)
+    try:
+        found = os.fstat(place)
+        path = f"/proc/self/fd/{place}"
+        if not stat.S_ISREG(found.st_mode) or os.path.abspath(file).startswith(_NO_FILES):
+            with open(path, "ab") as out:  # where it stands, if it leads to a file
+                out.write(data)
+            return
+        real = os.readlink(path)
+        everybodys = os.stat(os.path.dirname(real)).st_mode & stat.S_ISVTX
+        replace(real, data, like=None if everybodys else found)
+    finally:
+        os.close(place)
 
 
 def replace(

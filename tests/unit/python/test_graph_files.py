@@ -284,11 +284,14 @@ def test_save_replaces_no_pipe_and_no_link(daemon: DaemonUnderTest, tmp_path: Pa
     file, link = tmp_path / "repository" / "arm.yaml", tmp_path / "arm.yaml"
     file.parent.mkdir()
     link.symlink_to(file)
-    for _ in range(2):  # which leads nowhere at first
-        assert daemon.ctl("save", str(link)).returncode == 0
-        assert link.is_symlink()
-        assert file.read_text() == text
-        file.chmod(0o664)
+    done = daemon.ctl("save", str(link))
+    assert done.returncode == 1
+    assert done.stderr == f"rtcfctl: {link}: a symbolic link that leads nowhere\n"
+    file.touch()
+    file.chmod(0o664)
+    assert daemon.ctl("save", str(link)).returncode == 0
+    assert link.is_symlink()
+    assert file.read_text() == text
     assert stat.S_IMODE(file.stat().st_mode) == 0o664
     # A name of the kernel's, whatever it leads to.
     log = tmp_path / "log"
@@ -300,3 +303,19 @@ def test_save_replaces_no_pipe_and_no_link(daemon: DaemonUnderTest, tmp_path: Pa
         )
     assert done.returncode == 0
     assert log.read_text() == f"before\n{text}saved rt_runner to /proc/self/fd/1\n"
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="a stranger's files take root")
+def test_save_trusts_no_file_of_a_stranger_in_a_folder_of_everybody(
+    daemon: DaemonUnderTest, tmp_path: Path
+) -> None:
+    everybodys = tmp_path / "tmp"
+    everybodys.mkdir()
+    everybodys.chmod(0o1777)
+    file = everybodys / "arm.yaml"
+    file.touch()
+    file.chmod(0o666)
+    os.chown(file, 65534, 65534)
+    assert daemon.ctl("save", str(file)).returncode == 0
+    found = file.stat()
+    assert (found.st_uid, stat.S_IMODE(found.st_mode) & 0o022) == (0, 0)
