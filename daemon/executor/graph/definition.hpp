@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "graph/names.hpp"
+#include "names/names.hpp"
 #include "rtcf/parameter.hpp"
 
 namespace rtcf::executor {

@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "graph/plan.hpp"
+#include "ordering/plan.hpp"
 
 namespace rtcf::executor {
 

@@ -12,9 +12,9 @@
 #include "bridge/hook_gate.hpp"
 #include "faults/flight_recorder.hpp"
 #include "graph/definition.hpp"
-#include "graph/name_pattern.hpp"
 #include "logging/log.hpp"
 #include "loop/schedule.hpp"
+#include "names/name_pattern.hpp"
 #include "plugins/library.hpp"
 #include "rtcf/component.hpp"
 

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "graph/order.hpp"
-#include "graph/rates.hpp"
+#include "ordering/order.hpp"
+#include "ordering/rates.hpp"
 #include "refusal.hpp"
 
 namespace rtcf::executor {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "graph/graph.hpp"
-#include "graph/name_pattern.hpp"
+#include "names/name_pattern.hpp"
 
 namespace rtcf::executor {
 

@@ -2,7 +2,7 @@
 /// An image of a runner: all that its next cycle depends on, as a value, by the names and types
 /// of what holds it. Restored into a runner with the same graph, whoever built its libraries and
 /// whenever, the loop goes on with the same values, bit by bit, as far as components declare what
-/// they remember. How it stands in a file: server/image_file.hpp.
+/// they remember. How it stands in a file: messages/image_file.hpp.
 #pragma once
 
 #include <cstdint>

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "graph/plan.hpp"
 #include "image/image.hpp"
 #include "image/image_taker.hpp"
+#include "ordering/plan.hpp"
 
 namespace rtcf::executor {
 

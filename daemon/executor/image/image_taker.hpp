@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "graph/plan.hpp"
 #include "image/image.hpp"
+#include "ordering/plan.hpp"
 
 namespace rtcf::executor {
 

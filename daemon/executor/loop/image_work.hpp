@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "bridge/injector.hpp"
-#include "graph/state_copy.hpp"
 #include "rtcf/component.hpp"
+#include "state/state_copy.hpp"
 
 namespace rtcf::executor {
 

@@ -9,7 +9,7 @@
 
 #include "faults/crash_handler.hpp"
 #include "logging/log.hpp"
-#include "loop/floating_point.hpp"
+#include "realtime/floating_point.hpp"
 #include "refusal.hpp"
 
 namespace rtcf::executor {

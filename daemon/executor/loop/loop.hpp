@@ -15,12 +15,12 @@
 #include <string>
 
 #include "faults/flight_recorder.hpp"
-#include "loop/cpu_claim.hpp"
 #include "loop/cycle.hpp"
 #include "loop/probe.hpp"
-#include "loop/realtime.hpp"
 #include "loop/schedule.hpp"
-#include "loop/thread_locals.hpp"
+#include "realtime/cpu_claim.hpp"
+#include "realtime/realtime.hpp"
+#include "realtime/thread_locals.hpp"
 
 namespace rtcf::executor {
 

@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "logging/log.hpp"
-#include "loop/floating_point.hpp"
 #include "loop/loop.hpp"
 #include "loop/simulated_clock.hpp"
+#include "realtime/floating_point.hpp"
 
 namespace rtcf::executor {
 

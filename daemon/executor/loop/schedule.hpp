@@ -12,10 +12,10 @@
 #include "bridge/injector.hpp"
 #include "bridge/tap.hpp"
 #include "frames/frame_ring.hpp"
-#include "graph/state_copy.hpp"
 #include "loop/faults.hpp"
 #include "loop/image_work.hpp"
 #include "rtcf/component.hpp"
+#include "state/state_copy.hpp"
 #include "statistics/histogram.hpp"
 
 namespace rtcf::executor {

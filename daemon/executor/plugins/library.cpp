@@ -12,10 +12,10 @@
 #include <cstring>
 #include <filesystem>
 
-#include "loop/floating_point.hpp"
 #include "plugins/elf_file.hpp"
 #include "plugins/linked_files.hpp"
 #include "plugins/trusted_file.hpp"
+#include "realtime/floating_point.hpp"
 #include "refusal.hpp"
 
 namespace rtcf::executor {

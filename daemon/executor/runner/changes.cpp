@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include "graph/state_value.hpp"
 #include "refusal.hpp"
 #include "runner/runner.hpp"
+#include "state/state_value.hpp"
 
 namespace rtcf::executor {
 

@@ -15,9 +15,9 @@
 #include <cstring>
 #include <system_error>
 
+#include "messages/convert.hpp"
+#include "messages/image_file.hpp"
 #include "rtcf/version.hpp"
-#include "server/convert.hpp"
-#include "server/image_file.hpp"
 #include "statistics/thread_usage.hpp"
 
 namespace rtcf::executor {

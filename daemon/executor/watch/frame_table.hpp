@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "frames/frame_ring.hpp"
-#include "graph/plan.hpp"
+#include "ordering/plan.hpp"
 #include "watch/port_selection.hpp"
 
 namespace rtcf::executor {

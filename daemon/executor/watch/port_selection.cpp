@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "graph/names.hpp"
+#include "names/names.hpp"
 #include "refusal.hpp"
 
 namespace rtcf::executor {

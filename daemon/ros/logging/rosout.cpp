@@ -5,7 +5,7 @@
 
 #include "ros/roscpp/handles.hpp"
 
-#include "runner/runner_view.hpp"
+#include "view/runner_view.hpp"
 
 namespace rtcf::ros1 {
 

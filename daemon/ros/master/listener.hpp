@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "ros/roscpp/master_client.hpp"
+#include "ros/calls/master_client.hpp"
 
 namespace rtcf::ros1 {
 

@@ -15,9 +15,9 @@
 
 #include "access/rights.hpp"
 #include "bridge/bridge.hpp"
+#include "ros/calls/host_names.hpp"
+#include "ros/calls/master_client.hpp"
 #include "ros/parameters/parameter_mirror.hpp"
-#include "ros/roscpp/host_names.hpp"
-#include "ros/roscpp/master_client.hpp"
 #include "ros/roscpp/roscpp_node.hpp"
 
 namespace rtcf::ros1 {

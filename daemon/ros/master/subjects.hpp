@@ -16,11 +16,11 @@
 #include "ros/master/master_link.hpp"
 #include "ros/reconfigure/reconfiguring.hpp"
 #include "ros/roscpp/reconciled.hpp"
-#include "ros/roscpp/refusals.hpp"
 #include "ros/roscpp/replacements.hpp"
 #include "ros/runner/introspection.hpp"
 #include "ros/topics/publishing.hpp"
 #include "ros/topics/subscribing.hpp"
+#include "ros/transport/refusals.hpp"
 
 namespace rtcf::ros1 {
 

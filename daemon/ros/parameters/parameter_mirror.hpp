@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "bridge/bridge.hpp"
-#include "ros/roscpp/master_client.hpp"
+#include "ros/calls/master_client.hpp"
 #include "ros/roscpp/reconciled.hpp"
 
 namespace rtcf::ros1 {

@@ -17,9 +17,9 @@
 #include <vector>
 
 #include "bridge/bridge.hpp"
+#include "ros/calls/master_client.hpp"
 #include "ros/parameters/parameter_mirror.hpp"
 #include "ros/reconfigure/reconfigure_server.hpp"
-#include "ros/roscpp/master_client.hpp"
 
 namespace ros {
 class NodeHandle;

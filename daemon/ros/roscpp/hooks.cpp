@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-#include "ros/roscpp/master_calls.hpp"
+#include "ros/calls/master_calls.hpp"
 
 namespace rtcf::ros1 {
 

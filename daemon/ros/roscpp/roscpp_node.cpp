@@ -16,7 +16,7 @@
 #include <system_error>
 
 #include "ros/roscpp/quiet_thread.hpp"
-#include "ros/roscpp/reconnection.hpp"
+#include "ros/transport/reconnection.hpp"
 
 // Exported by roscpp, and called by itself, but in none of its headers.
 namespace ros::master {

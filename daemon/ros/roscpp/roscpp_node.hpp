@@ -10,7 +10,7 @@
 #include <string>
 #include <thread>
 
-#include "ros/roscpp/master_calls.hpp"
+#include "ros/calls/master_calls.hpp"
 #include "ros/roscpp/node_name.hpp"
 
 namespace ros {

@@ -7,10 +7,10 @@
 #include <algorithm>
 #include <chrono>
 
-#include "graph/names.hpp"
+#include "names/names.hpp"
 #include "ros/roscpp/handles.hpp"
 #include "ros/roscpp/quiet_thread.hpp"
-#include "runner/runner_view.hpp"
+#include "view/runner_view.hpp"
 
 namespace rtcf::ros1 {
 

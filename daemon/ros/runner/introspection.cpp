@@ -11,7 +11,7 @@
 #include "ros/roscpp/handles.hpp"
 #include "ros/roscpp/quiet_thread.hpp"
 #include "runner/runner.hpp"
-#include "runner/runner_view.hpp"
+#include "view/runner_view.hpp"
 
 namespace rtcf::ros1 {
 

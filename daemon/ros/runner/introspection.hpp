@@ -13,10 +13,10 @@
 #include <thread>
 
 #include "bridge/outside_call.hpp"
-#include "ros/roscpp/raw_message.hpp"
 #include "ros/runner/cycle_topic.hpp"
 #include "ros/runner/runner_report.hpp"
 #include "ros/runner/runner_services.hpp"
+#include "ros/transport/raw_message.hpp"
 
 namespace rtcf::executor {
 enum class RunnerState;

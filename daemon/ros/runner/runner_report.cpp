@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "runner/runner.hpp"
-#include "runner/runner_view.hpp"
+#include "view/runner_view.hpp"
 
 namespace rtcf::ros1 {
 

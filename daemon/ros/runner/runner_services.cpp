@@ -9,10 +9,10 @@
 #include <rtcf_msgs/UnloadOrocosComponent.h>
 #include <std_srvs/Trigger.h>
 
-#include "graph/names.hpp"
+#include "names/names.hpp"
 #include "ros/roscpp/quiet_thread.hpp"
 #include "ros/runner/runner_report.hpp"
-#include "runner/runner_view.hpp"
+#include "view/runner_view.hpp"
 
 namespace rtcf::ros1 {
 

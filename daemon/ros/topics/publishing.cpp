@@ -5,9 +5,9 @@
 #include <set>
 #include <utility>
 
-#include "graph/name_pattern.hpp"
-#include "ros/roscpp/idle_subscribers.hpp"
+#include "names/name_pattern.hpp"
 #include "ros/roscpp/quiet_thread.hpp"
+#include "ros/transport/idle_subscribers.hpp"
 
 namespace rtcf::ros1 {
 

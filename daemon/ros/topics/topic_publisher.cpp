@@ -5,7 +5,7 @@
 #include <new>
 #include <thread>
 
-#include "ros/roscpp/raw_message.hpp"
+#include "ros/transport/raw_message.hpp"
 
 namespace rtcf::ros1 {
 

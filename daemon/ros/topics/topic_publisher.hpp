@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "ros/roscpp/handles.hpp"
-#include "ros/roscpp/raw_message.hpp"
 #include "ros/topics/stamped_type.hpp"
+#include "ros/transport/raw_message.hpp"
 #include "rtcf/port_type.hpp"
 
 namespace ros {

@@ -3,8 +3,8 @@
 #include <ros/node_handle.h>
 #include <ros/subscription_callback_helper.h>
 
-#include "ros/roscpp/bounded_transport.hpp"
-#include "ros/roscpp/raw_message.hpp"
+#include "ros/transport/bounded_transport.hpp"
+#include "ros/transport/raw_message.hpp"
 
 namespace rtcf::ros1 {
 

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "faults/flight_recorder.hpp"
-#include "graph/plan.hpp"
 #include "logging/log.hpp"
 #include "loop/loop.hpp"
+#include "ordering/plan.hpp"
 
 namespace rtcf::bench {
 

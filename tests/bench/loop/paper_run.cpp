@@ -12,7 +12,7 @@
 #include <string>
 
 #include "bench_graph.hpp"
-#include "loop/realtime.hpp"
+#include "realtime/realtime.hpp"
 
 namespace {
 

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "ros/roscpp/raw_message.hpp"
+#include "ros/transport/raw_message.hpp"
 
 using rtcf::ros1::startsWithHeader;
 

@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <thread>
 
-#include "ros/roscpp/master_client.hpp"
+#include "ros/calls/master_client.hpp"
 
 namespace {
 

@@ -18,7 +18,7 @@
 #include <limits>
 #include <vector>
 
-#include "ros/roscpp/raw_message.hpp"
+#include "ros/transport/raw_message.hpp"
 #include "rtcf/component.hpp"
 
 namespace rtcf::ros1 {

@@ -1,11 +1,11 @@
-#include "graph/name_pattern.hpp"
+#include "names/name_pattern.hpp"
 
 #include <gtest/gtest.h>
 
 #include <string>
 #include <thread>
 
-#include "graph/names.hpp"
+#include "names/names.hpp"
 #include "refusal.hpp"
 
 namespace rtcf::test {

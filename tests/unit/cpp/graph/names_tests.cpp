@@ -1,4 +1,4 @@
-#include "graph/names.hpp"
+#include "names/names.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "graph/order.hpp"
+#include "ordering/order.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "loop/cpu_claim.hpp"
+#include "realtime/cpu_claim.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

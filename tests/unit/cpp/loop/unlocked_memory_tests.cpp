@@ -1,5 +1,5 @@
 // Memory that is not locked although the process locks all of its own.
-#include "loop/unlocked_memory.hpp"
+#include "realtime/unlocked_memory.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/mman.h>

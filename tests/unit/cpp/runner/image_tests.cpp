@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "server/image_file.hpp"
+#include "messages/image_file.hpp"
 #include "support/runner_fixture.hpp"
 
 namespace rtcf::test {

@@ -4,7 +4,7 @@
 #include <mutex>
 #include <utility>
 
-#include "graph/plan.hpp"
+#include "ordering/plan.hpp"
 
 // buildPlan() as the linker knows it: another signature is an undefined symbol, and told.
 #define RTCF_BUILD_PLAN                                                \

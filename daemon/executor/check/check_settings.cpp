@@ -1,0 +1,22 @@
+#include "check/check_settings.hpp"
+
+#include <unistd.h>
+
+#include "messages/convert.hpp"
+#include "refusal.hpp"
+#include "rtcf/v1/runner.pb.h"
+#include "view/settings.hpp"
+
+namespace rtcf::executor {
+
+int checkSettings() {
+    ::rtcf::v1::RunnerSettings message;
+    if (!message.ParseFromFileDescriptor(STDIN_FILENO)) {
+        throw Refusal(RefusalKind::InvalidArgument, "standard input is no RunnerSettings");
+    }
+    RunnerSettings settings = settingsFrom(message, {});
+    validate(settings);
+    return 0;
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,58 @@
+#include "check/describe.hpp"
+
+#include <fmt/format.h>
+#include <linux/capability.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <exception>
+#include <memory>
+#include <system_error>
+
+#include "messages/convert.hpp"
+#include "plugins/library.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+// Foreign code runs from here on, and needs none of what a loop needs.
+void dropCapabilities() {
+    if (::geteuid() == 0) return;  // a private rtcfd of root's: it would be root all the same
+    ::prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL, 0, 0, 0);
+    __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+    std::array<__user_cap_data_struct, _LINUX_CAPABILITY_U32S_3> none{};
+    if (::syscall(SYS_capset, &header, none.data()) != 0)
+        throw std::system_error(errno, std::generic_category(), "cannot drop capabilities");
+}
+
+}  // namespace
+
+int describeLibrary(const std::string& library, const std::string& package,
+                    const std::vector<uid_t>& owners) {
+    v1::LibraryDescription description;
+    try {
+        dropCapabilities();
+        // Not destroyed: components may be of a library that has static state of its own.
+        auto* libraries = new LibraryStore;
+        for (const uid_t owner : owners) libraries->trust(owner);
+        const auto code = libraries->open(library);
+        for (const ComponentRecord* record : code->types()) {
+            try {
+                const std::unique_ptr<Component> component(record->create(record->type, nullptr));
+                *description.add_types() = typeTo(package, library, *record, *component);
+            } catch (const std::exception& error) {
+                description.set_problem(fmt::format("library {}: constructor of {} threw: {}",
+                                                    library, record->type, error.what()));
+            }
+        }
+    } catch (const std::exception& error) {
+        description.set_problem(error.what());
+    }
+    return description.SerializeToFileDescriptor(STDOUT_FILENO) ? 0 : 1;
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,224 @@
+#include "messages/image_file.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cstdint>
+#include <cstring>
+
+#include "messages/parameter_value.hpp"
+#include "refusal.hpp"
+#include "rtcf/executor/v1/snapshot.pb.h"
+
+namespace rtcf::executor {
+
+namespace {
+
+constexpr std::string_view kMagic = "RTCFSNAP";
+constexpr std::uint32_t kVersion = 1;
+constexpr std::size_t kHeader = 24;
+
+std::uint32_t checksum(std::string_view bytes) {
+    static const std::array<std::uint32_t, 256> kTable = [] {
+        std::array<std::uint32_t, 256> table{};
+        for (std::uint32_t i = 0; i < table.size(); ++i) {
+            std::uint32_t remainder = i;
+            for (int bit = 0; bit < 8; ++bit)
+                remainder = (remainder >> 1U) ^ ((remainder & 1U) != 0 ? 0xedb88320U : 0U);
+            table[i] = remainder;
+        }
+        return table;
+    }();
+    std::uint32_t sum = 0xffffffffU;
+    for (const char byte : bytes)
+        sum = (sum >> 8U) ^ kTable[(sum ^ static_cast<unsigned char>(byte)) & 0xffU];
+    return ~sum;
+}
+
+// Both architectures that rtcf is built for have it in this order.
+template <typename T>
+T numberAt(std::string_view bytes, std::size_t offset) {
+    T number = 0;
+    std::memcpy(&number, bytes.data() + offset, sizeof number);
+    return number;
+}
+
+template <typename T>
+void append(std::string& bytes, T number) {
+    bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
+}
+
+[[noreturn]] void refuse(const std::string& why) {
+    throw Refusal(RefusalKind::InvalidArgument, why);
+}
+
+v1::PortType typeTo(const ImageType& type) {
+    v1::PortType message;
+    message.set_name(type.name);
+    message.set_md5(type.md5);
+    message.set_size(type.size);
+    message.set_alignment(type.alignment);
+    message.set_fixed_size(type.fixed_size);
+    return message;
+}
+
+ImageType typeFrom(const v1::PortType& message) {
+    return {message.name(), message.md5(), message.size(), message.alignment(),
+            message.fixed_size()};
+}
+
+v1::PortValue valueTo(const ImageValue& value) {
+    v1::PortValue message;
+    message.set_sequence(value.sequence);
+    message.set_time_ns(value.time_ns);
+    message.set_value(value.bytes);
+    return message;
+}
+
+ImageValue valueFrom(const v1::PortValue& message) {
+    return {message.sequence(), message.time_ns(), message.value()};
+}
+
+v1::ComponentSnapshot componentTo(const ImageComponent& component) {
+    v1::ComponentSnapshot message;
+    message.set_name(component.name);
+    message.set_package(component.package);
+    message.set_type(component.type);
+    message.set_every(component.every);
+    message.set_phase(component.phase);
+    message.set_updated_ns(component.updated_ns);
+    message.set_elapsed_ns(component.elapsed_ns);
+    for (const auto& [name, value] : component.parameters) {
+        auto& parameter = *message.add_parameters();
+        parameter.set_name(name);
+        *parameter.mutable_value() = parameterValueTo(value);
+    }
+    for (const ImageState& state : component.states) {
+        v1::StateSnapshot& to = *message.add_states();
+        to.set_name(state.name);
+        to.set_type(state.type);
+        to.set_identity(state.identity);
+        to.set_value(state.bytes);
+    }
+    for (const ImageOutput& output : component.outputs) {
+        v1::OutputSnapshot& to = *message.add_outputs();
+        to.set_name(output.name);
+        *to.mutable_type() = typeTo(output.type);
+        *to.mutable_value() = valueTo(output.value);
+        if (output.staged) *to.mutable_staged() = valueTo(*output.staged);
+        if (output.latched) *to.mutable_latched() = valueTo(*output.latched);
+    }
+    for (const ImageInput& input : component.inputs) {
+        v1::InputSnapshot& to = *message.add_inputs();
+        to.set_name(input.name);
+        *to.mutable_type() = typeTo(input.type);
+        to.set_source(input.source);
+        to.set_seen(input.seen);
+        to.set_reads_source(input.reads_source);
+        to.set_kept_of(input.kept_of);
+        if (input.kept) *to.mutable_kept() = valueTo(*input.kept);
+        to.set_kept_is_new(input.kept_is_new);
+        if (input.left) *to.mutable_left() = valueTo(*input.left);
+    }
+    return message;
+}
+
+ImageComponent componentFrom(const v1::ComponentSnapshot& message) {
+    ImageComponent component{message.name(),
+                             message.package(),
+                             message.type(),
+                             message.every(),
+                             message.phase(),
+                             message.updated_ns(),
+                             message.elapsed_ns(),
+                             {},
+                             {},
+                             {},
+                             {}};
+    for (const auto& parameter : message.parameters()) {
+        component.parameters.emplace_back(parameter.name(),
+                                          parameterValueFrom(parameter.value(), parameter.name()));
+    }
+    for (const v1::StateSnapshot& state : message.states())
+        component.states.push_back({state.name(), state.type(), state.identity(), state.value()});
+    for (const v1::OutputSnapshot& from : message.outputs()) {
+        ImageOutput output{from.name(), typeFrom(from.type()), valueFrom(from.value()), {}, {}};
+        if (from.has_staged()) output.staged = valueFrom(from.staged());
+        if (from.has_latched()) output.latched = valueFrom(from.latched());
+        component.outputs.push_back(std::move(output));
+    }
+    for (const v1::InputSnapshot& from : message.inputs()) {
+        ImageInput input;
+        input.name = from.name();
+        input.type = typeFrom(from.type());
+        input.source = from.source();
+        input.seen = from.seen();
+        input.reads_source = from.reads_source();
+        input.kept_of = from.kept_of();
+        if (from.has_kept()) input.kept = valueFrom(from.kept());
+        input.kept_is_new = from.kept_is_new();
+        if (from.has_left()) input.left = valueFrom(from.left());
+        component.inputs.push_back(std::move(input));
+    }
+    return component;
+}
+
+}  // namespace
+
+std::string imageToFile(const RunnerImage& image) {
+    v1::RunnerSnapshot message;
+    message.set_runner(image.runner);
+    message.set_taken_ns(image.taken_ns);
+    message.set_period_ns(image.period_ns);
+    message.set_iteration(image.clock.iteration);
+    message.set_time_ns(image.clock.time_ns);
+    message.set_stamp_ns(image.clock.stamp_ns);
+    message.set_elapsed_ns(image.clock.elapsed_ns);
+    message.set_total_elapsed_ns(image.clock.total_elapsed_ns);
+    for (const ImageComponent& component : image.components)
+        *message.add_components() = componentTo(component);
+    for (const ImageTopic& topic : image.topics) {
+        v1::TopicSnapshot& to = *message.add_topics();
+        to.set_name(topic.name);
+        *to.mutable_type() = typeTo(topic.type);
+        to.set_sequence(topic.sequence);
+        *to.mutable_value() = valueTo(topic.value);
+    }
+    const std::string body = message.SerializeAsString();
+    std::string file(kMagic);
+    append(file, kVersion);
+    append(file, checksum(body));
+    append(file, std::uint64_t{body.size()});
+    return file + body;
+}
+
+RunnerImage imageFromFile(std::string_view file) {
+    if (file.size() < kHeader || file.substr(0, kMagic.size()) != kMagic)
+        refuse("that is no snapshot: rtcfctl snapshot FILE makes one");
+    if (const auto version = numberAt<std::uint32_t>(file, 8); version != kVersion) {
+        refuse(fmt::format("the snapshot is of format {}, this rtcf reads format {}: take it anew",
+                           version, kVersion));
+    }
+    const std::string_view body = file.substr(kHeader);
+    v1::RunnerSnapshot message;
+    if (body.size() != numberAt<std::uint64_t>(file, 16) ||
+        checksum(body) != numberAt<std::uint32_t>(file, 12) ||
+        !message.ParseFromArray(body.data(), static_cast<int>(body.size())))
+        refuse("the snapshot is damaged: its checksum is wrong; take it anew");
+    RunnerImage image{message.runner(),
+                      message.taken_ns(),
+                      message.period_ns(),
+                      {message.iteration(), message.time_ns(), message.stamp_ns(),
+                       message.elapsed_ns(), message.total_elapsed_ns()},
+                      {},
+                      {}};
+    for (const v1::ComponentSnapshot& component : message.components())
+        image.components.push_back(componentFrom(component));
+    for (const v1::TopicSnapshot& topic : message.topics()) {
+        image.topics.push_back(
+            {topic.name(), typeFrom(topic.type()), topic.sequence(), valueFrom(topic.value())});
+    }
+    return image;
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,277 @@
+#include "ordering/plan.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "graph/footprint.hpp"
+#include "refusal.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+// A tap holds what is written in half a second: its reader is a thread that
+// has to share the machine with everything else.
+constexpr double kTapSeconds = 0.5;
+constexpr std::size_t kVariableTapValues = 2;  // of the largest
+// Of larger types it holds fewer, at least two: rings are locked memory.
+constexpr std::size_t kMiB = 1024 * 1024;
+constexpr std::size_t kLargestTap = 8 * kMiB;
+constexpr std::size_t kAllTaps = 256 * kMiB;
+
+std::size_t tapCapacity(const TypeInfo& type, double frequency_hz, std::size_t largest) {
+    if (!type.fixed_size) return kVariableTapValues * (largest + 24);
+    const std::size_t record = 24 + type.length(*type.make_slot(nullptr));
+    const auto values =
+        static_cast<std::size_t>(std::clamp(frequency_hz * kTapSeconds, 64.0, 16384.0));
+    return std::min(record * values, kLargestTap);
+}
+
+class Builder {
+   public:
+    Builder(Plan& plan, const Plan& previous, double frequency_hz, Adoption& adoption,
+            const BridgeSettings& bridge)
+        : plan_(plan),
+          previous_(previous),
+          frequency_hz_(frequency_hz),
+          adoption_(adoption),
+          bridge_(bridge),
+          decimated_("decimate", bridge.decimate) {}
+
+    void build() {
+        plan_.schedule.generation = previous_.schedule.generation + 1;
+        positions_.resize(plan_.graph.nodes().size());
+        for (std::size_t i = 0; i < plan_.wiring.order.size(); ++i)
+            positions_[plan_.wiring.order[i]] = i;
+        for (const auto& [name, connection] : plan_.wiring.connections)
+            addConnection(name, connection);
+        addSteps();
+        addLeaving();
+        // What arrives knows its inputs when it takes over; what leaves has said its last before
+        // others turn to new writers.
+        adoption_.rewires_of_new = static_cast<std::size_t>(
+            std::stable_partition(adoption_.rewires.begin(), adoption_.rewires.end(),
+                                  [this](const Rewire& rewire) {
+                                      return previous_.bindings.count(rewire.input) == 0;
+                                  }) -
+            adoption_.rewires.begin());
+        plan_.schedule.footprint = footprint(plan_);
+        adoption_.schedule = &plan_.schedule;
+    }
+
+   private:
+    void addConnection(const std::string& name, const ConnectionPlan& connection) {
+        if (connection.published) {
+            addTap(name, name, *connection.writer);
+            // No mapped name has a blank in it.
+            for (const Writer& writer : connection.others) {
+                const Instance& instance = *plan_.graph.nodes()[writer.node].instance;
+                addTap(name + " of " + instance.fullName() + "." + writer.output->name(), name,
+                       writer);
+            }
+        }
+        if (connection.writer) {
+            for (const Reader& reader : connection.readers) bindToWriter(connection, reader);
+            OutputBase& output = *connection.writer->output;
+            const bool heard = connection.published || !connection.readers.empty();
+            if (heard != output.connected()) adoption_.audiences.push_back({&output, heard});
+            for (const Writer& writer : connection.others) {
+                if (connection.published != writer.output->connected())
+                    adoption_.audiences.push_back({writer.output, connection.published});
+            }
+        } else if (connection.subscribed) {
+            addFeed(name, connection);
+        } else {
+            for (const Reader& reader : connection.readers) unbind(reader.input);
+        }
+    }
+
+    void addTap(const std::string& key, const std::string& name, const Writer& writer) {
+        const OutputBase& output = *writer.output;
+        const std::size_t capacity =
+            tapCapacity(output.type(), frequency_hz_, bridge_.largest_message);
+        std::shared_ptr<Tap> tap;
+        if (const auto found = previous_.taps.find(key);
+            found != previous_.taps.end() && found->second->source() == output.slot().get() &&
+            (output.type().fixed_size || found->second->largest() == bridge_.largest_message)) {
+            tap = found->second;
+        } else {
+            tap = std::make_shared<Tap>(name, output.type(), output.slot(), capacity,
+                                        bridge_.largest_message);
+        }
+        // One that stays may be of another frequency: what runs is to be taken anew, too.
+        requireRoom(std::max(tap->ringBytes(), Tap::ringBytes(output.type(), capacity)));
+        tap->setDecimation(decimated_.matches(name) ? bridge_.decimation : 1);
+        plan_.schedule.taps.push_back(tap.get());
+        plan_.taps.emplace(key, std::move(tap));
+    }
+
+    void requireRoom(std::size_t ring_bytes) {
+        tap_bytes_ += ring_bytes;
+        if (tap_bytes_ <= kAllTaps) return;
+        throw Refusal(
+            RefusalKind::ResourceExhausted,
+            fmt::format("the rings of all published outputs (taps) would take more than the {} MiB "
+                        "of locked memory allowed: let the whitelist match fewer, or set a lower "
+                        "frequency or a smaller largest message",
+                        kAllTaps / kMiB));
+    }
+
+    void addFeed(const std::string& name, const ConnectionPlan& connection) {
+        std::shared_ptr<Injector> injector;
+        if (const auto found = previous_.injectors.find(name);
+            found != previous_.injectors.end() &&
+            sameType(found->second->type(), *connection.type)) {
+            injector = found->second;
+        } else {
+            injector = std::make_shared<Injector>(name, *connection.type);
+        }
+        injector->setLargest(bridge_.largest_message);
+        Feed feed{injector.get(), {}};
+        for (const Reader& reader : connection.readers) {
+            feed.readers.push_back(reader.input);
+            Binding binding = present(reader.input);
+            if (binding.writer != injector.get()) {
+                adoption_.rewires.push_back({reader.input, nullptr, injector.get(), false});
+                binding.writer = injector.get();
+                binding.source = nullptr;
+                binding.source_owner = injector;
+            }
+            plan_.bindings.emplace(reader.input, std::move(binding));
+        }
+        plan_.schedule.feeds.push_back(std::move(feed));
+        plan_.injectors.emplace(name, std::move(injector));
+    }
+
+    void bindToWriter(const ConnectionPlan& connection, const Reader& reader) {
+        const std::shared_ptr<SlotHeader>& slot = connection.writer->output->slot();
+        // A loop break means the previous cycle, also where the writer runs earlier in this one.
+        const bool latched =
+            reader.broken && positions_[connection.writer->node] <= positions_[reader.node];
+        const std::shared_ptr<SlotHeader> source =
+            latched ? latchOf(*connection.writer, slot) : slot;
+        Binding binding = present(reader.input);
+        if (binding.writer != slot.get() || binding.source != source.get()) {
+            adoption_.rewires.push_back(
+                {reader.input, source.get(), nullptr, binding.writer == slot.get()});
+            binding.writer = slot.get();
+            binding.source = source.get();
+            binding.source_owner = source;
+        }
+        plan_.bindings.emplace(reader.input, std::move(binding));
+    }
+
+    std::shared_ptr<SlotHeader> latchOf(const Writer& writer,
+                                        const std::shared_ptr<SlotHeader>& slot) {
+        std::shared_ptr<SlotHeader>& latch = plan_.latches[slot.get()];
+        if (!latch) {
+            const TypeInfo& type = writer.output->type();
+            const auto found = previous_.latches.find(slot.get());
+            const bool is_new = found == previous_.latches.end();
+            latch =
+                is_new
+                    ? type.make_slot(plan_.graph.nodes()[writer.node].instance->sample(writer.port))
+                    : found->second;
+            plan_.schedule.latches.push_back({&type, latch.get(), slot.get()});
+            if (is_new) adoption_.new_latches.push_back(plan_.schedule.latches.back());
+        }
+        return latch;
+    }
+
+    void unbind(InputBase* input) {
+        Binding binding = present(input);
+        // Never had a writer, nor a value that a snapshot has brought.
+        if (binding.source_owner == nullptr && binding.kept_owner == nullptr) return;
+        if (binding.writer != nullptr)
+            adoption_.rewires.push_back({input, nullptr, nullptr, false});
+        binding.writer = nullptr;
+        plan_.bindings.emplace(input, std::move(binding));
+    }
+
+    Binding present(const InputBase* input) const {
+        const auto found = previous_.bindings.find(input);
+        return found == previous_.bindings.end() ? Binding{} : found->second;
+    }
+
+    void addSteps() {
+        for (const std::size_t index : plan_.wiring.order) {
+            Instance& instance = *plan_.graph.nodes()[index].instance;
+            const ComponentDefinition& definition = instance.definition();
+            plan_.schedule.steps.push_back(
+                {&instance.component(), &instance.context(), instance.figures().get(),
+                 instance.slot(), definition.every, instance.phase(), definition.optional});
+            if (Source* source = instance.source(); source != nullptr)
+                plan_.schedule.source = source;
+        }
+        plan_.schedule.findStretches();
+    }
+
+    void addLeaving() {
+        std::set<const Instance*> staying;
+        for (const GraphNode& node : plan_.graph.nodes()) staying.insert(node.instance.get());
+        for (const std::size_t index : previous_.wiring.order) {
+            const Instance& instance = *previous_.graph.nodes()[index].instance;
+            if (staying.count(&instance) != 0) continue;
+            Leaving leaving{&instance.component(), instance.figures().get(), {}, {}};
+            for (const OutputBase* output : instance.component().outputs()) {
+                const SlotHeader* const slot = output->slot().get();
+                if (const auto found = previous_.latches.find(slot);
+                    found != previous_.latches.end())
+                    leaving.latches.push_back({&output->type(), found->second.get(), slot});
+                for (const auto& [topic, tap] : previous_.taps)
+                    if (tap->source() == slot) leaving.taps.push_back(tap.get());
+            }
+            adoption_.leaving.push_back(std::move(leaving));
+        }
+    }
+
+    Plan& plan_;
+    const Plan& previous_;
+    double frequency_hz_;
+    Adoption& adoption_;
+    const BridgeSettings& bridge_;
+    NamePattern decimated_;
+    std::vector<std::size_t> positions_;  // in the order, by node
+    std::size_t tap_bytes_ = 0;           // of the rings so far
+};
+
+}  // namespace
+
+void Plan::noteKept(const Adoption& adoption, const Plan& previous) {
+    for (const Rewire& rewire : adoption.rewires) {
+        const auto found = bindings.find(rewire.input);
+        if (found == bindings.end()) continue;
+        Binding& binding = found->second;
+        const auto before = previous.bindings.find(rewire.input);
+        const bool nothing_kept =
+            before == previous.bindings.end() || rewire.kept == binding.source;
+        if (nothing_kept) {
+            binding.kept = nullptr;
+            binding.kept_owner = nullptr;
+        } else if (rewire.kept != before->second.kept) {
+            binding.kept = rewire.kept;
+            binding.kept_owner = before->second.source_owner;
+        }
+    }
+}
+
+BridgeTable Plan::bridgeTable() const {
+    BridgeTable table;
+    for (const auto& [name, tap] : taps) table.outputs.push_back(tap);
+    for (const auto& [name, injector] : injectors) table.inputs.push_back(injector);
+    return table;
+}
+
+std::unique_ptr<Plan> buildPlan(Graph graph, Wiring wiring, const Plan& previous,
+                                double frequency_hz, Adoption& adoption,
+                                const BridgeSettings& bridge) {
+    auto plan = std::make_unique<Plan>();
+    plan->graph = std::move(graph);
+    plan->wiring = std::move(wiring);
+    Builder(*plan, previous, frequency_hz, adoption, bridge).build();
+    return plan;
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,84 @@
+#include "state/state_copy.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace rtcf::executor {
+
+namespace {
+
+const StateDeclaration* find(const Component& component, const std::string& name) {
+    const auto& states = component.states();
+    const auto found = std::find_if(states.begin(), states.end(),
+                                    [&](const auto& state) { return state.name == name; });
+    return found == states.end() ? nullptr : &*found;
+}
+
+}  // namespace
+
+std::size_t bytesOf(const std::vector<StateCopy>& copies) {
+    std::size_t bytes = 0;
+    for (const StateCopy& copy : copies) bytes += copy.size;
+    return bytes;
+}
+
+void planHandOver(const Component& previous, const Component& successor,
+                  std::vector<StateCopy>& copies, std::vector<std::string>& notes) {
+    const std::string& name = successor.fullName();
+    if (previous.states().empty() && !successor.states().empty())
+        notes.push_back(name + " begins at its initial state: what it replaces declares none");
+    for (const StateDeclaration& state : successor.states()) {
+        const StateDeclaration* before = find(previous, state.name);
+        if (before == nullptr) {
+            if (previous.states().empty()) continue;  // said already
+            notes.push_back(fmt::format("state {} of {} is new: it begins at {}", state.name, name,
+                                        state.print(state.initial.data())));
+        } else if (before->identity != state.identity || before->size != state.size) {
+            notes.push_back(fmt::format("state {} of {} begins at {}: it was {} and is {}",
+                                        state.name, name, state.print(state.initial.data()),
+                                        before->type, state.type));
+        } else {
+            copies.push_back({state.value, before->value, state.size});
+        }
+    }
+    for (const StateDeclaration& state : previous.states()) {
+        if (find(successor, state.name) == nullptr)
+            notes.push_back(fmt::format("state {} of {} is no more", state.name, name));
+    }
+}
+
+std::vector<StateCopy> planReset(const Component& component) {
+    std::vector<StateCopy> copies;
+    for (const StateDeclaration& state : component.states())
+        copies.push_back({state.value, state.initial.data(), state.size});
+    return copies;
+}
+
+StatePicture::StatePicture(const Component& component) : declared_(component.states()) {
+    std::size_t size = 0;
+    for (const StateDeclaration& state : declared_) size += state.size;
+    bytes_.resize(size);
+}
+
+std::vector<StateCopy> StatePicture::copies() {
+    std::vector<StateCopy> copies;
+    std::byte* to = bytes_.data();
+    for (const StateDeclaration& state : declared_) {
+        copies.push_back({to, state.value, state.size});
+        to += state.size;
+    }
+    return copies;
+}
+
+std::vector<std::string> StatePicture::texts() const {
+    std::vector<std::string> texts;
+    const std::byte* from = bytes_.data();
+    for (const StateDeclaration& state : declared_) {
+        texts.push_back(state.print(from));
+        from += state.size;
+    }
+    return texts;
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,36 @@
+/// @file
+/// What a bridge may show of its runner: graph, state, figures, and every cycle.
+/// Implemented by the runner. Nothing here waits for a hook or for the loop.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "loop/loop.hpp"
+#include "view/snapshot.hpp"
+
+namespace rtcf::executor {
+
+struct RunnerPicture;
+
+class RunnerView {
+   public:
+    /// @name Any thread
+    /// @{
+    virtual const std::string& name() const noexcept = 0;
+    virtual std::shared_ptr<const GraphSnapshot> snapshot() const = 0;
+    virtual RunnerPicture picture() const = 0;
+    virtual const Loop& loop() const noexcept = 0;
+    virtual std::uint64_t logRecordsDropped() const = 0;
+    /// @}
+
+    /// Takes the oldest cycle record. One thread, which takes them often: the loop drops what
+    /// finds no room. @return false if there is none
+    virtual bool popCycle(CycleRecord& record) = 0;
+
+   protected:
+    ~RunnerView() = default;
+};
+
+}  // namespace rtcf::executor

@@ -1,0 +1,92 @@
+#include "view/snapshot.hpp"
+
+#include <fmt/format.h>
+
+#include "refusal.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+std::shared_ptr<const ComponentSnapshot> picture(const GraphNode& node) {
+    const Instance& instance = *node.instance;
+    auto result = std::make_shared<ComponentSnapshot>();
+    result->instance = &instance;
+    result->figures = instance.figures();
+    result->definition = instance.definition();
+    result->definition.breaks = node.breaks;
+    result->full_name = instance.fullName();
+    result->library = instance.library().path();
+    result->doc = instance.record().doc;
+    const auto& inputs = instance.component().inputs();
+    for (std::size_t i = 0; i < inputs.size(); ++i) {
+        result->ports.push_back(
+            {inputs[i]->name(), false, instance.inputNames()[i], &inputs[i]->type(), {}});
+    }
+    const auto& outputs = instance.component().outputs();
+    for (std::size_t i = 0; i < outputs.size(); ++i) {
+        result->ports.push_back({outputs[i]->name(), true, instance.outputNames()[i],
+                                 &outputs[i]->type(), outputs[i]->unit()});
+    }
+    const auto& parameters = instance.component().parameters();
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+        result->parameters.push_back({parameters[i]->declaration(), instance.parameterValues()[i]});
+    }
+    for (const StateDeclaration& state : instance.component().states()) {
+        result->states.push_back(
+            {state.name, state.type, state.unit, state.doc, state.print(state.initial.data())});
+    }
+    result->fault = instance.faultText();
+    return result;
+}
+
+ConnectionSnapshot picture(const Graph& graph, const ConnectionPlan& plan) {
+    const auto component = [&](std::size_t node) {
+        return graph.nodes()[node].instance->fullName();
+    };
+    ConnectionSnapshot result{plan.type->name, {}, {}, {}, plan.published, plan.subscribed};
+    if (plan.writer)
+        result.writer = {component(plan.writer->node), plan.writer->output->name(), false};
+    for (const Writer& writer : plan.others)
+        result.other_writers.push_back({component(writer.node), writer.output->name(), false});
+    for (const Reader& reader : plan.readers) {
+        result.readers.push_back({component(reader.node), reader.input->name(), reader.broken});
+    }
+    return result;
+}
+
+}  // namespace
+
+const ComponentSnapshot& GraphSnapshot::get(const std::string& full_name) const {
+    for (const auto& component : components) {
+        if (component->full_name == full_name) return *component;
+    }
+    throw Refusal(RefusalKind::NotFound, fmt::format("no component {} in this runner", full_name));
+}
+
+std::shared_ptr<const GraphSnapshot> takeSnapshot(const Plan& plan, const GraphSnapshot& previous,
+                                                  const std::set<std::string>& changed) {
+    auto result = std::make_shared<GraphSnapshot>();
+    result->generation = plan.schedule.generation;
+    std::map<const Instance*, std::shared_ptr<const ComponentSnapshot>> known;
+    for (const auto& component : previous.components) known.emplace(component->instance, component);
+    for (const std::size_t index : plan.wiring.order) {
+        const GraphNode& node = plan.graph.nodes()[index];
+        const auto found = known.find(node.instance.get());
+        const bool same = found != known.end() &&
+                          found->second->full_name == node.instance->fullName() &&
+                          found->second->figures == node.instance->figures() &&
+                          found->second->definition.breaks == node.breaks &&
+                          found->second->fault == node.instance->faultText() &&
+                          changed.count(node.instance->fullName()) == 0;
+        result->components.push_back(same ? found->second : picture(node));
+    }
+    for (const auto& [name, connection] : plan.wiring.connections) {
+        result->connections.emplace(name, picture(plan.graph, connection));
+    }
+    for (const auto& [name, tap] : plan.taps) result->taps.push_back(tap);
+    for (const auto& [name, injector] : plan.injectors) result->injectors.push_back(injector);
+    return result;
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,74 @@
+#include "ros/transport/reconnection.hpp"
+
+#include <dlfcn.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <ros/transport/transport_tcp.h>
+#include <ros/transport_publisher_link.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <atomic>
+
+namespace rtcf::ros1 {
+
+namespace {
+
+// A peer is asked for a sign of life when it has been silent for the first, then each second;
+// the connection ends when there was none for the last, its beginning included.
+constexpr int kSilence = 1;     // s
+constexpr int kBetween = 1;     // s
+constexpr int kUnanswered = 3;  // questions
+constexpr int kUnanswered_ms = 3000;
+constexpr double kLongestPause = 1.0;  // s, between two attempts
+
+std::atomic<bool> soon{false};
+
+void set(int socket, int level, int option, int value) {
+    // One that the kernel does not know leaves the connection as patient as it was.
+    setsockopt(socket, level, option, &value, sizeof value);
+}
+
+}  // namespace
+
+void reconnectSoon() noexcept { soon = true; }
+
+}  // namespace rtcf::ros1
+
+namespace ros {
+
+// Take the place of roscpp's own, which its other parts call by these names.
+
+void TransportTCP::setKeepAlive(bool use, std::uint32_t idle, std::uint32_t interval,
+                                std::uint32_t count) {
+    using namespace rtcf::ros1;
+    // Those that others have opened are theirs to open again: dropping one here would leave
+    // them waiting for what will never come.
+    const bool ours = soon && !connected_host_.empty();
+    set(sock_, SOL_SOCKET, SO_KEEPALIVE, use ? 1 : 0);
+    if (!use) return;
+    set(sock_, IPPROTO_TCP, TCP_KEEPIDLE, ours ? kSilence : static_cast<int>(idle));
+    set(sock_, IPPROTO_TCP, TCP_KEEPINTVL, ours ? kBetween : static_cast<int>(interval));
+    set(sock_, IPPROTO_TCP, TCP_KEEPCNT, ours ? kUnanswered : static_cast<int>(count));
+    if (ours) set(sock_, IPPROTO_TCP, TCP_USER_TIMEOUT, kUnanswered_ms);
+}
+
+void TransportPublisherLink::onRetryTimer(const SteadyTimerEvent& event) {
+    using namespace rtcf::ros1;
+    using Retry = void (*)(TransportPublisherLink*, const SteadyTimerEvent&);
+    static const auto retry = reinterpret_cast<Retry>(
+        dlsym(RTLD_NEXT, "_ZN3ros22TransportPublisherLink12onRetryTimerERKNS_16SteadyTimerEventE"));
+    if (retry == nullptr) return;
+    const ConnectionPtr before = connection_;
+    // It doubles the pause before it tries.
+    if (soon) retry_period_ = std::min(retry_period_, WallDuration(kLongestPause / 2));
+    retry(this, event);
+    // An attempt that failed at once is not repeated by roscpp: there was no route.
+    const bool gave_up = !dropping_ && !needs_retry_ && connection_ == before;
+    if (soon && gave_up && connection_->isDropped()) {
+        needs_retry_ = true;
+        next_retry_ = SteadyTime::now() + retry_period_;
+    }
+}
+
+}  // namespace ros

@@ -1,0 +1,42 @@
+#include "ros/transport/refusals.hpp"
+
+#include <string_view>
+#include <utility>
+
+namespace rtcf::ros1 {
+
+Refusals::Refusals() { ros::console::register_appender(this); }
+
+Refusals::~Refusals() { ros::console::deregister_appender(this); }
+
+std::vector<std::string> Refusals::take() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(fresh_, {});
+}
+
+std::string Refusals::recent() const {
+    const std::lock_guard lock(mutex_);
+    const bool recent = std::chrono::steady_clock::now() - last_time_ < std::chrono::minutes(1);
+    return recent ? last_ : std::string();
+}
+
+void Refusals::log(ros::console::Level level, const char* text, const char* /*file*/,
+                   const char* /*function*/, int /*line*/) {
+    if (level < ros::console::levels::Error || text == nullptr) return;
+    // We are the publisher, or the subscriber, of a pair that does not match.
+    const std::string_view view(text);
+    if (view.find(" wants topic ") == std::string_view::npos &&
+        view.find("error message in header") == std::string_view::npos) {
+        return;
+    }
+    constexpr std::size_t kMost = 100;  // texts with numbers in them must not fill the memory
+    const std::lock_guard lock(mutex_);
+    last_ = "a ROS connection was refused: " + std::string(view);
+    for (char& c : last_) {
+        if (c == '\n') c = ' ';
+    }
+    last_time_ = std::chrono::steady_clock::now();
+    if (known_.size() < kMost && known_.insert(last_).second) fresh_.push_back(last_);
+}
+
+}  // namespace rtcf::ros1
