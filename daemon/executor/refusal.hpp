@@ -8,7 +8,7 @@
 
 namespace rtcf::executor {
 
-/// What programs switch on: messages/convert.cpp makes a reason and a code of each.
+/// What programs switch on: messages/errors.cpp makes a reason and a code of each.
 enum class RefusalKind {
     InvalidArgument,  ///< a value is out of range or of the wrong type
     RequestMalformed,

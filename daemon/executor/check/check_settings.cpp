@@ -2,7 +2,9 @@
 
 #include <unistd.h>
 
-#include "messages/convert.hpp"
+#include "messages/settings_messages.hpp"
+#include "messages/errors.hpp"
+#include "messages/to_wire.hpp"
 #include "refusal.hpp"
 #include "rtcf/v1/runner.pb.h"
 #include "view/settings.hpp"

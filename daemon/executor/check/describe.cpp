@@ -12,7 +12,7 @@
 #include <memory>
 #include <system_error>
 
-#include "messages/convert.hpp"
+#include "messages/to_wire.hpp"
 #include "plugins/library.hpp"
 
 namespace rtcf::executor {

@@ -18,11 +18,10 @@
 #include "runner/runner.hpp"
 #include "server/connection.hpp"
 #include "server/direct_stop.hpp"
+#include "server/figures.hpp"
 #include "server/listen.hpp"
 #include "server/outside_calls.hpp"
 #include "server/port_streams.hpp"
-#include "statistics/histogram.hpp"
-#include "statistics/thread_usage.hpp"
 
 namespace rtcf::executor {
 
@@ -57,36 +56,12 @@ class Server {
         v1::Response response;
         bool last;  // ends its request
     };
-    struct Figures {  // all that is counted, since the beginning
-        struct Component {
-            HistogramSnapshot duration;
-            std::uint64_t overruns = 0;
-            std::uint64_t device_calls = 0;
-            std::int64_t device_time_ns = 0;
-        };
-        // Held, as another component's figures could come to the same address.
-        std::map<std::shared_ptr<const ComponentFigures>, Component> components;
-        HistogramSnapshot duration;
-        HistogramSnapshot latency;
-        HistogramSnapshot adoption;
-        std::uint64_t overruns = 0;
-        std::uint64_t missed = 0;
-        std::uint64_t late_wake_ups = 0;
-        std::uint64_t exchange_overruns = 0;
-        std::uint64_t catching_up = 0;
-        std::uint64_t log_dropped = 0;
-        // Not held, as their rings are large.
-        std::map<std::weak_ptr<const Tap>, std::uint64_t, std::owner_less<>> tap_dropped;
-        int thread = 0;
-        ThreadUsage usage;
-    };
     struct Reset {  // one that waits for the end of a cycle
         std::uint64_t connection;
         std::uint64_t request;
         std::int64_t until_ns;
     };
 
-    Figures figures(const GraphSnapshot& graph) const;
     void post(std::uint64_t connection, v1::Response response, bool last);
     void wakeUp() const;
     void handOn(const v1::Response& call);
@@ -104,16 +79,8 @@ class Server {
     void servePorts();
     void expire();
     bool orphaned();
-    template <typename Message>
-    void trustOwnerOf(const Message& message);
-    ChangeOutcome change(const v1::Request& request, const Runner::Progress& progress);
     ::rtcf::v1::RunnerStatus status() const;
-    ::rtcf::v1::RunnerStatistics statistics() const;
-    static std::uint64_t tapDropped(const GraphSnapshot& graph, const Figures& baseline);
     void resetStatistics(std::uint64_t connection, std::uint64_t request);
-    bool takeBaseline();
-    void setBaseline(Figures figures);
-    std::shared_ptr<const Figures> baseline() const;
     void goOnWithResets();
     std::string stuck() const;
     void requireNotStuck() const;
@@ -131,11 +98,8 @@ class Server {
     const DirectStop* direct_stop_ = nullptr;
     std::uint64_t next_id_ = 1;
     std::map<std::uint64_t, std::unique_ptr<Connection>> connections_;
+    std::unique_ptr<Figures> figures_;
     std::vector<Reset> resets_;
-
-    // What status and statistics count from. The graph thread tells a status, too.
-    mutable std::mutex baseline_mutex_;
-    std::shared_ptr<const Figures> baseline_ = std::make_shared<Figures>();
 
     // Requests that the graph thread has, by connection and id: when to give up on them.
     struct Waiting {

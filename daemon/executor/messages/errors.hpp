@@ -1,0 +1,17 @@
+/// @file
+/// Refusals as the wire's errors, with a code and a reason for programs. Pure functions.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "refusal.hpp"
+#include "rtcf/executor/v1/executor.pb.h"
+
+namespace rtcf::executor {
+
+v1::Error errorTo(RefusalKind kind, const std::string& message);
+/// That which ends request `id`.
+v1::Response errorResponse(std::uint64_t id, RefusalKind kind, const std::string& message);
+
+}  // namespace rtcf::executor

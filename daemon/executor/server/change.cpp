@@ -1,0 +1,91 @@
+#include "server/change.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+#include <vector>
+
+#include "messages/from_wire.hpp"
+#include "messages/image_file.hpp"
+#include "refusal.hpp"
+
+namespace rtcf::executor {
+
+namespace pb = ::rtcf::v1;
+
+namespace {
+
+// What rtcfd says about the folder that it found a library in.
+template <typename Message>
+void trustOwnerOf(Runner& runner, const Message& message) {
+    if (message.has_owner()) runner.trust(message.owner());
+}
+
+}  // namespace
+
+ChangeOutcome change(Runner& runner, const v1::Request& request, const Runner::Progress& progress) {
+    switch (request.kind_case()) {
+        case v1::Request::kStart:
+            return runner.start(progress);
+        case v1::Request::kStop:
+            return runner.stop(progress);
+        case v1::Request::kStep:
+            if (request.step().cycles() == 0)
+                throw Refusal(RefusalKind::InvalidArgument, "0 cycles to step: name a number");
+            return runner.step(request.step().cycles(), progress);
+        case v1::Request::kLoad: {
+            trustOwnerOf(runner, request.load());
+            ComponentDefinition definition = definitionFrom(request.load().component());
+            for (auto& [name, value] : parametersFrom(request.load().inherited()))
+                definition.inherited.push_back({name, value});
+            return runner.load(std::move(definition), request.load().library(), progress);
+        }
+        case v1::Request::kUnload: {
+            std::vector<std::string> names;
+            for (const std::string& name : request.unload().components())
+                names.push_back(fullNameOf(name));
+            return runner.unload(names, progress);
+        }
+        case v1::Request::kReplace: {
+            trustOwnerOf(runner, request.replace());
+            const std::string name = fullNameOf(request.replace().component());
+            for (const auto& component : runner.snapshot()->components) {
+                if (component->full_name != name) continue;
+                return runner.replace(
+                    name, replacementFrom(request.replace().replacement(), component->definition),
+                    request.replace().library(), request.replace().reset_parameters(), progress);
+            }
+            throw Refusal(RefusalKind::NotFound, fmt::format("no component {} to replace", name));
+        }
+        case v1::Request::kApply: {
+            std::vector<WantedComponent> wanted;
+            for (const v1::Load& load : request.apply().components()) {
+                trustOwnerOf(runner, load);
+                wanted.push_back({definitionFrom(load.component()), load.library(), load.anew()});
+            }
+            return runner.apply(wanted, request.apply().dry_run(), progress);
+        }
+        case v1::Request::kSetBreaks: {
+            std::vector<std::pair<std::string, std::string>> ports;
+            for (const pb::PortName& port : request.set_breaks().ports()) {
+                ports.emplace_back(fullNameOf(port.component()), port.port());
+            }
+            return runner.setBreaks(ports, request.set_breaks().broken());
+        }
+        case v1::Request::kRestoreSnapshot:
+            return runner.restore(imageFromFile(request.restore_snapshot().snapshot()), progress);
+        case v1::Request::kResetState:
+            return runner.reset(fullNameOf(request.reset_state().component()));
+        case v1::Request::kSetState:
+            return runner.setStates(fullNameOf(request.set_state().component()),
+                                    parametersFrom(request.set_state().states()));
+        case v1::Request::kSetParameters:
+            return runner.setParameters(fullNameOf(request.set_parameters().component()),
+                                        parametersFrom(request.set_parameters().parameters()));
+        default:
+            throw Refusal(RefusalKind::RequestMalformed,
+                          "a request of unknown kind: is rtcfd newer than its executor?");
+    }
+}
+
+}  // namespace rtcf::executor

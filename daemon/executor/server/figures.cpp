@@ -1,0 +1,146 @@
+#include "server/figures.hpp"
+
+#include <utility>
+
+namespace rtcf::executor {
+
+namespace pb = ::rtcf::v1;
+
+namespace {
+
+void setDistribution(pb::Distribution& message, const DistributionSummary& summary) {
+    message.set_count(summary.count);
+    message.set_min_ns(summary.min);
+    message.set_mean_ns(summary.mean);
+    message.set_p50_ns(summary.p50);
+    message.set_p99_ns(summary.p99);
+    message.set_p999_ns(summary.p999);
+    message.set_max_ns(summary.max);
+}
+
+}  // namespace
+
+void Figures::addTo(pb::RunnerStatus& status, const GraphSnapshot& graph) const {
+    const LoopFigures& loop = runner_.loop().figures();
+    const std::shared_ptr<const Counted> baseline = this->baseline();
+    status.set_iteration(loop.iteration.load(std::memory_order_relaxed));
+    status.set_overruns(loop.overruns.load(std::memory_order_relaxed) - baseline->overruns);
+    status.set_missed(loop.missed.load(std::memory_order_relaxed) - baseline->missed);
+    status.set_log_dropped(log_.dropped() - baseline->log_dropped);
+    status.set_tap_dropped(tapDropped(graph, *baseline));
+}
+
+// Of the same cycles, unless the loop leaves no time between them.
+pb::RunnerStatistics Figures::statistics() const {
+    const std::shared_ptr<const GraphSnapshot> graph = runner_.snapshot();
+    const Loop& loop = runner_.loop();
+    const double ns_per_tick = loop.counter().nsPerTick();
+    const std::shared_ptr<const Counted> baseline = this->baseline();
+    Counted now;
+    if (!loop.figures().counting.read([&] { now = counted(*graph); })) now = counted(*graph);
+    pb::RunnerStatistics message;
+    message.set_runner(runner_.name());
+    const HistogramSnapshot duration = difference(now.duration, baseline->duration);
+    message.set_iterations(duration.count);
+    setDistribution(*message.mutable_duration(), summarize(duration, ns_per_tick));
+    setDistribution(*message.mutable_latency(),
+                    summarize(difference(now.latency, baseline->latency), 1.0));
+    setDistribution(*message.mutable_adoption(),
+                    summarize(difference(now.adoption, baseline->adoption), ns_per_tick));
+    message.set_overruns(now.overruns - baseline->overruns);
+    message.set_missed(now.missed - baseline->missed);
+    message.set_late_wake_ups(now.late_wake_ups - baseline->late_wake_ups);
+    message.set_exchange_overruns(now.exchange_overruns - baseline->exchange_overruns);
+    message.set_catching_up(now.catching_up - baseline->catching_up);
+    for (const auto& component : graph->components) {
+        pb::ComponentStatistics& statistics = *message.add_components();
+        statistics.set_component(component->full_name);
+        Counted::Component& present = now.components[component->figures];
+        if (const auto found = baseline->components.find(component->figures);
+            found != baseline->components.end()) {
+            const Counted::Component& past = found->second;
+            present.duration = difference(present.duration, past.duration);
+            present.overruns -= past.overruns;
+            present.device_calls -= past.device_calls;
+            present.device_time_ns -= past.device_time_ns;
+        }
+        setDistribution(*statistics.mutable_duration(), summarize(present.duration, ns_per_tick));
+        statistics.set_overruns(present.overruns);
+        statistics.set_faults(component->figures->faults.count.value());
+        statistics.set_device_calls(present.device_calls);
+        if (present.device_calls != 0) {
+            statistics.set_device_mean_ns(static_cast<double>(present.device_time_ns) /
+                                          static_cast<double>(present.device_calls));
+        }
+    }
+    // The kernel counts of each thread from its beginning.
+    const ThreadUsage before = now.thread == baseline->thread ? baseline->usage : ThreadUsage{};
+    message.set_minor_faults(now.usage.minor_faults - before.minor_faults);
+    message.set_major_faults(now.usage.major_faults - before.major_faults);
+    message.set_involuntary_switches(now.usage.involuntary_switches - before.involuntary_switches);
+    message.set_log_dropped(now.log_dropped - baseline->log_dropped);
+    message.set_tap_dropped(tapDropped(*graph, *baseline));
+    return message;
+}
+
+std::uint64_t Figures::tapDropped(const GraphSnapshot& graph, const Counted& baseline) {
+    std::uint64_t dropped = 0;
+    for (const auto& tap : graph.taps) {
+        const auto found = baseline.tap_dropped.find(tap);
+        dropped += tap->dropped() - (found == baseline.tap_dropped.end() ? 0 : found->second);
+    }
+    return dropped;
+}
+
+Figures::Counted Figures::counted(const GraphSnapshot& graph) const {
+    const auto relaxed = std::memory_order_relaxed;
+    const LoopFigures& loop = runner_.loop().figures();
+    Counted figures;
+    for (const auto& component : graph.components) {
+        const ComponentFigures& each = *component->figures;
+        figures.components[component->figures] = {
+            each.duration.snapshot(), each.overruns.load(relaxed), each.device.calls.load(relaxed),
+            each.device.time_ns.load(relaxed)};
+    }
+    figures.duration = loop.duration.snapshot();
+    figures.latency = loop.latency.snapshot();
+    figures.adoption = loop.adoption.snapshot();
+    figures.overruns = loop.overruns.load(relaxed);
+    figures.missed = loop.missed.load(relaxed);
+    figures.late_wake_ups = loop.late_wake_ups.value();
+    figures.exchange_overruns = loop.exchange_overruns.value();
+    figures.catching_up = loop.catching_up.value();
+    figures.log_dropped = log_.dropped();
+    for (const auto& tap : graph.taps) figures.tap_dropped[tap] = tap->dropped();
+    figures.thread = runner_.loop().threadId();
+    figures.usage = readThreadUsage(figures.thread);
+    return figures;
+}
+
+// @return whether it could be taken: not while a cycle is being counted
+bool Figures::restart() {
+    runner_.holdFigures(true);
+    const std::shared_ptr<const GraphSnapshot> graph = runner_.snapshot();
+    Counted now;
+    if (!runner_.loop().figures().counting.read([&] { now = counted(*graph); })) return false;
+    setBaseline(std::move(now));
+    return true;
+}
+
+void Figures::setBaseline(Counted figures) {
+    {
+        const auto next = std::make_shared<const Counted>(std::move(figures));
+        const std::lock_guard<std::mutex> lock(mutex_);
+        baseline_ = next;
+    }
+    runner_.holdFigures(false);
+}
+
+std::shared_ptr<const Figures::Counted> Figures::baseline() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return baseline_;
+}
+
+void Figures::restartInStep() { setBaseline(counted(*runner_.snapshot())); }
+
+}  // namespace rtcf::executor

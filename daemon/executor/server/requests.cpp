@@ -1,0 +1,354 @@
+// The server's requests: queries, changes, probes and watches.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <utility>
+
+#include "messages/errors.hpp"
+#include "messages/from_wire.hpp"
+#include "messages/settings_messages.hpp"
+#include "messages/to_wire.hpp"
+#include "rtcf/version.hpp"
+#include "server/change.hpp"
+#include "server/server.hpp"
+
+namespace rtcf::executor {
+
+namespace pb = ::rtcf::v1;
+
+namespace {
+
+// Of rtcfd and executor the newer asks for nothing that the older does not know:
+// see link.py of rtcfd. Hello, stop and exit stay as they are for good.
+constexpr std::uint32_t kProtocol = 4;
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::int64_t kHookTimeout = 10 * kSecond;
+constexpr std::int64_t kProbeTimeout = kSecond / 2;
+
+}  // namespace
+
+std::string Server::stuck() const {
+    const auto [activity, since_ns] = runner_->activity();
+    return !activity.empty() && monotonicNow() - since_ns > kHookTimeout ? activity : std::string();
+}
+
+void Server::requireNotStuck() const {
+    const std::string where = stuck();
+    if (where.empty()) return;
+    throw Refusal(RefusalKind::Unavailable,
+                  fmt::format("runner {} is stuck in {}(): only stop and restart it",
+                              runner_->name(), where));
+}
+
+void Server::handle(Connection& connection, const v1::Request& request) {
+    const std::uint64_t id = connection.id();
+    if (request.kind_case() == v1::Request::kHello) {
+        v1::Response response;
+        response.set_id(request.id());
+        v1::HelloResult& hello = *response.mutable_hello();
+        hello.set_protocol(kProtocol);
+        hello.set_version(RTCF_VERSION);
+        hello.set_runner(runner_->name());
+        hello.set_pid(::getpid());
+        hello.set_flight_recorder_fd(runner_->recorder().fd());
+        if (const DirectStopReport report = direct_stop_->last(); report.count != 0)
+            *hello.mutable_direct_stop() = directStopTo(report);
+        connection.setGreeted();
+        respond(id, response);
+        return;
+    }
+    if (!connection.greeted()) {
+        respond(id, errorResponse(request.id(), RefusalKind::FailedPrecondition,
+                                  "the first request must be hello"));
+        return;
+    }
+    try {
+        if (answerQuery(id, request)) return;
+        if (request.kind_case() == v1::Request::kGetComponent) {
+            submitProbe(id, request);
+        } else if (request.kind_case() == v1::Request::kWatchPorts) {
+            beginWatch(id, request);
+        } else {
+            submitChange(id, request);
+        }
+    } catch (const Refusal& refusal) {
+        respond(id, errorResponse(request.id(), refusal.kind(), refusal.what()));
+    }
+}
+
+bool Server::answerQuery(std::uint64_t connection, const v1::Request& request) {
+    v1::Response response;
+    response.set_id(request.id());
+    const std::shared_ptr<const GraphSnapshot> graph = runner_->snapshot();
+    switch (request.kind_case()) {
+        case v1::Request::kListComponents: {
+            const RunnerState state = runner_->picture().state;
+            auto& result = *response.mutable_components();
+            for (std::size_t i = 0; i < graph->components.size(); ++i) {
+                *result.add_components() = componentTo(*graph, i, state);
+            }
+            break;
+        }
+        case v1::Request::kListConnections:
+            *response.mutable_connections() = connectionsTo(*graph);
+            break;
+        case v1::Request::kGetStatistics:
+            *response.mutable_statistics() = figures_->statistics();
+            break;
+        case v1::Request::kResetStatistics:
+            resetStatistics(connection, request.id());
+            return true;
+        case v1::Request::kGetStatus:
+            setState(response, runner_->numberedState());
+            *response.mutable_status() = status();
+            break;
+        case v1::Request::kServiceAnswer:
+            calls_.answer(request.service_answer().call(),
+                          {request.service_answer().success(), request.service_answer().message()});
+            response.mutable_done();
+            break;
+        case v1::Request::kAccess:
+            access_->set(rulesFrom(request.access()));
+            response.mutable_done();
+            break;
+        case v1::Request::kEndWatch: {
+            const auto id = std::make_pair(connection, request.end_watch().watch());
+            waiting_.erase(id);
+            if (const std::uint64_t watch = ports_.end(id); watch != 0) endWatches({watch});
+            response.mutable_done();
+            break;
+        }
+        case v1::Request::kExit:
+            response.mutable_done();
+            exiting_ = true;
+            break;
+        default:
+            return false;
+    }
+    respond(connection, response);
+    return true;
+}
+
+void Server::submitChange(std::uint64_t connection, const v1::Request& request) {
+    const std::uint64_t id = request.id();
+    // Stop never queues behind a hook.
+    if (request.kind_case() == v1::Request::kStop) runner_->requestStop();
+    if (request.kind_case() != v1::Request::kStop) requireNotStuck();
+    requireStopsKnown(request);
+    // Statistics are of one run of the loop, which has not begun yet.
+    const bool begins = request.kind_case() == v1::Request::kStart ||
+                        (request.kind_case() == v1::Request::kReplay && request.replay().begin()) ||
+                        ((request.kind_case() == v1::Request::kStep ||
+                          request.kind_case() == v1::Request::kRestoreSnapshot) &&
+                         runner_->picture().state != RunnerState::Stepping);
+    if (begins && !runner_->loop().running() && !figures_->restart()) {
+        figures_->restartInStep();  // in a step, which this one waits for
+    }
+    // Steps take as long as they take; they report progress.
+    const bool endless =
+        request.kind_case() == v1::Request::kStep || request.kind_case() == v1::Request::kReplay;
+    const auto given_up = std::make_shared<std::atomic<bool>>(false);
+    const auto otherwise = [this, id] {
+        return errorResponse(id, RefusalKind::Unavailable,
+                             fmt::format("runner {} is stuck in {}()", runner_->name(), stuck()));
+    };
+    waiting_[{connection, id}] = {endless ? INT64_MAX : monotonicNow() + kHookTimeout, otherwise,
+                                  given_up};
+    runner_->post([this, connection, id, request, given_up] {
+        v1::Response response;
+        response.set_id(id);
+        // Whoever asked has been told that it did not happen. Stop is another matter.
+        const auto require_wanted = [&] {
+            if (!given_up->load() || request.kind_case() == v1::Request::kStop) return;
+            throw Refusal(RefusalKind::Unavailable, "given up: a hook took too long");
+        };
+        try {
+            require_wanted();
+            requireStopsKnown(request);
+            const auto progress = [this, connection, id, &require_wanted](const std::string& line) {
+                require_wanted();
+                v1::Response step;
+                step.set_id(id);
+                step.set_progress(line);
+                post(connection, std::move(step), false);
+            };
+            if (request.kind_case() == v1::Request::kConfigure) {
+                runner_->configure(settingsFrom(request.configure(), runner_->settings()));
+                *response.mutable_status() = status();
+            } else if (request.kind_case() == v1::Request::kLimits) {
+                runner_->limitTaps(request.limits().taps());
+                response.mutable_done();
+            } else if (request.kind_case() == v1::Request::kReplay) {
+                *response.mutable_replay() =
+                    replayTo(runner_->replay(replayFrom(request.replay()), progress));
+            } else if (request.kind_case() == v1::Request::kTakeSnapshot) {
+                *response.mutable_snapshot() = snapshotTo(runner_->takeImage());
+            } else {
+                *response.mutable_change() = outcomeTo(change(*runner_, request, progress));
+            }
+        } catch (const Refusal& refusal) {
+            response = errorResponse(id, refusal.kind(), refusal.what());
+        } catch (const std::exception& error) {
+            response = errorResponse(id, RefusalKind::FailedPrecondition, error.what());
+        } catch (...) {
+            response = errorResponse(id, RefusalKind::FailedPrecondition, "an unknown exception");
+        }
+        setState(response, runner_->numberedState());
+        log_->drain();  // what the hooks said comes before the answer
+        post(connection, std::move(response), true);
+    });
+}
+
+// What was asked for before somebody stopped the loop past rtcfd does not run it again.
+void Server::requireStopsKnown(const v1::Request& request) const {
+    const bool runs = request.kind_case() == v1::Request::kStart ||
+                      request.kind_case() == v1::Request::kStep ||
+                      request.kind_case() == v1::Request::kRestoreSnapshot ||
+                      request.kind_case() == v1::Request::kReplay;
+    const DirectStopReport report = direct_stop_->last();
+    if (!runs || request.direct_stops() >= report.count) return;
+    throw Refusal(RefusalKind::LoopStopped,
+                  fmt::format("runner {} was stopped at its executor by user {} after this was "
+                              "asked for: ask again",
+                              runner_->name(), report.user));
+}
+
+// A component's picture is at hand; only its ports' values need the graph thread, and are left
+// out if that is busy.
+void Server::submitProbe(std::uint64_t connection, const v1::Request& request) {
+    const std::string name = fullNameOf(request.get_component().component());
+    const std::uint64_t id = request.id();
+    const std::shared_ptr<const GraphSnapshot> graph = runner_->snapshot();
+    const RunnerState state = runner_->picture().state;
+    const auto found =
+        std::find_if(graph->components.begin(), graph->components.end(),
+                     [&](const auto& component) { return component->full_name == name; });
+    if (found == graph->components.end()) {
+        (void)graph->get(name);  // refuses
+    }
+    v1::Response response;
+    response.set_id(id);
+    *response.mutable_component() =
+        componentTo(*graph, static_cast<std::size_t>(found - graph->components.begin()), state);
+    waiting_[{connection, id}] = {monotonicNow() + kProbeTimeout, [response] { return response; },
+                                  nullptr};
+    runner_->post([this, connection, name, response]() mutable {
+        try {
+            addValues(*response.mutable_component(), runner_->probe(name));
+            addStates(*response.mutable_component(), runner_->states(name));
+        } catch (const std::exception&) {
+            // Unloaded since: the picture of a moment ago is still an answer.
+        }
+        post(connection, std::move(response), true);
+    });
+}
+
+// Its values begin once the graph thread has the loop keep them.
+void Server::beginWatch(std::uint64_t connection, const v1::Request& request) {
+    requireNotStuck();
+    const std::uint64_t id = request.id();
+    const std::uint64_t watch = next_watch_++;
+    const auto& patterns = request.watch_ports().selection();
+    const PortSelection selection({patterns.begin(), patterns.end()});
+    ports_.begin({connection, id}, watch, selection, request.watch_ports().every());
+    const auto nothing = [id] {
+        return errorResponse(id, RefusalKind::Unavailable, "the stream has ended");
+    };
+    waiting_[{connection, id}] = {INT64_MAX, nothing, nullptr};
+    runner_->post([this, connection, id, watch, selection] {
+        try {
+            runner_->watch(watch, selection);
+        } catch (const Refusal& refusal) {
+            post(connection, errorResponse(id, refusal.kind(), refusal.what()), true);
+        } catch (const std::exception& error) {
+            post(connection, errorResponse(id, RefusalKind::FailedPrecondition, error.what()),
+                 true);
+        }
+    });
+}
+
+void Server::endWatches(const std::vector<std::uint64_t>& watches) {
+    for (const std::uint64_t watch : watches)
+        runner_->post([this, watch] { runner_->endWatch(watch); });
+}
+
+pb::RunnerStatus Server::status() const {
+    const RunnerPicture picture = runner_->picture();
+    const std::shared_ptr<const GraphSnapshot> graph = runner_->snapshot();
+    const Loop& loop = runner_->loop();
+    pb::RunnerStatus status;
+    status.set_runner(runner_->name());
+    status.set_state(stateTo(picture.state));
+    status.set_status(picture.status);
+    status.set_simulated(picture.simulated);
+    if (const std::string where = stuck(); !where.empty()) {
+        status.set_state(pb::RUNNER_STATE_STUCK);
+        status.set_status(fmt::format("stuck in {}()", where));
+    }
+    *status.mutable_settings() = settingsTo(picture.settings);
+    status.set_pid(::getpid());
+    status.set_realtime_tid(loop.threadId());
+    if (loop.cpu() >= 0) status.set_loop_cpu(loop.cpu());
+    figures_->addTo(status, *graph);
+    status.set_components(static_cast<std::uint32_t>(graph->components.size()));
+    status.set_generation(graph->generation);
+    std::uint64_t faults = 0;
+    for (const auto& component : graph->components)
+        faults += component->figures->faults.count.value();
+    status.set_faults(faults);
+    for (const std::string& line : picture.degraded) status.add_degraded(line);
+    pb::RosStatus& ros = *status.mutable_ros();
+    ros.set_enabled(picture.bridge.enabled);
+    ros.set_connected(picture.bridge.connected);
+    ros.set_node(picture.bridge.node);
+    ros.set_master_uri(picture.bridge.master_uri);
+    ros.set_publications(picture.bridge.publications);
+    ros.set_subscriptions(picture.bridge.subscriptions);
+    ros.set_problem(picture.bridge.problem);
+    ros.set_too_large(picture.too_large);
+    std::uint64_t passed_over = 0;
+    for (const auto& injector : graph->injectors) passed_over += injector->passedOver();
+    ros.set_passed_over(passed_over);
+    return status;
+}
+
+// At once, or when the cycle has ended that is being counted: those after it are not, until then.
+void Server::resetStatistics(std::uint64_t connection, std::uint64_t request) {
+    constexpr std::int64_t kPeriods = 10;
+    const std::int64_t period_ns = runner_->picture().settings.loop.period_ns;
+    resets_.push_back({connection, request, monotonicNow() + kSecond + kPeriods * period_ns});
+    goOnWithResets();
+}
+
+void Server::goOnWithResets() {
+    if (resets_.empty()) return;
+    v1::Response answer;
+    std::vector<Reset> answered;
+    if (figures_->restart()) {
+        answer.mutable_done();
+        answered.swap(resets_);
+    } else {
+        const std::int64_t now = monotonicNow();
+        const auto late =
+            std::stable_partition(resets_.begin(), resets_.end(),
+                                  [now](const Reset& each) { return now < each.until_ns; });
+        if (late == resets_.end()) return;
+        answered.assign(late, resets_.end());
+        resets_.erase(late, resets_.end());
+        if (resets_.empty()) runner_->holdFigures(false);
+        const std::string activity = runner_->recorder().realtimeActivity();
+        answer = errorResponse(
+            0, RefusalKind::Unavailable,
+            fmt::format("the loop of {} reaches no cycle boundary: {} does not return; its figures "
+                        "go on",
+                        runner_->name(), activity.empty() ? "a component" : activity + "()"));
+    }
+    for (const Reset& each : answered) {
+        answer.set_id(each.request);
+        respond(each.connection, answer);
+    }
+}
+
+}  // namespace rtcf::executor
