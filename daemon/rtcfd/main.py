@@ -57,7 +57,7 @@ class Daemon:
         self._options = given
         self._read_options = read_options
         self._notify = Notify()
-        self._store = Store(given.state_dir)
+        self._store = Store(given.state_dir, given.runtime_dir / "executors")
         self._command = ExecutorCommand(
             given.executor,
             given.runtime_dir / "executors",
@@ -151,7 +151,7 @@ class Daemon:
         self._serve_privately()
         self._shared.rules = await self._reloads.rules()
         self._left_over = left_overs(self._command.folder)
-        states = self._store.load()
+        states = self._store.load(self._left_over)
         if self._options.default_runner and DEFAULT_RUNNER not in [s.runner for s in states]:
             states.append(Desired(DEFAULT_RUNNER))
         self._runners.adopt(self._reloads.boot(states, self._left_over))

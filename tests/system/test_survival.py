@@ -107,6 +107,39 @@ def test_a_full_disk_is_told_and_survived(service: Service) -> None:
         machine.run("umount", "/var/lib/rtcfd")
 
 
+def test_a_stop_is_final_on_a_read_only_disk_too(service: Service) -> None:
+    machine = service.machine
+
+    def anew() -> str:
+        service.systemctl("reset-failed", "rtcfd.service")  # so many starts in so short a time
+        service.start_anew()
+        return str(service.status()["state"])
+
+    service.configure('[runner]\non_boot = "resume"\n')
+    service.systemctl("stop", "rtcfd.service")
+    machine.run("mount", "-t", "tmpfs", "-o", "mode=750,uid=rtcf,gid=rtcf", "tmpfs",
+                "/var/lib/rtcfd")  # fmt: skip
+    try:
+        service.systemctl("start", "rtcfd.service")
+        service.load_and_start()
+        machine.run("mount", "-o", "remount,ro", "/var/lib/rtcfd")
+        # As a restart leaves what runs.
+        service.systemctl("restart", "rtcfd.service")
+        assert service.status()["state"] == "running"
+        assert "is not resumed" not in service.ctl("status").stdout
+        assert "not saved: Read-only file system" in service.ctl("stop").stderr
+        # With what ran its executor goes, which knew of the stop.
+        assert anew() == "stopped"
+        machine.run("mount", "-o", "remount,rw", "/var/lib/rtcfd")
+        assert anew() == "stopped"
+        service.ctl("start")
+        machine.run("mount", "-o", "remount,ro", "/var/lib/rtcfd")
+        assert anew() == "stopped"
+    finally:
+        service.systemctl("stop", "rtcfd.service")
+        machine.run("umount", "/var/lib/rtcfd")
+
+
 def test_a_read_only_etc_is_enough(service: Service) -> None:
     machine = service.machine
     machine.run("mount", "--bind", "/etc", "/etc")

@@ -5,6 +5,7 @@ that fails, nothing is saved in its place.  One of an older rtcfd is upgraded, a
 kept beside: a way back.
 """
 
+import contextlib
 import dataclasses
 import errno
 import itertools
@@ -13,7 +14,7 @@ import logging
 import os
 import stat
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,7 @@ VERSION = 2
 _SUFFIX = ".json"
 _MARK = ".running"
 _HISTORY = ".history"
+_STOPPED = ".stopped"
 _UNREADABLE = (
     "it cannot be read ({}); once that is mended, stop rtcfd and rename it back to have it again"
 )
@@ -60,10 +62,15 @@ class _Newer(ValueError):
 
 
 class Store:
-    """The state folder; None keeps nothing."""
+    """The state folder; None keeps nothing.
 
-    def __init__(self, folder: Path | None) -> None:
+    `boot_folder`: where stops are noted, until the machine's next boot, that the state folder
+    does not take.
+    """
+
+    def __init__(self, folder: Path | None, boot_folder: Path | None = None) -> None:
         self._folder = folder
+        self._boot_folder = boot_folder
         self._kept: set[Path] = set()  # what could neither be read nor set aside
         self._unseen = False  # what is in the folder is not known
         self.problems: list[str] = []  # that load() met, a line each
@@ -81,8 +88,11 @@ class Store:
         """
         return None if self._folder is None else self._folder / f"{runner}{_MARK}"
 
-    def load(self) -> list[Desired]:
-        """Return all states, by runner."""
+    def load(self, alive: Collection[str] = ()) -> list[Desired]:
+        """Return all states, by runner.
+
+        `alive`: runners whose executors are there, and say themselves whether their loops run.
+        """
         if self._folder is None:
             return []
         states = []
@@ -99,9 +109,22 @@ class Store:
                 reason = " ".join(str(error).split())
                 self._set_aside(file, "corrupt", f"it is corrupt ({reason})")
             else:
-                if desired.running and not self._marked(desired.runner):
+                if desired.running and (
+                    not self._marked(desired.runner) or self._stop_is_noted(desired.runner)
+                ):
                     # Stopped, and there was nobody or no room to write it down.
                     desired.running, desired.ended_boot = False, this_boot()
+                if (
+                    desired.running
+                    and desired.runner not in alive
+                    and not os.access(self._folder, os.W_OK)
+                ):
+                    desired.running = False
+                    self._report(
+                        f"the loop of {desired.runner} is not resumed: state folder "
+                        f"{self._folder} cannot be written, so it would say that the loop runs "
+                        "also if somebody has stopped it; mend that"
+                    )
                 self._read_history(desired)
                 states.append(desired)
                 if version != VERSION:
@@ -159,9 +182,13 @@ class Store:
         if self._folder is None or mark is None:
             return
         if not running:
-            _unmark(mark)
-            # At once: the rest may find no room, and the state before says that it runs.
-            durable.sync_folder(self._folder)
+            try:
+                _unmark(mark)
+                # At once: the rest may find no room, and the state before says that it runs.
+                durable.sync_folder(self._folder)
+            except OSError:
+                self._note_stop(runner)
+                raise
         file = self._folder / f"{runner}{_SUFFIX}"
         self._require_known(file)
         durable.replace(file, text)
@@ -169,6 +196,7 @@ class Store:
             # Whatever else has its name is none.
             durable.replace(mark, b"", sync=False)
         durable.sync_folder(self._folder)
+        self._forget_stop(runner)
 
     def save_history(self, runner: str, changes: Sequence[Change], anew: bool) -> None:
         """Write what History.to_write() gave; raises OSError.  May run on any thread.
@@ -200,11 +228,31 @@ class Store:
         if self._folder is None:
             return
         _unmark(self._folder / f"{runner}{_MARK}")
+        self._forget_stop(runner)
         for suffix in (_SUFFIX, _HISTORY):
             file = self._folder / f"{runner}{suffix}"
             self._require_known(file)
             file.unlink(missing_ok=True)
         durable.sync_folder(self._folder)
+
+    def _note(self, runner: str) -> Path | None:
+        return None if self._boot_folder is None else self._boot_folder / f"{runner}{_STOPPED}"
+
+    def _note_stop(self, runner: str) -> None:
+        note = self._note(runner)
+        if note is not None:
+            with contextlib.suppress(OSError):
+                durable.replace(note, b"", sync=False)
+
+    def _stop_is_noted(self, runner: str) -> bool:
+        note = self._note(runner)
+        return note is not None and os.path.lexists(note)
+
+    def _forget_stop(self, runner: str) -> None:
+        note = self._note(runner)
+        if note is not None:
+            with contextlib.suppress(OSError):
+                note.unlink(missing_ok=True)
 
     def _set_aside(self, file: Path, why: str, reason: str) -> None:
         name = file.stem if file.suffix == _SUFFIX else file.name

@@ -9,7 +9,7 @@ from pathlib import Path
 import odd_files
 import pytest
 from rtcf.v1 import graph_pb2
-from rtcfd.state.desired import Desired
+from rtcfd.state.desired import Desired, this_boot
 from rtcfd.state.store import Store
 
 Value = graph_pb2.ParameterValue
@@ -39,6 +39,54 @@ def test_a_stop_outlives_a_power_cut_also_on_a_full_disk(
     (state,) = store.load()
     assert not state.running
     assert sorted(file.name for file in tmp_path.iterdir()) == ["arm.json"]
+
+
+def test_a_stop_on_a_read_only_disk_outlives_rtcfd(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, this_boots = tmp_path / "state", tmp_path / "run"
+    folder.mkdir()
+    this_boots.mkdir()
+    store = Store(folder, this_boots)
+    desired = Desired("arm")
+    desired.running = True
+    store.save("arm", store.text(desired), running=True)
+
+    def read_only(*_: object, **__: object) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    desired.running = False
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", read_only)
+        with pytest.raises(OSError, match="Read-only"):
+            store.save("arm", store.text(desired), running=False)
+    # It can be written again, but says that the loop runs.
+    (state,) = Store(folder, this_boots).load()
+    assert not state.running
+    assert state.ended_boot == this_boot()
+    desired.running = True
+    store.save("arm", store.text(desired), running=True)
+    (state,) = Store(folder, this_boots).load()
+    assert state.running
+
+
+def test_nothing_is_resumed_from_a_disk_that_takes_no_stop(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    desired = Desired("arm")
+    desired.running = True
+    store = Store(tmp_path)
+    store.save("arm", store.text(desired), running=True)
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    store = Store(tmp_path)
+    (state,) = store.load()
+    assert not state.running
+    assert "the loop of arm is not resumed: state folder" in store.problems[0]
+    # Of one that runs nobody has to guess.
+    store = Store(tmp_path)
+    (state,) = store.load(["arm"])
+    assert state.running
+    assert store.problems == []
 
 
 def saved(folder: Path, runner: str, running: bool = False) -> str:
