@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from rtcf_shared.errors import RtcfError
 
-from rtcf.client import Client, default_socket
+from rtcf.client import Client
+from rtcf.connection import default_socket
 from rtcf.errors import DaemonUnreachableError, RefusedError
 from rtcf.tenancy import Tenancy
 
@@ -23,15 +24,15 @@ if TYPE_CHECKING:
     from rtcf_shared.graph_writer import live_spec, write_graphs
     from rtcf_shared.spec import component, parse_parameter, parse_port, parse_remap, parse_value
 
-    from rtcf.recording import Recording, RecordingError, read_recording
+    from rtcf.recording.reader import Recording, RecordingError, read_recording
 
 __version__ = "0.1.0"
 
 # Imported when they are used first: a command is short, and few need them.
 _LATER = {
-    "Recording": "rtcf.recording",
-    "RecordingError": "rtcf.recording",
-    "read_recording": "rtcf.recording",
+    "Recording": "rtcf.recording.reader",
+    "RecordingError": "rtcf.recording.reader",
+    "read_recording": "rtcf.recording.reader",
     "Graph": "rtcf_shared.graph_reader",
     "GraphFileError": "rtcf_shared.graph_reader",
     "read_graphs": "rtcf_shared.graph_reader",

@@ -1,57 +1,21 @@
 """The client of rtcfd: one method per call of `rtcf.v1.Control`."""
 
-import os
-import time
-from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
 
-import grpc
 from rtcf_shared.errors import RtcfError
 from rtcf_shared.spec import several
 
-from rtcf import direct_stop, failures
-from rtcf.closing import Closing
-from rtcf.errors import DaemonUnreachableError, RefusedError
-from rtcf.events import EventStream, Place
+from rtcf import direct_stop
+from rtcf.connection import CHANGE_TIMEOUT_S, QUERY_TIMEOUT_S, OnProgress
 from rtcf.replay_call import ReplayCall
+from rtcf.streams.watching import Watching
 from rtcf.tenancy import Tenancy
-from rtcf.v1 import control_pb2, control_pb2_grpc, graph_pb2, runner_pb2
+from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 
-if TYPE_CHECKING:
-    from rtcf.ports import PortStream
-
-DEFAULT_SOCKET = "/run/rtcfd/control.sock"
-QUERY_TIMEOUT_S = 20.0
-# Above rtcfd's own limits, so that its better word arrives.
-CHANGE_TIMEOUT_S = 120.0
-_CROWDED_S = 15.0  # for a place in the queue at the door
-_RETRY_S = 0.05
-_LONGEST_PATH = 107  # unix(7)
 DEFAULT_RUNNER = "rt_runner"
 
-_OPTIONS = (
-    ("grpc.max_receive_message_length", 64 * 1024 * 1024),
-    # A refusal travels as metadata, of which gRPC takes 8 KiB by default.
-    ("grpc.max_metadata_size", 1024 * 1024),
-    # A connection of its own: a shared one may belong to a rtcfd that has ended.
-    ("grpc.use_local_subchannel_pool", 1),
-    # After a restart of rtcfd a client is to be back soon, not in gRPC's 1 to 120 s.
-    ("grpc.initial_reconnect_backoff_ms", 100),
-    # How long one attempt to connect may take: rtcfd may not be up yet when systemd takes the
-    # connection, or not have been scheduled on a busy machine.
-    ("grpc.min_reconnect_backoff_ms", 60_000),
-    ("grpc.max_reconnect_backoff_ms", 1000),
-)
 
-OnProgress = Callable[[str], None]
-
-
-def default_socket() -> str:
-    """Return $RTCF_SOCKET, or the system daemon's socket."""
-    return os.environ.get("RTCF_SOCKET") or DEFAULT_SOCKET
-
-
-class Client(Closing):
+class Client(Watching):
     """A connection to rtcfd; opened with the first call, thread-safe.
 
     `runner` in the methods names one; empty is rt_runner.  All methods raise
@@ -60,20 +24,6 @@ class Client(Closing):
     stands for several names.  `on_progress` is called with a line for each
     step of a long call.
     """
-
-    def __init__(self, socket: str | os.PathLike[str] | None = None) -> None:
-        self.socket = os.path.abspath(socket if socket is not None else default_socket())
-        if len(os.fsencode(self.socket)) > _LONGEST_PATH:
-            raise DaemonUnreachableError(
-                f"{self.socket} is longer than the {_LONGEST_PATH} characters of a unix socket's "
-                "path"
-            )
-        self._channel = grpc.insecure_channel(f"unix:{self.socket}", options=_OPTIONS)
-        self._stub: Any = control_pb2_grpc.ControlStub(self._channel)  # type: ignore[no-untyped-call]
-
-    def close(self) -> None:
-        """End the connection."""
-        self._channel.close()
 
     def get_status(
         self, runner: str = "", timeout_s: float = QUERY_TIMEOUT_S
@@ -401,128 +351,6 @@ class Client(Closing):
         request = control_pb2.GetStatisticsRequest(runner=runner)
         return self._ask(self._stub.GetStatistics, request).statistics  # type: ignore[no-any-return]
 
-    def watch_statistics(
-        self, runner: str = "", interval_s: float = 1.0
-    ) -> Iterator[runner_pb2.RunnerStatistics]:
-        """Yield the figures now and after each interval (at least 0.1 s), without end but by a
-        refusal, as when the runner is removed."""
-        request = control_pb2.WatchStatisticsRequest(
-            runner=runner, interval_ms=round(interval_s * 1000)
-        )
-        try:
-            for response in self._stub.WatchStatistics(request):
-                yield response.statistics
-        except grpc.RpcError as error:
-            raise failures.from_grpc(error, self.socket) from None
-
-    def watch_events(
-        self,
-        runners: Iterable[str] = (),
-        after: Place | None = None,
-        *,
-        until_now: bool = False,
-    ) -> EventStream:
-        """Watch what happens to some runners, or all, and to rtcfd itself.
-
-        Begins behind `after`, the `place` of a stream of before; Place() is where what rtcfd keeps
-        begins, None is now.  With `until_now` it ends with what has happened so far; without, it
-        ends with a refusal when none of the runners is there.
-        """
-        return EventStream(
-            self._stub.WatchEvents, self.socket, several("runners", runners), after, until_now
-        )
-
-    def watch_ports(
-        self, selection: Iterable[str] = (), runner: str = "", every: int = 1
-    ) -> "PortStream":
-        """Watch values of outputs and declared state, of each `every`-th cycle.
-
-        `selection` names them with the wildcards of a shell, e.g. "/arm/*.effort"; all without.
-        Nothing is missed from here on; what the caller does not take in time is counted.
-        """
-        # Few commands need it, and each import is time.
-        from rtcf.ports import PortStream
-
-        return PortStream(
-            self._stub.WatchPorts, self.socket, runner, several("selection", selection), every
-        )
-
     def reset_statistics(self, runner: str = "") -> None:
         """Begin the figures anew."""
         self._ask(self._stub.ResetStatistics, control_pb2.ResetStatisticsRequest(runner=runner))
-
-    def _pages(self, method: Any, request: Any, field: str) -> list[Any]:
-        """Return a whole list; one that changes between two pages is asked for again."""
-        found: list[Any] = []
-        while True:
-            try:
-                response = self._ask(method, request)
-            except RefusedError as refused:
-                if refused.reason != "LIST_CHANGED":
-                    raise
-                found.clear()
-                request.page_token = ""
-                continue
-            found.extend(getattr(response, field))
-            request.page_token = response.next_page_token
-            if not request.page_token:
-                return found
-
-    def _ask(self, method: Any, request: Any, timeout_s: float | None = QUERY_TIMEOUT_S) -> Any:
-        until = time.monotonic() + _CROWDED_S
-        while True:
-            try:
-                return method(request, timeout=timeout_s)
-            except grpc.RpcError as error:
-                if not self._crowded(error, until):
-                    raise failures.from_grpc(error, self.socket) from None
-
-    def _crowded(self, error: Any, until: float) -> bool:
-        """Tell whether to try again, after a moment: others were before us in the queue at the
-        door, for which gRPC does not wait."""
-        if time.monotonic() > until or not failures.is_crowded(error, self.socket):
-            return False
-        time.sleep(_RETRY_S)
-        return True
-
-    def _changed(
-        self,
-        method: Any,
-        request: Any,
-        on_progress: OnProgress | None,
-        timeout_s: float | None = CHANGE_TIMEOUT_S,
-        *,
-        patient: bool = True,
-    ) -> control_pb2.ChangeResult:
-        last = self._change(method, request, on_progress, timeout_s, patient=patient)
-        return last.result  # type: ignore[no-any-return]
-
-    def _change(
-        self,
-        method: Any,
-        request: Any,
-        on_progress: OnProgress | None,
-        timeout_s: float | None = CHANGE_TIMEOUT_S,
-        *,
-        patient: bool = True,
-    ) -> Any:
-        """Follow a long call; return its last message."""
-        until = time.monotonic() + (_CROWDED_S if patient else 0.0)
-        while True:
-            try:
-                return self._change_once(method, request, on_progress, timeout_s)
-            except grpc.RpcError as error:
-                if not self._crowded(error, until):
-                    raise failures.from_grpc(error, self.socket) from None
-
-    @staticmethod
-    def _change_once(
-        method: Any, request: Any, on_progress: OnProgress | None, timeout_s: float | None
-    ) -> Any:
-        last: Any = None
-        # A rtcfd that was stopped may come to it after somebody has ended the loop elsewhere.
-        asked = (("rtcf-asked-ns", str(time.monotonic_ns())),)
-        for last in method(request, timeout=timeout_s, metadata=asked):
-            if on_progress is not None and last.WhichOneof("kind") == "progress":
-                on_progress(last.progress)
-        return last

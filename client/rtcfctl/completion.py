@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import rtcf
-from rtcf.client import DEFAULT_SOCKET
+from rtcf.connection import DEFAULT_SOCKET
 from rtcf.v1 import graph_pb2
 
 

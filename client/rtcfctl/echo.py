@@ -7,7 +7,7 @@ import time
 from typing import Any
 
 import rtcf
-from rtcf.ports import PortBatch
+from rtcf.streams.ports import PortBatch
 
 from rtcfctl.idle_loop import say_if_ended, say_if_idle
 from rtcfctl.output import Output

@@ -6,7 +6,7 @@ import time
 from typing import Any
 
 import rtcf
-from rtcf.events import Lost, Place
+from rtcf.streams.events import Lost, Place
 from rtcf.v1 import control_pb2
 
 from rtcfctl.output import Output

@@ -3,7 +3,7 @@
 import sys
 
 import rtcf
-from rtcf.ports import PortBatch
+from rtcf.streams.ports import PortBatch
 from rtcf.v1 import runner_pb2
 
 from rtcfctl.output import Output

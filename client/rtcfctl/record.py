@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import rtcf
-from rtcf.mcap_writer import McapWriter
-from rtcf.ports import PortStream
-from rtcf.recorder import Recorder
+from rtcf.recording.mcap_writer import McapWriter
+from rtcf.recording.recorder import Recorder
+from rtcf.streams.ports import PortStream
 
 from rtcfctl.idle_loop import say_if_ended, say_if_idle
 from rtcfctl.output import Output

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import rtcf
-from rtcf.client import DEFAULT_SOCKET
+from rtcf.connection import DEFAULT_SOCKET
 from rtcf.v1 import control_pb2, runner_pb2
 from rtcf_shared.enums import word
 

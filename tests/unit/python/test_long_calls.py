@@ -16,7 +16,7 @@ from strangers import open_to_strangers, root_only, stranger
 
 WATCH = """
 import sys, rtcf
-from rtcf.events import Place
+from rtcf.streams.events import Place
 with rtcf.Client(sys.argv[1]) as client:
     try:
         for number, _ in enumerate({stream}):

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import rtcf
 import yaml
-from rtcf.mcap_writer import McapWriter
-from rtcf.ports import PortBatch, PortSchema, _schema
-from rtcf.recorder import Recorder
+from rtcf.recording.mcap_writer import McapWriter
+from rtcf.recording.recorder import Recorder
+from rtcf.streams.ports import PortBatch, PortSchema, _schema
 from rtcf.v1 import ports_pb2
 from rtcfctl import echo
 from rtcfctl.output import Output

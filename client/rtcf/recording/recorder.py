@@ -4,8 +4,8 @@ import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rtcf.mcap_writer import Column, McapWriter
-from rtcf.ports import PortBatch, PortSchema, Signal
+from rtcf.recording.mcap_writer import Column, McapWriter
+from rtcf.streams.ports import PortBatch, PortSchema, Signal
 from rtcf.v1 import ports_pb2
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from rtcf_shared.errors import RtcfError
 
-from rtcf import mcap_writer as mcap
-from rtcf import ros_layout
 from rtcf.closing import Closing
+from rtcf.recording import mcap_writer as mcap
+from rtcf.streams import ros_layout
 
 if TYPE_CHECKING:
     import numpy as np

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import grpc
 from rtcf_shared.errors import RtcfError
 
-from rtcf import failures, ros_layout
+from rtcf import failures
 from rtcf.closing import Closing
+from rtcf.streams import ros_layout
 from rtcf.v1 import ports_pb2
 
 if TYPE_CHECKING:

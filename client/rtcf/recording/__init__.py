@@ -1,0 +1,1 @@
+"""Recordings of every cycle: written from a stream, and read again."""

@@ -1,0 +1,1 @@
+"""What a client follows as it happens: values of every cycle, events."""
