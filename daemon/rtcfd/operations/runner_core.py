@@ -195,21 +195,21 @@ class RunnerCore(ABC):
         `only_left_over` (None).  One that is being ended is waited for."""
         self._settled.clear()
         self.trouble = "its executor is starting"
+        command = self.shared.command
         try:
             async with self._changing_executor:
-                executor = await Executor.adopt(
-                    self.name, self.shared.command, self.take_unasked, self._ended
-                )
+                executor = await Executor.adopt(self.name, command, self.take_unasked, self._ended)
                 adopted = executor is not None
-                if executor is None and only_left_over:
+                if not adopted and only_left_over:
                     self.trouble = "it has no executor"
                     return None
-                executor = executor or await self._launch()
+                if executor is None and (self.leaving or not self.closing):
+                    executor = await self._launch()
                 if self.closing:
-                    await (executor.leave() if self.leaving else executor.shut_down())
-                    raise Unavailable(
-                        f"runner {self.name} is being ended", errors_pb2.REASON_RUNNER_ENDING
-                    )
+                    if executor:
+                        await (executor.leave() if self.leaving else executor.shut_down())
+                    ending = f"runner {self.name} is being ended"
+                    raise Unavailable(ending, errors_pb2.REASON_RUNNER_ENDING)
                 self._executor = executor
                 self.figures = Figures()
                 if adopted:

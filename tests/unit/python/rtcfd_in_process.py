@@ -109,14 +109,17 @@ class PeerProcess:
     async def _run(self) -> None:
         server = await asyncio.start_unix_server(self.peer.serve, self._socket)
         self._machine.peers[self._socket] = self
-        await self.peer.end.wait()
-        server.close()
-        self.peer.writer.close()
-        with contextlib.suppress(OSError):
-            Path(self._socket).unlink()
-        del self._machine.peers[self._socket]
-        self.end = End(0)
-        self._ended.set()
+        try:
+            await self.peer.end.wait()
+        finally:  # also when the event loop ends, which waits for who waits for this
+            server.close()
+            if self.peer.connections:
+                self.peer.writer.close()
+            with contextlib.suppress(OSError):
+                Path(self._socket).unlink()
+            del self._machine.peers[self._socket]
+            self.end = End(0)
+            self._ended.set()
 
 
 class Refused(Exception):

@@ -15,7 +15,8 @@ import pytest
 import rtcf
 from daemon_under_test import BUILD_TREE, DEADLINE_S, DaemonUnderTest, wait_for
 from rtcf.v1 import control_pb2, runner_pb2
-from rtcfd_in_process import Rtcfd
+from rtcfd.common.refusals import Unavailable
+from rtcfd_in_process import Machine, Rtcfd
 
 RUNNING, STOPPED = runner_pb2.RUNNER_STATE_RUNNING, runner_pb2.RUNNER_STATE_STOPPED
 
@@ -389,6 +390,26 @@ def test_of_two_removals_at_once_neither_is_answered_before_the_executor_is_gone
         assert daemon.peer("arm") is None
         assert daemon.saved("arm") is None
         await daemon.call("AddRunner", control_pb2.AddRunnerRequest(runner="arm"))
+        await daemon.runners.close(in_order=True)
+
+    asyncio.run(play())
+
+
+def test_a_runner_that_is_being_forgotten_gets_no_new_executor(
+    rtcfd: Callable[[], Rtcfd], machine: Machine
+) -> None:
+    async def play() -> None:
+        daemon = rtcfd()
+        await daemon.start()
+        await daemon.call("AddRunner", control_pb2.AddRunnerRequest(runner="arm"))
+        runner = daemon.runners.get("arm")
+        await runner.shut_down()  # as a removal begins; then what is on disk goes
+        restart = asyncio.create_task(runner.restart())
+        while not restart.done():
+            assert not [path for path in machine.peers if "arm" in path]
+            await asyncio.sleep(0)
+        with pytest.raises(Unavailable, match="runner arm is being ended"):
+            restart.result()
         await daemon.runners.close(in_order=True)
 
     asyncio.run(play())
