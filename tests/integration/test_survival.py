@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_process import Daemon, wait_for
+from daemon_process import Daemon, stopped, wait_for
 from rtcf.v1 import runner_pb2
 from values import state
 
@@ -65,6 +65,23 @@ def test_a_loop_runs_on_without_rtcfd_and_is_adopted_as_it_is(daemon: Daemon) ->
         wait_for(lambda: count(client) > counted, "a cycle")
     assert daemon.end() == 0
     wait_for(lambda: is_gone(before.pid), "its end")
+
+
+def test_an_executor_that_was_held_up_is_adopted_when_it_goes_on(daemon: Daemon) -> None:
+    with rtcf.Client(daemon.socket) as client:
+        client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
+        client.start()
+        before = state(client)
+    daemon.end(signal.SIGKILL)
+    # As on a machine that was suspended, or by a debugger.
+    with stopped(before.pid):
+        daemon.start()
+        with rtcf.Client(daemon.socket) as client:
+            wait_for(lambda: "its loop may be running" in state(client).status, "its silence")
+    with rtcf.Client(daemon.socket) as client:
+        wait_for(lambda: state(client).pid == before.pid, "its adoption")
+        assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
+        assert client.get_order() == ["/steady"]
 
 
 def test_the_crash_of_an_adopted_executor_is_told_by_its_flight_recorder(daemon: Daemon) -> None:

@@ -44,6 +44,10 @@ class Unavailable(Refusal):
     """The executor does not answer."""
 
 
+class Silent(Unavailable):
+    """An executor that is there, and whose loop may be running, does not answer."""
+
+
 class PermissionDenied(Refusal):
     """The caller may not do that."""
 

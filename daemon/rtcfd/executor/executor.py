@@ -18,7 +18,7 @@ from rtcf.v1 import errors_pb2, ports_pb2
 
 from rtcfd import VERSION
 from rtcfd.common.limits import Limits
-from rtcfd.common.refusals import FailedPrecondition, Refusal, Unavailable
+from rtcfd.common.refusals import FailedPrecondition, Refusal, Silent, Unavailable
 from rtcfd.common.tasks import looked_at
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.flight_recorder import FlightRecorder, Note
@@ -151,8 +151,8 @@ class Executor:
             await link.close()
             process.release()
             if isinstance(problem, Unavailable):
-                raise Unavailable(
-                    f"{problem}; its loop may be running: `rtcfctl -r {runner} start` tries again, "
+                raise Silent(
+                    f"{problem}; its loop may be running: it is asked again and again, "
                     f"`kill {executor.pid}` ends it",
                     errors_pb2.REASON_EXECUTOR_SILENT,
                 ) from None

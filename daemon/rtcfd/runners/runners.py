@@ -11,7 +11,7 @@ from rtcf_shared.naming import closest, listing, suggestion
 from rtcfd.catalog.catalog import loads
 from rtcfd.common import runner_settings
 from rtcfd.common.names import DEFAULT_RUNNER, check_base_name, check_graph, full_name
-from rtcfd.common.refusals import AlreadyExists, NotFound, Refusal, Unavailable
+from rtcfd.common.refusals import AlreadyExists, NotFound, Refusal, Silent, Unavailable
 from rtcfd.executor.link import Progress
 from rtcfd.operations import graph
 from rtcfd.operations.operations import Operations
@@ -20,6 +20,8 @@ from rtcfd.runners.runner import LEAVE_TIMEOUT_S, Runner
 from rtcfd.state.desired import Desired
 
 log = logging.getLogger(__name__)
+
+_LOOK_AGAIN_S = 2.0  # for an executor that did not answer
 
 
 class Runners:
@@ -43,10 +45,12 @@ class Runners:
 
         async def one(runner: Runner) -> None:
             try:
-                if runner.desired.hold or runner.desired.leased:
-                    await self._bring_up_held(runner)
-                else:
-                    await runner.bring_up(boot=True)
+                await self._bring_up_known(runner)
+            except Silent as refusal:
+                runner.log.error("%s", refusal)
+                runner.operations.in_background(
+                    "the search for its executor", self._look_again(runner)
+                )
             except Refusal as refusal:
                 runner.log.error("%s", refusal)
             except Exception:  # the others are not to suffer for it
@@ -57,6 +61,26 @@ class Runners:
             *(one(runner) for runner in self._runners.values()),
             *(self._take_left_over(name) for name in unknown),
         )
+
+    async def _bring_up_known(self, runner: Runner) -> None:
+        if runner.desired.hold or runner.desired.leased:
+            await self._bring_up_held(runner)
+        else:
+            await runner.bring_up(boot=True)
+
+    async def _look_again(self, runner: Runner) -> None:
+        """Take over an executor that was held up, as by a machine that was suspended: without
+        rtcfd its loop would end."""
+        while True:
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self.closing.wait(), _LOOK_AGAIN_S)
+            if runner.up or runner.closing or self.closing.is_set():
+                return
+            try:
+                await self._bring_up_known(runner)
+                return
+            except Silent:
+                continue
 
     async def _bring_up_held(self, runner: Runner) -> None:
         """Of a launch: it goes on if its loop does; otherwise it is over."""
