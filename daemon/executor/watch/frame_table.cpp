@@ -91,21 +91,20 @@ void requireMatches(const PortSelection& selection, const Plan& plan) {
     for (const Candidate& candidate : candidatesOf(plan))
         names.push_back(candidate.column.fullName());
     for (const PortSelection::Pattern& pattern : selection.patterns()) {
-        if (std::any_of(names.begin(), names.end(), [&](const std::string& name) {
-                return PortSelection::matches(pattern.full, name);
-            }))
+        if (std::any_of(names.begin(), names.end(),
+                        [&](const std::string& name) { return pattern.matches(name); }))
             continue;
         if (names.empty()) {
             throw Refusal(RefusalKind::PortNotFound,
                           fmt::format("{} matches nothing: no component of this runner has an "
                                       "output of fixed size or declared state",
-                                      pattern.given));
+                                      pattern.given()));
         }
         const bool all = names.size() <= kNamesInMessage;
         if (!all) names.resize(kNamesInMessage);
         throw Refusal(RefusalKind::PortNotFound,
                       fmt::format("{} matches no output of fixed size and no state; there is {}{}",
-                                  pattern.given, fmt::join(names, ", "), all ? "" : ", …"));
+                                  pattern.given(), fmt::join(names, ", "), all ? "" : ", …"));
     }
 }
 

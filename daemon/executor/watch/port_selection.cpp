@@ -7,63 +7,75 @@
 
 namespace rtcf::executor {
 
-namespace {
-
-// One element of a pattern: what one character, or any number of them, may be.
-struct Element {
-    enum class Kind { Literal, One, Set, Any, AnyButSlash };
-    Kind kind;
-    std::string characters;  // of Literal one, of Set pairs of first and last
-};
-
 // A '[' without ']' stands for itself.
-std::vector<Element> elementsOf(const std::string& pattern) {
-    using Kind = Element::Kind;
-    std::vector<Element> elements;
+PortSelection::Pattern::Pattern(const std::string& text) : given_(text) {
+    std::string pattern = text;
+    if (pattern[0] != '/' && pattern[0] != '*') pattern.insert(0, "/");
+    const std::size_t dot = pattern.rfind('.');
+    if (dot == std::string::npos || pattern.find('/', dot) != std::string::npos) pattern += ".**";
     for (std::size_t i = 0; i < pattern.size(); ++i) {
+        Element element{{}, false};
         if (pattern[i] == '*') {
             const bool twice = i + 1 < pattern.size() && pattern[i + 1] == '*';
             if (twice) ++i;
-            elements.push_back({twice ? Kind::Any : Kind::AnyButSlash, {}});
+            element.many = true;
+            element.characters.set();
+            element.characters['/'] = twice;
         } else if (pattern[i] == '?') {
-            elements.push_back({Kind::One, {}});
+            element.characters.set();
+            element.characters.reset('/');
         } else if (const std::size_t end = pattern.find(']', i + 2);
                    pattern[i] == '[' && end != std::string::npos) {
-            Element set{Kind::Set, {}};
             for (std::size_t at = i + 1; at < end; ++at) {
                 const bool range = at + 2 < end && pattern[at + 1] == '-';
-                set.characters += {pattern[at], range ? pattern[at + 2] : pattern[at]};
+                const auto first = static_cast<unsigned char>(pattern[at]);
+                const auto last = static_cast<unsigned char>(pattern[range ? at + 2 : at]);
+                for (unsigned character = first; character <= last; ++character)
+                    element.characters.set(character);
                 if (range) at += 2;
             }
-            elements.push_back(std::move(set));
             i = end;
         } else {
-            elements.push_back({Kind::Literal, std::string(1, pattern[i])});
+            element.characters.set(static_cast<unsigned char>(pattern[i]));
         }
+        add(element);
     }
-    return elements;
 }
 
-bool takes(const Element& element, char character) {
-    switch (element.kind) {
-        case Element::Kind::Literal:
-            return character == element.characters[0];
-        case Element::Kind::Set:
-            for (std::size_t i = 0; i < element.characters.size(); i += 2) {
-                if (element.characters[i] <= character && character <= element.characters[i + 1])
-                    return true;
+void PortSelection::Pattern::add(const Element& element) {
+    // Any number of them and once more any number are any number of both.
+    if (element.many && !elements_.empty() && elements_.back().many)
+        elements_.back().characters |= element.characters;
+    else
+        elements_.push_back(element);
+}
+
+// Which lengths of the name the elements so far take: time and memory are bounded whatever they
+// are.
+bool PortSelection::Pattern::matches(const std::string& name) const {
+    std::vector<char> taken(name.size() + 1, 0);
+    taken[0] = 1;
+    for (const Element& element : elements_) {
+        const auto takes = [&](std::size_t length) {
+            return element.characters[static_cast<unsigned char>(name[length - 1])];
+        };
+        if (element.many) {
+            // What was taken still is, and each length makes the next one possible.
+            for (std::size_t length = 1; length <= name.size(); ++length) {
+                if (taken[length - 1] != 0 && takes(length)) taken[length] = 1;
             }
-            return false;
-        case Element::Kind::Any:
-            return true;
-        case Element::Kind::One:
-        case Element::Kind::AnyButSlash:
-            break;
+            continue;
+        }
+        bool any = false;
+        for (std::size_t length = name.size(); length > 0; --length) {
+            taken[length] = taken[length - 1] != 0 && takes(length) ? 1 : 0;
+            any = any || taken[length] != 0;
+        }
+        if (!any) return false;
+        taken[0] = 0;
     }
-    return character != '/';
+    return taken[name.size()] != 0;
 }
-
-}  // namespace
 
 PortSelection::PortSelection(const std::vector<std::string>& patterns) {
     for (const std::string& given : patterns) {
@@ -73,38 +85,14 @@ PortSelection::PortSelection(const std::vector<std::string>& patterns) {
                           "leave it out for all");
         }
         requireLength("a selection of ports", given, kLongestPattern);
-        std::string pattern = given;
-        if (pattern[0] != '/' && pattern[0] != '*') pattern.insert(0, "/");
-        const std::size_t dot = pattern.rfind('.');
-        if (dot == std::string::npos || pattern.find('/', dot) != std::string::npos)
-            pattern += ".**";
-        patterns_.push_back({given, std::move(pattern)});
+        patterns_.emplace_back(given);
     }
 }
 
 bool PortSelection::matches(const std::string& name) const {
     return patterns_.empty() ||
            std::any_of(patterns_.begin(), patterns_.end(),
-                       [&](const Pattern& pattern) { return matches(pattern.full, name); });
-}
-
-// Which lengths of the name the elements so far take: time and memory are bounded whatever they
-// are.
-bool PortSelection::matches(const std::string& pattern, const std::string& name) {
-    std::vector<bool> taken(name.size() + 1, false);
-    taken[0] = true;
-    for (const Element& element : elementsOf(pattern)) {
-        const bool many =
-            element.kind == Element::Kind::Any || element.kind == Element::Kind::AnyButSlash;
-        std::vector<bool> next(name.size() + 1, false);
-        for (std::size_t length = 0; length <= name.size(); ++length) {
-            if (many && taken[length]) next[length] = true;
-            if (length == 0 || !takes(element, name[length - 1])) continue;
-            if (many ? next[length - 1] : taken[length - 1]) next[length] = true;
-        }
-        taken = std::move(next);
-    }
-    return taken[name.size()];
+                       [&](const Pattern& pattern) { return pattern.matches(name); });
 }
 
 }  // namespace rtcf::executor

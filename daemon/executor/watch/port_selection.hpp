@@ -2,7 +2,8 @@
 /// Which outputs and states somebody watches, as a person writes it: with the wildcards of a shell.
 #pragma once
 
-#include <cstddef>
+#include <bitset>
+#include <climits>
 #include <string>
 #include <vector>
 
@@ -16,14 +17,29 @@ class PortSelection {
     /// @throws Refusal of one that is empty or too long
     explicit PortSelection(const std::vector<std::string>& patterns);
 
-    struct Pattern {
-        std::string given;
-        std::string full;  ///< of whole names
+    /// Of whole names.
+    class Pattern {
+       public:
+        explicit Pattern(const std::string& text);
+        /// What was asked for.
+        const std::string& given() const noexcept { return given_; }
+        /// @param name as of PortSelection::matches()
+        bool matches(const std::string& name) const;
+
+       private:
+        // What one character may be, or any number of them.
+        struct Element {
+            std::bitset<UCHAR_MAX + 1> characters;
+            bool many;
+        };
+        void add(const Element& element);
+
+        std::string given_;
+        std::vector<Element> elements_;
     };
     const std::vector<Pattern>& patterns() const noexcept { return patterns_; }
     /// @param name full name of the component, '.', and of the output or state
     bool matches(const std::string& name) const;
-    static bool matches(const std::string& pattern, const std::string& name);
 
    private:
     std::vector<Pattern> patterns_;

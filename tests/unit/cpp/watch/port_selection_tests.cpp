@@ -55,6 +55,12 @@ TEST(PortSelection, TakesOneCharacterAndSets) {
     EXPECT_TRUE(selects("/joint[1.out", "/joint[1.out")) << "without its end it stands for itself";
 }
 
+TEST(PortSelection, StarsInARowAreOne) {
+    EXPECT_TRUE(selects("/arm" + std::string(900, '*') + ".out", "/arm/joint/pid.out"));
+    EXPECT_TRUE(selects("/***.out", "/arm/pid.out"));
+    EXPECT_FALSE(selects("/arm" + std::string(900, '*') + ".out", "/leg/pid.out"));
+}
+
 TEST(PortSelection, HardPatternsEndSoon) {
     std::string pattern = "/";
     for (int i = 0; i < 300; ++i) pattern += "*a";
