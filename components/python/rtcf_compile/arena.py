@@ -1,9 +1,10 @@
 """What compiled code calls instead of an allocator: an arena that is emptied before each hook.
 
-As LLVM's assembly, linked into each object, so that it is inlined. A block begins with what numba
-calls a MemInfo: references, destructor, its argument, data, size, allocator; the argument's place
-holds where the arena began before the block. What is released last in first out is used again, so
-that a loop may make temporaries; one that does not fit is a MemoryError, never more memory.
+As LLVM's assembly, pointers with types (backend.py), linked into each object, so that it is
+inlined. A block begins with what numba calls a MemInfo: references, destructor, its argument, data,
+size, allocator; the argument's place holds where the arena began before the block. What is released
+last in first out is used again, so that a loop may make temporaries; one that does not fit is a
+MemoryError, never more memory.
 """
 
 HEADER = 64
@@ -126,19 +127,20 @@ done:
 def entry(symbol: str, inner: str, record: str, exception: str) -> str:
     """Return a hook's function as C calls it: null, or what it raised.
 
-    `const void* symbol(void* record)`; `record` and `exception` are the types that the inner
-    function takes.
+    `const void* symbol(void* record)`; `record` and `exception` are what the inner function takes:
+    the component's members, and the place for what it raises.
     """
     return f"""
-declare i32 @{inner}(i8**, {exception}**, {record})
+declare i32 @{inner}(i8**, {exception}, {record})
 
 define i8* @{symbol}({record} %self) {{
   store i64 0, i64* @rtcf_arena_used
   %result = alloca i8*
-  %raised = alloca {exception}*
+  %raised = alloca i8*
   store i8* null, i8** %result
-  store {exception}* null, {exception}** %raised
-  %status = call i32 @{inner}(i8** %result, {exception}** %raised, {record} %self)
+  store i8* null, i8** %raised
+  %place = bitcast i8** %raised to {exception}
+  %status = call i32 @{inner}(i8** %result, {exception} %place, {record} %self)
   %fine = icmp eq i32 %status, 0
   %none = icmp eq i32 %status, -2
   %good = or i1 %fine, %none
@@ -146,8 +148,7 @@ define i8* @{symbol}({record} %self) {{
 ended:
   ret i8* null
 fault:
-  %what = load {exception}*, {exception}** %raised
-  %bytes = bitcast {exception}* %what to i8*
-  ret i8* %bytes
+  %what = load i8*, i8** %raised
+  ret i8* %what
 }}
 """

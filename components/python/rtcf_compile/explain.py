@@ -59,7 +59,7 @@ _KNOWN: tuple[tuple[str, str, str], ...] = (
 
 def mistake(error: Any, function: FunctionType) -> Mistake:
     """Return numba's error about a function as a mistake in its source."""
-    text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
+    text = re.sub(r"\x1b\[[0-9;]*m", "", str(error)) or type(error).__name__
     file = function.__code__.co_filename
     # numba gives a file's path as it is, or relative to the present folder.
     name = re.escape(file.rpartition("/")[2])

@@ -1,8 +1,8 @@
-"""What `@`, assignment and np.linalg become: functions for small arrays of fixed size.
+"""What `@`, assignment, np.linalg and np.where become: functions for small arrays of fixed size.
 
 Each exists twice with the same operations in the same order: the function itself is for the
 interpreter, its overload is compiled. Neither calls BLAS or LAPACK, whose sums depend on the
-machine and which allocate.
+machine and which allocate; np.where of numba from 0.57 on makes lists of shapes.
 """
 
 from typing import Any
@@ -52,6 +52,14 @@ def rtcf_int(value: Any) -> Any:
 def rtcf_bool(value: Any) -> Any:
     """Return a bool."""
     return bool(value)
+
+
+def rtcf_where(condition: Any, x: Any, y: Any) -> Any:
+    """Return x where the condition holds, else y: arrays of one shape, or numbers."""
+    shapes = {np.shape(each) for each in (condition, x, y)} - {()}
+    if len(shapes) > 1:
+        raise ValueError(f"np.where of shapes {sorted(shapes)}")
+    return np.where(condition, x, y)[()]
 
 
 def rtcf_solve(a: Any, b: Any) -> Any:
@@ -108,6 +116,7 @@ INSTEAD = {
     np.linalg.cholesky: rtcf_cholesky,
     np.dot: rtcf_matmul,
     np.matmul: rtcf_matmul,
+    np.where: rtcf_where,
 }
 BY_NAME = {
     each.__name__: each

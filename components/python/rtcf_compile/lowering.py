@@ -16,28 +16,26 @@ from typing import Any
 os.environ["NUMBA_CPU_NAME"] = "generic"
 os.environ["NUMBA_CPU_FEATURES"] = ""
 
-import llvmlite.binding as llvm
 import numba
 from numba.core import errors
 from rtcf.component import Component, describe
 from rtcf.component.declaration import Description
 
 import rtcf_compile.overloads  # noqa: F401, registers them
-from rtcf_compile import arena, explain, gate, log_calls, trial
+from rtcf_compile import arena, backend, explain, gate, log_calls, trial
 from rtcf_compile.functions import Functions
 from rtcf_compile.logs import Logs
+from rtcf_compile.mistake import Mistake
 from rtcf_compile.raises import Raise, raises_in
 
 warnings.filterwarnings("ignore", category=errors.NumbaWarning)
-llvm.initialize()
-llvm.initialize_native_target()
-llvm.initialize_native_asmprinter()
 
 _NRT_COUNTS = re.compile(
     r"^define [^\n]*@NRT_(?:incref|decref)\([^\n]*\{\n.*?^\}\n"
     r"|^declare [^\n]*@NRT_(?:incref|decref)\([^\n]*\n",
     re.M | re.S,
 )
+_COUNTS = "declare void @NRT_incref(i8*)\ndeclare void @NRT_decref(i8*)\n"
 _OPTIONS = {"boundscheck": True, "error_model": "python"}
 # What runs in the real-time thread, and beside it: each has an arena of its own.
 _THREADS = (("update", "safe"), ("start",))
@@ -84,7 +82,7 @@ def compile_component(cls: type[Component], arena_bytes: int = ARENA) -> Compile
             module = _linked(result, inner, arena_bytes)
             result.raises |= raises_in(str(module), functions.file())
             gate.check(module, result, inner)
-            result.objects.append(_machine().emit_object(module))
+            result.objects.append(backend.machine().emit_object(module))
     trial.run(cls, functions.file())
     return result
 
@@ -98,7 +96,9 @@ def _inner(function: FunctionType, record: Any) -> tuple[str, str]:
     dispatcher = _compiler(function)
     try:
         dispatcher.compile((record,))
-    except errors.NumbaError as error:
+    except Mistake:
+        raise
+    except Exception as error:  # numba's own, or what it fails by where it ought to have one
         raise explain.mistake(error, function) from None
     result = next(iter(dispatcher.overloads.values()))
     return result.fndesc.mangled_name, result.library.get_llvm_str()
@@ -108,26 +108,18 @@ def _linked(compiled: Compiled, inner: dict[str, tuple[str, str]], arena_bytes: 
     """Return one module with the entries of these hooks, and nothing that they do not need."""
     parts, base = [], arena.assembly(arena_bytes)
     for hook, (name, text) in inner.items():
+        record, exception = backend.taken(text, name)
+        base += arena.entry(compiled.symbol(hook), name, record, exception)
         # Ours take their place; numba's count by locked instructions.
-        text = _NRT_COUNTS.sub("", text) + "declare void @NRT_incref(i8*)\n"
-        text += "declare void @NRT_decref(i8*)\n"
-        found = re.search(
-            rf"^define [^\n]*@{re.escape(name)}\(i8\*\*[^,]*, (\{{[^}}]*\}})\*\*[^,]*, "
-            r"(\[[^\]]*\]\*)",
-            text,
-            re.M,
-        )
-        if found is None:
-            raise RuntimeError(f"numba {numba.__version__}: functions have a form not known here")
-        base += arena.entry(compiled.symbol(hook), name, found[2], found[1])
-        part = llvm.parse_assembly(text)
+        text = _NRT_COUNTS.sub("", text) + backend.pointers(_COUNTS)
+        part = backend.parsed(text)
         _keep(part, {name})
         parts.append(part)
-    module = llvm.parse_assembly(base)
+    module = backend.parsed(backend.pointers(base))
     for part in parts:
         module.link_in(part)
     _keep(module, {compiled.symbol(hook) for hook in inner})
-    _optimise(module)
+    backend.optimise(module)
     module.verify()
     return module
 
@@ -137,27 +129,4 @@ def _keep(module: Any, names: set[str]) -> None:
     for function in module.functions:
         if not function.is_declaration:
             function.linkage = "external" if function.name in names else "internal"
-    passes = llvm.ModulePassManager()
-    passes.add_global_dce_pass()
-    passes.run(module)
-
-
-def _optimise(module: Any) -> None:
-    passes = llvm.ModulePassManager()
-    builder = llvm.PassManagerBuilder()
-    builder.opt_level = 3
-    builder.loop_vectorize = True
-    builder.slp_vectorize = True
-    builder.inlining_threshold = 1000
-    machine = _machine()  # the passes refer to it
-    machine.add_analysis_passes(passes)
-    builder.populate(passes)
-    passes.run(module)
-    passes = llvm.ModulePassManager()
-    passes.add_global_dce_pass()
-    passes.run(module)
-
-
-def _machine() -> Any:
-    target = llvm.Target.from_default_triple()
-    return target.create_target_machine(cpu="generic", opt=3, reloc="pic", codemodel="default")
+    backend.drop_unused(module)

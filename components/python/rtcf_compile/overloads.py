@@ -8,6 +8,7 @@ import numpy as np
 from numba import types
 from numba.core.errors import TypingError
 from numba.extending import overload
+from numba.np.numpy_support import as_dtype
 
 from rtcf_compile import helpers
 
@@ -161,6 +162,70 @@ def _assign(target: Any, value: Any) -> Any:
                 target[i, j] = value[i, j]
 
     return matrix
+
+
+@_compiled_as(helpers.rtcf_where)
+def _where(condition: Any, x: Any, y: Any) -> Any:
+    given = (condition, x, y)
+    dimensions = {each.ndim for each in given if isinstance(each, types.Array)}
+    if len(dimensions) > 1 or not all(
+        isinstance(each, types.Array | types.Number | types.Boolean) for each in given
+    ):
+        words = ", ".join(_words(each) for each in given)
+        raise TypingError(f"RTCF:np.where of {words}:it takes arrays of one shape, and numbers")
+    if not dimensions:
+        return lambda condition, x, y: x if condition else y
+    dtype = np.result_type(*(as_dtype(types.unliteral(getattr(each, "dtype", each)))
+                             for each in (x, y)))  # fmt: skip
+
+    def where(condition: Any, x: Any, y: Any) -> Any:
+        shape = _shape(condition, x, y)
+        if not (_fits(condition, shape) and _fits(x, shape) and _fits(y, shape)):
+            raise ValueError("np.where of shapes that do not fit")
+        result = np.empty(shape, dtype)
+        for place in np.ndindex(shape):
+            if _element(condition, place):
+                result[place] = _element(x, place)
+            else:
+                result[place] = _element(y, place)
+        return result
+
+    return where
+
+
+def _shape(condition: Any, x: Any, y: Any) -> Any:
+    raise NotImplementedError
+
+
+@_compiled_as(_shape)
+def _shape_of_the_first_array(condition: Any, x: Any, y: Any) -> Any:
+    if isinstance(condition, types.Array):
+        return lambda condition, x, y: condition.shape
+    if isinstance(x, types.Array):
+        return lambda condition, x, y: x.shape
+    return lambda condition, x, y: y.shape
+
+
+def _fits(value: Any, shape: Any) -> Any:
+    raise NotImplementedError
+
+
+@_compiled_as(_fits)
+def _has_shape(value: Any, shape: Any) -> Any:
+    if isinstance(value, types.Array):
+        return lambda value, shape: value.shape == shape
+    return lambda value, shape: True
+
+
+def _element(value: Any, place: Any) -> Any:
+    raise NotImplementedError
+
+
+@_compiled_as(_element)
+def _element_or_number(value: Any, place: Any) -> Any:
+    if isinstance(value, types.Array):
+        return lambda value, place: value[place]
+    return lambda value, place: value
 
 
 @_compiled_as(helpers.rtcf_solve)

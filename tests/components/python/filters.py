@@ -141,3 +141,29 @@ class Solver(Component):
         self.x.write(np.linalg.solve(regular, self.b.value))
         self.lower.write(np.linalg.cholesky(regular))
         self.spectrum[1:] = np.where(self.b.value[1:] > 0.0, np.sin(self.b.value[1:]), 0.0)
+
+
+class Chooser(Component):
+    """What np.where has: numbers, vectors and matrices, of floats, ints and bools."""
+
+    a: Input[np.float64, 4]
+    m: Input[np.float64, 2, 3]
+    n: Input[np.int32, 4]
+    f: Input[np.float32, 4]
+    first: Input[bool]
+    vector: Output[np.float64, 4]
+    matrix: Output[np.float64, 2, 3]
+    whole: Output[np.int32, 4]
+    narrow: Output[np.float32, 4]
+    number: Output[float]
+    flags: Output[bool, 4]
+
+    def update(self):
+        """Choose by element, and by one condition for all."""
+        a, m, n, f = self.a.value, self.m.value, self.n.value, self.f.value
+        self.vector.write(np.where(a > 0.0, a, -a))
+        self.matrix.write(np.where(m > 1.0, m, 1))
+        self.whole.write(np.where(n > 3, n, 3))
+        self.narrow.write(np.where(self.first.value, f, 0.5))
+        self.number.write(np.where(self.first.value, 1.0, a[0]))
+        self.flags.write(np.where(a > 1.0, True, n > 2))

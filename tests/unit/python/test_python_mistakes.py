@@ -95,6 +95,8 @@ IN_UPDATE = {
         "a is once",
     ),
     "unsupported function of NumPy": ("a = np.polyfit(self.z, self.z, 1)", "np.polyfit"),
+    "np.where of other dimensions": ("self.z[:] = np.where(self.z > 0.0, A, 0.0)", "np.where of"),
+    "np.where of other shapes": ("self.z[:] = np.where(self.on, np.zeros(3), self.z)", "shape"),
     "misspelled function of NumPy": ("a = np.sinn(1.0)", "numpy has no sinn"),
     "read call": ("self.u.read()", "inputs are read before each update"),
     "fault with a variable": ("self.fault(self.n)", "a fault has one constant text"),
