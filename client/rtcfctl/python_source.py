@@ -2,6 +2,7 @@
 
 import hashlib
 import importlib.util
+import platform
 import re
 import shutil
 import subprocess
@@ -72,7 +73,8 @@ def _changes(file: Path, last: str) -> Iterator[bool]:
 
 def fingerprint(source: Path) -> str:
     """Return what a library of it depends on, as a hash: files beside it, and the compiler's."""
-    digest = hashlib.sha256(rtcf.__version__.encode())
+    # Libraries that it needs have other names in another release of Debian.
+    digest = hashlib.sha256(f"{rtcf.__version__} {_release()}\n".encode())
     compiler = importlib.util.find_spec("rtcf_compile")
     folders = [source.parent]
     if compiler is not None and compiler.origin is not None:
@@ -93,3 +95,10 @@ def _compiler(build_tree: Path | None) -> str:
     if found is None:
         raise NotCompiledError("no rtcf-compile to compile it: sudo apt install rtcf-python")
     return found
+
+
+def _release() -> str:
+    try:
+        return platform.freedesktop_os_release().get("VERSION_ID", "")
+    except OSError:
+        return ""

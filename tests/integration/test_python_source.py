@@ -1,5 +1,6 @@
 """A component's Python source given to rtcfctl: compiled, kept, swapped when it is saved."""
 
+import platform
 import re
 import subprocess
 import threading
@@ -97,6 +98,17 @@ def test_what_is_saved_while_a_source_is_compiled_is_seen(tmp_path: Path) -> Non
     seeing.start()
     seeing.join(DEADLINE_S)
     assert not seeing.is_alive()
+
+
+def test_a_library_of_another_debian_counts_as_of_another_source(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = tmp_path / "counts.py"
+    source.write_text(COUNTS)
+    ours = python_source.fingerprint(source)
+    assert python_source.fingerprint(source) == ours
+    monkeypatch.setattr(platform, "freedesktop_os_release", lambda: {"VERSION_ID": "14"})
+    assert python_source.fingerprint(source) != ours
 
 
 def test_a_source_that_is_wrong_is_refused_in_one_line(own_cache: Path, daemon: Daemon) -> None:
