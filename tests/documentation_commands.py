@@ -48,6 +48,10 @@ ELSEWHERE: dict[str, dict[str, str]] = {
         "rosbag ": "takes a master: tests/integration/test_evaluate_performance.py",
         "rosrun rtcf ": "takes a bag: tests/integration/test_evaluate_performance.py",
     },
+    "scope.md": {
+        "rtcfctl scope ": "goes on until Ctrl-C: tests/integration/test_scope.py",
+        "sudo ": "takes the unit, of the package",
+    },
     "security.md": {"journalctl ": _BOOTED},
     "simulation.md": {
         "rosparam ": "takes a master: tests/integration/test_sim_time.py",

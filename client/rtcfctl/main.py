@@ -47,6 +47,7 @@ _MODULES = {
     "events": "events",
     "echo": "echo",
     "record": "record",
+    "scope": "scope",
     "check": "check",
     "doctor": "doctor",
 }

@@ -56,6 +56,7 @@ PREPARE: dict[str, Callable[[Daemon, rtcf.Client], None]] = {
     "graph.md": _nothing,
     "performance.md": _graph_of_a_file("fig1.yaml"),
     "ros.md": _nothing,
+    "scope.md": _nothing,
     "security.md": _wave_that_was_tuned,
     "signals.md": _nothing,
     "simulation.md": _loop_with_a_bag,

@@ -5,7 +5,7 @@ from machine import Machine
 from rtcf_service import Service
 
 MAN_PAGES = ("rtcfctl.1", "rtcfd.8", "rtcf-executor.8", "rtcfd.toml.5", "rtcf-graph.5",
-             "rtcf-protocol.7", "rtcf-compile.1")  # fmt: skip
+             "rtcf-protocol.7", "rtcf-compile.1", "rtcf-scope.8")  # fmt: skip
 
 
 def test_installing_them_starts_the_service(machine: Machine) -> None:
@@ -31,12 +31,31 @@ def test_the_control_socket_is_roots_and_the_groups(machine: Machine) -> None:
 
 
 def test_units_are_valid(machine: Machine) -> None:
-    done = machine.run("systemd-analyze", "verify", "rtcfd.service", "rtcfd.socket")
-    assert "rtcfd" not in done.stderr
+    units = ("rtcfd.service", "rtcfd.socket", "rtcf-scope.service")
+    done = machine.run("systemd-analyze", "verify", *units)
+    assert "rtcf" not in done.stderr
 
 
 def test_the_service_is_little_exposed(machine: Machine) -> None:
     machine.run("systemd-analyze", "security", "--threshold=30", "rtcfd.service")
+    machine.run("systemd-analyze", "security", "--threshold=20", "rtcf-scope.service")
+
+
+def test_the_scope_is_off_until_somebody_starts_it(machine: Machine) -> None:
+    state = machine.run("systemctl", "is-enabled", "rtcf-scope.service", check=False).stdout
+    assert state == "disabled\n"
+    try:
+        machine.run("systemctl", "start", "rtcf-scope.service")
+        token = machine.path("/var/lib/rtcf-scope/token").read_text().strip()
+        about = "http://127.0.0.1:8642/api/about"
+        headers = {"Authorization": f"Bearer {token}"}
+        ask = (
+            "import urllib.request as u;"
+            f"print(u.urlopen(u.Request('{about}', headers={headers})).read())"
+        )
+        assert "rt_runner" in machine.run("/usr/bin/python3", "-c", ask).stdout
+    finally:
+        machine.run("systemctl", "stop", "rtcf-scope.service")
 
 
 @pytest.mark.parametrize("page", MAN_PAGES)

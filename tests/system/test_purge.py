@@ -4,7 +4,7 @@ from machine import Machine, wait_for
 from rtcf_service import Service
 
 PACKAGES = ("librtcf-dev", "python3-rtcf", "ros-rtcf", "rtcf-check", "rtcf-components", "rtcf-doc",
-            "rtcf-python", "rtcfctl", "rtcfd")  # fmt: skip
+            "rtcf-python", "rtcf-scope", "rtcfctl", "rtcfd")  # fmt: skip
 
 
 def test_removal_in_the_moment_after_rtcfd_died_ends_its_loops(machine: Machine) -> None:

@@ -100,6 +100,11 @@ class Recording(Closing):
         return self._of_cycles("iteration")
 
     @property
+    def stamps_ns(self) -> "NDArray[np.int64]":
+        """CLOCK_REALTIME of each cycle's deadline, or the simulated time; ns."""
+        return self._column_of_cycles("iteration").stamps_ns
+
+    @property
     def durations_ns(self) -> "NDArray[np.int64]":
         """Calculation in each cycle; ns."""
         return self._of_cycles("duration_ns")
@@ -137,10 +142,13 @@ class Recording(Closing):
         return pandas.DataFrame(columns)
 
     def _of_cycles(self, name: str) -> "NDArray[np.int64]":
+        return self._column_of_cycles(name).values
+
+    def _column_of_cycles(self, name: str) -> RecordedColumn:
         if not self._cycle_channel:
             raise RecordingError(f"{self.path} tells no cycles: rtcfctl record has not written it")
         with self._whole_only():
-            return self._read(self._cycle_channel, self._leaf_of_cycles(name)).values
+            return self._read(self._cycle_channel, self._leaf_of_cycles(name))
 
     @contextlib.contextmanager
     def _whole_only(self) -> Iterator[None]:

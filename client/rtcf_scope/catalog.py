@@ -1,0 +1,163 @@
+"""What a runner is, for a page: state, signals, parameters, connections and figures, as JSON.
+
+Everything here asks rtcfd and waits for it: not to be called in the event loop.
+"""
+
+import math
+from typing import Any
+
+import rtcf
+from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+from rtcf_shared.enums import word
+
+from rtcf_scope.chunk import traces
+
+_RARELY = 1_000_000  # cycles: a stream that is opened for its schema
+
+
+def runners(client: rtcf.Client) -> list[dict[str, Any]]:
+    """Return all runners by name."""
+    return [runner(each) for each in client.list_runners()]
+
+
+def runner(status: runner_pb2.RunnerStatus) -> dict[str, Any]:
+    """Return what there is to say of one."""
+    return {
+        "runner": status.runner,
+        "state": word(runner_pb2.RunnerState.DESCRIPTOR, status.state),
+        "frequency_hz": status.settings.frequency_hz,
+        "iteration": status.iteration,
+        "overruns": status.overruns,
+        "missed": status.missed,
+        "generation": status.generation,
+        "degraded": list(status.degraded),
+        "status": status.status,
+        "simulated": status.simulated,
+    }
+
+
+def graph(client: rtcf.Client, name: str) -> dict[str, Any]:
+    """Return signals, components with their parameters, and connections."""
+    with client.watch_ports([], name, _RARELY) as stream:
+        schema = stream.schema
+    return {
+        "signals": traces(schema),
+        "notes": list(schema.notes),
+        "components": [component(each) for each in client.list_components(name)],
+        "connections": [_connection(each) for each in client.list_connections(name)],
+    }
+
+
+def component(info: graph_pb2.ComponentInfo) -> dict[str, Any]:
+    """Return a component; values of its ports and state where it was asked for alone."""
+    return {
+        "name": info.full_name,
+        "type": f"{info.spec.package}/{info.spec.type}",
+        "state": word(graph_pb2.ComponentState.DESCRIPTOR, info.state),
+        "position": info.position,
+        "doc": info.doc,
+        "fault": info.fault,
+        "parameters": [_parameter(each) for each in info.parameters],
+        "values": {each.name: each.value for each in info.ports if each.HasField("value")}
+        | {each.name: each.value for each in info.states if each.value},
+    }
+
+
+def statistics(client: rtcf.Client, name: str) -> dict[str, Any]:
+    """Return what cycles and components take, in µs."""
+    figures = client.get_statistics(name)
+    return {
+        "iterations": figures.iterations,
+        "overruns": figures.overruns,
+        "duration": _distribution(figures.duration),
+        "latency": _distribution(figures.latency),
+        "components": {
+            each.component: _distribution(each.duration) | {"overruns": each.overruns}
+            for each in figures.components
+        },
+    }
+
+
+def event(found: control_pb2.Event) -> dict[str, Any]:
+    """Return something that has happened."""
+    return {
+        "kind": "event",
+        "what": word(control_pb2.Event.Kind.DESCRIPTOR, found.kind),
+        "time_ns": str(found.time_ns),
+        "iteration": found.iteration,
+        "component": found.component,
+        "user": found.user,
+        "message": found.message,
+    }
+
+
+def value(told: graph_pb2.ParameterValue) -> Any:
+    """Return a parameter's value as JSON has it: of one that is not finite, its name."""
+    kind = told.WhichOneof("kind")
+    found = None if kind is None else getattr(told, kind)
+    return str(found) if isinstance(found, float) and not math.isfinite(found) else found
+
+
+def history(client: rtcf.Client, runner_name: str, most: int) -> list[dict[str, Any]]:
+    """Return who set what, newest first."""
+    changes = client.get_history(runner=runner_name, most=most)
+    return [
+        {"component": each.component, "parameter": each.parameter, "value": value(each.value),
+         "before": value(each.before), "who": each.who, "how": each.how,
+         "time_ns": str(each.time_ns)}
+        for each in reversed(changes)
+    ]  # fmt: skip
+
+
+def setting(info: graph_pb2.ParameterInfo, told: Any) -> graph_pb2.ParameterSetting:
+    """Return the setting of a parameter to what a page says; raises ValueError."""
+    found = graph_pb2.ParameterValue()
+    try:
+        if info.type == "bool" and isinstance(told, bool):
+            found.bool_value = told
+        elif info.type == "int" and isinstance(told, int) and not isinstance(told, bool):
+            found.int_value = told
+        elif info.type == "double" and isinstance(told, int | float) and told == told:
+            found.double_value = float(told)
+        elif info.type in ("string", "enum") and isinstance(told, str):
+            found.string_value = told
+    except (OverflowError, ValueError):
+        pass
+    if found.WhichOneof("kind") is None:
+        raise ValueError(f"{info.name} is of type {info.type}, and {told!r} is not")
+    return graph_pb2.ParameterSetting(name=info.name, value=found)
+
+
+def _parameter(info: graph_pb2.ParameterInfo) -> dict[str, Any]:
+    return {
+        "name": info.name,
+        "type": info.type,
+        "value": value(info.value),
+        "default": value(info.default_value),
+        "minimum": _bound(info, "minimum"),
+        "maximum": _bound(info, "maximum"),
+        "unit": info.unit,
+        "doc": info.doc,
+        "choices": list(info.choices),
+    }
+
+
+def _bound(info: graph_pb2.ParameterInfo, name: str) -> float | None:
+    found = getattr(info, name) if info.HasField(name) else math.inf
+    return float(found) if math.isfinite(found) else None
+
+
+def _connection(found: graph_pb2.Connection) -> dict[str, Any]:
+    writer = found.writer
+    return {
+        "name": found.name,
+        "type": found.type,
+        "writer": [writer.component, writer.port] if found.HasField("writer") else None,
+        "readers": [[each.component, each.port, each.broken] for each in found.readers],
+        "published": found.published,
+        "subscribed": found.subscribed,
+    }
+
+
+def _distribution(found: runner_pb2.Distribution) -> dict[str, float]:
+    return {name: getattr(found, f"{name}_ns") / 1e3 for name in ("mean", "p50", "p99", "max")}

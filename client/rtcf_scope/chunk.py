@@ -1,0 +1,139 @@
+"""Cycles one after the other, as the tabs of a runner get them, and the last ones of them."""
+
+from collections import deque
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rtcf.ports import PortBatch, PortSchema
+from rtcf.v1 import ports_pb2
+
+ELEMENTS = 64  # of an array that are told, each as a signal of its own
+
+
+@dataclass
+class Chunk:
+    """A batch; `at` counts all cycles that its hub has told before."""
+
+    batch: PortBatch
+    at: int
+    lost: int  # cycles before these
+    packed: dict[tuple[str, ...], bytes] = field(default_factory=dict)  # made by wire, for all tabs
+
+    def __len__(self) -> int:
+        return len(self.batch)
+
+    @property
+    def end(self) -> int:
+        """`at` of the next one."""
+        return self.at + len(self)
+
+    @property
+    def cycles(self) -> NDArray[np.int64]:
+        """The numbers of the cycles."""
+        return self.batch.cycles
+
+    @property
+    def stamps_ns(self) -> NDArray[np.int64]:
+        """The loop's time; ns."""
+        return self.batch.stamps_ns
+
+    @property
+    def latencies_us(self) -> NDArray[np.float64]:
+        """Wake-up after each deadline; µs."""
+        return self.batch.latencies_ns / 1e3
+
+    @property
+    def durations_us(self) -> NDArray[np.float64]:
+        """Calculation in each cycle; µs."""
+        return self.batch.durations_ns / 1e3
+
+    def values(self, name: str) -> NDArray[np.float64]:
+        """Return the values of a trace; NaN where the graph has no such signal."""
+        signal, index = split_element(name)
+        found = self.batch.schema.signals.get(signal)
+        if found is None:
+            return np.full(len(self), np.nan)
+        values: NDArray[Any] = self.batch[signal].reshape(len(self), -1)
+        if index >= values.shape[1]:
+            return np.full(len(self), np.nan)
+        return values[:, index].astype(np.float64)
+
+
+def later(batch: PortBatch, skip: int) -> PortBatch:
+    """Return a batch without its first cycles."""
+    old = batch.message
+    message = ports_pb2.PortBatch(
+        first_cycle=batch.first_cycle + skip * batch.every,
+        last_of_loop=old.last_of_loop,
+        stamps_ns=old.stamps_ns[skip:],
+        latencies_ns=old.latencies_ns[skip:],
+        durations_ns=old.durations_ns[skip:],
+        values=[
+            values[skip * column.size :]
+            for values, column in zip(old.values, batch.schema.columns, strict=True)
+        ],
+    )
+    return replace(batch, first_cycle=message.first_cycle, lost=0, message=message)
+
+
+class Memory:
+    """The last chunks of a runner, bounded in bytes."""
+
+    def __init__(self, most_bytes: int) -> None:
+        self._most = most_bytes
+        self._bytes = 0
+        self._chunks: deque[Chunk] = deque()
+
+    def __iter__(self) -> Any:
+        return iter(self._chunks)
+
+    def add(self, chunk: Chunk) -> None:
+        """Keep it; the oldest ones go."""
+        self._chunks.append(chunk)
+        self._bytes += _size(chunk)
+        while self._bytes > self._most and len(self._chunks) > 1:
+            gone = self._chunks.popleft()
+            self._bytes -= _size(gone)
+            gone.packed.clear()
+
+    def between(self, begin: int, end: int) -> list[Chunk]:
+        """Return those that hold any of the cycles from `begin` to before `end`, by `at`."""
+        found = []
+        for chunk in reversed(self._chunks):
+            if chunk.end <= begin:
+                break
+            if chunk.at < end:
+                found.append(chunk)
+        return found[::-1]
+
+
+def _size(chunk: Chunk) -> int:
+    message = chunk.batch.message
+    return sum(len(each) for each in message.values) + 48 * len(message.stamps_ns) + 1000
+
+
+def split_element(name: str) -> tuple[str, int]:
+    """Return signal and place of "/arm.q[2]"; of one that is a number, place 0."""
+    if name.endswith("]"):
+        signal, _, index = name[:-1].rpartition("[")
+        if signal and index.isdecimal():
+            return signal, int(index)
+    return name, 0
+
+
+def column_of(name: str) -> str:
+    """Return the output or state that a trace is of: "/arm.cmd" of "/arm.cmd.twist.linear.x"."""
+    return ".".join(split_element(name)[0].split(".")[:2])
+
+
+def traces(schema: PortSchema) -> list[dict[str, str]]:
+    """Return name and unit of all that can be drawn."""
+    found = []
+    for signal in schema.signals.values():
+        count = int(np.prod(signal.shape)) if signal.shape else 0
+        names = [f"{signal.name}[{i}]" for i in range(min(count, ELEMENTS))] or [signal.name]
+        kind = "bool" if signal.format == "?" else "number"
+        found += [{"name": name, "unit": signal.unit, "kind": kind} for name in names]
+    return found

@@ -1,0 +1,95 @@
+"""What happens to a runner, for its tabs: its state every second, events as they come.
+
+One thread of each, while there are tabs.
+"""
+
+import asyncio
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import rtcf
+from rtcf.events import Lost
+from rtcf_shared.errors import RtcfError
+
+from rtcf_scope import catalog
+from rtcf_scope.hub import Listener
+
+_EVERY_S = 1.0
+
+
+class News:
+    """The state and the events of one runner."""
+
+    def __init__(self, client: rtcf.Client, runner: str) -> None:
+        self._client = client
+        self._runner = runner
+        self._tabs: set[Listener] = set()
+        self._ended: threading.Event | None = None
+        self._streams: list[Any] = []
+
+    def join(self, tab: Listener) -> None:
+        """Begin to tell a tab."""
+        self._tabs.add(tab)
+        if self._ended is None:
+            self._ended = threading.Event()
+            for follow in (self._follow_state, self._follow_events):
+                words = (follow, self._ended, asyncio.get_running_loop())
+                threading.Thread(target=self._run, args=words, daemon=True).start()
+
+    def leave(self, tab: Listener) -> None:
+        """Tell it nothing more; without tabs nobody asks."""
+        self._tabs.discard(tab)
+        if not self._tabs:
+            self.close()
+
+    def close(self) -> None:
+        """End what follows."""
+        if self._ended is not None:
+            self._ended.set()
+            self._ended = None
+        for stream in self._streams:
+            stream.close()
+        self._streams.clear()
+
+    def _run(
+        self,
+        follow: Callable[[threading.Event, Callable[[dict[str, Any]], None]], None],
+        ended: threading.Event,
+        loop: asyncio.AbstractEventLoop,
+    ) -> None:
+        def tell(message: dict[str, Any]) -> None:
+            try:
+                loop.call_soon_threadsafe(self._tell, ended, message)
+            except RuntimeError:
+                ended.set()  # the server has ended
+
+        while not ended.is_set():
+            try:
+                follow(ended, tell)
+            except RtcfError as error:
+                tell({"kind": "state", "state": "unknown", "status": str(error)})
+            ended.wait(_EVERY_S)
+
+    def _tell(self, ended: threading.Event, message: dict[str, Any]) -> None:
+        if ended.is_set():
+            return
+        for tab in tuple(self._tabs):
+            tab.tell(message)
+
+    def _follow_state(self, ended: threading.Event, tell: Callable[[dict[str, Any]], None]) -> None:
+        for status in self._client.get_status(self._runner).runners:
+            tell({"kind": "state"} | catalog.runner(status))
+
+    def _follow_events(
+        self, ended: threading.Event, tell: Callable[[dict[str, Any]], None]
+    ) -> None:
+        with self._client.watch_events([self._runner]) as stream:
+            self._streams.append(stream)
+            if ended.is_set():
+                return
+            for found in stream:
+                if isinstance(found, Lost):
+                    tell({"kind": "lost_events", "count": found.count})
+                else:
+                    tell(catalog.event(found))

@@ -1,0 +1,80 @@
+// The cycles that are at hand: times, numbers, and a column for each trace.
+import { BLOCK, Column } from "./column.js";
+
+export const LATENCY = "~latency", DURATION = "~duration";
+const KEPT = 128 * BLOCK; // cycles: 4 minutes of 2 kHz, 4 MB a trace
+
+export class Store {
+  constructor(capacity = KEPT) {
+    this.capacity = Math.ceil(capacity / BLOCK) * BLOCK;
+    this.clear();
+  }
+
+  // What came as one message: a shot, or a recording.
+  static of(message, names) {
+    const store = new Store(message.count + 1);
+    store.push(message, names);
+    return store;
+  }
+
+  clear() {
+    this.times = new Float64Array(this.capacity);
+    this.cycles = new Float64Array(this.capacity);
+    this.columns = new Map([[LATENCY, new Column(this.capacity)], [DURATION, new Column(this.capacity)]]);
+    this.end = 0; // all that have come
+    this.lost = 0;
+  }
+
+  get begin() { return Math.max(0, this.end - this.capacity); }
+  get empty() { return this.end === 0; }
+  get firstTime() { return this.time(this.begin); }
+  get lastTime() { return this.time(this.end - 1); }
+  time(at) { return this.times[at % this.capacity]; }
+  cycle(at) { return this.cycles[at % this.capacity]; }
+  column(name) { return this.columns.get(name); }
+
+  push(message, names) {
+    if (!message.count) return;
+    if (!this.empty && message.times[0] < this.lastTime) this.clear(); // a clock that went back
+    this.lost += message.lost;
+    const columns = new Map([[LATENCY, message.latencies], [DURATION, message.durations]]);
+    names.forEach((name, i) => columns.set(name, message.traces[i]));
+    for (const name of columns.keys())
+      if (!this.columns.has(name)) this.columns.set(name, new Column(this.capacity));
+    // Where cycles are missing lines are broken.
+    const gap = !this.empty && (message.lost || message.cycles[0] > this.cycle(this.end - 1) + 1);
+    if (gap) this.#append(this.lastTime, NaN, () => NaN, columns);
+    for (let i = 0; i < message.count; i++)
+      this.#append(message.times[i], message.cycles[i], (values) => values ? values[i] : NaN, columns);
+  }
+
+  #append(time, cycle, value, columns) {
+    const at = this.end++;
+    this.times[at % this.capacity] = time;
+    this.cycles[at % this.capacity] = cycle;
+    for (const [name, column] of this.columns) column.set(at, value(columns.get(name)));
+  }
+
+  // Columns that nobody looks at any more.
+  keep(names) {
+    const kept = new Set([LATENCY, DURATION, ...names]);
+    for (const name of this.columns.keys()) if (!kept.has(name)) this.columns.delete(name);
+  }
+
+  // The place of the first cycle that is not before `time`.
+  find(time) {
+    let low = this.begin, high = this.end;
+    while (low < high) {
+      const middle = Math.floor((low + high) / 2);
+      if (this.time(middle) < time) low = middle + 1; else high = middle;
+    }
+    return low;
+  }
+
+  // The place of the cycle nearest to a time, or -1.
+  nearest(time) {
+    if (this.empty) return -1;
+    const at = Math.min(this.find(time), this.end - 1);
+    return at > this.begin && time - this.time(at - 1) < this.time(at) - time ? at - 1 : at;
+  }
+}

@@ -1,0 +1,64 @@
+// Files of what is in sight: a picture, a table, or the recording of it.
+import { colour, ink } from "./drawing/palette.js";
+import { query } from "./server.js";
+
+function hand(blob, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+export function toPng(scope) {
+  const ratio = 2, head = 22;
+  const sizes = scope.panes.map((pane) => [pane.canvas.clientWidth, pane.canvas.clientHeight]);
+  const width = Math.max(...sizes.map(([each]) => each)), height = sizes.reduce((sum, [, each]) => sum + each + head, 0);
+  const canvas = document.createElement("canvas");
+  canvas.width = width * ratio; canvas.height = height * ratio;
+  const g = canvas.getContext("2d");
+  g.scale(ratio, ratio);
+  g.fillStyle = ink("paper");
+  g.fillRect(0, 0, width, height);
+  let top = 0;
+  scope.panes.forEach((pane, i) => {
+    g.save();
+    g.translate(0, top + head);
+    pane.paint(g, ...sizes[i]);
+    g.restore();
+    let left = 64;
+    for (const { name, number } of pane.traces) {
+      g.fillStyle = colour(number);
+      g.fillText(`— ${name}`, left, top + 15);
+      left += g.measureText(`— ${name}`).width + 16;
+    }
+    top += sizes[i][1] + head;
+  });
+  canvas.toBlob((blob) => hand(blob, "scope.png"));
+}
+
+export function csv(scope) {
+  const { a, b } = scope.cursors, { store, view } = scope;
+  const both = a !== null && b !== null;
+  const first = store.find(both ? Math.min(a, b) : view.begin), last = Math.min(store.find(both ? Math.max(a, b) : view.end) + 1, store.end);
+  const names = scope.traces().map((each) => each.name);
+  const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+  const lines = [["cycle", "time [s]", ...names.map((name) => quoted(name + (scope.unit(name) ? ` [${scope.unit(name)}]` : "")))].join(",")];
+  const columns = names.map((name) => store.column(name));
+  for (let at = first; at < last; at++) {
+    if (Number.isNaN(store.cycle(at))) continue;
+    lines.push([store.cycle(at), store.time(at), ...columns.map((each) => (each ? each.get(at) : NaN))].join(","));
+  }
+  return lines.join("\n") + "\n";
+}
+
+export function toCsv(scope) { hand(new Blob([csv(scope)], { type: "text/csv" }), "scope.csv"); }
+
+export async function toMcap(scope, runner) {
+  const { store, view } = scope;
+  if (scope.mode === "recording") throw new Error("this is a recording already");
+  const first = store.cycle(Math.min(store.find(view.begin), store.end - 1)), last = store.cycle(Math.min(store.find(view.end), store.end - 1));
+  const response = await fetch(`/api/mcap?${query({ runner, first, last })}`);
+  if (!response.ok) throw new Error((await response.json()).refused);
+  hand(await response.blob(), `${runner}.mcap`);
+}

@@ -1,0 +1,34 @@
+// What keys do; `help` lists them.
+export const KEYS = [
+  ["Space", "freeze, or go on"], ["+ −", "a shorter or a longer time"], ["← →", "back and forth in time"],
+  ["End", "the newest again"], ["A", "fit the scales to the values"], ["C", "take the cursors away"],
+  ["N", "a new pane"], ["Delete", "take the active pane away"], ["1 … 9", "make a pane the active one"],
+  ["/", "search the signals"], ["T", "roll or triggered"], ["D", "dark or light"], ["?", "this list"],
+  ["Wheel", "zoom time; with Shift, or at the scale, values"], ["Drag", "pan; a cursor: move it"],
+  ["Click", "cursor A; with Shift B"], ["Double click", "fit the scale, no cursors"],
+];
+
+export function mind(scope, does) {
+  const keys = {
+    " ": () => does.freeze(), "+": () => scope.view.step(-1), "=": () => scope.view.step(-1), "-": () => scope.view.step(1),
+    ArrowLeft: () => { scope.freeze(); scope.view.pan(-scope.view.span / 10); },
+    ArrowRight: () => { scope.freeze(); scope.view.pan(scope.view.span / 10); },
+    End: () => scope.run(), a: () => scope.panes.forEach((pane) => { pane.scale = null; }),
+    c: () => scope.clearCursors(), n: () => scope.addPane(), Delete: () => scope.removePane(scope.active),
+    "/": () => does.search(), t: () => does.mode(), d: () => does.theme(), "?": () => does.help(),
+  };
+  document.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    if (event.target.closest("input:not([type=range]), select, textarea, dialog")) {
+      if (event.key === "Escape") event.target.blur();
+      return;
+    }
+    // A button that has the focus is pressed by Space.
+    if (event.key === " " && event.target.closest("button, summary")) return;
+    const does_ = /^[1-9]$/.test(event.key) ? () => { const pane = scope.panes[event.key - 1]; if (pane) scope.activate(pane); } : keys[event.key];
+    if (!does_) return;
+    event.preventDefault();
+    does_();
+    scope.changed();
+  });
+}

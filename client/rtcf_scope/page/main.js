@@ -1,0 +1,273 @@
+// Puts the page together: the scope, its panels, the stream, and what the buttons do.
+import { scaled } from "./drawing/axes.js";
+import * as exporting from "./export.js";
+import { KEYS, mind } from "./keys.js";
+import * as layout from "./layout.js";
+import { Cycles } from "./panels/cycles.js";
+import { Events } from "./panels/events.js";
+import { Graph } from "./panels/graph.js";
+import { Measurements } from "./panels/measurements.js";
+import { Parameters } from "./panels/parameters.js";
+import { Recordings } from "./panels/recordings.js";
+import { Spectrum } from "./panels/spectrum.js";
+import { Tree } from "./panels/tree.js";
+import { TriggerPanel } from "./panels/trigger.js";
+import { Scope } from "./scope.js";
+import { Stream, ask, query } from "./server.js";
+import { DURATION, LATENCY } from "./data/store.js";
+
+const SLOW_MS = 250; // between two looks at figures
+const CYCLES = [{ name: LATENCY, unit: "µs", kind: "number" }, { name: DURATION, unit: "µs", kind: "number" }];
+const $ = (id) => document.getElementById(id);
+const drawerOf = (name) => document.querySelector(`.drawer[data-drawer=${name}]`);
+
+const scope = new Scope($("panes"));
+const told = { right: "observe", runner: () => $("runner").value, trouble: (text) => trouble("page", text) };
+const tree = new Tree(scope, $("tree"), $("search"));
+const parameters = new Parameters($("parameters"), told);
+const recordings = new Recordings(scope, $("recordings"), told.trouble);
+const triggering = new TriggerPanel(scope, $("trigger"), arm);
+const measurements = new Measurements(scope, drawerOf("measurements"));
+const spectrum = new Spectrum(scope, $("spectrum"));
+const cycles = new Cycles(scope, $("cycles"));
+const events = new Events(scope, drawerOf("events"));
+const graph = new Graph(drawerOf("graph"), async (name) => (await ask(`/api/component?${query({ runner: told.runner(), name })}`)).values);
+const figures = { frames: 0, perSecond: 0, since: performance.now(), state: {} };
+let stream = null, drawer = "measurements", generation = -1, liveCatalog = [];
+const troubles = new Map();
+window.scope = scope; // for who looks at the page with the browser's tools
+window.figures = figures;
+
+function trouble(source, text) {
+  if (text) troubles.set(source, text); else troubles.delete(source);
+  const [first] = troubles.values();
+  $("trouble").hidden = !first;
+  $("trouble").textContent = first ?? "";
+}
+
+function arm(trigger) {
+  if (trigger) { scope.shots = []; scope.shotNumber = -1; }
+  stream.want({ trigger });
+}
+
+// What the panes show is watched; with nothing of it the first signal, for the numbers of cycles.
+function watch() {
+  const names = scope.traces().map((each) => each.name);
+  const ports = names.filter((name) => !name.startsWith("~"));
+  if (names.length && !ports.length && liveCatalog.length) ports.push(liveCatalog[0].name);
+  stream?.want({ watch: ports });
+  scope.live.keep(names);
+}
+
+scope.onTraces = () => {
+  watch();
+  tree.show();
+  if (scope.mode === "trigger") triggering.show();
+  if (scope.mode === "recording" && recordings.open.length) recordings.load().catch((error) => told.trouble(error.message));
+};
+scope.onLayout = () => layout.toAddress(() => layout.taken(scope, told.runner(), drawer));
+
+function connect(runner) {
+  stream?.close();
+  scope.live.clear();
+  scope.events = [];
+  generation = -1;
+  stream = new Stream(runner, {
+    connected: (is) => trouble("connection", is ? "" : "no connection to the scope's server: it is tried again"),
+    message: hear,
+    cycles: (message, names) => {
+      if (message.kind === 2) { scope.addShot(message, names); triggering.tell(); }
+      else scope.live.push(message, names);
+    },
+  });
+  watch();
+}
+
+function hear(message) {
+  if (message.kind === "trouble") trouble("rtcfd", message.text);
+  else if (message.kind === "refused") told.trouble(message.text);
+  else if (message.kind === "watching") rebase(BigInt(message.base_ns));
+  else if (message.kind === "trigger") { scope.trigger.state = message.state; triggering.tell(); }
+  else if (message.kind === "state") state(message);
+  else if (message.kind === "event") {
+    scope.events.push(message);
+    if (scope.events.length > 1000) scope.events.shift();
+    if (message.what === "parameters") renew(false);
+    if (drawer === "events") events.show();
+    scope.changed();
+  }
+}
+
+function rebase(baseNs) {
+  if (baseNs !== scope.baseNs) scope.live.clear();
+  scope.baseNs = baseNs;
+}
+
+function state(message) {
+  figures.state = message;
+  scope.rate = message.frequency_hz;
+  $("state").textContent = message.frequency_hz ? `${message.state}, ${scaled(message.frequency_hz, "Hz")}` : message.state;
+  $("state").className = message.state;
+  $("state").title = [message.status, ...(message.degraded ?? [])].filter(Boolean).join("\n");
+  if (message.generation !== undefined && message.generation !== generation) { generation = message.generation; renew(true); }
+}
+
+// Asks again what the graph is (all of it, or values of parameters alone).
+async function renew(all) {
+  try {
+    const found = await ask(`/api/graph?${query({ runner: told.runner() })}`);
+    liveCatalog = found.signals;
+    for (const { name, unit } of found.signals) scope.units.set(name, unit);
+    if (all) { catalog(); parameters.show(found.components); graph.show(found); watch(); }
+    else parameters.tell(found.components);
+    await parameters.who();
+    trouble("graph", "");
+  } catch (error) { trouble("graph", error.message); }
+}
+
+function catalog() {
+  scope.catalog = [...CYCLES, ...(scope.mode === "recording" ? recordings.catalog() : liveCatalog)];
+  tree.show();
+}
+
+function mode(name) {
+  if (name !== "recording" && recordings.open.length) { recordings.open = []; recordings.show(); }
+  scope.setMode(name);
+  show();
+}
+
+function show() {
+  $("roll").setAttribute("aria-pressed", String(scope.mode === "roll"));
+  $("triggered").setAttribute("aria-pressed", String(scope.mode === "trigger"));
+  $("trigger").hidden = scope.mode !== "trigger";
+  if (scope.mode === "trigger") triggering.show();
+  catalog();
+}
+
+function open(name) {
+  drawer = name;
+  for (const each of document.querySelectorAll("[data-drawer]")) {
+    if (each.matches("button")) each.setAttribute("aria-selected", String(each.dataset.drawer === name));
+    else each.hidden = each.dataset.drawer !== name;
+  }
+  slow();
+  scope.changed();
+}
+
+// What is dear: a few times a second, and only what is in sight.
+async function slow() {
+  const now = performance.now();
+  if (now - figures.since > 1000) {
+    figures.perSecond = figures.frames / (now - figures.since) * 1000;
+    figures.frames = 0;
+    figures.since = now;
+    if (drawer === "cycles" || drawer === "graph") {
+      try {
+        cycles.figures = await ask(`/api/statistics?${query({ runner: told.runner() })}`);
+        graph.tell(cycles.figures);
+      } catch (error) { trouble("graph", error.message); }
+    }
+  }
+  for (const pane of scope.panes) pane.tell();
+  ({ measurements, spectrum, cycles, events }[drawer] ?? { show() {} }).show();
+  $("span").textContent = scaled(scope.view.span, "s");
+  const frozen = scope.mode === "roll" && !scope.view.follows;
+  $("freeze").textContent = frozen ? "Run" : "Freeze";
+  $("freeze").classList.toggle("frozen", frozen);
+  $("freeze").disabled = scope.mode !== "roll";
+  const { overruns = 0 } = figures.state;
+  const lost = scope.live.lost;
+  $("figures").textContent = `${overruns} overruns   ${lost ? `${lost} cycles not seen here   ` : ""}${Math.round(figures.perSecond)} frames/s`;
+}
+
+async function layouts() {
+  const names = await layout.names();
+  $("layouts").replaceChildren(new Option("Layouts…", ""), ...names.map((name) => new Option(name, `=${name}`)),
+    new Option("Save as…", "save"), ...(names.length ? [new Option("Remove…", "remove")] : []));
+}
+
+async function chooseLayout(choice) {
+  if (choice === "save") {
+    const name = prompt("Save this layout as");
+    if (name) await layout.save(name, layout.taken(scope, told.runner(), drawer));
+  } else if (choice === "remove") {
+    const name = prompt("Remove which layout?");
+    if (name) await layout.remove(name);
+  } else apply(await layout.read(choice.slice(1)));
+  await layouts();
+}
+
+function apply(found) {
+  if ([...$("runner").options].some((each) => each.value === found.runner) && found.runner !== told.runner()) {
+    $("runner").value = found.runner;
+    connect(found.runner);
+  }
+  layout.given(scope, found);
+  mode(found.mode === "trigger" ? "trigger" : "roll");
+  if (["measurements", "spectrum", "cycles", "graph", "events"].includes(found.drawer)) open(found.drawer);
+}
+
+function theme(name) {
+  document.documentElement.dataset.theme = name;
+  localStorage.setItem("theme", name);
+  for (const pane of scope.panes) pane.describe();
+  tree.show();
+  scope.changed();
+}
+
+const trying = (does) => Promise.resolve().then(does).then(() => told.trouble(""), (error) => told.trouble(error.message));
+
+function buttons() {
+  const freeze = () => (scope.view.follows ? scope.freeze() : scope.run());
+  const other = () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
+  $("roll").onclick = () => mode("roll");
+  $("triggered").onclick = () => mode("trigger");
+  $("freeze").onclick = freeze;
+  $("shorter").onclick = () => { scope.view.step(-1); scope.changed(); };
+  $("longer").onclick = () => { scope.view.step(1); scope.changed(); };
+  $("pane").onclick = () => scope.addPane();
+  $("theme").onclick = other;
+  $("help").onclick = () => $("keys").showModal();
+  $("runner").onchange = () => connect(told.runner());
+  $("trigger").onsubmit = (event) => event.preventDefault();
+  $("layouts").onchange = ({ target }) => { const choice = target.value; target.value = ""; trying(() => chooseLayout(choice)); };
+  $("export").onchange = ({ target }) => {
+    const choice = target.value;
+    target.value = "";
+    trying(() => ({ png: exporting.toPng, csv: exporting.toCsv, mcap: exporting.toMcap })[choice](scope, told.runner()));
+  };
+  for (const each of document.querySelectorAll("footer [role=tab]")) each.onclick = () => open(each.dataset.drawer);
+  for (const each of document.querySelectorAll("aside [role=tab]")) each.onclick = () => {
+    for (const tab of document.querySelectorAll("aside [role=tab]")) tab.setAttribute("aria-selected", String(tab === each));
+    for (const section of document.querySelectorAll("aside section")) section.hidden = section.dataset.tab !== each.dataset.tab;
+  };
+  $("keys").querySelector("dl").replaceChildren(...KEYS.flatMap(([key, does]) => [
+    Object.assign(document.createElement("dt"), { textContent: key }), Object.assign(document.createElement("dd"), { textContent: does })]));
+  mind(scope, { freeze, theme: other, search: () => $("search").focus(), help: () => $("keys").showModal(),
+    mode: () => mode(scope.mode === "trigger" ? "roll" : "trigger") });
+}
+
+function frame() {
+  if (scope.frame()) figures.frames++;
+  requestAnimationFrame(frame);
+}
+
+async function begin() {
+  theme(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
+  buttons();
+  const asked = layout.ofAddress();
+  const about = await ask("/api/about");
+  told.right = about.right;
+  $("runner").replaceChildren(...about.runners.map(({ runner }) => new Option(runner, runner)));
+  connect(told.runner());
+  if (asked) apply(asked);
+  await Promise.all([layouts(), recordings.show()]);
+  new ResizeObserver(() => scope.changed()).observe($("panes"));
+  setInterval(slow, SLOW_MS);
+  frame();
+}
+
+begin().catch((error) => trouble("page", error.message));
+// A file that is opened has other signals than the stream.
+const shown = scope.showRecordings.bind(scope);
+scope.showRecordings = (found) => { shown(found); show(); };

@@ -1,0 +1,39 @@
+// What has happened: faults, changes, overruns; each is a mark in the panes, too.
+export class Events {
+  constructor(scope, box) { this.scope = scope; this.box = box; }
+
+  show() {
+    const { events } = this.scope;
+    if (!events.length) {
+      const none = document.createElement("p");
+      none.className = "hint";
+      none.textContent = "Nothing has happened since this page was opened.";
+      this.box.replaceChildren(none);
+      return;
+    }
+    const list = document.createElement("ol");
+    list.append(...events.slice(-200).reverse().map((event) => {
+      const item = document.createElement("li");
+      const button = document.createElement("button");
+      button.textContent = new Date(Number(BigInt(event.time_ns) / 1000000n)).toLocaleTimeString();
+      button.title = "show this moment";
+      button.onclick = () => this.#go(event);
+      const what = document.createElement("b");
+      what.textContent = event.what.replaceAll("_", " ");
+      what.className = /fault|overruns|degraded/.test(event.what) ? "bad" : "";
+      const text = document.createElement("span");
+      text.textContent = [event.message, event.user && `by ${event.user}`].filter(Boolean).join(", ");
+      item.append(button, what, text);
+      return item;
+    }));
+    this.box.replaceChildren(list);
+  }
+
+  #go(event) {
+    const { scope } = this;
+    if (scope.mode !== "roll") scope.setMode("roll");
+    const time = Number(BigInt(event.time_ns) - scope.baseNs) / 1e9;
+    scope.view.show(time - scope.view.span / 2, time + scope.view.span / 2);
+    scope.changed();
+  }
+}

@@ -1,0 +1,61 @@
+// The signals as a tree, by component and port, with a search over it.
+import { DURATION, LATENCY } from "../data/store.js";
+import { colour } from "../drawing/palette.js";
+
+const MANY = 60; // signals, from which components begin closed
+
+export class Tree {
+  constructor(scope, box, search) {
+    this.scope = scope;
+    this.box = box;
+    this.search = search;
+    search.oninput = () => this.show();
+  }
+
+  show() {
+    const words = this.search.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const signals = this.scope.catalog.filter(({ name }) => words.every((word) => name.toLowerCase().includes(word)));
+    const components = new Map([["cycles", []]]);
+    for (const signal of signals) {
+      const component = signal.name.startsWith("~") ? "cycles" : signal.name.slice(0, signal.name.indexOf("."));
+      if (!components.has(component)) components.set(component, []);
+      components.get(component).push(signal);
+    }
+    const closed = new Set([...this.box.querySelectorAll("details:not([open])")].map((each) => each.dataset.name));
+    const first = !this.box.querySelector("details");
+    this.box.replaceChildren(...[...components].filter(([, all]) => all.length).map(([component, all]) => {
+      const details = document.createElement("details");
+      details.dataset.name = component;
+      details.open = words.length > 0 || (first ? signals.length < MANY || component === "cycles" : !closed.has(component));
+      const summary = document.createElement("summary");
+      summary.textContent = component === "cycles" ? "cycles of the loop" : component;
+      details.append(summary, ...all.map((signal) => this.#leaf(signal, component)));
+      return details;
+    }));
+    if (!signals.length) {
+      const none = document.createElement("p");
+      none.className = "hint";
+      none.textContent = words.length ? `no signal has "${words.join(" ")}" in its name`
+        : "no signals: load components that write ports of fixed size";
+      this.box.append(none);
+    }
+  }
+
+  #leaf({ name, unit, kind }, component) {
+    const button = document.createElement("button");
+    const trace = this.scope.traces().find((each) => each.name === name);
+    button.className = "leaf";
+    button.setAttribute("aria-pressed", String(Boolean(trace)));
+    const dot = document.createElement("i");
+    dot.style.background = trace ? colour(trace.number) : "transparent";
+    const text = document.createElement("span");
+    text.textContent = name === LATENCY ? "wake-up latency" : name === DURATION ? "calculation"
+      : name.slice(component.length + 1);
+    const right = document.createElement("small");
+    right.textContent = unit || (kind === "bool" ? "bool" : "");
+    button.title = name;
+    button.append(dot, text, right);
+    button.onclick = () => this.scope.toggle(name);
+    return button;
+  }
+}

@@ -1,0 +1,76 @@
+// The trigger's settings; the server looks at every cycle.
+import { figure } from "../drawing/axes.js";
+
+const SLOPES = { edge: ["rising", "falling", "either"], level: ["above", "below"], window: ["leaves", "enters"], nan: [] };
+
+export class TriggerPanel {
+  constructor(scope, box, arm) { // arm(told or null)
+    this.scope = scope;
+    this.box = box;
+    this.arm = arm;
+    this.part = (name) => box.querySelector(`[name=${name}]`);
+    for (const input of box.querySelectorAll("select, input")) input.onchange = () => { this.#read(); this.#again(); };
+    this.part("arm").onclick = () => (this.scope.trigger.state === "armed" ? this.disarm() : this.start());
+    this.part("earlier").onclick = () => this.scope.showShot(this.scope.shotNumber - 1);
+    this.part("later").onclick = () => this.scope.showShot(this.scope.shotNumber + 1);
+  }
+
+  // Fills in the signals there are, and what is set.
+  show() {
+    const { told } = this.scope.trigger;
+    const names = [...new Set([...this.scope.traces().map((each) => each.name), ...this.scope.catalog.map((each) => each.name)])];
+    if (!told.signal) told.signal = names[0] ?? "";
+    this.part("signal").replaceChildren(...names.map((name) => new Option(name, name, false, name === told.signal)));
+    for (const name of ["kind", "low", "high", "single", "window", "position", "holdoff"]) {
+      const input = this.part(name);
+      if (told[name] === undefined) continue;
+      if (input.type === "checkbox") input.checked = told[name]; else input.value = told[name];
+    }
+    const slopes = SLOPES[told.kind];
+    if (!slopes.includes(told.slope)) told.slope = slopes[0] ?? "";
+    this.part("slope").replaceChildren(...slopes.map((each) => new Option(each, each, false, each === told.slope)));
+    this.part("slope").hidden = !slopes.length;
+    this.part("low").parentElement.hidden = told.kind === "nan";
+    this.part("high").parentElement.hidden = told.kind !== "window";
+    this.tell();
+  }
+
+  tell() {
+    const { trigger, shot, shots, shotNumber } = this.scope;
+    const state = this.part("state");
+    state.textContent = shot ? `hit at cycle ${shot.cycle} (${shotNumber + 1} of ${shots.length})`
+      : trigger.state === "armed" ? "waiting" : "not armed";
+    state.className = shot ? "hit" : trigger.state;
+    this.part("arm").textContent = trigger.state === "armed" ? "Disarm" : "Arm";
+    this.part("earlier").disabled = shotNumber <= 0;
+    this.part("later").disabled = shotNumber >= shots.length - 1;
+    state.title = shot ? `${figure(shot.hitTime)} s` : "";
+  }
+
+  start() {
+    this.#read();
+    const { told } = this.scope.trigger;
+    const rate = this.scope.rate || 1000;
+    const all = Math.max(2, Math.round(told.window / 1000 * rate));
+    const before = Math.round(all * told.position / 100);
+    this.arm({ ...told, before, after: Math.max(1, all - before), holdoff: Math.round(told.holdoff / 1000 * rate) });
+  }
+
+  disarm() { this.arm(null); }
+
+  #again() {
+    this.show();
+    if (this.scope.trigger.state === "armed") this.start();
+    this.scope.changed();
+  }
+
+  #read() {
+    const { told } = this.scope.trigger;
+    for (const name of ["signal", "kind", "slope"]) told[name] = this.part(name).value;
+    for (const name of ["low", "high", "window", "position", "holdoff"]) {
+      const number = Number(this.part(name).value);
+      if (isFinite(number)) told[name] = number;
+    }
+    told.single = this.part("single").checked;
+  }
+}

@@ -1,0 +1,165 @@
+// What is shown, and how: the panes, the view, what is at hand to draw. Panels change it by its
+// methods; `changed` has all drawn anew in the next frame.
+import { Pane } from "./drawing/pane.js";
+import { View } from "./drawing/view.js";
+import { minded } from "./drawing/pointer.js";
+import { DURATION, LATENCY, Store } from "./data/store.js";
+
+const SHOTS = 32;
+
+export class Scope {
+  constructor(box) {
+    this.box = box;
+    this.live = new Store();
+    this.view = new View();
+    this.mode = "roll"; // or "trigger", or "recording"
+    this.panes = [];
+    this.active = null;
+    this.cursors = { a: null, b: null };
+    this.units = new Map([[LATENCY, "µs"], [DURATION, "µs"]]);
+    this.catalog = [];
+    this.shots = []; // {store, cycle}, newest last
+    this.shotNumber = -1;
+    this.recordings = []; // {name, store}: one, or two over each other
+    this.events = []; // newest last
+    this.trigger = { told: { kind: "edge", signal: "", slope: "rising", low: 0, high: 1 }, state: "off" };
+    this.baseNs = 0n;
+    this.onTraces = () => {}; // others are watched
+    this.onLayout = () => {}; // something that a layout holds is another
+    this.dirty = true;
+    this.addPane();
+  }
+
+  get shot() { return this.shots[this.shotNumber]; }
+  get store() { return this.sources()[0]; }
+
+  // What is drawn over each other, the one that counts first.
+  sources() {
+    if (this.mode === "recording") return this.recordings.map((each) => each.store);
+    if (this.mode === "trigger") return this.shot ? [this.shot.store] : [EMPTY];
+    return [this.live];
+  }
+
+  unit(name) { return this.units.get(name) ?? ""; }
+  traces() { return this.panes.flatMap((pane) => pane.traces); }
+  changed() { this.dirty = true; this.onLayout(); }
+
+  addPane() {
+    const pane = new Pane(this);
+    minded(pane, this);
+    this.panes.push(pane);
+    this.box.append(pane.box);
+    pane.describe();
+    this.activate(pane);
+    return pane;
+  }
+
+  removePane(pane) {
+    if (this.panes.length === 1) return;
+    this.panes = this.panes.filter((each) => each !== pane);
+    pane.box.remove();
+    if (this.active === pane) this.activate(this.panes[0]);
+    this.onTraces();
+    this.changed();
+  }
+
+  activate(pane) {
+    this.active = pane;
+    for (const each of this.panes) each.box.classList.toggle("active", each === pane);
+    this.changed();
+  }
+
+  // Show a signal in a pane, or no more; one that is in another pane goes.
+  toggle(name, pane = null) {
+    const there = this.panes.find((each) => each.has(name));
+    if (there) {
+      there.remove(name);
+      if (!there.traces.length && this.panes.length > 1) this.removePane(there);
+    } else (pane ?? this.active).add(name);
+    this.onTraces();
+    this.changed();
+  }
+
+  freeze() { if (this.mode === "roll") { this.view.freeze(); this.changed(); } }
+
+  run() {
+    if (this.mode === "roll") this.view.follow();
+    this.changed();
+  }
+
+  setCursor(which, time) {
+    const at = this.store.nearest(time);
+    this.cursors[which] = at < 0 ? time : this.store.time(at); // on a cycle
+    if (which === "a") this.freeze();
+    this.changed();
+  }
+
+  clearCursors() { this.cursors = { a: null, b: null }; this.changed(); }
+
+  setMode(mode) {
+    if (mode === this.mode) return;
+    this.mode = mode;
+    this.clearCursors();
+    if (mode === "roll") { this.view.span = this.rollSpan ?? 10; this.view.follow(); }
+    else this.rollSpan ??= this.view.span;
+    if (mode === "trigger" && this.shot) this.showShot(this.shots.length - 1);
+    for (const pane of this.panes) pane.shown = { low: -1, high: 1 };
+    this.onTraces();
+    this.changed();
+  }
+
+  // A shot's time is 0 at its hit.
+  addShot(message, names) {
+    const hitTime = message.times[message.hit], cycle = message.cycles[message.hit];
+    const times = Float64Array.from(message.times, (time) => time - hitTime);
+    const store = Store.of({ ...message, times, lost: 0 }, names);
+    this.shots.push({ store, cycle, hitTime });
+    if (this.shots.length > SHOTS) this.shots.shift();
+    if (this.mode === "trigger") this.showShot(this.shots.length - 1);
+  }
+
+  showShot(number) {
+    if (number < 0 || number >= this.shots.length) return;
+    const fresh = this.shotNumber < 0 || !this.shot;
+    const before = this.shot?.store;
+    this.shotNumber = number;
+    const { store } = this.shot;
+    // A zoom stays from shot to shot while they are of one length.
+    if (fresh || Math.abs((before.lastTime - before.firstTime) - (store.lastTime - store.firstTime)) > 0.01 * this.view.span)
+      this.view.show(store.firstTime, store.lastTime);
+    this.changed();
+  }
+
+  showRecordings(recordings) {
+    this.recordings = recordings;
+    if (!recordings.length) { this.setMode("roll"); return; }
+    const fresh = this.mode !== "recording";
+    this.setMode("recording");
+    if (fresh) this.view.show(Math.min(...recordings.map((each) => each.store.firstTime)), Math.max(...recordings.map((each) => each.store.lastTime)));
+    this.changed();
+  }
+
+  // Events at the times of the axis that is shown.
+  marks() {
+    if (this.mode === "recording") return [];
+    const shift = this.mode === "trigger" ? this.shot?.hitTime ?? 0 : 0;
+    return this.events.map((event) => ({
+      time: Number(BigInt(event.time_ns) - this.baseNs) / 1e9 - shift,
+      ink: /fault|overruns|degraded/.test(event.what) ? "bad" : "change", event,
+    }));
+  }
+
+  // Draws what has changed; called for each frame.
+  frame() {
+    if (this.mode === "roll" && this.view.follows && !this.live.empty) {
+      if (this.view.end !== this.live.lastTime) this.dirty = true;
+      this.view.end = this.live.lastTime;
+    }
+    if (!this.dirty) return false;
+    this.dirty = false;
+    for (const pane of this.panes) pane.draw();
+    return true;
+  }
+}
+
+const EMPTY = new Store(1);

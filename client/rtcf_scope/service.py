@@ -1,0 +1,182 @@
+"""Runs the server: as rtcf-scope.service, or for one session of `rtcfctl scope`."""
+
+import argparse
+import asyncio
+import os
+import secrets
+import signal
+import socket
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import rtcf
+from aiohttp import web
+from rtcf_shared.errors import RtcfError
+
+from rtcf_scope.door import LOOPBACK, Door
+from rtcf_scope.layouts import Layouts
+from rtcf_scope.recordings import Recordings
+from rtcf_scope.site import RIGHTS, Site
+
+PORT = 8642
+MOST_CONNECTIONS = 128
+_END_S = 1.0  # for what is being answered
+_LEAST_TOKEN = 16  # characters
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a server is to be run."""
+
+    socket: str | None
+    address: str
+    port: int  # 0 = any that is free
+    names: tuple[str, ...]  # by which the machine may be called beside loopback's
+    right: str
+    token: str
+    layouts: Path
+    files: tuple[Path, ...]
+    recordings: Path | None
+
+
+def add_options(parser: argparse.ArgumentParser, port: int) -> None:
+    """Add what service and session have in common; `port` unless another one is named."""
+    parser.add_argument(
+        "--address", default="127.0.0.1", metavar="ADDRESS",
+        help="where to listen (default: 127.0.0.1, this machine alone)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--port",
+        type=int,
+        default=port,
+        metavar="N",
+        help=f"(default: {port or 'any that is free'})",
+    )
+    parser.add_argument(
+        "--name", dest="names", action="append", default=[], metavar="HOST",
+        help="a name or address of this machine that browsers may use, beside loopback's",
+    )  # fmt: skip
+    parser.add_argument(
+        "--right", choices=RIGHTS, default=RIGHTS[0],
+        help="what pages may do: observe (default), or tune parameters",
+    )  # fmt: skip
+    parser.add_argument("--layouts", type=Path, metavar="FOLDER", help="where layouts are saved")
+    parser.add_argument(
+        "--recordings", type=Path, metavar="FOLDER", help="whose *.mcap pages may open"
+    )
+    parser.add_argument(
+        "--token-file", type=Path, metavar="FILE",
+        help="holds the token (default: a new one for each start)",
+    )  # fmt: skip
+
+
+def options(args: argparse.Namespace, files: Sequence[Path] = ()) -> Options:
+    """Return what a command line says; raises ValueError."""
+    if not 0 <= args.port < 65536:
+        raise ValueError(f"--port {args.port}: from 0 to 65535")
+    for file in files:
+        if not file.is_file():
+            raise ValueError(f"{file}: no such file")
+    state = os.environ.get("STATE_DIRECTORY") or os.path.join(
+        os.environ.get("XDG_STATE_HOME") or os.path.expanduser("~/.local/state"), "rtcf-scope"
+    )
+    names = tuple(args.names)
+    if args.address not in (*LOOPBACK, "0.0.0.0", "::"):
+        names += (args.address,)
+    return Options(
+        args.socket, args.address, args.port, names, args.right, _token(args.token_file),
+        args.layouts or Path(state) / "layouts", tuple(files), args.recordings,
+    )  # fmt: skip
+
+
+async def serve(given: Options, ready: Callable[[str], None]) -> None:
+    """Serve until SIGINT or SIGTERM; `ready` gets the address with its token.
+
+    Raises RtcfError if the address cannot be had.
+    """
+    ended = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, ended.set)
+    door = Door(given.token, given.names, MOST_CONNECTIONS)
+    recordings = Recordings(given.files, given.recordings)
+    with rtcf.Client(given.socket) as client:
+        site = Site(client, door, given.right, Layouts(given.layouts), recordings)
+        # Requests have the token in their line, once: not for a log.
+        running = web.AppRunner(site.app, access_log=None)
+        await running.setup()
+        assert running.server is not None
+        try:
+            try:
+                server = await loop.create_server(
+                    door.open(running.server), given.address, given.port
+                )
+            except OSError as error:
+                raise RtcfError(
+                    f"{given.address} port {given.port}: {error.strerror}: choose another --port"
+                ) from None
+            async with server:
+                port = server.sockets[0].getsockname()[1]
+                ready(f"http://{_called(given)}:{port}/?token={given.token}")
+                await ended.wait()
+        finally:
+            site.close()
+            await running.server.shutdown(_END_S)
+            await running.cleanup()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the service; return its exit status."""
+    parser = argparse.ArgumentParser(
+        prog="rtcf-scope", description="An oscilloscope in the browser for the loops of rtcfd."
+    )
+    parser.add_argument("--socket", metavar="PATH", help="rtcfd's control socket")
+    add_options(parser, PORT)
+    args = parser.parse_args(arguments)
+    try:
+        asyncio.run(serve(options(args), _tell_service_manager))
+    except (RtcfError, ValueError) as error:
+        print(f"rtcf-scope: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _tell_service_manager(address: str) -> None:
+    # The token is for those who may read it in its file, not for all who read the journal.
+    print(f"serving {address.partition('?')[0]}", flush=True)
+    path = os.environ.get("NOTIFY_SOCKET")
+    if path:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as to:
+            to.connect(f"\0{path[1:]}" if path.startswith("@") else path)
+            to.send(b"READY=1")
+
+
+def _called(given: Options) -> str:
+    host = given.names[0] if given.names else given.address
+    if host in ("0.0.0.0", "::"):
+        host = "localhost"
+    return f"[{host}]" if ":" in host else host
+
+
+def _token(file: Path | None) -> str:
+    """Return the token of a file, which is made if it is not there; raises ValueError."""
+    if file is None:
+        return secrets.token_urlsafe(24)
+    try:
+        descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o640)
+    except FileExistsError:
+        pass
+    except OSError as error:
+        raise ValueError(f"{file}: {error.strerror}") from None
+    else:
+        with open(descriptor, "w") as made:
+            made.write(secrets.token_urlsafe(24) + "\n")
+    try:
+        token = file.read_text().strip()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"{file}: {error}") from None
+    if len(token) < _LEAST_TOKEN or not all(c.isalnum() or c in "-_" for c in token):
+        raise ValueError(f"{file}: a token has {_LEAST_TOKEN} letters and digits or more")
+    return token

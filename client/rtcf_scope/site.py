@@ -1,0 +1,221 @@
+"""What the server answers: the page, questions of it, and its WebSocket."""
+
+import asyncio
+import io
+import json
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import rtcf
+from aiohttp import web
+from rtcf.mcap_writer import McapWriter
+from rtcf.recorder import Recorder
+from rtcf_shared.errors import RtcfError
+
+from rtcf_scope import catalog
+from rtcf_scope.door import Door
+from rtcf_scope.hub import Hub
+from rtcf_scope.layouts import MOST_BYTES, LayoutError, Layouts
+from rtcf_scope.news import News
+from rtcf_scope.recordings import Recordings
+from rtcf_scope.tab import Tab
+
+RIGHTS = ("observe", "tune", "operate")
+MOST_TABS = 32
+_PAGE = Path(__file__).with_name("page")
+_TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css",
+          ".svg": "image/svg+xml"}  # fmt: skip
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+class Site:
+    """One server's pages, hubs and tabs; lives in one event loop."""
+
+    def __init__(
+        self, client: rtcf.Client, door: Door, right: str, layouts: Layouts, recordings: Recordings
+    ) -> None:
+        self._client = client
+        self._right = right
+        self._layouts = layouts
+        self._recordings = recordings
+        self._hubs: dict[str, Hub] = {}
+        self._news: dict[str, News] = {}
+        self._tabs: set[web.WebSocketResponse | Tab] = set()
+        self.app = web.Application(middlewares=[door.middleware()], client_max_size=MOST_BYTES * 2)
+        # All that there is, by name: no path of a request ever becomes one of the file system.
+        self._files = {
+            f"/page/{file.relative_to(_PAGE)}": (file.read_bytes(), _TYPES[file.suffix])
+            for file in _PAGE.rglob("*")
+            if file.suffix in _TYPES
+        }
+        route = self.app.router
+        route.add_get("/", self._file)
+        route.add_get("/page/{name:.*}", self._file)
+        route.add_get("/api/about", self._told(self._about))
+        route.add_get("/api/graph", self._told(self._graph))
+        route.add_get("/api/statistics", self._told(self._statistics))
+        route.add_get("/api/component", self._told(self._component))
+        route.add_get("/api/history", self._told(self._history))
+        route.add_post("/api/parameter", self._told(self._set))
+        route.add_get("/api/layouts", self._told(self._list_layouts))
+        route.add_get("/api/layouts/{name}", self._told(self._read_layout))
+        route.add_put("/api/layouts/{name}", self._told(self._write_layout))
+        route.add_delete("/api/layouts/{name}", self._told(self._remove_layout))
+        route.add_get("/api/recordings", self._told(self._list_recordings))
+        route.add_get("/api/recordings/{name}", self._told(self._describe_recording))
+        route.add_get("/api/recordings/{name}/columns", self._recorded)
+        route.add_get("/api/mcap", self._mcap)
+        route.add_get("/stream", self._stream)
+
+    def close(self) -> None:
+        """End all streams."""
+        for hub in self._hubs.values():
+            hub.close()
+        for news in self._news.values():
+            news.close()
+
+    async def _file(self, request: web.Request) -> web.Response:
+        path = "/page/index.html" if request.path == "/" else request.path
+        if path not in self._files:
+            raise web.HTTPNotFound(text=f"nothing at {request.path}\n")
+        data, kind = self._files[path]
+        return web.Response(body=data, content_type=kind, charset="utf-8")
+
+    def _told(self, answer: Callable[[web.Request], Awaitable[Any]]) -> Handler:
+        """Return a handler that answers in JSON, and refusals in one line."""
+
+        async def handle(request: web.Request) -> web.StreamResponse:
+            try:
+                return web.json_response(await answer(request))
+            except (RtcfError, LayoutError, ValueError) as error:
+                return refused(error)
+
+        return handle
+
+    async def _ask(self, what: Callable[..., Any], *words: Any) -> Any:
+        return await asyncio.to_thread(what, *words)
+
+    async def _about(self, request: web.Request) -> Any:
+        found = await self._ask(catalog.runners, self._client)
+        return {"version": rtcf.__version__, "right": self._right, "runners": found,
+                "socket": self._client.socket}  # fmt: skip
+
+    async def _graph(self, request: web.Request) -> Any:
+        return await self._ask(catalog.graph, self._client, runner_of(request))
+
+    async def _statistics(self, request: web.Request) -> Any:
+        return await self._ask(catalog.statistics, self._client, runner_of(request))
+
+    async def _history(self, request: web.Request) -> Any:
+        return await self._ask(catalog.history, self._client, runner_of(request), 50)
+
+    async def _component(self, request: web.Request) -> Any:
+        name = request.query.get("name", "")
+        info = await self._ask(self._client.get_component, name, runner_of(request))
+        return catalog.component(info)
+
+    async def _set(self, request: web.Request) -> Any:
+        if self._right == "observe":
+            raise ValueError("this scope only looks: start it with --right tune to set parameters")
+        told = await request.json()
+        try:
+            component, name, value = told["component"], told["parameter"], told["value"]
+        except (KeyError, TypeError):
+            raise ValueError("a change has component, parameter and value") from None
+
+        def change() -> Any:
+            runner = runner_of(request)
+            info = self._client.get_component(str(component), runner)
+            found = next((each for each in info.parameters if each.name == name), None)
+            if found is None:
+                raise ValueError(f"{component} has no parameter {name}")
+            setting = catalog.setting(found, value)
+            result = self._client.set_parameters(info.full_name, [setting], runner)
+            return {"notes": list(result.notes)}
+
+        return await self._ask(change)
+
+    async def _list_layouts(self, request: web.Request) -> Any:
+        return self._layouts.names()
+
+    async def _read_layout(self, request: web.Request) -> Any:
+        return self._layouts.read(request.match_info["name"])
+
+    async def _write_layout(self, request: web.Request) -> Any:
+        await self._ask(self._layouts.write, request.match_info["name"], await request.text())
+
+    async def _remove_layout(self, request: web.Request) -> Any:
+        self._layouts.remove(request.match_info["name"])
+
+    async def _list_recordings(self, request: web.Request) -> Any:
+        return await self._ask(self._recordings.names)
+
+    async def _describe_recording(self, request: web.Request) -> Any:
+        return await self._ask(self._recordings.describe, request.match_info["name"])
+
+    async def _recorded(self, request: web.Request) -> web.StreamResponse:
+        traces: list[str] = request.query.getall("trace", [])
+        try:
+            data = await self._ask(self._recordings.columns, request.match_info["name"], traces)
+        except RtcfError as error:
+            return refused(error)
+        return web.Response(body=data, content_type="application/octet-stream")
+
+    async def _mcap(self, request: web.Request) -> web.StreamResponse:
+        """Answer with the cycles that are still known, of all that is being watched."""
+        runner = runner_of(request) or "rt_runner"
+        try:
+            first, last = (float(request.query.get(each, "nan")) for each in ("first", "last"))
+        except ValueError:
+            return refused("first and last are numbers of cycles")
+        hub = self._hubs.get(runner)
+        batches = [] if hub is None else [
+            chunk.batch for chunk in hub.memory
+            if not (chunk.cycles[-1] < first or chunk.cycles[0] > last)
+        ]  # fmt: skip
+        if not batches:
+            return refused("none of these cycles is known any more")
+
+        def write() -> bytes:
+            file = io.BytesIO()
+            writer = McapWriter(file)
+            recorder = Recorder(writer, runner)
+            for batch in batches:
+                recorder.add(batch)
+            recorder.flush()
+            writer.close()
+            return file.getvalue()
+
+        return web.Response(
+            body=await self._ask(write),
+            content_type="application/octet-stream",
+            headers={"Content-Disposition": f'attachment; filename="{quote(runner)}.mcap"'},
+        )
+
+    async def _stream(self, request: web.Request) -> web.StreamResponse:
+        if len(self._tabs) >= MOST_TABS:
+            return refused(f"{MOST_TABS} pages are open already: close some", 503)
+        runner = runner_of(request) or "rt_runner"
+        hub = self._hubs.setdefault(runner, Hub(self._client, runner))
+        news = self._news.setdefault(runner, News(self._client, runner))
+        tab = Tab(hub)
+        self._tabs.add(tab)
+        news.join(tab)
+        try:
+            return await tab.serve(request)
+        finally:
+            news.leave(tab)
+            self._tabs.discard(tab)
+
+
+def runner_of(request: web.Request) -> str:
+    """Return the runner that a page asks about; empty is rt_runner."""
+    return request.query.get("runner", "")
+
+
+def refused(error: object, status: int = 400) -> web.Response:
+    """Return an answer that says what is wrong, in one line."""
+    text = json.dumps({"refused": " ".join(str(error).split())})
+    return web.Response(text=text, content_type="application/json", status=status)

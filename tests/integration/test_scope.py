@@ -1,0 +1,415 @@
+"""The scope's server: who comes in, and what pages are told."""
+
+import asyncio
+import json
+import os
+import socket
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+import numpy as np
+import pytest
+import rtcf
+from daemon_process import DEADLINE_S, Daemon, wait_for
+from numpy.typing import NDArray
+from scope_process import ScopeProcess
+
+_HEAD = struct.Struct("<BBHIIIdd8x")  # as rtcf_scope.wire tells
+_CYCLES, _SHOT = 1, 2
+
+
+@pytest.fixture(scope="module")
+def looping(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    """Give a daemon with a loop that runs, for all tests here."""
+    daemon = Daemon(tmp_path_factory.mktemp("loop"))
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        client.load(rtcf.component("rtcf_examples", "Wave", name="wave", parameters=["rate:=1.0"]))
+        client.load(rtcf.component("rtcf_examples", "Mimo", name="mimo"))
+        client.start()
+    yield daemon
+    daemon.end()
+
+
+@pytest.fixture(scope="module")
+def scope(looping: Daemon) -> Iterator[ScopeProcess]:
+    """Give a scope that only looks."""
+    with ScopeProcess(looping) as scope:
+        yield scope
+
+
+@pytest.mark.parametrize("path", ["/", "/page/main.js", "/api/about", "/api/graph", "/stream"])
+def test_without_the_token_nothing_is_shown(scope: ScopeProcess, path: str) -> None:
+    for token in ("", "x" * len(scope.token), scope.token[:-1]):
+        status, text = scope.ask(path, token=token)
+        assert (status, text.decode()) == (
+            403, "the address with its token is the one that rtcfctl scope printed\n",
+        )  # fmt: skip
+    assert scope.ask(f"/?token={scope.token[:-1]}", token="")[0] == 403
+
+
+def test_the_address_with_the_token_leads_to_the_page_without_it(scope: ScopeProcess) -> None:
+    async def visit() -> tuple[str, str]:
+        async with (
+            aiohttp.ClientSession(cookie_jar=aiohttp.CookieJar(unsafe=True)) as session,
+            session.get(scope.address) as answer,
+        ):
+            return str(answer.url), await answer.text()
+
+    address, text = asyncio.run(visit())
+    assert address == f"http://127.0.0.1:{scope.port}/"
+    assert "<title>rtcf scope</title>" in text
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "["])
+def test_a_name_that_is_not_this_machines_is_refused(scope: ScopeProcess, host: str) -> None:
+    status, text = scope.ask("/api/about", Host=host)
+    assert (status, text.decode()) == (403, f"{host} is not a name of this scope: see --name\n")
+    for ours in (f"localhost:{scope.port}", f"[::1]:{scope.port}", "127.0.0.1:1"):
+        assert scope.ask("/api/about", Host=ours)[0] == 200
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1:1"])
+def test_pages_of_others_may_not_ask(scope: ScopeProcess, origin: str) -> None:
+    upgrade = {"Connection": "Upgrade", "Upgrade": "websocket"}
+    asked: list[tuple[str, dict[str, str]]] = [("/api/about", {}), ("/stream", upgrade)]
+    for path, headers in asked:
+        status, text = scope.ask(path, Origin=origin, **headers)
+        assert (status, text.decode()) == (403, f"pages of {origin} may not ask here\n")
+
+
+def test_a_browser_without_an_origin_gets_no_stream_and_changes_nothing(
+    scope: ScopeProcess,
+) -> None:
+    cookie = f"rtcf_scope_{scope.port}={scope.token}"
+    assert scope.ask("/api/about", token="", Cookie=cookie)[0] == 200
+    status, text = scope.ask("/api/layouts/a", "PUT", "{}", token="", Cookie=cookie)
+    assert (status, text) == (403, b"a browser says from which page it asks: no Origin\n")
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/page/../site.py", "/page/%2e%2e/site.py", "/page/..%2fsite.py", "/page//etc/passwd",
+     "/../../etc/passwd", "/page/....//site.py", "/page/%00"],
+)  # fmt: skip
+def test_no_path_leads_out_of_the_page(scope: ScopeProcess, path: str) -> None:
+    status, text = scope.ask(path)
+    assert status in (400, 404)
+    assert b"aiohttp" not in text and b"root:" not in text
+
+
+@pytest.mark.parametrize("name", ["..", "%2e%2e%2fa", "..%2f..%2fetc%2fpasswd", ".a", "a%00b"])
+def test_layouts_and_recordings_have_names_and_no_paths(scope: ScopeProcess, name: str) -> None:
+    for path in (f"/api/layouts/{name}", f"/api/recordings/{name}"):
+        status, text = scope.ask(path)
+        assert status in (400, 404) and b"root:" not in text
+    assert scope.ask(f"/api/layouts/{name}", "PUT", "{}")[0] in (400, 404, 405)
+
+
+def test_a_layout_is_kept_until_it_is_removed(scope: ScopeProcess) -> None:
+    assert scope.told("/api/layouts") == []
+    scope.told("/api/layouts/my%20arm", "PUT", '{"span": 5}')
+    assert scope.told("/api/layouts") == ["my arm"]
+    assert scope.told("/api/layouts/my%20arm") == {"span": 5}
+    status, text = scope.ask("/api/layouts/b", "PUT", "{")
+    assert status == 400 and b"layout b is no JSON" in text
+    status, text = scope.ask("/api/layouts/b", "PUT", json.dumps("x" * 70_000))
+    assert (status, json.loads(text)) == (400, {"refused": "a layout has 65536 bytes at most"})
+    scope.told("/api/layouts/my%20arm", "DELETE")
+    assert scope.told("/api/layouts") == []
+    status, text = scope.ask("/api/layouts/my%20arm")
+    assert (status, json.loads(text)) == (400, {"refused": "no layout my arm"})
+
+
+def test_a_flood_of_connections_is_refused_and_passes(scope: ScopeProcess) -> None:
+    flood = [socket.create_connection(("127.0.0.1", scope.port)) for _ in range(200)]
+    try:
+        flood[-1].settimeout(DEADLINE_S)
+        assert b"503" in flood[-1].recv(200)
+        # Who has shown no token is hung up on: then there is room again.
+        wait_for(lambda: _answers(scope), "room for another connection")
+    finally:
+        for each in flood:
+            each.close()
+
+
+def _answers(scope: ScopeProcess) -> bool:
+    try:
+        return scope.ask("/api/about")[0] == 200
+    except OSError:
+        return False
+
+
+def test_without_the_right_no_parameter_is_set(scope: ScopeProcess) -> None:
+    change = json.dumps({"component": "/wave", "parameter": "rate", "value": 2.0})
+    status, text = scope.ask("/api/parameter", "POST", change)
+    assert (status, json.loads(text)) == (
+        400,
+        {"refused": "this scope only looks: start it with --right tune to set parameters"},
+    )
+
+
+def test_with_the_right_parameters_are_set_within_their_bounds(
+    looping: Daemon,
+) -> None:
+    with (
+        ScopeProcess(looping, "--right", "tune") as scope,
+        rtcf.Client(looping.socket) as client,
+    ):
+
+        def change(component: str, parameter: str, value: Any) -> str:
+            told = {"component": component, "parameter": parameter, "value": value}
+            status, text = scope.ask("/api/parameter", "POST", json.dumps(told))
+            return "" if status == 200 else str(json.loads(text)["refused"])
+
+        assert change("/wave", "rate", 2) == ""
+        (rate,) = (p for p in client.get_component("/wave").parameters if p.name == "rate")
+        assert rate.value.double_value == 2.0
+        assert change("/wave", "shape", "square") == ""
+        assert "1000" in change("/wave", "rate", 2000)
+        assert change("/wave", "rate", "fast") == "rate is of type double, and 'fast' is not"
+        assert change("/wave", "size", 1) == "/wave has no parameter size"
+        assert "/nobody" in change("/nobody", "size", 1)
+        assert scope.ask("/api/parameter", "POST", "[1]")[0] == 400
+        first = scope.told("/api/history")[0]
+        assert (first["component"], first["value"], first["how"]) == ("/wave", "square", "set")
+        assert first["who"]
+
+
+class _Page:
+    """What a page of the scope hears."""
+
+    def __init__(self, socket: aiohttp.ClientWebSocketResponse) -> None:
+        self._socket = socket
+        self.texts: list[dict[str, Any]] = []
+
+    async def say(self, **words: Any) -> None:
+        await self._socket.send_json(words)
+
+    async def text(self, kind: str) -> dict[str, Any]:
+        while True:
+            message = await self._socket.receive(DEADLINE_S)
+            if message.type == aiohttp.WSMsgType.TEXT:
+                self.texts.append(json.loads(message.data))
+                if self.texts[-1]["kind"] == kind:
+                    return self.texts[-1]
+
+    async def binary(self, kind: int) -> tuple[tuple[Any, ...], NDArray[np.float64]]:
+        while True:
+            message = await self._socket.receive(DEADLINE_S)
+            if message.type == aiohttp.WSMsgType.TEXT:
+                self.texts.append(json.loads(message.data))
+            elif message.type == aiohttp.WSMsgType.BINARY and message.data[0] == kind:
+                head = _HEAD.unpack_from(message.data)
+                return head, np.frombuffer(message.data[_HEAD.size :]).reshape(head[4], head[3])
+
+
+class _Visit:
+    """A page's WebSocket, in an `async with`."""
+
+    def __init__(self, scope: ScopeProcess) -> None:
+        self._scope = scope
+
+    async def __aenter__(self) -> _Page:
+        self._session = aiohttp.ClientSession(
+            headers={"Authorization": f"Bearer {self._scope.token}"}
+        )
+        address = f"http://127.0.0.1:{self._scope.port}"
+        return _Page(await self._session.ws_connect(f"{address}/stream", origin=address))
+
+    async def __aexit__(self, *_: object) -> None:
+        await self._session.close()
+
+
+def test_tabs_share_one_stream_and_miss_no_cycle_when_another_comes(scope: ScopeProcess) -> None:
+    async def look() -> None:
+        async with _Visit(scope) as first:
+            await first.say(watch=["/wave.phase"])
+            seen, lost = [], 0.0
+            head, columns = await first.binary(_CYCLES)
+            seen.append(columns)
+            async with _Visit(scope) as second:
+                # Others are watched from here on.
+                await second.say(watch=["/wave.wave", "/mimo.out1"])
+                while len(seen) < 40:
+                    head, columns = await first.binary(_CYCLES)
+                    assert columns.shape[0] == 5
+                    lost += head[6]
+                    seen.append(columns)
+                _, both = await second.binary(_CYCLES)
+                assert both.shape[0] == 6
+            cycles = np.hstack([each[1] for each in seen])
+            assert np.all(np.diff(cycles) >= 1)
+            assert cycles[-1] - cycles[0] + 1 == len(cycles) + lost
+            phase = np.hstack([each[4] for each in seen])
+            assert np.isfinite(phase).all() and phase.min() >= 0.0 and phase.max() < 1.0
+
+    asyncio.run(look())
+
+
+def test_a_trigger_shows_the_cycle_that_it_waits_for_and_its_neighbours(
+    scope: ScopeProcess,
+) -> None:
+    async def look() -> None:
+        async with _Visit(scope) as page:
+            await page.say(
+                watch=["/wave.phase"],
+                trigger={"kind": "edge", "signal": "/wave.phase", "slope": "falling", "low": 0.5,
+                         "before": 30, "after": 20, "single": True},
+            )  # fmt: skip
+            head, columns = await page.binary(_SHOT)
+            hit, phase = int(head[7]), columns[4]
+            assert (hit, columns.shape) == (30, (5, 50))
+            assert phase[hit - 1] > 0.5 >= phase[hit]
+            assert (await page.text("trigger"))["state"] == "done"
+            # A single shot is one: the next fall comes a second later, and nothing with it.
+            for _ in range(80):
+                assert (await page.binary(_CYCLES))[0][0] == _CYCLES
+
+    asyncio.run(look())
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        ({"trigger": 3}, "a trigger has signal, kind, before and after"),
+        ({"trigger": {"kind": "loud"}}, "trigger on 'loud': one of edge, level, window, nan"),
+        (
+            {"trigger": {"kind": "window", "signal": "/wave.wave", "low": 2, "high": 1,
+                         "before": 1, "after": 1}},
+            "a window from 2 to 1: low is below high",
+        ),
+        (
+            {"trigger": {"kind": "nan", "signal": "/wave.wave", "before": 1, "after": 1_000_000}},
+            "200000 cycles are the most that a trigger shows",
+        ),
+        ({"watch": [str(i) for i in range(300)]}, "300 traces: at most 256"),
+    ],
+)  # fmt: skip
+def test_what_a_page_may_not_ask_is_refused_in_one_line(
+    scope: ScopeProcess, told: dict[str, Any], said: str
+) -> None:
+    async def ask() -> str:
+        async with _Visit(scope) as page:
+            await page.say(**told)
+            return str((await page.text("refused"))["text"])
+
+    assert asyncio.run(ask()) == said
+
+
+def test_a_page_that_does_not_read_holds_up_nobody(scope: ScopeProcess) -> None:
+    async def look() -> None:
+        async with _Visit(scope) as slow, _Visit(scope) as quick:
+            for page in (slow, quick):
+                await page.say(watch=["/wave.phase"])
+            head, columns = await quick.binary(_CYCLES)
+            for _ in range(60):
+                head, columns = await quick.binary(_CYCLES)
+                assert columns.shape == (5, head[3])
+
+    asyncio.run(look())
+
+
+def test_the_last_cycles_are_had_as_a_recording(scope: ScopeProcess, tmp_path: Path) -> None:
+    async def look() -> tuple[float, float]:
+        async with _Visit(scope) as page:
+            await page.say(watch=["/wave.phase"])
+            _, first = await page.binary(_CYCLES)
+            for _ in range(10):
+                _, last = await page.binary(_CYCLES)
+            return first[1][0], last[1][-1]
+
+    first, last = asyncio.run(look())
+    status, data = scope.ask(f"/api/mcap?first={first:.0f}&last={last:.0f}")
+    assert status == 200
+    file = tmp_path / "had.mcap"
+    file.write_bytes(data)
+    with rtcf.read_recording(file) as recording:
+        assert set(recording.signals) >= {"/wave.phase"}
+        cycles = recording.cycles
+    assert cycles[0] <= first and cycles[-1] >= last
+    assert scope.ask("/api/mcap?first=1e15&last=2e15")[0] == 400
+
+
+def test_recordings_are_told_as_they_were_recorded(looping: Daemon, tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    done = looping.ctl("record", "-o", str(file), "wave", "--duration", "0.3s")
+    assert done.returncode == 0, done.stderr
+    with ScopeProcess(looping, str(file)) as scope, rtcf.read_recording(file) as recording:
+        assert scope.told("/api/recordings") == ["run.mcap"]
+        told = scope.told("/api/recordings/run.mcap")
+        assert {each["name"] for each in told["signals"]} == set(recording.signals)
+        status, data = scope.ask("/api/recordings/run.mcap/columns?trace=/wave.phase&trace=/no.one")
+        assert status == 200
+        head = _HEAD.unpack_from(data)
+        columns = np.frombuffer(data[_HEAD.size :]).reshape(head[4], head[3])
+        assert np.array_equal(columns[1], recording.cycles)
+        assert np.array_equal(columns[4], recording["/wave.phase"])
+        assert np.isnan(columns[5]).all()
+        status, text = scope.ask("/api/recordings/other.mcap")
+        assert (status, json.loads(text)["refused"]) == (
+            400, "no recording other.mcap here: start the scope with its file",
+        )  # fmt: skip
+
+
+def test_tabs_that_are_killed_leave_nothing(looping: Daemon, scope: ScopeProcess) -> None:
+    rtcfd = Path(f"/proc/{looping.pid}/fd")
+    scopes = Path(f"/proc/{scope.process.pid}/fd")
+
+    async def one() -> None:
+        async with _Visit(scope) as page:
+            await page.say(watch=["/wave.phase"])
+            await page.binary(_CYCLES)
+
+    async def many() -> None:
+        pages = [_Visit(scope) for _ in range(20)]
+        for each in pages:
+            page = await each.__aenter__()
+            await page.say(watch=["/wave.phase", "/mimo.out1"])
+            await page.binary(_CYCLES)
+        for each in pages:
+            # No farewell, as of a browser that was killed.
+            for connection in each._session.connector._conns.values():  # type: ignore[union-attr]
+                for protocol, _ in connection:
+                    protocol.transport.abort()  # type: ignore[union-attr]
+            await each.__aexit__()
+
+    asyncio.run(one())
+    before = [len(os.listdir(folder)) for folder in (rtcfd, scopes)]
+    asyncio.run(many())
+    wait_for(
+        lambda: all(
+            len(os.listdir(folder)) <= count
+            for folder, count in zip((rtcfd, scopes), before, strict=True)
+        ),
+        "nothing left of the tabs",
+    )
+
+
+def test_over_ssh_the_way_through_is_told(looping: Daemon, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SSH_CONNECTION", "10.0.0.2 50000 10.0.0.1 22")
+    monkeypatch.setenv("USER", "alice")
+    with ScopeProcess(looping) as scope:
+        wait_for(lambda: "ssh" in scope.log.read_text(), "the way through")
+        said = scope.log.read_text().splitlines()[1]
+    assert said == (
+        f"from your machine:  ssh -N -L {scope.port}:127.0.0.1:{scope.port} alice@10.0.0.1"
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--port", "99999"], "rtcfctl: --port 99999: from 0 to 65535"),
+        (["/nowhere.mcap"], "rtcfctl: /nowhere.mcap: no such file"),
+        (["--address", "192.0.2.1"], "choose another --port"),
+        (["--token-file", "/dev/null"], "rtcfctl: /dev/null: a token has 16 letters"),
+    ],
+)
+def test_a_wrong_command_line_is_refused(looping: Daemon, arguments: list[str], said: str) -> None:
+    done = looping.ctl("scope", *arguments)
+    assert done.returncode in (1, 2)
+    assert said in done.stderr and done.stderr.count("\n") == 1

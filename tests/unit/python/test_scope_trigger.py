@@ -1,0 +1,67 @@
+"""Which cycle a trigger takes."""
+
+import numpy as np
+import pytest
+from rtcf_scope.trigger import Search, TriggerError, parse
+
+_BASE = {"signal": "/a.b", "before": 1, "after": 1}
+_NAN = float("nan")
+
+
+def _hits(values: list[float], **told: object) -> list[int]:
+    return [int(each) for each in Search(parse(_BASE | told)).hits(np.array(values))]
+
+
+@pytest.mark.parametrize(
+    ("told", "values", "hits"),
+    [
+        ({"kind": "edge", "low": 1.0}, [0, 1, 2, 0, 3], [1, 4]),
+        ({"kind": "edge", "low": 1.0, "slope": "falling"}, [2, 1, 0, 2, 0], [1, 4]),
+        ({"kind": "edge", "low": 1.0, "slope": "either"}, [0, 2, 0], [1, 2]),
+        ({"kind": "edge", "low": 1.0}, [_NAN, 2, 0, 1], [3]),
+        ({"kind": "level", "low": 1.0}, [0, 1, 2, _NAN, 0], [1, 2]),
+        ({"kind": "level", "low": 1.0, "slope": "below"}, [0, 1, 2], [0, 1]),
+        ({"kind": "window", "low": -1.0, "high": 1.0}, [0, 2, 3, 0, -2], [1, 4]),
+        ({"kind": "window", "low": -1.0, "high": 1.0}, [0, _NAN, 0], [1]),
+        ({"kind": "window", "low": -1.0, "high": 1.0, "slope": "enters"}, [2, 0, 0, 2], [1]),
+        ({"kind": "nan"}, [0, _NAN, 1, float("inf")], [1, 3]),
+    ],
+)
+def test_a_trigger_hits_the_cycles_that_it_is_for(
+    told: dict[str, object], values: list[float], hits: list[int]
+) -> None:
+    assert _hits(values, **told) == hits
+
+
+@pytest.mark.parametrize("kind", ["edge", "window", "level", "nan"])
+def test_it_hits_the_same_cycles_however_they_come(kind: str) -> None:
+    values = np.random.default_rng(12).normal(size=500)
+    values[100:103] = np.nan
+    trigger = parse(_BASE | {"kind": kind, "low": 0.5, "high": 1.0})
+    whole = Search(trigger).hits(values).tolist()
+    assert whole
+    for size in (1, 7, 64):
+        search, found = Search(trigger), []
+        for at in range(0, len(values), size):
+            found += (search.hits(values[at : at + size]) + at).tolist()
+        assert found == whole
+
+
+def test_a_slope_that_a_kind_has_not_is_refused() -> None:
+    with pytest.raises(TriggerError, match="edge 'above': one of rising, falling, either"):
+        parse(_BASE | {"kind": "edge", "slope": "above"})
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        ({"low": "high"}, "a trigger's numbers"),
+        ({"low": _NAN}, "a trigger's level is a number"),
+        ({"after": 0}, "at least one cycle"),
+        ({"before": -1}, "at least one cycle"),
+        ({"holdoff": -1}, "at least one cycle"),
+    ],
+)
+def test_numbers_that_cannot_be_are_refused(told: dict[str, object], said: str) -> None:
+    with pytest.raises(TriggerError, match=said):
+        parse(_BASE | {"kind": "edge"} | told)
