@@ -178,22 +178,23 @@ def _checked(graph: Graph) -> Graph:
     return graph
 
 
-def writer(graph: Graph, name: str) -> tuple[str, str] | None:
-    """Return the component and port that writes a connection."""
-    for mixer in graph.values():
-        for port in OUTPUTS:
-            if mixer.mapped(port) == name:
-                return mixer.name, port
-    return None
+def writers(graph: Graph, name: str) -> set[tuple[str, str]]:
+    """Return the components and ports that write a connection; where an input reads it, one at
+    most."""
+    return {
+        (mixer.name, port)
+        for mixer in graph.values()
+        for port in OUTPUTS
+        if mixer.mapped(port) == name
+    }
 
 
 def sources(graph: Graph, mixer: Mixer) -> set[str]:
     """Return the components that must run before this one."""
     found = set()
     for port in INPUTS:
-        peer = writer(graph, mixer.mapped(port))
-        if peer is not None and not mixer.broken(port):
-            found.add(peer[0])
+        if not mixer.broken(port):
+            found |= {peer for peer, _ in writers(graph, mixer.mapped(port))}
     return found
 
 
@@ -213,9 +214,9 @@ def order(graph: Graph) -> list[str]:
 
 @dataclass(frozen=True)
 class Connection:
-    """A mapped name and its ends."""
+    """A mapped name and its ends; of several writers none goes before the others."""
 
-    writer: tuple[str, str] | None
+    writers: frozenset[tuple[str, str]]
     readers: frozenset[tuple[str, str, bool]]
 
 
@@ -224,7 +225,7 @@ def connections(graph: Graph) -> dict[str, Connection]:
     names = {mixer.mapped(port) for mixer in graph.values() for port in TYPES}
     return {
         name: Connection(
-            writer(graph, name),
+            frozenset(writers(graph, name)),
             frozenset(
                 (mixer.name, port, mixer.broken(port))
                 for mixer in graph.values()
@@ -248,11 +249,11 @@ def run_cycle(graph: Graph, iteration: int, values: Values) -> Values:
             continue
         read: dict[str, float] = {}
         for port in INPUTS:
-            peer = writer(graph, mixer.mapped(port))
-            if peer is None:
-                read[port] = now[name, port]
+            peers = writers(graph, mixer.mapped(port))
+            if peers:
+                read[port] = (before if mixer.broken(port) else now)[peers.pop()]
             else:
-                read[port] = (before if mixer.broken(port) else now)[peer]
+                read[port] = now[name, port]
         mixed = mixer.value("offset") * mixer.value("gain")
         mixed += int(3 * read["in1"] + 5 * read["in2"]) + int(read["level"])
         now[name, "out"] = mixed % MODULUS

@@ -227,7 +227,11 @@ class GraphMachine(stateful.RuleBasedStateMachine):
             assert (max(1, spec.every), spec.phase) == (mixer.every, mixer.phase)
         assert {
             each.name: model.Connection(
-                (each.writer.component, each.writer.port) if each.HasField("writer") else None,
+                frozenset(
+                    (end.component, end.port)
+                    for end in ([each.writer] if each.HasField("writer") else [])
+                    + list(each.other_writers)
+                ),
                 frozenset((end.component, end.port, end.broken) for end in each.readers),
             )
             for each in self.client.list_connections()
