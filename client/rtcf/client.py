@@ -7,6 +7,7 @@ from rtcf_shared.spec import several
 
 from rtcf import direct_stop
 from rtcf.connection import CHANGE_TIMEOUT_S, QUERY_TIMEOUT_S, OnProgress
+from rtcf.errors import DaemonUnreachableError
 from rtcf.replay_call import ReplayCall
 from rtcf.streams.watching import Watching
 from rtcf.tenancy import Tenancy
@@ -113,7 +114,11 @@ class Client(Watching):
             ]
         except RtcfError as error:
             if not stopped:
-                stopped[""] = direct_stop.Stopped("", trouble or error)
+                # Of who may neither look nor ask, rtcfd's door says how to mend it.
+                both = (
+                    error if trouble is None else DaemonUnreachableError(str(trouble), str(error))
+                )
+                stopped[""] = direct_stop.Stopped("", both)
             runners = []
         # A runner without an executor may be about to get one.
         for runner in runners:

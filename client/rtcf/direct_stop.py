@@ -122,7 +122,9 @@ def stop_all(socket: str) -> list[Stopped]:
         except OSError as error:
             problem = error
     if problem is not None and not read:
-        raise DaemonUnreachableError(f"cannot look for loops: {problem}")
+        raise DaemonUnreachableError(
+            f"cannot look for loops: {problem.filename}: {problem.strerror}"
+        )
     names = sorted(runners)
     if not names:
         return []

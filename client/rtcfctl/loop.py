@@ -57,7 +57,10 @@ def _stop_all(client: rtcf.Client, output: Output) -> None:
     else:
         output.data([{"runner": each.runner, "stopped": each.error is None} for each in found])
     if failed:
-        raise rtcf.RtcfError("; ".join(str(each.error) for each in failed))
+        lines = "; ".join(str(each.error) for each in failed)
+        if all(isinstance(each.error, rtcf.DaemonUnreachableError) for each in failed):
+            raise rtcf.DaemonUnreachableError(lines)
+        raise rtcf.RtcfError(lines)
 
 
 def step(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:

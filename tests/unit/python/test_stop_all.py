@@ -36,6 +36,8 @@ def test_rtcfd_is_asked_where_the_executors_cannot_be(
     daemon.end()
     (failed,) = client.stop_all()
     assert str(failed.error).startswith("cannot look for loops: ")
+    assert "rtcfd is not running at" in str(failed.error)
+    assert main(["--socket", str(daemon.socket), "stop", "--all"]) == 3
 
 
 def test_a_folder_that_cannot_be_read_keeps_none_from_the_other(tmp_path: Path) -> None:
