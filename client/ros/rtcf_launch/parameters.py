@@ -37,7 +37,7 @@ class Parameters:
             raise _wrong(f"~{name} must be an integer, not {_shown(value)}")
         if not low <= value <= high:
             raise _wrong(f"~{name} of {value} is out of range: {low} to {high}")
-        return value
+        return int(value)
 
     def number(self, name: str, low: float, high: float) -> float | None:
         """Take a number in a range."""

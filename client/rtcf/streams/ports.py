@@ -156,6 +156,7 @@ def _schema(message: ports_pb2.PortSchema) -> PortSchema:
 
 
 def _signals(number: int, name: str, column: ports_pb2.PortColumn) -> Iterator[Signal]:
+    shape: tuple[int, ...]
     if column.kind == ports_pb2.PortColumn.KIND_OUTPUT:
         for leaf in ros_layout.leaves(column.ros_definition, column.sample):
             full = f"{name}.{leaf.path}" if leaf.path else name
