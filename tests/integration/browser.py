@@ -1,0 +1,144 @@
+"""Debian's Chromium without a screen, driven by its DevTools protocol."""
+
+import asyncio
+import base64
+import os
+import subprocess
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import aiohttp
+from daemon_process import DEADLINE_S, wait_for
+
+_POLL_S = 0.05
+
+
+class Browser:
+    """One browser with pages of a profile of its own; ends at the end of its `with`."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder / "chromium"
+        # A renderer that may not open namespaces, as in containers, has no sandbox to be in.
+        sandbox = ["--no-sandbox"] if os.geteuid() == 0 else []
+        self._process = subprocess.Popen(
+            ["chromium", "--headless=new", *sandbox, "--disable-gpu", "--disable-dev-shm-usage",
+             "--no-first-run", "--disable-background-networking", "--disable-component-update",
+             "--disable-extensions", "--remote-debugging-port=0", "--hide-scrollbars",
+             f"--user-data-dir={self._folder}", "about:blank"],
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )  # fmt: skip
+        self._loop = asyncio.new_event_loop()
+        self._session = self._run(_session())
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._run(self._session.close())
+        self._loop.close()
+        self.kill()
+
+    def kill(self) -> None:
+        """End it as a power cut does."""
+        self._process.kill()
+        self._process.wait()
+
+    def page(self, address: str, width: int = 1280, height: int = 800) -> "Page":
+        """Open an address."""
+        port_file = self._folder / "DevToolsActivePort"
+        wait_for(lambda: port_file.exists() and len(port_file.read_text().split()) == 2, "Chromium")
+        port, _ = port_file.read_text().split()
+        target = self._run(self._new(f"http://127.0.0.1:{port}/json/new?about:blank"))
+        socket = self._run(self._session.ws_connect(target["webSocketDebuggerUrl"], max_msg_size=0))
+        page = Page(self._loop, socket)
+        page.call(
+            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1,
+            mobile=False,
+        )  # fmt: skip
+        for domain in ("Runtime", "Log"):
+            page.call(f"{domain}.enable")
+        page.call("Page.navigate", url=address)
+        return page
+
+    async def _new(self, address: str) -> Any:
+        async with self._session.put(address) as response:
+            return await response.json()
+
+    def _run(self, what: Any) -> Any:
+        return self._loop.run_until_complete(asyncio.wait_for(what, DEADLINE_S))
+
+
+class Page:
+    """One page."""
+
+    def __init__(
+        self, loop: asyncio.AbstractEventLoop, socket: aiohttp.ClientWebSocketResponse
+    ) -> None:
+        self._loop = loop
+        self._socket = socket
+        self._number = 0
+        self.errors: list[str] = []  # of scripts, and what was refused
+
+    def close(self) -> None:
+        """Close it: what is behind another page is not drawn."""
+        self.call("Page.close")
+
+    def call(self, method: str, **words: Any) -> Any:
+        """Call a method of the protocol; return its result."""
+        return self._loop.run_until_complete(
+            asyncio.wait_for(self._call(method, words), DEADLINE_S)
+        )
+
+    def ask(self, expression: str) -> Any:
+        """Return the value of an expression of JavaScript, which may be a promise."""
+        told = self.call(
+            "Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True
+        )
+        assert "exceptionDetails" not in told, told["exceptionDetails"]
+        return told["result"].get("value")
+
+    def wait(self, expression: str) -> Any:
+        """Return the value of an expression as soon as it is true."""
+        deadline = time.monotonic() + DEADLINE_S
+        while not (found := self.ask(f"(() => {{ try {{ return {expression} }} catch {{ }} }})()")):
+            assert time.monotonic() < deadline, f"waited for {expression}; the page says: " + str(
+                self.ask("document.body.innerText.slice(0, 600)")
+            )
+            time.sleep(_POLL_S)
+        return found
+
+    def picture(self, file: Path) -> None:
+        """Write what is seen, as PNG."""
+        file.write_bytes(base64.b64decode(self.call("Page.captureScreenshot")["data"]))
+
+    async def _call(self, method: str, words: dict[str, Any]) -> Any:
+        self._number += 1
+        number = self._number
+        await self._socket.send_json({"id": number, "method": method, "params": words})
+        while True:
+            told = await self._socket.receive_json()
+            if told.get("method") == "Runtime.exceptionThrown":
+                details = told["params"]["exceptionDetails"]
+                self.errors.append(
+                    details.get("exception", details).get("description", str(details))
+                )
+            elif (
+                told.get("method") == "Log.entryAdded"
+                and told["params"]["entry"]["level"] == "error"
+            ):
+                self.errors.append(str(told["params"]["entry"]["text"]))
+            if told.get("id") == number:
+                assert "error" not in told, told["error"]
+                return told["result"]
+
+
+async def _session() -> aiohttp.ClientSession:
+    return aiohttp.ClientSession()

@@ -1,0 +1,144 @@
+"""The scope's page in a browser, on a real loop."""
+
+import math
+from collections.abc import Callable, Iterator
+from urllib.parse import quote
+
+import pytest
+import rtcf
+from browser import Browser, Page
+from daemon_process import Daemon
+from rtcf.v1 import runner_pb2
+from scope_process import ScopeProcess
+
+_WAVES = 8
+
+
+@pytest.fixture(scope="module")
+def loop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    """Give a daemon with a loop of 2 kHz, of sixteen numbers that move."""
+    daemon = Daemon(tmp_path_factory.mktemp("loop"))
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=2000.0))
+        client.apply(
+            [
+                rtcf.component(
+                    "rtcf_examples", "Wave", name=f"w{i}", parameters=[f"rate:={i + 1}.0"]
+                )
+                for i in range(_WAVES)
+            ]
+        )
+        client.start()
+    yield daemon
+    daemon.end()
+
+
+@pytest.fixture(scope="module")
+def scope(loop: Daemon) -> Iterator[ScopeProcess]:
+    with ScopeProcess(loop, "--right", "tune") as scope:
+        yield scope
+
+
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with Browser(tmp_path_factory.mktemp("browser")) as browser:
+        yield browser
+
+
+Opener = Callable[..., Page]
+
+
+@pytest.fixture
+def visit(chromium: Browser) -> Iterator[Opener]:
+    """Give what opens a page of a scope with a layout; it is closed afterwards."""
+    pages = []
+
+    def visit(scope: ScopeProcess, layout: str = "") -> Page:
+        pages.append(_open(chromium, scope, layout))
+        return pages[-1]
+
+    yield visit
+    for page in pages:
+        page.close()
+
+
+def _open(browser: Browser, scope: ScopeProcess, layout: str = "") -> Page:
+    return browser.page(scope.address + (f"#{quote(layout)}" if layout else ""))
+
+
+def _press(page: Page, element: str) -> None:
+    page.ask(f"document.querySelector({element!r}).click()")
+
+
+def test_what_was_frozen_stays_while_the_loop_goes_on(visit: Opener, scope: ScopeProcess) -> None:
+    page = visit(scope, '{"panes":[{"traces":["/w0.wave"]}],"span":1}')
+    page.wait("scope.live.end > 2500")
+    page.ask("document.body.dispatchEvent(new KeyboardEvent('keydown', {key: ' ', bubbles: true}))")
+    end = page.ask("scope.view.end")
+    page.wait("scope.live.lastTime > scope.view.end + 1")
+    assert page.ask("scope.view.end") == end
+    assert page.wait("document.getElementById('freeze').textContent === 'Run'")
+    # All of it is there at full rate, and measured.
+    page.ask("scope.setCursor('a', scope.view.end - 1); scope.setCursor('b', scope.view.end)")
+    page.wait("document.querySelector('caption').textContent.startsWith('between the cursors')")
+    page.wait("document.querySelector('.drawer tbody').textContent.includes('/w0.wave')")
+
+
+def test_what_is_so_for_one_cycle_is_shown_in_the_middle(
+    visit: Opener, scope: ScopeProcess
+) -> None:
+    # A phase of 1 Hz falls in one of 2000 cycles.
+    page = visit(
+        scope,
+        '{"panes":[{"traces":["/w0.phase"]}],"mode":"trigger","trigger":{"signal":"/w0.phase",'
+        '"kind":"edge","slope":"falling","low":0.5,"high":1,"window":100,"position":50,'
+        '"holdoff":0,"single":true}}',
+    )  # fmt: skip
+    page.wait("scope.mode === 'trigger' && scope.rate === 2000")
+    page.wait("document.querySelector('#trigger [name=signal]').value === '/w0.phase'")
+    _press(page, "#trigger [name=arm]")
+    page.wait("scope.shot && scope.trigger.state === 'done'")
+    shot = page.ask(
+        """(() => {
+          const { store, cycle } = scope.shot, { view } = scope;
+          const phase = store.column("/w0.phase"), found = [];
+          for (let at = store.begin + 1; at < store.end; at++)
+            if (phase.get(at) < phase.get(at - 1))
+              found.push([at, store.time(at), store.cycle(at) === cycle]);
+          return { found, count: store.end - store.begin, begin: view.begin, end: view.end };
+        })()"""
+    )
+    assert shot["found"] == [[100, 0, True]]
+    assert shot["count"] == 200
+    assert abs(shot["begin"] + shot["end"]) < 0.02 * (shot["end"] - shot["begin"])
+    assert page.errors == []
+
+
+def test_figures_and_spectra_of_known_values_are_right(visit: Opener, scope: ScopeProcess) -> None:
+    page = visit(scope)
+    page.wait("scope.rate")
+    found = page.ask(
+        """(async () => {
+          const m = await import("/page/data/measure.js"), f = await import("/page/data/fft.js");
+          const rate = 1000, times = Array.from({ length: 4096 }, (_, i) => i / rate);
+          const sine = times.map((t) => 3 * Math.sin(2 * Math.PI * 125 * t) + 1);
+          const { amplitudes, step } = f.spectrum(sine, rate);
+          const peak = amplitudes.indexOf(Math.max(...amplitudes));
+          const response = times.map((t) => t < 1 ? 0 : 1 - Math.exp(-(t - 1) / 0.1));
+          const wild = response.map((r, i) =>
+            1 - (1 - r) * Math.cos(40 * Math.max(times[i] - 1, 0)));
+          return { hertz: peak * step, size: amplitudes[peak],
+            frequency: m.frequency(times, sine, -2, 4), step: m.step(times, response),
+            wild: m.step(times, wild), none: m.step(times, sine) };
+        })()"""
+    )
+    assert found["hertz"] == 125.0
+    assert math.isclose(found["size"], 3.0, rel_tol=1e-6)
+    assert math.isclose(found["frequency"], 125.0, rel_tol=1e-6)
+    # Of a first order with 0.1 s: ln 9 and ln 50 of it, the second from 10 % on.
+    assert abs(found["step"]["rise"] - 0.1 * math.log(9)) < 2e-3
+    assert found["step"]["overshoot"] < 1e-6
+    assert abs(found["step"]["settling"] - 0.1 * (math.log(50) - math.log(10 / 9))) < 2e-3
+    assert found["wild"]["overshoot"] > 30
+    assert found["none"]["rise"] is None or math.isnan(found["none"]["rise"])
