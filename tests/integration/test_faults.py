@@ -325,10 +325,8 @@ def test_a_crash_is_recovered_within_a_second(daemon: Daemon, client: rtcf.Clien
     print(f"restored {took} s after the death")
 
 
-def test_an_executor_that_dies_all_the_time_is_given_up(
-    daemon: Daemon, client: rtcf.Client
-) -> None:
-    client.load(rtcf.component("rtcf_test", "Counter", name="a"))
+def give_up(daemon: Daemon, client: rtcf.Client) -> None:
+    """Kill executors until there is none any more."""
     seen = set()
     while (status := state(client)).state != runner_pb2.RUNNER_STATE_DOWN:
         if status.pid and status.pid not in seen:
@@ -341,4 +339,26 @@ def test_an_executor_that_dies_all_the_time_is_given_up(
                 lambda: state(client).pid not in (0, *seen) or "the last of" in daemon.log(),
                 "another executor, or none any more",
             )
+
+
+def test_an_executor_that_dies_all_the_time_is_given_up(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter", name="a"))
+    give_up(daemon, client)
     assert client.start().order == ["/a"]
+
+
+def test_settings_of_a_runner_that_is_down_are_judged_too(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter", name="a"))
+    give_up(daemon, client)
+    done = daemon.ctl("runner", "set", "--whitelist", "(")
+    assert done.returncode == 1
+    assert "whitelist: bad regular expression '('" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    done = daemon.ctl("runner", "set", "--whitelist", "/a/.*")
+    assert done.returncode == 0, done.stderr
+    assert client.start().order == ["/a"]
+    assert state(client).settings.ros.whitelist == "/a/.*"

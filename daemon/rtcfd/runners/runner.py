@@ -12,7 +12,8 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2, runner_pb2
 
 from rtcfd.common import runner_settings
-from rtcfd.common.refusals import Refusal
+from rtcfd.common.refusals import InvalidArgument, Refusal
+from rtcfd.executor import opinion
 from rtcfd.executor.events import Events
 from rtcfd.executor.executor import Executor
 from rtcfd.executor.process import End
@@ -301,12 +302,21 @@ class Runner(RunnerCore):
             if self.up:
                 effect = self.desired.effect(change, self.defaults)
                 await self.ask(wire.Request(configure=effect))
+            else:
+                await self._require_acceptable(change)
             self.desired.choose(change)
             self.happened(control_pb2.Event.KIND_RUNNER_SETTINGS, "settings changed")
             await self.save()
             self.log.info("settings changed")
 
         await self.change("a change of settings", work)
+
+    async def _require_acceptable(self, change: runner_pb2.RunnerSettings) -> None:
+        # Its next executor would refuse them, and then there would be none.
+        after = runner_settings.merged(self.settings(), change)
+        binary = self.shared.command.binary
+        if complaint := await asyncio.to_thread(opinion.of_settings, binary, after):
+            raise InvalidArgument(complaint, errors_pb2.REASON_VALUE_INVALID)
 
     async def follow_limits(self) -> None:
         """Take over limits that have changed."""
