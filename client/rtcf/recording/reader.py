@@ -13,6 +13,7 @@ from rtcf_shared.errors import RtcfError
 from rtcf.closing import Closing
 from rtcf.recording import mcap_writer as mcap
 from rtcf.streams import ros_layout
+from rtcf.streams.ports import signal_name
 
 if TYPE_CHECKING:
     import numpy as np
@@ -293,6 +294,11 @@ class Recording(Closing):
         return _Chunk(self._file.tell(), size, compression, start, end)
 
     def _find_signals(self) -> None:
+        outputs = {
+            (channel.metadata.get("component"), channel.metadata.get("name"))
+            for channel in self._channels.values()
+            if channel.metadata.get("kind") == "output"
+        }
         for number, channel in self._channels.items():
             if channel.metadata.get("kind") == "cycle":
                 self._cycle_channel = number
@@ -302,7 +308,9 @@ class Recording(Closing):
                 continue
             name = channel.topic
             if "component" in channel.metadata:
-                name = f"{channel.metadata['component']}.{channel.metadata['name']}"
+                component, own = channel.metadata["component"], channel.metadata["name"]
+                is_state = channel.metadata.get("kind") == "state"
+                name = signal_name(component, own, is_state and (component, own) in outputs)
             for leaf in ros_layout.leaves(channel.definition, sample):
                 full = f"{name}.{leaf.path}" if leaf.path else name
                 unit = channel.metadata.get("unit", "")

@@ -87,10 +87,11 @@ class Recorder:
         self._schema = schema
         self._kept.clear()
         notes = []
+        of_column = {signal.column: signal for signal in schema.signals.values()}
         for number, column in enumerate(schema.columns):
             state = None
             if column.kind == ports_pb2.PortColumn.KIND_STATE:
-                state = _state(schema, column)
+                state = _state(of_column.get(number))
                 if state is None:
                     notes.append(
                         f"{column.component}.{column.name} is {column.type}, which no ROS message "
@@ -169,8 +170,7 @@ def _cycle_rows(batch: PortBatch) -> "NDArray[Any]":
     return rows.view("u1").reshape(len(batch), -1)
 
 
-def _state(schema: PortSchema, column: ports_pb2.PortColumn) -> _State | None:
-    signal = schema.signals.get(f"{column.component}.{column.name}")
+def _state(signal: Signal | None) -> _State | None:
     if signal is None:
         return None
     kind = _KINDS[signal.format]

@@ -148,11 +148,27 @@ class PortStream(Closing):
 
 def _schema(message: ports_pb2.PortSchema) -> PortSchema:
     signals = {}
+    outputs = {
+        (column.component, column.name)
+        for column in message.columns
+        if column.kind == ports_pb2.PortColumn.KIND_OUTPUT
+    }
     for number, column in enumerate(message.columns):
-        name = f"{column.component}.{column.name}"
+        also_output = (column.component, column.name) in outputs
+        name = signal_name(column.component, column.name, also_output and _is_state(column))
         for signal in _signals(number, name, column):
             signals[signal.name] = signal
     return PortSchema(tuple(message.columns), tuple(message.notes), signals)
+
+
+def signal_name(component: str, name: str, hidden: bool) -> str:
+    """Return the full name of an output or a state; `hidden`: a state that has the name of an
+    output of its component."""
+    return f"{component}.{name}[state]" if hidden else f"{component}.{name}"
+
+
+def _is_state(column: ports_pb2.PortColumn) -> bool:
+    return column.kind == ports_pb2.PortColumn.KIND_STATE
 
 
 def _signals(number: int, name: str, column: ports_pb2.PortColumn) -> Iterator[Signal]:

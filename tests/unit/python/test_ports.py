@@ -24,9 +24,9 @@ def state(type_name: str, size: int) -> ports_pb2.PortColumn:
     return ports_pb2.PortColumn(component="/c", name="s", kind=STATE, type=type_name, size=size)
 
 
-def output(definition: str, md5: str, value: bytes) -> ports_pb2.PortColumn:
+def output(definition: str, md5: str, value: bytes, name: str = "o") -> ports_pb2.PortColumn:
     return ports_pb2.PortColumn(
-        component="/c", name="o", kind=OUTPUT, type="p/M", ros_type="p/M", ros_md5=md5,
+        component="/c", name=name, kind=OUTPUT, type="p/M", ros_type="p/M", ros_md5=md5,
         ros_definition=definition, sample=value, size=len(value),
     )  # fmt: skip
 
@@ -68,6 +68,20 @@ def test_arrays_of_bytes_are_read_byte_by_byte(tmp_path: Path) -> None:
         assert told["/c.s"].tolist() == expected.tolist(), type_name
         with recorded(tmp_path / "x.mcap", told) as recording:
             assert recording["/c.s"].tolist() == expected.reshape(2, -1).tolist(), type_name
+
+
+def test_an_output_and_a_state_of_one_name_are_both_there(tmp_path: Path) -> None:
+    made = output("float64 data\n", "1", bytes(8), name="s")
+    for columns in ((made, state("double", 8)), (state("double", 8), made)):
+        values = [
+            np.array([1.0, 2.0] if column is made else [3.0, 4.0]).tobytes() for column in columns
+        ]
+        told = batch(schema(*columns), 0, *values)
+        assert told["/c.s"].tolist() == [1.0, 2.0]
+        assert told["/c.s[state]"].tolist() == [3.0, 4.0]
+        with recorded(tmp_path / "x.mcap", told) as recording:
+            assert recording["/c.s"].tolist() == [1.0, 2.0]
+            assert recording["/c.s[state]"].tolist() == [3.0, 4.0]
 
 
 def test_numbers_of_cycles_are_whole_however_long_a_loop_runs(tmp_path: Path) -> None:
