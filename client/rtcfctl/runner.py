@@ -25,7 +25,7 @@ _RIGHTS = choices(runner_pb2.Right.DESCRIPTOR)
 # Options that are fields of RunnerSettings and of RosSettings.
 _FIELDS = ("frequency_hz", "cpu", "priority", "spin_us", "spin_auto", "max_overruns",
            "warmup_cycles", "stall_timeout_ms", "orphan_timeout_s", "lock_memory", "heap_kb",
-           "stack_kb", "max_clock_jump_s", "log_limit")  # fmt: skip
+           "stack_kb", "max_clock_jump_s", "log_limit", "frame_kb")  # fmt: skip
 _ROS_FIELDS = ("enabled", "master_uri", "hostname", "ns", "whitelist", "blacklist", "queue",
                "latch", "decimation", "decimate", "stamped", "largest_message_kb",
                "refuse_out_of_range")  # fmt: skip
@@ -175,6 +175,9 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
     to.add_argument("--lock-memory", action=switch, help="lock the executor's memory")
     add_quantity(to, "--heap-kb", "heap_kb", "heap touched at start")
     add_quantity(to, "--stack-kb", "stack_kb", "stack of the real-time thread")
+    add_quantity(
+        to, "--frame-kb", "frame_kb", "values that each cycle keeps; 0: only what is watched"
+    )
     to.add_argument(
         "--refuse-out-of-range",
         dest="ros_refuse_out_of_range",

@@ -142,11 +142,12 @@ class PortStream(Closing):
                 return None  # by close()
             raise failures.from_grpc(error, self._socket) from None
         if response is not None and response.WhichOneof("kind") == "schema":
-            self.schema = _schema(response.schema)
+            self.schema = schema_of(response.schema)
         return response
 
 
-def _schema(message: ports_pb2.PortSchema) -> PortSchema:
+def schema_of(message: ports_pb2.PortSchema) -> PortSchema:
+    """Return what a stream tells, with its signals."""
     signals = {}
     outputs = {
         (column.component, column.name)

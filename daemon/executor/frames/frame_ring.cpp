@@ -11,24 +11,37 @@ constexpr std::size_t kWord = sizeof(std::uint64_t);
 
 std::int64_t signedOf(std::uint64_t word) { return static_cast<std::int64_t>(word); }
 
+std::size_t wordsOf(const FrameRing::Source& source) { return (source.size + kWord - 1) / kWord; }
+
 }  // namespace
 
-FrameRing::FrameRing(std::vector<Source> sources, std::size_t frames)
+FrameRing::FrameRing(std::vector<Source> sources, std::size_t frames, FrameMemory* memory)
     : sources_(std::move(sources)) {
-    std::size_t words = 0;
+    mask_ = capacityFor(sources_, frames) - 1;
     for (const Source& source : sources_) {
-        offsets_.push_back(words * kWord);
-        words += (source.size + kWord - 1) / kWord;
+        offsets_.push_back((stride_ - kHeadWords) * kWord);
+        stride_ += wordsOf(source);
     }
-    stride_ += words;
-    std::size_t capacity = kFewestFrames;
-    // A power of two, so that a place in the ring is found without a division.
-    while (capacity < frames && 2 * capacity * stride_ * kWord <= kLargestRing) capacity *= 2;
-    mask_ = capacity - 1;
+    const std::size_t words = capacity() * stride_;
+    if (memory != nullptr) block_ = memory->take(words * kWord);
+    if (block_ != nullptr) {
+        words_ = block_->words();
+        return;
+    }
     // Written here for the first time, not in the loop.
-    words_ = std::make_unique<Word[]>(capacity * stride_);  // NOLINT(modernize-avoid-c-arrays)
-    for (std::size_t i = 0; i < capacity * stride_; ++i)
-        words_[i].store(0, std::memory_order_relaxed);
+    own_ = std::make_unique<Word[]>(words);  // NOLINT(modernize-avoid-c-arrays)
+    words_ = own_.get();
+    for (std::size_t i = 0; i < words; ++i) words_[i].store(0, std::memory_order_relaxed);
+}
+
+// A power of two, so that a place in the ring is found without a division.
+std::size_t FrameRing::capacityFor(const std::vector<Source>& sources,
+                                   std::size_t frames) noexcept {
+    std::size_t words = kHeadWords;
+    for (const Source& source : sources) words += wordsOf(source);
+    std::size_t capacity = kFewestFrames;
+    while (capacity < frames && 2 * capacity * words * kWord <= kLargestRing) capacity *= 2;
+    return capacity;
 }
 
 // A reader that has seen any of the words stored here sees the mark before them, too.

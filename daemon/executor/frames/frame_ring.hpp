@@ -1,6 +1,6 @@
 /// @file
-/// The values of every cycle while somebody watches: at its end the real-time thread copies them,
-/// with the cycle's record, into a ring. One writer, any number of readers, none of whom it waits
+/// The values of every cycle: at its end the real-time thread copies them, with the cycle's
+/// record, into a ring. One writer, any number of readers, none of whom it waits
 /// for or knows of: a reader that is late finds its frame gone, and one that is being written is
 /// recognised. Words are atomic and ordered by release and acquire alone, which costs nothing on
 /// x86-64.
@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "frames/cycle_record.hpp"
+#include "frames/frame_memory.hpp"
 #include "rtcf/realtime.hpp"
 
 namespace rtcf::executor {
@@ -47,7 +48,9 @@ class FrameRing {
 
     /// @param frames how many the ring is to hold; fewer where they would take more than
     ///               kLargestRing
-    FrameRing(std::vector<Source> sources, std::size_t frames);
+    /// @param memory for a ring that is to outlive the process; null = any. Where that has no room,
+    ///               it is any, too
+    FrameRing(std::vector<Source> sources, std::size_t frames, FrameMemory* memory = nullptr);
     FrameRing(const FrameRing&) = delete;
     FrameRing& operator=(const FrameRing&) = delete;
 
@@ -67,6 +70,11 @@ class FrameRing {
     /// Where a source's value lies in a frame, bytes.
     std::size_t offset(std::size_t source) const noexcept { return offsets_[source]; }
     std::size_t capacity() const noexcept { return mask_ + 1; }
+    /// Words of a frame, and the block that they lie in; null = it goes with the process.
+    std::size_t wordsOfFrame() const noexcept { return stride_; }
+    const std::shared_ptr<FrameBlock>& block() const noexcept { return block_; }
+    /// How many frames a ring of such sources holds.
+    static std::size_t capacityFor(const std::vector<Source>& sources, std::size_t frames) noexcept;
     /// Number of the next frame: those from 0 up to it have been committed.
     std::uint64_t end() const noexcept { return end_.load(std::memory_order_acquire); }
     /// Copies a committed frame. @return false if it is not there any more
@@ -81,21 +89,21 @@ class FrameRing {
     /// @}
 
    private:
-    using Word = std::atomic<std::uint64_t>;
+    using Word = FrameBlock::Word;
     // A frame begins with these words. The first one is twice its number plus 1 while it is
     // written, plus 2 once it is whole.
     enum Head : std::size_t { kMark, kIteration, kStamp, kLatency, kDuration, kLast, kHeadWords };
 
-    Word* at(std::uint64_t number) const noexcept {
-        return words_.get() + (number & mask_) * stride_;
-    }
+    Word* at(std::uint64_t number) const noexcept { return words_ + (number & mask_) * stride_; }
 
     std::vector<Source> sources_;
     std::vector<std::size_t> offsets_;
     std::size_t stride_ = kHeadWords;  // words of a frame
     std::size_t mask_ = 0;             // frames minus 1
-    std::unique_ptr<Word[]> words_;    // NOLINT(modernize-avoid-c-arrays): sized at run time
-    std::uint64_t next_ = 0;           // of the writer
+    std::shared_ptr<FrameBlock> block_;
+    std::unique_ptr<Word[]> own_;  // NOLINT(modernize-avoid-c-arrays): without a block
+    Word* words_ = nullptr;
+    std::uint64_t next_ = 0;  // of the writer
     std::atomic<std::uint64_t> end_{0};
     std::atomic<std::uint64_t> taken_{UINT64_MAX};
 };

@@ -126,7 +126,7 @@ class Cycle {
     std::uint64_t warmup_cycles_ = 0;
     bool exchanges_ = false;       // the schedule has feeds, latches or taps
     bool active_ = false;          // between begin() and the last cycle
-    FrameRing* frames_ = nullptr;  // while somebody watches
+    FrameRing* frames_ = nullptr;  // that the cycles fill
     bool counted_ = false;         // the present cycle's durations
     // Shared.
     std::atomic<std::int64_t> stamp_offset_ns_{0};  // CLOCK_REALTIME minus CLOCK_MONOTONIC

@@ -112,6 +112,7 @@ RunnerSettings settingsFrom(const pb::RunnerSettings& message, RunnerSettings ba
     if (message.has_spin_auto()) base.spin_auto = message.spin_auto();
     if (message.has_on_boot()) base.on_boot = message.on_boot();
     if (message.has_on_crash()) base.on_crash = message.on_crash();
+    if (message.has_frame_kb()) base.frame_bytes = std::size_t{message.frame_kb()} * kKilo;
     if (message.has_log_limit()) base.log_limit = message.log_limit();
     if (message.has_sim_time()) base.sim_time = simTimeFrom(message.sim_time());
     if (message.has_max_clock_jump_s()) {
@@ -159,6 +160,7 @@ pb::RunnerSettings settingsTo(const RunnerSettings& settings) {
     message.set_spin_auto(settings.spin_auto);
     message.set_on_boot(static_cast<pb::OnBoot>(settings.on_boot));
     message.set_on_crash(static_cast<pb::OnCrash>(settings.on_crash));
+    message.set_frame_kb(static_cast<std::uint32_t>(settings.frame_bytes / kKilo));
     message.set_log_limit(settings.log_limit);
     message.set_sim_time(simTimeTo(settings.sim_time));
     message.set_max_clock_jump_s(static_cast<double>(settings.max_clock_jump_ns) / 1e9);

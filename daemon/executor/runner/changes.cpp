@@ -94,9 +94,7 @@ std::vector<std::string> Runner::adopt(Change change, const Progress& progress) 
     adoption.copies = change.copies;
     adoption.period_ns = change.period_ns;
     adoption.restoration = change.restoration;
-    std::shared_ptr<const FrameTable> frames;
-    if (!watches_.empty())
-        frames = makeFrameTable(*plan, watches_, frames_.get(), settings_.frequency_hz);
+    std::shared_ptr<const FrameTable> frames = framesOf(*plan);
     // What leaves is not to be copied any more, whoever watches.
     adoption.frames = frames == nullptr ? nullptr : frames->ring.get();
     if (loop_.running() || state_ == RunnerState::Stepping) {

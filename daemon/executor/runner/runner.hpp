@@ -185,6 +185,7 @@ class Runner final : private RunnerView {
     NumberedState numberedState() const noexcept { return numbered_state_.load(); }
     const Loop& loop() const noexcept override { return loop_; }
     const FlightRecorder& recorder() const noexcept { return recorder_; }
+    const FrameMemory& frameMemory() const noexcept { return frame_memory_; }
     /// What has come since the last call of how frames look: each table holds for the frames in its
     /// ring, up to those of the next one. Its last owner is to let go of it on the graph thread.
     std::vector<std::shared_ptr<const FrameTable>> takeFrameTables();
@@ -268,6 +269,7 @@ class Runner final : private RunnerView {
     void adopted(const Change& change);
     /// Has the loop fill the frames that the watches want, of the present plan.
     void renewFrames();
+    std::shared_ptr<const FrameTable> framesOf(const Plan& plan);
     void publishFrames(std::shared_ptr<const FrameTable> frames);
     std::uint64_t stepWatched(std::uint64_t cycles);
     void awaitReaders();
@@ -317,8 +319,9 @@ class Runner final : private RunnerView {
     HistogramSnapshot tuned_from_;  // wake-up latency at the last tuneSpin()
     std::int64_t tuned_at_ns_ = 0;
     std::int64_t sizes_due_ns_ = 0;
+    FrameMemory frame_memory_;
     Watches watches_;
-    std::shared_ptr<const FrameTable> frames_;  // that the loop fills; null while nobody watches
+    std::shared_ptr<const FrameTable> frames_;  // that the loop fills; may be null
 
     // Published for queries.
     std::atomic<NumberedState> numbered_state_;

@@ -38,7 +38,7 @@ void Runner::onFramesWaiting(std::function<void()> tell) {
 
 // Cycles that go as fast as they can wait for those who watch them.
 std::uint64_t Runner::stepWatched(std::uint64_t cycles) {
-    if (frames_ == nullptr) return loop_.step(cycles);
+    if (watches_.empty()) return loop_.step(cycles);
     const std::uint64_t most = frames_->ring->capacity() / 2;
     std::uint64_t done = 0;
     while (done < cycles) {
@@ -69,11 +69,15 @@ void Runner::awaitReaders() {
     }
 }
 
+std::shared_ptr<const FrameTable> Runner::framesOf(const Plan& plan) {
+    if (watches_.empty() && settings_.frame_bytes == 0) return nullptr;
+    return makeFrameTable(plan, {watches_, settings_.frequency_hz, settings_.frame_bytes,
+                                 &frame_memory_, frames_.get()});
+}
+
 void Runner::renewFrames() {
     noticeEnd();
-    std::shared_ptr<const FrameTable> frames;
-    if (!watches_.empty())
-        frames = makeFrameTable(*plan_, watches_, frames_.get(), settings_.frequency_hz);
+    std::shared_ptr<const FrameTable> frames = framesOf(*plan_);
     Adoption adoption;
     adoption.frames = frames == nullptr ? nullptr : frames->ring.get();
     adoptAtBoundary(adoption);
@@ -83,7 +87,7 @@ void Runner::renewFrames() {
 // Once the loop fills them.
 void Runner::publishFrames(std::shared_ptr<const FrameTable> frames) {
     frames_ = std::move(frames);
-    if (frames_ == nullptr) return;
+    if (watches_.empty()) return;
     const std::lock_guard<std::mutex> lock(published_mutex_);
     new_frames_.push_back(frames_);
 }

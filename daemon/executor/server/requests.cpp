@@ -53,6 +53,7 @@ void Server::handle(Connection& connection, const v1::Request& request) {
         hello.set_runner(runner_->name());
         hello.set_pid(::getpid());
         hello.set_flight_recorder_fd(runner_->recorder().fd());
+        hello.set_frames_fd(runner_->frameMemory().fd());
         if (const DirectStopReport report = direct_stop_->last(); report.count != 0)
             *hello.mutable_direct_stop() = directStopTo(report);
         connection.setGreeted();

@@ -57,6 +57,7 @@ void validate(RunnerSettings& settings) {
                  "s");
     requireRange("max clock jump", static_cast<double>(settings.max_clock_jump_ns) / 1e9, 0.0, 1e6,
                  "s");
+    requireRange("frame", settings.frame_bytes / kKilo, std::size_t{0}, kKilo, "KiB");
     requireRange("log limit", settings.log_limit, 0U, 1'000'000U, "records a second");
     if (!settings.bridge.name_space.empty())
         settings.bridge.name_space = canonicalNamespace(settings.bridge.name_space);

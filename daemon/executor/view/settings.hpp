@@ -26,6 +26,7 @@ struct RunnerSettings {
     int on_boot = 0;                                  ///< rtcfd's, kept for it
     int on_crash = 0;                                 ///< rtcfd's, kept for it
     std::uint32_t log_limit = 100;  ///< records of one line of a component in a second; 0 = any
+    std::size_t frame_bytes = std::size_t{64} * 1024;  ///< of values that a cycle keeps
     BridgeSettings bridge;
     SimTime sim_time = SimTime::Auto;
     std::int64_t max_clock_jump_ns = 10'000'000'000;  ///< further forward, a simulation begins anew

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "black_box/frame_layout.hpp"
 #include "refusal.hpp"
 
 namespace rtcf::executor {
@@ -49,39 +50,61 @@ std::vector<Candidate> candidatesOf(const Plan& plan) {
     return found;
 }
 
-}  // namespace
+bool watched(const Candidate& candidate, const Watches& watches) {
+    const std::string name = candidate.column.fullName();
+    return std::any_of(watches.begin(), watches.end(),
+                       [&](const auto& watch) { return watch.second.matches(name); });
+}
 
-std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const Watches& watches,
-                                                 const FrameTable* previous, double frequency_hz) {
-    auto table = std::make_shared<FrameTable>();
-    table->watches = watches;
-    std::vector<FrameRing::Source> sources;
+// Which there is room for, in schedule order: what is watched first, then the others.
+std::vector<Candidate> chosenOf(const Plan& plan, const FrameDemand& demand, FrameTable& table) {
+    std::vector<Candidate> candidates = candidatesOf(plan);
+    const bool all = demand.most_bytes != 0;
+    const std::size_t most = all ? demand.most_bytes : kLargestFrame;
+    std::vector<bool> chosen(candidates.size(), false);
     std::size_t bytes = 0;
     std::size_t left_out = 0;
-    for (Candidate& candidate : candidatesOf(plan)) {
-        const std::string name = candidate.column.fullName();
-        if (std::none_of(watches.begin(), watches.end(),
-                         [&](const auto& watch) { return watch.second.matches(name); }))
-            continue;
-        const std::size_t size = (candidate.column.size + 7) / 8 * 8;
-        if (bytes + size > kLargestFrame) {
-            ++left_out;
-            continue;
+    for (const bool first : {true, false}) {
+        for (std::size_t i = 0; i < candidates.size(); ++i) {
+            if (watched(candidates[i], demand.watches) != first || (!first && !all)) continue;
+            const std::size_t size = (candidates[i].column.size + 7) / 8 * 8;
+            chosen[i] = bytes + size <= most;
+            chosen[i] ? bytes += size : ++left_out;
         }
-        bytes += size;
+    }
+    if (left_out != 0) {
+        table.notes.push_back(
+            fmt::format("{} outputs and states are left out: a cycle copies {} bytes at most: {}",
+                        left_out, most, all ? "raise frame_kb of the runner" : "select fewer"));
+    }
+    std::vector<Candidate> found;
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+        if (chosen[i]) found.push_back(std::move(candidates[i]));
+    }
+    return found;
+}
+
+}  // namespace
+
+std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const FrameDemand& demand) {
+    auto table = std::make_shared<FrameTable>();
+    table->watches = demand.watches;
+    std::vector<FrameRing::Source> sources;
+    for (Candidate& candidate : chosenOf(plan, demand, *table)) {
         sources.push_back({candidate.from, candidate.column.size});
         table->columns.push_back(std::move(candidate.column));
     }
-    if (left_out != 0) {
-        table->notes.push_back(fmt::format(
-            "{} outputs and states are left out: a cycle copies {} bytes at most: select fewer",
-            left_out, kLargestFrame));
-    }
-    if (previous != nullptr && previous->ring->sources() == sources) {
+    const auto frames = static_cast<std::size_t>(std::ceil(kSeconds * demand.frequency_hz));
+    const FrameTable* const previous = demand.previous;
+    if (previous != nullptr && previous->ring->sources() == sources &&
+        previous->ring->capacity() == FrameRing::capacityFor(sources, frames)) {
         table->ring = previous->ring;
-    } else {
-        table->ring = std::make_shared<FrameRing>(
-            std::move(sources), static_cast<std::size_t>(std::ceil(kSeconds * frequency_hz)));
+        return table;
+    }
+    table->ring = std::make_shared<FrameRing>(std::move(sources), frames, demand.memory);
+    if (const auto& block = table->ring->block(); block != nullptr) {
+        demand.memory->announce(block, table->ring->capacity(), table->ring->wordsOfFrame(),
+                                frameLayout(*table));
     }
     return table;
 }

@@ -1,7 +1,7 @@
 /// @file
-/// What the frames of a loop hold while somebody watches: which outputs and states, in which order,
-/// and the ring itself. Made by the graph thread for one plan and never changed; others read it,
-/// and give it back to that thread, as it keeps component libraries loaded.
+/// What the frames of a loop hold: which outputs and states, in which order, and the ring itself.
+/// Made by the graph thread for one plan and never changed; others read it, and give it back to
+/// that thread, as it keeps component libraries loaded.
 #pragma once
 
 #include <cstdint>
@@ -40,14 +40,20 @@ struct FrameTable {
     Watches watches;  ///< whom it is for
 };
 
-/// The most bytes of values that a cycle copies.
+/// What is wanted of frames.
+struct FrameDemand {
+    const Watches& watches;
+    double frequency_hz;         ///< of the loop; the ring holds about a second
+    std::size_t most_bytes;      ///< of values in each cycle, whoever watches; 0 = what is watched
+    FrameMemory* memory;         ///< that outlives the process; may be null
+    const FrameTable* previous;  ///< whose ring is kept if that copies the same; may be null
+};
+
+/// The most bytes of values that a cycle copies, where what is watched alone is copied.
 constexpr std::size_t kLargestFrame = std::size_t{64} * 1024;
 
-/// Makes the table for a plan.
-/// @param previous the one before it, whose ring is kept if that copies the same; may be null
-/// @param frequency_hz of the loop; the ring holds about a second
-std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const Watches& watches,
-                                                 const FrameTable* previous, double frequency_hz);
+/// Makes the table for a plan. What is watched comes first where there is not room for all.
+std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const FrameDemand& demand);
 
 /// Refuses a selection that has a pattern which matches nothing in the plan, and says what there
 /// is.

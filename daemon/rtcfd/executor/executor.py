@@ -73,6 +73,7 @@ class Executor:
         self._on_end = on_end
         self._link: Link | None = None
         self._recorder: FlightRecorder | None = None
+        self.frames: int | None = None  # descriptor of what incidents/frame_file.py reads
         self._watching: asyncio.Task[None] | None = None
 
     @classmethod
@@ -219,8 +220,7 @@ class Executor:
             await asyncio.gather(self._watching, return_exceptions=True)
         if self._link is not None:
             await self._link.close()
-        if self._recorder is not None:
-            self._recorder.close()
+        self._close_memory()
         self._process.release()
 
     async def shut_down(self) -> None:
@@ -291,6 +291,12 @@ class Executor:
                 self._recorder = FlightRecorder(link.peer_pid, hello.flight_recorder_fd)
             except (OSError, ValueError) as error:
                 log.warning("%s: no flight recorder: %s", self._peer, error)
+        if self.frames is None and hello.frames_fd > 0:
+            try:
+                path = f"/proc/{link.peer_pid}/fd/{hello.frames_fd}"
+                self.frames = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+            except OSError as error:
+                log.warning("%s: its last cycles cannot be read: %s", self._peer, error)
         self._link = link
         if hello.HasField("direct_stop"):
             link.direct_stops = hello.direct_stop.count
@@ -325,10 +331,17 @@ class Executor:
             await self._link.close()
         self._remove_sockets()
         self._on_end(self, end)
+        self._close_memory()
+        self.ended.set()
+
+    def _close_memory(self) -> None:
+        """Let go of what it shares with us."""
         if self._recorder is not None:
             self._recorder.close()
             self._recorder = None
-        self.ended.set()
+        if self.frames is not None:
+            os.close(self.frames)
+            self.frames = None
 
     def _remove_sockets(self) -> None:
         """Of an executor that has ended: by force, it has left them."""

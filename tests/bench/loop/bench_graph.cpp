@@ -90,6 +90,14 @@ void BenchGraph::adopt(const executor::Graph& graph) {
     for (const executor::Step& step : plan_->schedule.steps) order_.push_back(step.component);
 }
 
+void BenchGraph::keepFrames() {
+    frames_ = executor::makeFrameTable(
+        *plan_, {{}, kFrequencyHz, executor::kLargestFrame, &frame_memory_, nullptr});
+    executor::Adoption adoption;
+    adoption.frames = frames_->ring.get();
+    loop_.adopt(adoption, kAdoptionTimeoutNs);
+}
+
 void BenchGraph::deliver() {
     for (const auto& [topic, injector] : plan_->injectors) {
         const std::shared_ptr<SlotHeader> slot = injector->type().make_slot(nullptr);

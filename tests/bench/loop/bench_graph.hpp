@@ -14,6 +14,7 @@
 #include "logging/log.hpp"
 #include "loop/loop.hpp"
 #include "ordering/plan.hpp"
+#include "watch/frame_table.hpp"
 
 namespace rtcf::bench {
 
@@ -47,6 +48,8 @@ class BenchGraph {
     /// A component beside the graph. @param remaps of its ports
     std::shared_ptr<executor::Instance> make(const std::string& type, const std::string& name,
                                              executor::Remaps remaps = {}, bool first = false);
+    /// Has each cycle keep the values of all outputs and states.
+    void keepFrames();
     /// Makes `graph` what the loop executes.
     void adopt(const executor::Graph& graph);
     /// The components in order of execution.
@@ -55,6 +58,8 @@ class BenchGraph {
    private:
     executor::Log log_;
     executor::FlightRecorder recorder_;
+    executor::FrameMemory frame_memory_;
+    std::shared_ptr<const executor::FrameTable> frames_;
     executor::Loop loop_;
     executor::LibraryStore libraries_;
     std::shared_ptr<const executor::Library> code_;

@@ -3,7 +3,7 @@
 // the number of instructions so far. What the loop then says of itself, its
 // calculation duration and that of each component, is in instructions, and
 // repeats to the instruction. Prints JSON. x86-64 only.
-// Usage: instruction_count LIBRARY fig1|mapped|CHAIN [CYCLES]
+// Usage: instruction_count LIBRARY fig1|frames|mapped|CHAIN [CYCLES]
 #include <fmt/format.h>
 #include <sys/ptrace.h>
 #include <sys/user.h>
@@ -28,9 +28,10 @@ constexpr std::uint64_t kWarmUp = 10;  // cycles
 // The child: stops itself before and after what is to be counted.
 int runCounted(const std::string& library, const std::string& which, std::uint64_t cycles) {
     using namespace rtcf;
-    const bool paper = which == "fig1" || which == "mapped";
+    const bool paper = which == "fig1" || which == "frames" || which == "mapped";
     bench::BenchGraph graph(paper ? bench::paperGraph() : bench::chain(std::stoul(which)), library,
                             which == "mapped" ? kTopics : "");
+    if (which == "frames") graph.keepFrames();
     executor::LoopSettings settings;
     settings.warmup_cycles = kWarmUp;
     graph.loop().beginStepping(settings, graph.loop().stops());

@@ -8,6 +8,7 @@ from setting import Setting
 
 FIG_1_INSTRUCTIONS = 315.0  # LinuxCNC HAL takes 240 for plain sums, 348 for what Mimo does
 PER_MAPPED_PORT = 100.0
+FRAMES = 80.0
 _MAPPED_PORTS = 3
 
 
@@ -24,6 +25,7 @@ def run(setting: Setting) -> Result:
         "2": "chain of 2",
         "10": "chain of 10",
         "fig1": "Fig. 1",
+        "frames": "Fig. 1 with frames",
         "mapped": "Fig. 1 with 3 mapped ports, a message in each cycle",
     }
     for graph, title in titles.items():
@@ -34,6 +36,7 @@ def run(setting: Setting) -> Result:
     ports = (counts["mapped"] - counts["fig1"]) / _MAPPED_PORTS
     result.budgets = [
         Budget("Fig. 1", counts["fig1"], FIG_1_INSTRUCTIONS, "instructions"),
+        Budget("frames on top", counts["frames"] - counts["fig1"], FRAMES, "instructions"),
         Budget("each mapped port on top", ports, PER_MAPPED_PORT, "instructions"),
     ]
     return result

@@ -1,0 +1,1 @@
+"""What ran just before a fault or a death, kept as files."""

@@ -1,0 +1,160 @@
+"""Reads the frames of an executor, which may be dead: the last second of its loop.
+
+A shared memory (layout in executor.proto) that rtcfd opens at hello and holds.  A frame
+that was being written when the process died is left out.  Needs NumPy, and runs in a
+process of its own: rtcfd itself only holds the descriptor.
+"""
+
+import itertools
+import mmap
+import struct
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import ports_pb2
+
+_MAGIC = 0x42435452
+_VERSION = 1
+_HEAD = struct.Struct("<II")
+_ENTRY = struct.Struct("<6Q")
+_ENTRIES = 8
+_HEAD_WORDS = 6  # mark, iteration, stamp, latency, duration, last of its loop
+
+
+@dataclass(frozen=True)
+class Ring:
+    """Whole frames of one graph, one after the other."""
+
+    layout: wire.FrameLayout
+    words: "NDArray[np.uint64]"  # a row each
+
+    def __len__(self) -> int:
+        return len(self.words)
+
+    @property
+    def cycles(self) -> "NDArray[np.int64]":
+        """The numbers of the cycles."""
+        return self._signed(1)
+
+    @property
+    def stamps_ns(self) -> "NDArray[np.int64]":
+        """CLOCK_REALTIME of each cycle's deadline, or the simulated time."""
+        return self._signed(2)
+
+    @property
+    def latencies_ns(self) -> "NDArray[np.int64]":
+        """Wake-up after each deadline."""
+        return self._signed(3)
+
+    @property
+    def durations_ns(self) -> "NDArray[np.int64]":
+        """Calculation in each cycle."""
+        return self._signed(4)
+
+    @property
+    def last_of_loop(self) -> "NDArray[np.bool_]":
+        """Whether components made safe in that cycle."""
+        flags: NDArray[np.bool_] = self.words[:, 5] != 0
+        return flags
+
+    def schema(self) -> ports_pb2.PortSchema:
+        """Return what the columns are, as a stream would tell; see PortColumn."""
+        columns = []
+        for value in self.layout.values:
+            column = ports_pb2.PortColumn(
+                component=value.component,
+                name=value.name,
+                kind=ports_pb2.PortColumn.KIND_STATE,
+                type=value.type,
+                unit=value.unit,
+                mapped=value.mapped,
+                size=value.size,
+            )
+            if value.output:
+                of = self.layout.types[value.output - 1]
+                column.kind = ports_pb2.PortColumn.KIND_OUTPUT
+                column.ros_type, column.ros_md5 = of.ros_type, of.ros_md5
+                column.ros_definition, column.sample = of.ros_definition, of.sample
+                column.size = len(of.sample)
+            if not self._computed(value):
+                columns.append(column)
+        return ports_pb2.PortSchema(columns=columns, notes=self.notes())
+
+    def notes(self) -> list[str]:
+        """Return what is left out, a line each."""
+        return [
+            *self.layout.notes,
+            *(
+                f"{value.component}.{value.name} is left out: its message is computed from it"
+                for value in self.layout.values
+                if self._computed(value)
+            ),
+        ]
+
+    def batches(self) -> "list[ports_pb2.PortBatch]":
+        """Return all cycles, as a stream would tell: each batch without a gap."""
+        cycles, last = self.cycles, self.last_of_loop
+        gaps = (np.diff(cycles) != 1) | last[:-1]
+        ends: list[int] = (np.flatnonzero(gaps) + 1).tolist()
+        bounds = [0, *ends, len(cycles)]
+        return [self._batch(*pair) for pair in itertools.pairwise(bounds)]
+
+    def _batch(self, begin: int, end: int) -> ports_pb2.PortBatch:
+        part = slice(begin, end)
+        return ports_pb2.PortBatch(
+            first_cycle=int(self.cycles[begin]) if end > begin else 0,
+            last_of_loop=bool(end > begin and self.last_of_loop[end - 1]),
+            stamps_ns=self.stamps_ns[part].tolist(),
+            latencies_ns=self.latencies_ns[part].tolist(),
+            durations_ns=self.durations_ns[part].tolist(),
+            values=[
+                self._values(value, part)
+                for value in self.layout.values
+                if not self._computed(value)
+            ],
+        )
+
+    def _values(self, value: wire.FrameValue, part: slice) -> bytes:
+        rows = np.ascontiguousarray(self.words[part, _HEAD_WORDS:]).view("u1")
+        raw = rows[:, value.offset : value.offset + value.size]
+        if not value.output:
+            return raw.tobytes()
+        of = self.layout.types[value.output - 1]
+        messages = np.tile(np.frombuffer(of.sample, "u1"), (len(raw), 1))
+        for copy in of.copies:
+            source = getattr(copy, "from")
+            messages[:, copy.to : copy.to + copy.size] = raw[:, source : source + copy.size]
+        return messages.tobytes()
+
+    def _computed(self, value: wire.FrameValue) -> bool:
+        return bool(value.output) and self.layout.types[value.output - 1].computed
+
+    def _signed(self, word: int) -> "NDArray[np.int64]":
+        return self.words[:, word].astype("i8")
+
+
+def read(descriptor: int) -> list[Ring]:
+    """Return the rings, from the oldest on; raises OSError, and ValueError of what is no frames."""
+    with mmap.mmap(descriptor, 0, prot=mmap.PROT_READ) as memory:
+        if _HEAD.unpack_from(memory) != (_MAGIC, _VERSION):
+            raise ValueError(f"these are no frames of version {_VERSION}")
+        at = _HEAD.size
+        entries = [_ENTRY.unpack_from(memory, at + i * _ENTRY.size) for i in range(_ENTRIES)]
+        return [_ring(memory, *entry[1:]) for entry in sorted(entries) if entry[0]]
+
+
+def _ring(
+    memory: Any, offset: int, frames: int, stride: int, layout_at: int, layout_bytes: int
+) -> Ring:
+    layout = wire.FrameLayout.FromString(memory[layout_at : layout_at + layout_bytes])
+    flat = np.frombuffer(memory[offset : offset + 8 * frames * stride], "<u8")
+    words = flat.reshape(frames, stride)
+    marks = words[:, 0]
+    # Of the frame that belongs there; what is odd was being written.
+    numbers = marks // 2 - 1
+    whole = (marks % 2 == 0) & (marks != 0) & (numbers % frames == np.arange(frames))
+    kept = words[whole]
+    return Ring(layout, kept[np.argsort(kept[:, 0], kind="stable")])
