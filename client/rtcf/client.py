@@ -8,15 +8,15 @@ from rtcf_shared.spec import several
 from rtcf import direct_stop
 from rtcf.connection import CHANGE_TIMEOUT_S, QUERY_TIMEOUT_S, OnProgress
 from rtcf.errors import DaemonUnreachableError
+from rtcf.incidents import Incidents
 from rtcf.replay_call import ReplayCall
-from rtcf.streams.watching import Watching
 from rtcf.tenancy import Tenancy
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 
 DEFAULT_RUNNER = "rt_runner"
 
 
-class Client(Watching):
+class Client(Incidents):
     """A connection to rtcfd; opened with the first call, thread-safe.
 
     `runner` in the methods names one; empty is rt_runner.  All methods raise

@@ -126,6 +126,8 @@ class _Line:
         elif source == "NAME":
             yield from client.get_order(runner)
             yield from (name.removeprefix("/") for name in client.get_order(runner))
+        elif source == "INCIDENT":
+            yield from (str(each.name) for each in client.list_incidents())
         elif source == "PKG":
             yield from (str(each.package) for each in client.list_types().types)
         elif source == "COMPONENT" and self._given:

@@ -48,6 +48,7 @@ _MODULES = {
     "echo": "echo",
     "record": "record",
     "scope": "scope",
+    "incident": "incident",
     "check": "check",
     "doctor": "doctor",
 }

@@ -105,6 +105,11 @@ def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
             "began: `rtcfctl list` shows whose",
             "yellow",
         )
+    if runner.incident:
+        output.line(
+            f"{runner.runner}: the cycles before its last fault: "
+            f"`rtcfctl incident show {runner.incident}`"
+        )
     for library in runner.libraries_changed:
         output.line(
             f"{runner.runner}: {library} is another file now than components were loaded from: "

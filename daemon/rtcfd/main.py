@@ -26,6 +26,7 @@ from rtcfd.configuration import options
 from rtcfd.executor import frames
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.executor import left_overs
+from rtcfd.incidents.incidents import Incidents
 from rtcfd.notify import Notify, machine_goes_down
 from rtcfd.operations.runner_core import Surroundings
 from rtcfd.reload import Reloads
@@ -82,6 +83,10 @@ class Daemon:
             on_change=self._tell,
             serve_ros=ros_services.serve,
             limits=given.limits,
+            incidents=Incidents(
+                given.state_dir / "incidents" if given.state_dir else None,
+                lambda: self._shared.limits,
+            ),
             name_of=self._clients.name_of,
         )
         self._runners = Runners(shared)

@@ -54,6 +54,7 @@ PREPARE: dict[str, Callable[[Daemon, rtcf.Client], None]] = {
     "boot.md": _nothing,
     "graph-files.md": _graph_of_a_file("arm.yaml"),
     "graph.md": _nothing,
+    "incidents.md": _nothing,
     "performance.md": _graph_of_a_file("fig1.yaml"),
     "ros.md": _nothing,
     "scope.md": _nothing,

@@ -69,13 +69,14 @@ class Recording(Closing):
     """A recording, opened for reading; values are read when they are asked for.
 
     `signals` are there by name, as in a stream of ports; `whole` tells whether the file was ended
-    in order.  Raises RecordingError.
+    in order; `metadata` has what else stands in it, by name.  Raises RecordingError.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
         self.whole = False
         self.signals: dict[str, RecordedSignal] = {}
+        self.metadata: dict[str, dict[str, str]] = {}
         self._channels: dict[int, _Channel] = {}
         self._chunks: list[_Chunk] = []
         self._cycle_channel = 0
@@ -284,6 +285,10 @@ class Recording(Closing):
                 number, schema = reader.numbers("<HH")
                 topic, _ = reader.text(), reader.text()
                 self._channels[number] = _Channel(topic, reader.pairs(), definitions[schema])
+            elif opcode == mcap.METADATA:
+                reader = _Reader(self._file.read(length))
+                name = reader.text()
+                self.metadata[name] = reader.pairs()
         self._find_signals()
 
     def _chunk(self, at: int) -> _Chunk:

@@ -18,6 +18,7 @@ class Limits:
     taps: int = 1000  # outputs of one runner that are published; kept by its executor
     message_kb: int = 16384  # one request, KiB
     log_records_per_s: int = 2000  # of one runner, averaged over some seconds
+    incidents_mb: int = 1000  # files of incidents, MB; 0 = none of faults and crashes
 
     @property
     def reserve(self) -> int:
@@ -52,5 +53,6 @@ RANGES = {
     "taps": (0, 100_000),
     "message_kb": (16, 16384),
     "log_records_per_s": (1, 1_000_000),
+    "incidents_mb": (0, 1_000_000),
 }
 assert set(RANGES) == {field.name for field in fields(Limits)}

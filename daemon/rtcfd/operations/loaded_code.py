@@ -73,6 +73,11 @@ class LoadedCode:
         else:
             self._files.pop(name, None)
 
+    def files(self) -> dict[str, tuple[str, int, int, int]]:
+        """Return the file of each component, as it was when it was loaded: path, inode, time of
+        change, size."""
+        return {name: (path, *identity) for name, (path, identity) in self._files.items()}
+
     async def changed(self) -> dict[str, str]:
         """Return the components whose library is another file now, and its path."""
         files = dict(self._files)

@@ -27,6 +27,7 @@ from rtcfd.executor.events import logger_of
 from rtcfd.executor.executor import CONNECT_TIMEOUT_S, QUERY_TIMEOUT_S, Executor
 from rtcfd.executor.link import OnAnswer, OnPorts, Progress
 from rtcfd.executor.process import End
+from rtcfd.incidents.incidents import Incidents
 from rtcfd.operations.figures import Figures
 from rtcfd.operations.loaded_code import LoadedCode
 from rtcfd.operations.loop_state import LoopState
@@ -57,6 +58,7 @@ class Surroundings:
     serve_ros: Callable[["RunnerCore", wire.ServiceCall], Awaitable[wire.ServiceAnswer]]
     events: EventLog = field(default_factory=EventLog)
     limits: Limits = field(default_factory=Limits)
+    incidents: Incidents = field(default_factory=lambda: Incidents(None, Limits))
     rules: wire.AccessRules = field(default_factory=wire.AccessRules)  # for executors
     name_of: Callable[[int], Awaitable[str]] = _number  # of a user, for people
     # Threads of their own: a stop must get to disk whatever else hangs.
@@ -81,6 +83,7 @@ class RunnerCore(ABC):
         self.leaving = False  # it ends for this rtcfd only
         self.code = LoadedCode(surroundings.folders)
         self.figures = Figures()
+        self.incident = ""  # the name of the newest
         self._code_file = surroundings.command.folder / f"{self.name}.libraries"
         self._executor: Executor | None = None
         self._changing_executor = asyncio.Lock()

@@ -17,6 +17,7 @@ from rtcfd.executor import opinion
 from rtcfd.executor.events import Events
 from rtcfd.executor.executor import Executor
 from rtcfd.executor.process import End
+from rtcfd.operations.incidents import keep
 from rtcfd.operations.parameters import follow_ros
 from rtcfd.operations.runner_core import RunnerCore, Surroundings
 from rtcfd.recovery.bring_up import bring_up, recover, resumes
@@ -26,6 +27,8 @@ from rtcfd.runners.outbox import Outbox
 from rtcfd.runners.status import status_of
 from rtcfd.state.desired import Desired
 
+# What the cycles before are kept of.
+_INCIDENTS = (control_pb2.Event.KIND_LOOP_FAULT, control_pb2.Event.KIND_COMPONENT_FAULT)
 LEAVE_TIMEOUT_S = 5.0  # for changes under way when rtcfd is restarted
 
 _Ended = control_pb2.LeaseEnded
@@ -134,6 +137,7 @@ class Runner(RunnerCore):
         was_running = self.loop.running
         self.loop.gone()
         verdict = judge(end, executor.note())
+        keep(self, executor, f"executor {verdict}", verdict.culprit)
         died = f"its executor (pid {executor.pid}) {verdict} at {time.strftime('%H:%M:%S')}"
         self.trouble = executor.verdict = died
         self.log.logger.error(
@@ -173,6 +177,8 @@ class Runner(RunnerCore):
     def told(self, kind: "control_pb2.Event.Kind", event: wire.Event) -> None:
         """The executor tells of something, which has been seen to."""
         self.happened(kind, event.message, event.component, event.iteration)
+        if kind in _INCIDENTS and self.executor is not None:
+            keep(self, self.executor, event.message, event.component, event.iteration)
 
     def late(self, message: str) -> None:
         """Cycles ended late: find out how many."""

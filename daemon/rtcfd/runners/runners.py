@@ -13,6 +13,7 @@ from rtcfd.common import runner_settings
 from rtcfd.common.names import DEFAULT_RUNNER, check_base_name, check_graph, full_name
 from rtcfd.common.refusals import AlreadyExists, NotFound, Refusal, Silent, Unavailable
 from rtcfd.executor.link import Progress
+from rtcfd.incidents.incidents import Incidents
 from rtcfd.operations import graph
 from rtcfd.operations.operations import Operations
 from rtcfd.operations.runner_core import Surroundings
@@ -33,6 +34,11 @@ class Runners:
         self._leaving: set[Runner] = set()  # being removed
         self.closing = asyncio.Event()
         self.operations = Operations("rtcfd", log)
+
+    @property
+    def incidents(self) -> Incidents:
+        """What is kept of faults."""
+        return self._shared.incidents
 
     def adopt(self, states: Iterable[Desired]) -> None:
         """Take runners as they were kept, without starting them yet."""

@@ -93,6 +93,7 @@ async def status_of(runner: RunnerCore) -> runner_pb2.RunnerStatus:
     # Some settings are rtcfd's alone.
     status.settings.CopyFrom(runner_settings.merged(runner.settings(), status.settings))
     desired = runner.desired
+    status.incident = runner.incident
     rebuilt = await runner.code.changed()
     status.libraries_changed.extend(sorted(set(rebuilt.values())))
     status.chosen.CopyFrom(desired.chosen)

@@ -11,7 +11,15 @@ from functools import partial
 from typing import Any, Protocol
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import control_pb2, control_pb2_grpc, errors_pb2, graph_pb2, ports_pb2, runner_pb2
+from rtcf.v1 import (
+    control_pb2,
+    control_pb2_grpc,
+    errors_pb2,
+    graph_pb2,
+    incidents_pb2,
+    ports_pb2,
+    runner_pb2,
+)
 from rtcf_shared.naming import listing
 
 from rtcfd import VERSION
@@ -21,7 +29,7 @@ from rtcfd.common.names import DEFAULT_RUNNER, absolute
 from rtcfd.common.refusals import InvalidArgument
 from rtcfd.common.status_codes import abort
 from rtcfd.executor.link import Progress
-from rtcfd.operations import graph, parameters, snapshots
+from rtcfd.operations import graph, incidents, parameters, snapshots
 from rtcfd.operations.loop import stop
 from rtcfd.recovery import starting
 from rtcfd.runners.held_runners import Hold
@@ -247,6 +255,38 @@ class Control(control_pb2_grpc.ControlServicer):
     async def TakeSnapshot(self, request: control_pb2.TakeSnapshotRequest) -> Any:
         """All that the next cycle depends on."""
         return await snapshots.take(self._runners.get(request.runner))
+
+    @answering
+    async def ListIncidents(self, request: incidents_pb2.ListIncidentsRequest) -> Any:
+        """Files with the last cycles before faults."""
+        found = await self._runners.incidents.all(request.runner)
+        return incidents_pb2.ListIncidentsResponse(incidents=found)
+
+    @answering
+    async def TakeIncident(self, request: incidents_pb2.TakeIncidentRequest) -> Any:
+        """Keep the last cycles now."""
+        return await incidents.take(self._runners.get(request.runner), request.reason)
+
+    async def GetIncident(
+        self, request: incidents_pb2.GetIncidentRequest, context: Any
+    ) -> AsyncIterator[incidents_pb2.GetIncidentResponse]:
+        """The file, piece by piece."""
+        try:
+            kept = self._runners.incidents
+            found = await kept.get(request.name)
+            yield incidents_pb2.GetIncidentResponse(incident=found)
+            at = 0
+            while piece := await kept.read(found, at):
+                at += len(piece)
+                yield incidents_pb2.GetIncidentResponse(data=piece)
+        except Exception as error:
+            await abort(context, error, request)
+
+    @answering
+    async def RemoveIncidents(self, request: incidents_pb2.RemoveIncidentsRequest) -> Any:
+        """Remove files."""
+        gone = await self._runners.incidents.remove(request.names)
+        return incidents_pb2.RemoveIncidentsResponse(incidents=gone)
 
     @changing
     def RestoreSnapshot(self, request: control_pb2.RestoreSnapshotRequest) -> Any:

@@ -1,0 +1,220 @@
+"""`rtcfctl incident`: what ran just before faults, as files of rtcfd."""
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import IO, Any
+
+import rtcf
+from rtcf.v1 import incidents_pb2
+
+from rtcfctl.output import Output
+from rtcfctl.words import counted, microseconds
+
+_CYCLES = 10  # that are shown
+_SIGNALS = 40  # of the culprit, or of all
+_CHANGES = 5  # of parameters
+_EVENTS = 8
+
+
+def register(verbs: Any, common: argparse.ArgumentParser) -> None:
+    """Add the noun and its verbs."""
+    noun = verbs.add_parser("incident", help="what ran just before faults: keep, list, show")
+    actions = noun.add_subparsers(metavar="ACTION", required=True)
+
+    taking = actions.add_parser("take", parents=[common], help="keep the last cycles now")
+    taking.add_argument("--reason", default="", metavar="TEXT", help="why, for whoever reads it")
+    taking.set_defaults(run=take)
+
+    listing = actions.add_parser("list", parents=[common], help="those that are kept")
+    listing.set_defaults(run=show_all)
+
+    showing = actions.add_parser("show", parents=[common], help="what happened, on a page")
+    _add_name(showing)
+    showing.set_defaults(run=show)
+
+    exporting = actions.add_parser("export", parents=[common], help="a copy of the MCAP file")
+    _add_name(exporting)
+    exporting.add_argument("--to", metavar="FILE", type=Path, help="default: here, by its name")
+    exporting.set_defaults(run=export)
+
+    removing = actions.add_parser("rm", parents=[common], help="remove them")
+    removing.add_argument("names", nargs="+", metavar="INCIDENT")
+    removing.set_defaults(run=remove)
+
+
+def _add_name(to: argparse.ArgumentParser) -> None:
+    to.add_argument("name", nargs="?", default="", metavar="INCIDENT", help="default: the newest")
+
+
+def take(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Keep one."""
+    kept = client.take_incident(args.runner, args.reason)
+    if output.for_people:
+        output.line(f"{kept.name} in {kept.file}: rtcfctl incident show {kept.name}")
+    else:
+        output.data(kept)
+
+
+def show_all(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Print a table."""
+    found = client.list_incidents(args.runner)
+    if not output.for_people:
+        output.data(found)
+        return
+    output.table(
+        ("incident", "runner", "time", "MB", "reason"),
+        [(each.name, each.runner, _local(each), f"{each.bytes / 1e6:.1f}", each.reason)
+         for each in found],
+        right=("MB",),
+    )  # fmt: skip
+
+
+def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Print what happened."""
+    with tempfile.NamedTemporaryFile(suffix=".mcap") as file:
+        incident = client.get_incident(file, args.name)
+        file.flush()
+        with rtcf.read_recording(file.name) as recording:
+            told = _told(incident, recording)
+    if output.for_people:
+        _print(told, output)
+    else:
+        output.data(told)
+
+
+def export(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Copy the file."""
+    with tempfile.TemporaryFile() as whole:
+        incident = client.get_incident(whole, args.name)
+        whole.seek(0)
+        to = args.to or Path(f"{incident.name}.mcap")
+        _copy(whole, to)
+    if output.for_people:
+        output.line(f"{incident.name} in {to}")
+    else:
+        output.data({"incident": incident.name, "file": str(to)})
+
+
+def remove(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Remove some."""
+    gone = client.remove_incidents(args.names)
+    if output.for_people:
+        output.line(f"{counted(len(gone), 'incident')} removed")
+    else:
+        output.data(gone)
+
+
+def _copy(whole: IO[bytes], to: Path) -> None:
+    try:
+        with to.open("xb") as copy:
+            while piece := whole.read(1024 * 1024):
+                copy.write(piece)
+    except FileExistsError:
+        raise ValueError(f"{to} is there already: name another file with --to") from None
+    except OSError as error:
+        raise ValueError(f"{to}: {error.strerror}") from None
+
+
+def _told(incident: incidents_pb2.Incident, recording: "rtcf.Recording") -> dict[str, Any]:
+    about = recording.metadata.get("incident", {})
+    cycles = recording.cycles
+    last = slice(max(len(cycles) - _CYCLES, 0), None)
+    component = about.get("component", "")
+    # Of nobody in particular: of all.
+    names = [name for name in recording.signals if name.startswith(f"{component}.")]
+    names = names or list(recording.signals)
+    values = {}
+    for name in names[:_SIGNALS]:
+        column = recording.read(name)
+        if len(column.values):
+            values[name] = {"cycle": int(column.cycles[-1]), "value": column.values[-1].tolist()}
+    return {
+        "incident": incident.name,
+        "runner": incident.runner,
+        "time": _local(incident),
+        "reason": incident.reason,
+        "component": component,
+        "cycle": int(about.get("cycle", 0)),
+        "rtcf": about.get("rtcf", ""),
+        "executor": about.get("executor", ""),
+        "notes": [note for note in about.get("notes", "").split("\n") if note],
+        "components": len(_listed(recording, "graph")),
+        "cycles": len(cycles),
+        "last_cycles": [
+            {"cycle": int(cycle), "duration_us": duration / 1e3, "latency_us": latency / 1e3}
+            for cycle, duration, latency in zip(
+                cycles[last].tolist(),
+                recording.durations_ns[last].tolist(),
+                recording.latencies_ns[last].tolist(),
+                strict=True,
+            )
+        ],
+        "values": values,
+        "values_left_out": max(len(names) - _SIGNALS, 0),
+        "parameters": _listed(recording, "parameters")[-_CHANGES:],
+        "events": _listed(recording, "events")[-_EVENTS:],
+        "libraries": recording.metadata.get("libraries", {}),
+    }
+
+
+def _listed(recording: "rtcf.Recording", name: str) -> list[Any]:
+    try:
+        found = json.loads(recording.metadata.get(name, {}).get("json", "[]"))
+    except ValueError:
+        return []
+    return found if isinstance(found, list) else []
+
+
+def _print(told: dict[str, Any], output: Output) -> None:
+    output.line(f"{told['incident']}: {told['reason']}", "bold")
+    what = f"runner {told['runner']}, {told['time']}, cycle {told['cycle']}"
+    output.line(f"{what}, {counted(told['components'], 'component')}, rtcf {told['executor']}")
+    for note in told["notes"]:
+        output.line(note, "yellow")
+    cycles = told["last_cycles"]
+    print(f"\nlast of {counted(told['cycles'], 'cycle')}")
+    output.table(
+        ("cycle", "duration µs", "wake-up µs"),
+        [(each["cycle"], microseconds(each["duration_us"] * 1e3),
+          microseconds(each["latency_us"] * 1e3)) for each in cycles],
+        right=("cycle", "duration µs", "wake-up µs"),
+    )  # fmt: skip
+    print(f"\nvalues of {told['component'] or 'all components'}")
+    output.table(
+        ("signal", "cycle", "value"),
+        [(name, each["cycle"], _value(each["value"])) for name, each in told["values"].items()],
+        right=("cycle",),
+    )
+    if told["values_left_out"]:
+        print(f"and {told['values_left_out']} more")
+    if told["parameters"]:
+        print("\nparameters changed lately")
+        for each in told["parameters"]:
+            when = _time(int(each.get("timeNs", 0)))
+            print(f"{when}  {each.get('component')}.{each.get('parameter')} by {each.get('who')}")
+    if told["events"]:
+        print("\nevents")
+        for each in told["events"]:
+            print(f"{_time(int(each.get('timeNs', 0)))}  {each.get('message')}")
+    if told["libraries"]:
+        print("\nlibraries")
+        for line in sorted(set(told["libraries"].values())):
+            print(line)
+    sys.stdout.flush()
+
+
+def _value(value: Any) -> str:
+    text = str(value)
+    return text if len(text) <= 60 else f"{text[:60]}…"
+
+
+def _local(incident: incidents_pb2.Incident) -> str:
+    return time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(incident.time_ns / 1e9))
+
+
+def _time(nanoseconds: int) -> str:
+    return time.strftime("%H:%M:%S", time.localtime(nanoseconds / 1e9))

@@ -1,0 +1,51 @@
+"""What an incident's file says of itself at its begin: its first metadata, without reading on.
+
+Pure but for the file; no NumPy.
+"""
+
+import struct
+from pathlib import Path
+
+_MAGIC = b"\x89MCAP0\r\n"
+_METADATA = 0x0C
+_RECORD = struct.Struct("<BQ")
+_LONGEST = 64 * 1024  # bytes that are looked at
+NAME = "incident"
+
+
+def read(file: Path) -> dict[str, str]:
+    """Return the pairs; nothing of a file that is no incident.  Raises OSError."""
+    with file.open("rb") as content:
+        data = content.read(_LONGEST)
+    try:
+        return _pairs(data)
+    except (struct.error, ValueError):
+        return {}
+
+
+def _pairs(data: bytes) -> dict[str, str]:
+    if not data.startswith(_MAGIC):
+        return {}
+    at = len(_MAGIC)
+    while True:
+        opcode, length = _RECORD.unpack_from(data, at)
+        at += _RECORD.size
+        if opcode == _METADATA:
+            break
+        at += length
+    name, at = _text(data, at)
+    size, at = *struct.unpack_from("<I", data, at), at + 4
+    end = at + size
+    pairs = {}
+    while name == NAME and at < end:
+        key, at = _text(data, at)
+        pairs[key], at = _text(data, at)
+    return pairs
+
+
+def _text(data: bytes, at: int) -> tuple[str, int]:
+    (length,) = struct.unpack_from("<I", data, at)
+    at += 4
+    if at + length > len(data):
+        raise ValueError("cut off")
+    return data[at : at + length].decode(), at + length

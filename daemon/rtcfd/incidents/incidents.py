@@ -1,0 +1,236 @@
+"""The incidents: files with the last cycles before a fault, a crash or a stall.
+
+Owned by the daemon, which they never hold up: frames are copied by a thread, and the file is
+written by a process of its own, which has NumPy.  The oldest files go when there are too many.
+"""
+
+import asyncio
+import json
+import logging
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from google.protobuf import json_format
+from rtcf.v1 import errors_pb2, incidents_pb2
+
+import rtcfd
+from rtcfd.common.limits import Limits
+from rtcfd.common.refusals import FailedPrecondition, NotFound, Unavailable
+from rtcfd.incidents import head
+
+log = logging.getLogger(__name__)
+
+_SUFFIX = ".mcap"
+_NAME = re.compile(r"[A-Za-z0-9_.-]+\Z")
+_PACE_S = 10.0  # between two of one runner that nobody asked for
+_WRITE_TIMEOUT_S = 120.0
+_PIECE = 1024 * 1024
+_MODULES = Path(rtcfd.__file__).parents[1]
+_WRITER = (
+    "import sys; sys.path.insert(0, sys.argv[1]); "
+    "from rtcfd.incidents import writer; sys.exit(writer.main(sys.argv[2:]))"
+)
+
+
+class Incidents:
+    """The files in one folder; None = none are kept."""
+
+    def __init__(self, folder: Path | None, limits: Callable[[], Limits]) -> None:
+        self._folder = folder
+        self._limits = limits
+        self._threads = ThreadPoolExecutor(1, "rtcfd-incidents")
+        self._kept: dict[str, float] = {}  # when, by runner
+        self._writing = asyncio.Lock()
+
+    def wanted(self, runner: str) -> bool:
+        """Tell whether to keep one that nobody asked for: a loop may fail again and again."""
+        if self._folder is None or not self._limits().incidents_mb:
+            return False
+        now = time.monotonic()
+        if now - self._kept.get(runner, -_PACE_S) < _PACE_S:
+            return False
+        self._kept[runner] = now
+        return True
+
+    async def keep(self, descriptor: int, facts: dict[str, Any]) -> incidents_pb2.Incident:
+        """Write a file of frames, whose descriptor is closed, and of what is known besides."""
+        try:
+            folder = self._place()
+            frozen = await self._aside(_copied, descriptor)
+        finally:
+            os.close(descriptor)
+        try:
+            async with self._writing:
+                await self._aside(_make, folder)
+                stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime(facts["time_ns"] / 1e9))
+                name = await self._aside(_free_name, folder, f"{stamp}-{facts['runner']}")
+                file = folder / (name + _SUFFIX)
+                await self._aside(_write, frozen, file, facts)
+                await self._aside(_tidy, folder, self._limits().incidents_mb * 1_000_000, file)
+        finally:
+            os.close(frozen)
+        return await self._aside(_incident, file)  # type: ignore[no-any-return]
+
+    async def all(self, runner: str = "") -> list[incidents_pb2.Incident]:
+        """Return what there is, from the oldest on."""
+        if self._folder is None:
+            return []
+        found = await self._aside(_all, self._folder)
+        return [each for each in found if not runner or each.runner == runner]
+
+    async def get(self, name: str) -> incidents_pb2.Incident:
+        """Return one by its name, or the newest."""
+        found = await self.all()
+        for each in reversed(found):
+            if name in ("", each.name):
+                return each
+        raise _unknown(name, found)
+
+    async def read(self, incident: incidents_pb2.Incident, at: int) -> bytes:
+        """Return a piece of the file; nothing at its end."""
+        return await self._aside(_piece, Path(incident.file), at)  # type: ignore[no-any-return]
+
+    async def remove(self, names: Sequence[str]) -> list[incidents_pb2.Incident]:
+        """Remove files, all of them or none."""
+        found = await self.all()
+        known = {str(each.name): each for each in found}
+        for name in names:
+            if name not in known:
+                raise _unknown(name, found)
+        gone = [known[name] for name in dict.fromkeys(names)]
+        for each in gone:
+            await self._aside(_remove, Path(each.file))
+        return gone
+
+    def _place(self) -> Path:
+        if self._folder is None:
+            raise FailedPrecondition(
+                "this rtcfd keeps nothing, no incidents either: start it with --state-dir",
+                errors_pb2.REASON_DAEMON_FAILED,
+            )
+        return self._folder
+
+    async def _aside(self, work: Callable[..., Any], *arguments: Any) -> Any:
+        try:
+            return await asyncio.get_running_loop().run_in_executor(self._threads, work, *arguments)
+        except OSError as error:
+            raise Unavailable(
+                f"incidents in {self._folder}: {error.strerror or error}",
+                errors_pb2.REASON_MACHINE_SILENT,
+            ) from None
+
+
+def _unknown(name: str, found: Sequence[incidents_pb2.Incident]) -> NotFound:
+    there = ", ".join(each.name for each in found[-4:]) or "none"
+    return NotFound(
+        f"there is no incident {name}; there is {there}" if name else "there are no incidents",
+        errors_pb2.REASON_INCIDENT_NOT_FOUND,
+    )
+
+
+def _copied(descriptor: int) -> int:
+    """Return the memory as it is now; its holes stay holes."""
+    size = os.fstat(descriptor).st_size
+    copy = os.memfd_create("rtcf-incident")
+    try:
+        os.ftruncate(copy, size)
+        # An offset of its own: the descriptor shares its with others.
+        own = os.open(f"/proc/self/fd/{descriptor}", os.O_RDONLY | os.O_CLOEXEC)
+        try:
+            at = 0
+            while at < size:
+                try:
+                    at = os.lseek(own, at, os.SEEK_DATA)
+                except OSError:
+                    break  # no more data
+                end = os.lseek(own, at, os.SEEK_HOLE)
+                while at < end:
+                    at += os.pwrite(copy, os.pread(own, min(end - at, _PIECE), at), at)
+        finally:
+            os.close(own)
+    except BaseException:
+        os.close(copy)
+        raise
+    return copy
+
+
+def _make(folder: Path) -> None:
+    folder.mkdir(mode=0o700, exist_ok=True)
+    for left in folder.glob("*.part"):
+        left.unlink(missing_ok=True)  # its writer was killed
+
+
+def _free_name(folder: Path, stem: str) -> str:
+    name, number = stem, 1
+    while (folder / (name + _SUFFIX)).exists():
+        number += 1
+        name = f"{stem}-{number}"
+    return name
+
+
+def _write(frozen: int, file: Path, facts: dict[str, Any]) -> None:
+    part = file.with_suffix(".part")
+    try:
+        done = subprocess.run(
+            [sys.executable, "-I", "-c", _WRITER, str(_MODULES), str(frozen), str(part)],
+            input=json.dumps(facts, default=json_format.MessageToDict).encode(),
+            pass_fds=[frozen],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            timeout=_WRITE_TIMEOUT_S,
+            check=False,
+        )
+        if done.returncode != 0:
+            said = done.stderr.decode(errors="replace").strip().splitlines()
+            raise OSError(0, said[-1] if said else f"its writer ended with {done.returncode}")
+        part.rename(file)
+    except subprocess.TimeoutExpired:
+        raise OSError(0, f"not written in {_WRITE_TIMEOUT_S:g} s") from None
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _tidy(folder: Path, most: int, newest: Path) -> None:
+    """Remove the oldest ones until there is room; the newest stays."""
+    files = sorted((each.stat().st_mtime_ns, each) for each in folder.glob("*" + _SUFFIX))
+    room = most
+    for _, file in reversed(files):
+        room -= file.stat().st_size
+        if room < 0 and file != newest:
+            file.unlink(missing_ok=True)
+            log.info("incident %s removed: those kept are more than incidents_mb", file.stem)
+
+
+def _all(folder: Path) -> list[incidents_pb2.Incident]:
+    found = [_incident(each) for each in folder.glob("*" + _SUFFIX) if _NAME.match(each.stem)]
+    return sorted(found, key=lambda each: (each.time_ns, each.name))
+
+
+def _incident(file: Path) -> incidents_pb2.Incident:
+    status = file.stat()
+    told = head.read(file)
+    return incidents_pb2.Incident(
+        name=file.stem,
+        runner=told.get("runner", ""),
+        time_ns=int(told.get("time_ns", status.st_mtime_ns)),
+        bytes=status.st_size,
+        file=str(file),
+        reason=told.get("reason", ""),
+    )
+
+
+def _piece(file: Path, at: int) -> bytes:
+    with file.open("rb") as content:
+        content.seek(at)
+        return content.read(_PIECE)
+
+
+def _remove(file: Path) -> None:
+    file.unlink(missing_ok=True)

@@ -1,0 +1,86 @@
+"""Writes the file of an incident; a process of its own, see incidents.py.
+
+Arguments: the descriptor of a copy of the frames, and the file.  Standard input: what is known
+besides, as JSON.
+"""
+
+import json
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rtcfd.incidents import build_id, head
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Write; what goes wrong is a line on standard error, and the exit status 1."""
+    try:
+        import numpy  # noqa: F401
+    except ImportError:
+        print("an incident needs python3-numpy: install it", file=sys.stderr)
+        return 1
+    try:
+        facts = json.load(sys.stdin)
+        _write(int(arguments[0]), Path(arguments[1]), facts)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        print(reason or type(error).__name__, file=sys.stderr)
+        return 1
+    return 0
+
+
+def _write(descriptor: int, file: Path, facts: dict[str, Any]) -> None:
+    from rtcf.recording.mcap_writer import McapWriter
+    from rtcf.recording.recorder import Recorder
+    from rtcf.streams.ports import PortBatch, schema_of
+
+    from rtcfd.incidents import frame_file
+
+    rings = frame_file.read(descriptor)
+    notes = [note for ring in rings[-1:] for note in ring.notes()]
+    with file.open("xb") as out:
+        writer = McapWriter(out)
+        writer.metadata(
+            head.NAME,
+            {
+                "runner": facts["runner"],
+                "reason": facts["reason"],
+                "component": facts["component"],
+                "time_ns": str(facts["time_ns"]),
+                "cycle": str(facts["iteration"]),
+                "rtcf": facts["version"],
+                "executor": facts["executor_version"],
+                "notes": "\n".join(notes),
+            },
+        )
+        for name in ("graph", "settings", "parameters", "events"):
+            writer.metadata(name, {"json": json.dumps(facts[name])})
+        writer.metadata("libraries", _libraries(facts["libraries"]))
+        recorder = Recorder(writer, facts["runner"])
+        for ring in rings:
+            schema = schema_of(ring.schema())
+            for message in ring.batches():
+                if message.stamps_ns:
+                    recorder.add(
+                        PortBatch(schema, 1, message.first_cycle, 0, message.last_of_loop, message)
+                    )
+        recorder.flush()
+        writer.close()
+        out.flush()
+        os.fsync(out.fileno())
+
+
+def _libraries(of: dict[str, Any]) -> dict[str, str]:
+    """Return file and build id of each component's library, as far as it is still that file."""
+    told = {}
+    for component, (path, *identity) in of.items():
+        try:
+            status = os.stat(path)
+            same = [status.st_ino, status.st_mtime_ns, status.st_size] == identity
+            found = build_id.of(Path(path)) if same else ""
+            told[component] = f"{path} {found or ('no build id' if same else 'changed since')}"
+        except (OSError, ValueError):
+            told[component] = f"{path} gone"
+    return told

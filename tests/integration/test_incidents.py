@@ -1,0 +1,197 @@
+"""What ran before a fault, a crash or a stall is kept in a file, whatever else goes on."""
+
+import json
+import os
+import random
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rtcf
+from daemon_process import NO_ROS, Daemon, wait_for
+from rtcf.v1 import graph_pb2, incidents_pb2, runner_pb2
+from values import state
+
+SETTINGS = f"[runner]\nstall_timeout_ms = 500\n{NO_ROS}"
+FAULTS = ("Throws", "NotFiniteStops", "NullDereference", "NeverReturns")
+PACE_S = 11.0  # after which another incident of a runner is kept
+
+
+@pytest.fixture
+def settings() -> str:
+    """Let there be an rtcfd whose loops are soon taken for stalled."""
+    return SETTINGS
+
+
+def faulty(type_name: str, after: int) -> graph_pb2.ComponentSpec:
+    return rtcf.component(
+        "rtcf_faults", type_name, name="bad", remaps=["in:=/a"], parameters=[f"after:={after}"]
+    )
+
+
+@contextmanager
+def hot_swaps(daemon: Daemon) -> Iterator[None]:
+    """Load and unload a component again and again."""
+    done = threading.Event()
+
+    def swap() -> None:
+        with rtcf.Client(daemon.socket) as client:
+            while not done.is_set():
+                try:
+                    client.load(rtcf.component("rtcf_test", "Counter", name="guest"))
+                    client.unload(["guest"])
+                except rtcf.RtcfError:
+                    time.sleep(0.05)  # its executor has just died
+
+    swapping = threading.Thread(target=swap)
+    swapping.start()
+    try:
+        yield
+    finally:
+        done.set()
+        swapping.join()
+
+
+def newest(client: rtcf.Client, known: int) -> incidents_pb2.Incident:
+    """Wait for an incident besides those known."""
+    wait_for(lambda: len(client.list_incidents()) > known, "an incident")
+    return client.list_incidents()[-1]
+
+
+def check_file(incident: incidents_pb2.Incident) -> None:
+    """See that values of /a.out are there, each of its own cycle, up to the end."""
+    with rtcf.read_recording(incident.file) as recording:
+        assert recording.whole
+        about = recording.metadata["incident"]
+        cycles = recording.cycles
+        assert len(cycles) > 10
+        assert (np.diff(cycles) == 1).all(), "no cycle is missing"
+        assert int(about["cycle"]) - cycles[-1] <= 2, "up to the end"
+        column = recording.read("/a.out")
+        # In the last one, where components make safe, nobody counts.
+        assert (column.values == column.cycles + 1)[:-1].all(), "each is of its own cycle"
+        graph = json.loads(recording.metadata["graph"]["json"])
+        assert "a" in {each["name"].strip("/") for each in graph}
+        assert about["rtcf"] == about["executor"] != ""
+        libraries = recording.metadata["libraries"].values()
+        assert any(len(line.split()[-1]) == 40 for line in libraries), "a build id"
+
+
+def test_each_fault_has_its_file(daemon: Daemon, client: rtcf.Client) -> None:
+    for number, type_name in enumerate(FAULTS):
+        runner = f"loop{number}"
+        client.add_runner(runner)
+        client.load(rtcf.component("rtcf_test", "Counter", name="a"), runner)
+        client.load(faulty(type_name, 200), runner)
+        client.start(runner)
+        incident = newest(client, number)
+        assert incident.runner == runner
+        assert "/bad" in incident.reason
+        assert daemon.log().count(f"incident {incident.name} kept in {incident.file}") == 1
+        assert state(client, runner).incident == incident.name
+        check_file(incident)
+
+
+def test_sigkill_amid_hot_swaps_has_its_file(daemon: Daemon, client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter", name="a"))
+    client.start()
+    with hot_swaps(daemon):
+        wait_for(lambda: state(client).iteration > 300, "300 cycles")
+        os.kill(state(client).pid, signal.SIGKILL)
+        incident = newest(client, 0)
+    assert "was killed by SIGKILL" in incident.reason
+    check_file(incident)
+
+
+@pytest.mark.long
+def test_50_random_incidents_amid_hot_swaps_have_their_files(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    with hot_swaps(daemon):
+        for number in range(50):
+            runner = f"loop{number}"
+            client.add_runner(runner)
+            client.load(rtcf.component("rtcf_test", "Counter", name="a"), runner)
+            kind = random.choice([*FAULTS, "SIGKILL"])
+            after = random.randint(100, 2000)
+            if kind != "SIGKILL":
+                client.load(faulty(kind, after), runner)
+            client.start(runner)
+            if kind == "SIGKILL":
+                wait_for(lambda: state(client, runner).iteration > after, f"{after} cycles")  # noqa: B023
+                os.kill(state(client, runner).pid, signal.SIGKILL)
+            incident = newest(client, number)
+            assert incident.runner == runner
+            check_file(incident)
+            client.remove_runner(runner)
+
+
+def test_one_is_taken_of_a_loop_that_runs_on(daemon: Daemon, client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter", name="a"))
+    client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", parameters=["rate:=2.5"]))
+    client.start()
+    client.set_parameters("knobs", [rtcf.parse_parameter("count:=7")])
+    wait_for(lambda: state(client).iteration > 100, "100 cycles")
+    taken = daemon.ctl("incident", "take", "--reason", "a noise in joint 3")
+    assert taken.returncode == 0, taken.stderr
+    assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
+    (incident,) = client.list_incidents()
+    check_file(incident)
+    shown = daemon.ctl("incident", "show").stdout
+    for part in ("a noise in joint 3", "rt_runner", "/a.out", "duration µs", "/knobs.count"):
+        assert part in shown, shown
+    told = json.loads(daemon.ctl("-o", "json", "incident", "show", incident.name).stdout)
+    cycles = [each["cycle"] for each in told["last_cycles"]]
+    assert len(cycles) == 10
+    assert told["values"]["/a.out"] == {"cycle": cycles[-1], "value": cycles[-1] + 1}
+    assert incident.name in daemon.ctl("incident", "list").stdout
+
+
+def test_a_file_is_exported_and_removed(
+    daemon: Daemon, client: rtcf.Client, tmp_path: Path
+) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter", name="a"))
+    client.start()
+    incident = client.take_incident()
+    to = tmp_path / "copy.mcap"
+    assert daemon.ctl("incident", "export", incident.name, "--to", str(to)).returncode == 0
+    assert to.read_bytes() == Path(incident.file).read_bytes()
+    again = daemon.ctl("incident", "export", incident.name, "--to", str(to))
+    assert again.returncode != 0 and "is there already" in again.stderr
+    refused = daemon.ctl("incident", "rm", incident.name, "other")
+    assert refused.returncode == 1 and "no incident other" in refused.stderr
+    assert Path(incident.file).exists(), "all of them or none"
+    assert daemon.ctl("incident", "rm", incident.name).returncode == 0
+    assert not Path(incident.file).exists()
+    refused = daemon.ctl("incident", "show")
+    assert refused.returncode == 1 and "there are no incidents" in refused.stderr
+
+
+def test_a_runner_without_executor_has_none_to_take(daemon: Daemon, client: rtcf.Client) -> None:
+    refused = daemon.ctl("-r", "nobody", "incident", "take")
+    assert refused.returncode == 1 and "nobody" in refused.stderr
+    with pytest.raises(rtcf.RefusedError, match="there is no incident /etc/passwd"):
+        client.remove_incidents(["/etc/passwd"])
+
+
+def test_the_oldest_go_when_there_are_too_many(tmp_path: Path) -> None:
+    daemon = Daemon(tmp_path, f"[limits]\nincidents_mb = 1\n{NO_ROS}")
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            client.load(rtcf.component("rtcf_test", "Counter", name="a"))
+            client.start()
+            first = client.take_incident()
+            # As one of a large graph would be.
+            Path(first.file).write_bytes(bytes(1_000_000))
+            os.utime(first.file, (1.0, 1.0))
+            second = client.take_incident()
+            assert not Path(first.file).exists()
+            assert Path(second.file).exists()
+    finally:
+        daemon.end()
