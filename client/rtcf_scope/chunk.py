@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rtcf.ports import PortBatch, PortSchema
+from rtcf.streams.ports import PortBatch, PortSchema
 from rtcf.v1 import ports_pb2
 
 ELEMENTS = 64  # of an array that are told, each as a signal of its own

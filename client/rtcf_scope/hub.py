@@ -8,7 +8,7 @@ import threading
 from typing import Any, Protocol
 
 import rtcf
-from rtcf.ports import PortBatch, PortStream
+from rtcf.streams.ports import PortBatch, PortStream
 from rtcf_shared.errors import RtcfError
 
 from rtcf_scope.chunk import Chunk, Memory, column_of, later

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rtcf.recording import Recording, RecordingError
+from rtcf.recording.reader import Recording, RecordingError
 
 from rtcf_scope import wire
 from rtcf_scope.chunk import ELEMENTS, split_element

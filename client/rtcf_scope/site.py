@@ -10,8 +10,8 @@ from urllib.parse import quote
 
 import rtcf
 from aiohttp import web
-from rtcf.mcap_writer import McapWriter
-from rtcf.recorder import Recorder
+from rtcf.recording.mcap_writer import McapWriter
+from rtcf.recording.recorder import Recorder
 from rtcf_shared.errors import RtcfError
 
 from rtcf_scope import catalog

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import rtcf
-from rtcf.ports import PortBatch, PortSchema
+from rtcf.streams.ports import PortBatch, PortSchema
 from rtcf.v1 import ports_pb2
 from rtcf_scope import wire
 from rtcf_scope.chunk import Chunk, Memory, column_of, split_element
