@@ -129,12 +129,14 @@ Reconciled ParameterMirror::reconcile(ParallelCalls& master, const Caller& calle
             known_[component.set->full_name].others.clear();
         }
     }
-    if (!read(master, caller, present, result)) return result & owing;
+    std::set<std::string> asked;
+    if (!read(master, caller, present, asked, result)) return result & owing;
     {
         const std::lock_guard lock(pending_->mutex);
-        const auto waits = [this](const Component& component) {
+        // Of what the loop was asked just now it may have answered, but our values are from before.
+        const auto waits = [&](const Component& component) {
             const std::string& name = component.set->full_name;
-            return pending_->asked.count(name) != 0 || pending_->followed.count(name) == 0;
+            return asked.count(name) != 0 || pending_->followed.count(name) == 0;
         };
         present.erase(std::remove_if(present.begin(), present.end(), waits), present.end());
     }
@@ -142,10 +144,12 @@ Reconciled ParameterMirror::reconcile(ParallelCalls& master, const Caller& calle
     return result & owing;
 }
 
+// @param asked takes the names of components of which the loop is asked something
 // @return false if nothing more is to be done in this turn
 bool ParameterMirror::read(ParallelCalls& master, const Caller& caller,
-                           const std::vector<Component>& components, Reconciled& result) {
-    std::vector<const Component*> asked;
+                           const std::vector<Component>& components, std::set<std::string>& asked,
+                           Reconciled& result) {
+    std::vector<const Component*> looked_at;
     std::vector<bool> first;
     std::vector<MasterCall> calls;
     {
@@ -160,7 +164,7 @@ bool ParameterMirror::read(ParallelCalls& master, const Caller& caller,
                 result = result & Reconciled::Again;
                 break;
             }
-            asked.push_back(&component);
+            looked_at.push_back(&component);
             first.push_back(!followed);
             calls.push_back(
                 followed ? MasterCall{"getParam", texts({caller.name, name})}
@@ -169,7 +173,7 @@ bool ParameterMirror::read(ParallelCalls& master, const Caller& caller,
     }
     std::vector<MasterAnswer> answers = master.run(calls, kEach, soon());
     for (std::size_t i = 0; i < answers.size(); ++i) {
-        const std::string& name = asked[i]->set->full_name;
+        const std::string& name = looked_at[i]->set->full_name;
         if (answers[i].silent()) {
             if (!first[i]) noteWritten(name + "/");
             result = Reconciled::Later;
@@ -179,14 +183,15 @@ bool ParameterMirror::read(ParallelCalls& master, const Caller& caller,
             const std::lock_guard lock(pending_->mutex);
             pending_->followed.insert(name);
         }
-        take(answers[i].value, *asked[i], first[i]);
+        if (take(answers[i].value, *looked_at[i], first[i])) asked.insert(name);
     }
     return result != Reconciled::Later;
 }
 
 // @param values the master's of the component's namespace, a struct if there are any
 // @param first  for the first time at this master
-void ParameterMirror::take(XmlRpc::XmlRpcValue& values, const Component& component, bool first) {
+// @return whether the loop is asked to take any of them
+bool ParameterMirror::take(XmlRpc::XmlRpcValue& values, const Component& component, bool first) {
     const executor::ParameterSet& set = *component.set;
     Known& known = known_[set.full_name];
     const bool any = values.getType() == XmlRpc::XmlRpcValue::TypeStruct;
@@ -210,7 +215,9 @@ void ParameterMirror::take(XmlRpc::XmlRpcValue& values, const Component& compone
             first && component.is_new && !sameValue(value, declaration.default_value);
         if (!sameValue(*found, value) && !was_given) batch.emplace_back(name, *std::move(found));
     }
-    if (!batch.empty() && follows_) ask(set.full_name, std::move(batch));
+    if (batch.empty() || !follows_) return false;
+    ask(set.full_name, std::move(batch));
+    return true;
 }
 
 void ParameterMirror::ask(const std::string& component, executor::ParameterBatch batch) {

@@ -76,10 +76,10 @@ class ParameterMirror {
     };
 
     bool read(ParallelCalls& master, const Caller& caller, const std::vector<Component>& components,
-              Reconciled& result);
+              std::set<std::string>& asked, Reconciled& result);
     bool write(ParallelCalls& master, const Caller& caller,
                const std::vector<Component>& components, Reconciled& result);
-    void take(XmlRpc::XmlRpcValue& values, const Component& component, bool first);
+    bool take(XmlRpc::XmlRpcValue& values, const Component& component, bool first);
     void ask(const std::string& component, executor::ParameterBatch batch);
 
     executor::ParameterRequest request_;

@@ -65,6 +65,27 @@ TEST_F(ParameterMirrorTest, OwesNothingOfAComponentThatIsBack) {
     EXPECT_TRUE(ask("getParam", texts({"/test", "/C/kp"}))[0]) << "it was deleted";
 }
 
+// The loop may answer while a turn is under way, which still has the values from before.
+TEST_F(ParameterMirrorTest, WritesNoOldValueOverOneThatTheLoopHasJustTaken) {
+    std::vector<double> taken;
+    ParameterMirror mirror;
+    mirror.serve([&](const std::string&, const rtcf::executor::ParameterBatch& batch,
+                     const std::function<void(const std::string&)>& done) {
+        taken.push_back(std::get<double>(batch.at(0).second));
+        done({});
+    });
+    mirror.reconcile(calls(), caller_, {component(2.0)});
+    XmlRpc::XmlRpcValue arguments = texts({"/test", "/C/kp"});
+    arguments[2] = 5.0;
+    ASSERT_TRUE(ask("setParam", arguments)[0]);
+    mirror.noteWritten("/C/kp/");
+    mirror.reconcile(calls(), caller_, {component(2.0)});
+    ASSERT_EQ(taken, std::vector{5.0});
+    auto answers = ask("getParam", texts({"/test", "/C/kp"}));
+    ASSERT_TRUE(answers[0]);
+    EXPECT_EQ(static_cast<double>(answers[0].value), 5.0);
+}
+
 // NaN is a value that a default may have; that it does not equal itself is no change.
 TEST_F(ParameterMirrorTest, AsksForNoNaNThatIsThere) {
     constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
