@@ -1,0 +1,52 @@
+"""rtcf.testing.step_response against systems whose response is known in closed form."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from rtcf.testing import step_response
+
+TIME = np.linspace(0, 20, 20001)
+
+
+def test_first_order_lag_has_its_textbook_times() -> None:
+    measured = step_response(TIME, 3 * (1 - np.exp(-TIME)), target=3.0)
+    assert measured.rise_time == pytest.approx(math.log(9), abs=1e-3)
+    assert measured.settling_time == pytest.approx(math.log(50), abs=2e-3)
+    assert measured.overshoot == 0
+
+
+@pytest.mark.parametrize(("initial", "target"), [(0.0, 1.0), (2.0, -1.0)])
+def test_second_order_system_overshoots_by_its_damping(initial: float, target: float) -> None:
+    damping = 0.5
+    root = math.sqrt(1 - damping**2)
+    share = 1 - np.exp(-damping * TIME) * (
+        np.cos(root * TIME) + damping / root * np.sin(root * TIME)
+    )
+    measured = step_response(TIME, initial + (target - initial) * share, target, initial)
+    assert measured.overshoot == pytest.approx(math.exp(-math.pi * damping / root), abs=1e-5)
+
+
+def test_what_never_arrives_has_no_times() -> None:
+    measured = step_response(TIME, 0.5 * (1 - np.exp(-TIME)), target=1.0)
+    assert measured.rise_time == measured.settling_time == math.inf
+    assert measured.final_error == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("time", "value", "target", "tolerance", "words"),
+    [
+        ([0, 1], [0], 1.0, 0.02, "same length"),
+        ([0, 1], [0, math.nan], 1.0, 0.02, "finite in all samples"),
+        ([0, 0], [0, 1], 1.0, 0.02, "increase"),
+        ([0, 1], [0, 1], 0.0, 0.02, "not its initial value"),
+        ([0, 1], [0, 1], 1.0, 0.0, "between 0 and 1"),
+    ],
+)
+def test_what_cannot_be_measured_is_one_line(
+    time: list[float], value: list[float], target: float, tolerance: float, words: str
+) -> None:
+    with pytest.raises(ValueError, match=words):
+        step_response(time, value, target, tolerance=tolerance)
