@@ -297,11 +297,9 @@ def test_save_replaces_no_pipe_and_no_link(daemon: DaemonUnderTest, tmp_path: Pa
     log = tmp_path / "log"
     log.write_text("before\n")
     with log.open("a") as out:
-        done = subprocess.run(
-            [BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "save", "/proc/self/fd/1"],
-            stdout=out,
-        )
-    assert done.returncode == 0
+        rtcfctl = str(BUILD_TREE / "bin" / "rtcfctl")
+        save = [rtcfctl, "--socket", str(daemon.socket), "save", "/proc/self/fd/1"]
+        assert subprocess.run(save, stdout=out).returncode == 0
     assert log.read_text() == f"before\n{text}saved rt_runner to /proc/self/fd/1\n"
 
 

@@ -11,7 +11,7 @@ import rtcf
 import yaml
 from rtcf.recording.mcap_writer import McapWriter
 from rtcf.recording.recorder import Recorder
-from rtcf.streams.ports import PortBatch, PortSchema, _schema
+from rtcf.streams.ports import PortBatch, PortSchema, schema_of
 from rtcf.v1 import ports_pb2
 from rtcfctl import echo
 from rtcfctl.output import Output
@@ -32,7 +32,7 @@ def output(definition: str, md5: str, value: bytes, name: str = "o") -> ports_pb
 
 
 def schema(*columns: ports_pb2.PortColumn) -> PortSchema:
-    return _schema(ports_pb2.PortSchema(columns=columns))
+    return schema_of(ports_pb2.PortSchema(columns=columns))
 
 
 def batch(of: PortSchema, first: int, *values: bytes) -> PortBatch:
