@@ -19,19 +19,19 @@ class Incidents(Watching):
         """Return the files with the last cycles before faults, from the oldest on; of all runners
         without one."""
         request = incidents_pb2.ListIncidentsRequest(runner=runner)
-        return list(self._ask(self._stub.ListIncidents, request).incidents)
+        return self._pages(self._stub.ListIncidents, request, "incidents")
 
     def take_incident(self, runner: str = "", reason: str = "") -> incidents_pb2.Incident:
         """Keep the last cycles now."""
         request = incidents_pb2.TakeIncidentRequest(runner=runner, reason=reason)
-        return self._ask(self._stub.TakeIncident, request, CHANGE_TIMEOUT_S)  # type: ignore[no-any-return]
+        return self._ask(self._stub.TakeIncident, request, CHANGE_TIMEOUT_S).incident  # type: ignore[no-any-return]
 
     def get_incident(self, to: IO[bytes], name: str = "") -> incidents_pb2.Incident:
         """Write the file of an incident, or of the newest, to an open file."""
-        request = incidents_pb2.GetIncidentRequest(name=name)
+        request = incidents_pb2.ReadIncidentRequest(name=name)
         incident = incidents_pb2.Incident()
         try:
-            for response in self._stub.GetIncident(request, timeout=CHANGE_TIMEOUT_S):
+            for response in self._stub.ReadIncident(request, timeout=CHANGE_TIMEOUT_S):
                 if response.HasField("incident"):
                     incident = response.incident
                 to.write(response.data)
@@ -41,5 +41,5 @@ class Incidents(Watching):
 
     def remove_incidents(self, names: Iterable[str]) -> list[incidents_pb2.Incident]:
         """Remove files of incidents, all of them or none; return what is gone."""
-        request = incidents_pb2.RemoveIncidentsRequest(names=several("names", names))
-        return list(self._ask(self._stub.RemoveIncidents, request).incidents)
+        request = incidents_pb2.DeleteIncidentsRequest(names=several("names", names))
+        return list(self._ask(self._stub.DeleteIncidents, request).incidents)

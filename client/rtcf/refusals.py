@@ -82,6 +82,10 @@ class LeaseNotFoundError(RefusedError):
     """The component is kept for its holder no more."""
 
 
+class IncidentNotFoundError(RefusedError):
+    """Of none that is kept."""
+
+
 class HoldNotFoundError(RefusedError):
     """The runner is kept for its holder no more."""
 
@@ -272,6 +276,7 @@ BY_REASON: dict[str, type[RefusedError]] = {
     "TYPE_NOT_FOUND": TypeNotFoundError,
     "LEASE_NOT_FOUND": LeaseNotFoundError,
     "HOLD_NOT_FOUND": HoldNotFoundError,
+    "INCIDENT_NOT_FOUND": IncidentNotFoundError,
     "RUNNER_EXISTS": RunnerExistsError,
     "COMPONENT_EXISTS": ComponentExistsError,
     "TYPES_DIFFER": TypesDifferError,

@@ -260,33 +260,35 @@ class Control(control_pb2_grpc.ControlServicer):
     async def ListIncidents(self, request: incidents_pb2.ListIncidentsRequest) -> Any:
         """Files with the last cycles before faults."""
         found = await self._runners.incidents.all(request.runner)
-        return incidents_pb2.ListIncidentsResponse(incidents=found)
+        chosen, token = page(found, request, lambda each: str(each.name))
+        return incidents_pb2.ListIncidentsResponse(incidents=chosen, next_page_token=token)
 
     @answering
     async def TakeIncident(self, request: incidents_pb2.TakeIncidentRequest) -> Any:
         """Keep the last cycles now."""
-        return await incidents.take(self._runners.get(request.runner), request.reason)
+        taken = await incidents.take(self._runners.get(request.runner), request.reason)
+        return incidents_pb2.TakeIncidentResponse(incident=taken)
 
-    async def GetIncident(
-        self, request: incidents_pb2.GetIncidentRequest, context: Any
-    ) -> AsyncIterator[incidents_pb2.GetIncidentResponse]:
+    async def ReadIncident(
+        self, request: incidents_pb2.ReadIncidentRequest, context: Any
+    ) -> AsyncIterator[incidents_pb2.ReadIncidentResponse]:
         """The file, piece by piece."""
         try:
             kept = self._runners.incidents
             found = await kept.get(request.name)
-            yield incidents_pb2.GetIncidentResponse(incident=found)
+            yield incidents_pb2.ReadIncidentResponse(incident=found)
             at = 0
             while piece := await kept.read(found, at):
                 at += len(piece)
-                yield incidents_pb2.GetIncidentResponse(data=piece)
+                yield incidents_pb2.ReadIncidentResponse(data=piece)
         except Exception as error:
             await abort(context, error, request)
 
     @answering
-    async def RemoveIncidents(self, request: incidents_pb2.RemoveIncidentsRequest) -> Any:
+    async def DeleteIncidents(self, request: incidents_pb2.DeleteIncidentsRequest) -> Any:
         """Remove files."""
         gone = await self._runners.incidents.remove(request.names)
-        return incidents_pb2.RemoveIncidentsResponse(incidents=gone)
+        return incidents_pb2.DeleteIncidentsResponse(incidents=gone)
 
     @changing
     def RestoreSnapshot(self, request: control_pb2.RestoreSnapshotRequest) -> Any:

@@ -63,7 +63,7 @@ def test_every_call_is_in_the_table_and_nothing_else() -> None:
 
 def test_what_is_named_like_a_query_is_open_to_observers_alone() -> None:
     for name, call in calls.CALLS.items():
-        asks = name.startswith(("Get", "List", "Watch"))
+        asks = name.startswith(("Get", "List", "Read", "Watch"))
         assert (call.right == Level.OBSERVE) == asks, name
 
 
