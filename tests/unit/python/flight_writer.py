@@ -21,6 +21,10 @@ class FlightWriter:
         self.put(4, 1)
         self.put(52, SLOTS)
 
+    def close(self) -> None:
+        self.memory.close()
+        os.close(self.descriptor)
+
     def put(self, offset: int, value: int, form: str = "<I") -> None:
         struct.pack_into(form, self.memory, offset, value)
 

@@ -120,6 +120,7 @@ class PeerProcess:
             del self._machine.peers[self._socket]
             self.end = End(0)
             self._ended.set()
+            self.peer.recorder.close()
 
 
 class Refused(Exception):
