@@ -16,8 +16,8 @@ HOOKS = ["configure", "start", "update", "safe", "stop", "cleanup"]
 
 def _hooks(daemon: Daemon) -> list[str]:
     """Return the hooks of the Witness, in the order of its log records."""
-    return [line.partition("hook ")[2].split()[0] for line in daemon.log().splitlines()
-            if "hook " in line]  # fmt: skip
+    return [line.partition(": hook ")[2].split()[0] for line in daemon.log().splitlines()
+            if ": hook " in line]  # fmt: skip
 
 
 def _executor(client: rtcf.Client) -> int:

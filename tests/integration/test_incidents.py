@@ -92,7 +92,9 @@ def test_each_fault_has_its_file(daemon: Daemon, client: rtcf.Client) -> None:
         incident = newest(client, number)
         assert incident.runner == runner
         assert "/bad" in incident.reason
-        assert daemon.log().count(f"incident {incident.name} kept in {incident.file}") == 1
+        line = f"incident {incident.name} kept in {incident.file}"
+        wait_for(lambda line=line: line in daemon.log(), "the line in the log")  # type: ignore[misc]
+        assert daemon.log().count(line) == 1
         assert state(client, runner).incident == incident.name
         check_file(incident)
 
