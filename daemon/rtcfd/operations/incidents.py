@@ -7,12 +7,13 @@ import os
 import time
 from typing import Any
 
-from rtcf.v1 import control_pb2, errors_pb2, incidents_pb2
+from rtcf.v1 import errors_pb2, incidents_pb2
 
 from rtcfd import VERSION
 from rtcfd.access import caller
 from rtcfd.common.refusals import FailedPrecondition
 from rtcfd.executor.executor import Executor
+from rtcfd.operations import parameters
 from rtcfd.operations.runner_core import RunnerCore
 
 _EVENTS = 50
@@ -64,17 +65,6 @@ def _facts(
     known = note.iteration if note is not None else 0
     events, _ = runner.shared.events.after(max(runner.shared.events.last - 500, 0), 500)
     desired = runner.desired
-    request = control_pb2.GetHistoryResponse()
-    for each in desired.history.of()[-_CHANGES:]:
-        request.changes.add(
-            component=each.component,
-            parameter=each.parameter,
-            before=each.before,
-            value=each.value,
-            time_ns=each.time_ns,
-            who=each.who,
-            how=each.how,
-        )
     return {
         "runner": runner.name,
         "reason": " ".join(reason.split())[:_LONGEST_REASON],
@@ -85,7 +75,7 @@ def _facts(
         "executor_version": executor.version,
         "graph": list(desired.components.values()),
         "settings": runner.settings(),
-        "parameters": list(request.changes),
+        "parameters": [parameters.told(each) for each in desired.history.of()[-_CHANGES:]],
         "events": [each for each in events if each.runner == runner.name][-_EVENTS:],
         "libraries": runner.code.files(),
     }

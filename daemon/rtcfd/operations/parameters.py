@@ -77,20 +77,25 @@ def history(
     changes: list[control_pb2.ParameterChange] = []
     room = _MOST_BYTES
     for each in reversed(found[-most:]):
-        change = control_pb2.ParameterChange(
-            component=each.component,
-            parameter=each.parameter,
-            before=each.before,
-            value=each.value,
-            time_ns=each.time_ns,
-            who=each.who,
-            how=each.how,
-        )
+        change = told(each)
         room -= change.ByteSize() + 8  # a tag and a length besides
         if room < 0 and changes:
             break
         changes.append(change)
     return control_pb2.GetHistoryResponse(changes=reversed(changes))
+
+
+def told(change: Change) -> control_pb2.ParameterChange:
+    """Return a change as clients know it."""
+    return control_pb2.ParameterChange(
+        component=change.component,
+        parameter=change.parameter,
+        before=change.before,
+        value=change.value,
+        time_ns=change.time_ns,
+        who=change.who,
+        how=change.how,
+    )
 
 
 async def follow_ros(runner: RunnerCore, changed: Mapping[str, set[str]]) -> None:
