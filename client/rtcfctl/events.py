@@ -2,7 +2,6 @@
 
 import argparse
 import sys
-import time
 from typing import Any
 
 import rtcf
@@ -11,6 +10,7 @@ from rtcf.v1 import control_pb2
 
 from rtcfctl.output import Output
 from rtcfctl.plain import enumerator
+from rtcfctl.words import date
 
 _STYLES = {
     control_pb2.Event.KIND_LOOP_FAULT: "bold red",
@@ -50,7 +50,7 @@ def _print(event: control_pb2.Event | Lost, output: Output) -> None:
 
 
 def _line(event: control_pb2.Event) -> str:
-    stamp = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(event.time_ns / 1e9))
+    stamp = date(event.time_ns)
     subject = event.runner or "rtcfd"
     who = f" (by {event.user})" if event.user else ""
     return f"{stamp} {subject} {enumerator(event, 'kind')}: {event.message}{who}"

@@ -12,7 +12,7 @@ import rtcf
 from rtcf.v1 import incidents_pb2
 
 from rtcfctl.output import Output
-from rtcfctl.words import counted, microseconds
+from rtcfctl.words import counted, date, microseconds
 
 _CYCLES = 10  # that are shown
 _SIGNALS = 40  # of the culprit, or of all
@@ -67,7 +67,7 @@ def show_all(client: rtcf.Client, args: argparse.Namespace, output: Output) -> N
         return
     output.table(
         ("incident", "runner", "time", "MB", "reason"),
-        [(each.name, each.runner, _local(each), f"{each.bytes / 1e6:.1f}", each.reason)
+        [(each.name, each.runner, date(each.time_ns), f"{each.bytes / 1e6:.1f}", each.reason)
          for each in found],
         right=("MB",),
     )  # fmt: skip
@@ -135,7 +135,7 @@ def _told(incident: incidents_pb2.Incident, recording: "rtcf.Recording") -> dict
     return {
         "incident": incident.name,
         "runner": incident.runner,
-        "time": _local(incident),
+        "time": date(incident.time_ns),
         "reason": incident.reason,
         "component": component,
         "cycle": int(about.get("cycle", 0)),
@@ -210,10 +210,6 @@ def _print(told: dict[str, Any], output: Output) -> None:
 def _value(value: Any) -> str:
     text = str(value)
     return text if len(text) <= 60 else f"{text[:60]}…"
-
-
-def _local(incident: incidents_pb2.Incident) -> str:
-    return time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(incident.time_ns / 1e9))
 
 
 def _time(nanoseconds: int) -> str:

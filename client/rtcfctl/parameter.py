@@ -1,7 +1,6 @@
 """`rtcfctl set|history|undo|reset`."""
 
 import argparse
-import time
 from typing import Any
 
 import rtcf
@@ -68,7 +67,7 @@ def show_history(client: rtcf.Client, args: argparse.Namespace, output: Output) 
         ("when", "who", "how", "parameter", "before", "value"),
         (
             (
-                time.strftime("%F %T", time.localtime(each.time_ns / 1e9)),
+                words.date(each.time_ns),
                 each.who,
                 each.how,
                 f"{each.component}.{each.parameter}",

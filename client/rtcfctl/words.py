@@ -2,6 +2,7 @@
 
 import argparse
 import re
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -22,6 +23,11 @@ def age(nanoseconds: int) -> str:
         if abs(nanoseconds) >= size:
             return f"{nanoseconds / size:.3g} {unit}"
     return "0 ns"
+
+
+def date(nanoseconds: int) -> str:
+    """Return a time since 1970 by the clock here: "2026-03-01 14:05:09"."""
+    return time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(nanoseconds / 1e9))
 
 
 def amount(unit: str) -> Callable[[str], float]:
