@@ -2,6 +2,7 @@
 // components take of it.
 import { DURATION, LATENCY } from "../data/store.js";
 import { scaled, tickText, ticks } from "../drawing/axes.js";
+import { blank } from "../drawing/canvas.js";
 import { colour, ink } from "../drawing/palette.js";
 
 const AREA = { left: 64, top: 8, right: 12, bottom: 22 };
@@ -12,13 +13,7 @@ export class Cycles {
 
   show() {
     const { canvas, scope } = this;
-    const g = canvas.getContext("2d"), ratio = window.devicePixelRatio || 1;
-    const { clientWidth: width, clientHeight: height } = canvas;
-    canvas.width = width * ratio; canvas.height = height * ratio;
-    g.setTransform(ratio, 0, 0, ratio, 0, 0);
-    g.fillStyle = ink("paper");
-    g.fillRect(0, 0, width, height);
-    g.font = "11px system-ui, sans-serif";
+    const { g, width, height } = blank(canvas);
     const w = width - AREA.left - AREA.right, h = height - AREA.top - AREA.bottom - STACK;
     const { store, view } = scope;
     const period = scope.rate ? 1e6 / scope.rate : NaN;

@@ -1,5 +1,6 @@
 // The spectrum of each trace, of what is in sight or between the cursors.
 import { figure, scaled, tickText, ticks } from "../drawing/axes.js";
+import { blank } from "../drawing/canvas.js";
 import { spectrum } from "../data/fft.js";
 import { values } from "../data/measure.js";
 import { colour, ink } from "../drawing/palette.js";
@@ -18,13 +19,7 @@ export class Spectrum {
 
   show() {
     const { canvas, scope } = this;
-    const g = canvas.getContext("2d"), ratio = window.devicePixelRatio || 1;
-    const { clientWidth: width, clientHeight: height } = canvas;
-    canvas.width = width * ratio; canvas.height = height * ratio;
-    g.setTransform(ratio, 0, 0, ratio, 0, 0);
-    g.fillStyle = ink("paper");
-    g.fillRect(0, 0, width, height);
-    g.font = "11px system-ui, sans-serif";
+    const { g, width, height } = blank(canvas);
     const found = this.#spectra();
     if (!found.length) {
       g.fillStyle = ink("soft");
