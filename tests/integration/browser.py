@@ -6,16 +6,16 @@ import os
 import subprocess
 import time
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import aiohttp
 from daemon_process import DEADLINE_S, wait_for
+from rtcf.closing import Closing
 
 _POLL_S = 0.05
 
 
-class Browser:
+class Browser(Closing):
     """One browser with pages of a profile of its own; ends at the end of its `with`."""
 
     def __init__(self, folder: Path) -> None:
@@ -33,15 +33,9 @@ class Browser:
         self._loop = asyncio.new_event_loop()
         self._session = self._run(_session())
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        if self._loop.is_closed():
+            return
         self._run(self._session.close())
         self._loop.close()
         self.kill()

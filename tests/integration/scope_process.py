@@ -6,14 +6,14 @@ import signal
 import subprocess
 import tempfile
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 from urllib.parse import urlsplit
 
 from daemon_process import BUILD_TREE, DEADLINE_S, Daemon, wait_for
+from rtcf.closing import Closing
 
 
-class ScopeProcess:
+class ScopeProcess(Closing):
     """A scope of a daemon; ends at the end of its `with`."""
 
     def __init__(self, daemon: Daemon, *arguments: str) -> None:
@@ -39,15 +39,7 @@ class ScopeProcess:
         self.port = urlsplit(self.address).port or 0
         self.token = self.address.partition("token=")[2]
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
         self.process.send_signal(signal.SIGINT)
         self.process.wait(DEADLINE_S)
 
