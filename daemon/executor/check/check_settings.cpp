@@ -2,9 +2,7 @@
 
 #include <unistd.h>
 
-#include "messages/errors.hpp"
 #include "messages/settings_messages.hpp"
-#include "messages/to_wire.hpp"
 #include "refusal.hpp"
 #include "rtcf/v1/runner.pb.h"
 #include "view/settings.hpp"

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/eventfd.h>
-#include <sys/resource.h>
 #include <sys/signalfd.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -12,22 +11,15 @@
 #include <cerrno>
 #include <chrono>
 #include <csignal>
-#include <cstring>
 #include <system_error>
 
 #include "messages/errors.hpp"
-#include "messages/image_file.hpp"
 #include "messages/to_wire.hpp"
-#include "rtcf/version.hpp"
-#include "statistics/thread_usage.hpp"
 
 namespace rtcf::executor {
 
-namespace pb = ::rtcf::v1;
-
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;
 // Longer than rtcfd takes for one change, those before it included.
 constexpr std::chrono::seconds kAskTimeout{70};
 constexpr std::size_t kLargestOutbox = 10000;  // messages kept while no daemon is connected
