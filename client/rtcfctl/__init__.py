@@ -1,1 +1,1 @@
-"""rtcfctl: the command line of rtcf.  One module per noun; no logic beyond calls."""
+"""rtcfctl, the command line of rtcf: a module per noun, a room per subject."""

@@ -12,45 +12,45 @@ from typing import TYPE_CHECKING
 import rtcf
 
 if TYPE_CHECKING:
-    from rtcfctl.output import Output
+    from rtcfctl.terminal.output import Output
 
 DONE, REFUSED, USAGE, UNREACHABLE = range(4)
 
 # The module of each verb; only that of the one that is called is imported, as each import is time.
 _MODULES = {
-    "status": "status",
-    "runner": "runner",
-    "start": "loop",
-    "stop": "loop",
-    "step": "loop",
-    "replay": "replay",
-    "load": "component",
-    "unload": "component",
-    "replace": "component",
-    "release": "component",
-    "reset": "parameter",
-    "snapshot": "snapshot",
-    "restore": "snapshot",
-    "list": "component",
-    "info": "component",
-    "order": "graph",
-    "connections": "graph",
-    "break": "graph",
-    "unbreak": "graph",
-    "apply": "files",
-    "save": "files",
-    "set": "parameter",
-    "history": "parameter",
-    "undo": "parameter",
-    "types": "types",
-    "stats": "stats",
-    "events": "events",
-    "echo": "echo",
-    "record": "record",
-    "scope": "scope",
-    "incident": "incident",
-    "check": "check",
-    "doctor": "doctor",
+    "status": "loop.status",
+    "runner": "loop.runner",
+    "start": "loop.running",
+    "stop": "loop.running",
+    "step": "loop.running",
+    "replay": "loop.replay",
+    "load": "graph.component",
+    "unload": "graph.component",
+    "replace": "graph.component",
+    "release": "graph.component",
+    "reset": "graph.parameter",
+    "snapshot": "graph.snapshot",
+    "restore": "graph.snapshot",
+    "list": "graph.component",
+    "info": "graph.component",
+    "order": "graph.wires",
+    "connections": "graph.wires",
+    "break": "graph.wires",
+    "unbreak": "graph.wires",
+    "apply": "graph.files",
+    "save": "graph.files",
+    "set": "graph.parameter",
+    "history": "graph.parameter",
+    "undo": "graph.parameter",
+    "types": "graph.types",
+    "stats": "loop.stats",
+    "events": "signals.events",
+    "echo": "signals.echo",
+    "record": "signals.record",
+    "scope": "signals.scope",
+    "incident": "signals.incident",
+    "check": "machine.check",
+    "doctor": "machine.doctor",
 }
 _COMPLETION = "__complete"
 # Global options that are followed by a word of theirs.
@@ -69,7 +69,7 @@ def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None)
         return DONE
     args = parser(verb_of(words)).parse_args(words)
     args.build_tree = build_tree
-    from rtcfctl.output import Output
+    from rtcfctl.terminal.output import Output
 
     output = Output(args.output, args.verbose)
     # By the command, until here and after us.

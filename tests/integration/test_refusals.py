@@ -14,7 +14,7 @@ import pytest
 import rtcf
 from daemon_process import BUILD_TREE, Daemon, wait_for
 from rtcf.v1 import runner_pb2
-from rtcfctl.plain import plain
+from rtcfctl.terminal.plain import plain
 from values import iteration
 
 MIMO = "rtcf_examples Mimo"

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import rtcf
-from rtcfctl import component, graph
-from rtcfctl.output import Output
+from rtcfctl.graph import component, wires
+from rtcfctl.terminal.output import Output
 
 from rtcf_launch import arguments, rendezvous
 from rtcf_launch.master import Master, MasterSilent
@@ -25,10 +25,10 @@ Show = Callable[[rtcf.Client, argparse.Namespace, Output], None]
 TOOLS: dict[str, tuple[str, str, Show]] = {
     "component_list": ("the components of a loop, in their order", "", component.show_all),
     "component_info": ("one component, with its values", "component", component.show),
-    "component_order": ("the order in which the components run", "", graph.show_order),
-    "connection_list": ("the connections of a loop", "", graph.show_connections),
+    "component_order": ("the order in which the components run", "", wires.show_order),
+    "connection_list": ("the connections of a loop", "", wires.show_connections),
     "connection_info": ("one connection: who writes and who reads", "connection",
-                        graph.show_connection),
+                        wires.show_connection),
 }  # fmt: skip
 
 

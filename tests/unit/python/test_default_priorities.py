@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from rtcf.v1 import runner_pb2
 from rtcf_shared.quantities import RUNNER
-from rtcfctl.status import shared_cpus
+from rtcfctl.loop.status import shared_cpus
 from rtcfd.common import runner_settings
 from rtcfd.runners.status import note_shared_cpus, statuses_of
 from rtcfd.state.desired import Desired

@@ -9,8 +9,8 @@ import pytest
 from daemon_under_test import DaemonUnderTest, wait_for
 from rtcf.diagnosis import Finding, Grade, Host, Loop, cpu_of_next_loop, cpus, diagnose
 from rtcf.v1 import runner_pb2
-from rtcfctl import doctor
-from rtcfctl.output import Output
+from rtcfctl.machine import doctor
+from rtcfctl.terminal.output import Output
 
 PID = 42
 CPU = "/sys/devices/system/cpu"

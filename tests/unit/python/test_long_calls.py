@@ -9,9 +9,9 @@ import pytest
 import rtcf
 from daemon_under_test import DEADLINE_S, DaemonUnderTest, wait_for
 from rtcf.v1 import control_pb2
-from rtcfctl import component
+from rtcfctl.graph import component
 from rtcfctl.main import parser
-from rtcfctl.output import Output
+from rtcfctl.terminal.output import Output
 from strangers import open_to_strangers, root_only, stranger
 
 WATCH = """

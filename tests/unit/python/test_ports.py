@@ -13,8 +13,8 @@ from rtcf.recording.mcap_writer import McapWriter
 from rtcf.recording.recorder import Recorder
 from rtcf.streams.ports import PortBatch, PortSchema, schema_of
 from rtcf.v1 import ports_pb2
-from rtcfctl import echo
-from rtcfctl.output import Output
+from rtcfctl.signals import echo
+from rtcfctl.terminal.output import Output
 
 STATE = ports_pb2.PortColumn.KIND_STATE
 OUTPUT = ports_pb2.PortColumn.KIND_OUTPUT

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 import rtcf
 from rtcf.component import Fault
-from rtcf_compile.source import components, load
+from rtcf_compile.source.modules import components, load
 
 TREE = Path(__file__).parents[3]
 CONTROLLERS = load(TREE / "tests" / "components" / "python" / "controllers.py")

@@ -4,7 +4,7 @@ import pickle
 
 import pytest
 from llvmlite import binding, ir
-from rtcf_compile.raises import hash_of, raises_in
+from rtcf_compile.machine_code.raises import hash_of, raises_in
 
 FILE = "/some/where/controller.py"
 

@@ -4,7 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rtcf_compile import lowering, main, source, verify
+from rtcf_compile import main
+from rtcf_compile.comparison import verify
+from rtcf_compile.machine_code import lowering
+from rtcf_compile.source import modules as source
 
 FOLDER = Path(__file__).parents[2] / "components" / "python"
 FILES = [source.load(FOLDER / f"{name}.py") for name in ("controllers", "filters")]

@@ -7,8 +7,8 @@ import pytest
 from rtcf.v1 import runner_pb2
 from rtcf_shared import quantities
 from rtcf_shared.quantities import ROS, RUNNER, Quantity
+from rtcfctl.loop.runner import settings_of
 from rtcfctl.main import parser
-from rtcfctl.runner import settings_of
 from rtcfd.common import runner_settings
 from rtcfd.common.refusals import InvalidArgument
 

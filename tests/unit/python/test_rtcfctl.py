@@ -14,9 +14,9 @@ import rtcf
 import yaml
 from daemon_under_test import BUILD_TREE, MINDS_CTRL_C, DaemonUnderTest, wait_for
 from rtcf.v1 import graph_pb2, runner_pb2
+from rtcfctl.loop.runner import settings_of
 from rtcfctl.main import parser, verb_of
-from rtcfctl.plain import plain
-from rtcfctl.runner import settings_of
+from rtcfctl.terminal.plain import plain
 
 
 def test_a_session_in_words(daemon: DaemonUnderTest) -> None:
@@ -261,10 +261,10 @@ def test_a_call_imports_what_its_verb_takes_and_no_more(tmp_path: Path) -> None:
         check=True,
     )  # fmt: skip
     loaded = set(done.stdout.split())
-    assert "rtcfctl.status" in loaded
+    assert "rtcfctl.loop.status" in loaded
     for heavy in ("rich", "yaml", "difflib", "rtcf.replay", "rtcf_shared.graph_reader"):
         assert heavy not in loaded, heavy
-    assert not {"rtcfctl.doctor", "rtcfctl.check", "rtcfctl.completion"} & loaded
+    assert not {"rtcfctl.machine.doctor", "rtcfctl.machine.check", "rtcfctl.completion"} & loaded
 
 
 @pytest.mark.parametrize(

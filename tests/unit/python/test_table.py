@@ -4,9 +4,9 @@ import json
 
 import pytest
 from rtcf.v1 import graph_pb2
-from rtcfctl import words
-from rtcfctl.plain import plain
-from rtcfctl.table import Cell, format_table
+from rtcfctl.terminal import words
+from rtcfctl.terminal.plain import plain
+from rtcfctl.terminal.table import Cell, format_table
 
 
 def lines(

@@ -5,8 +5,8 @@ from typing import Any
 
 import rtcf
 
-from rtcfctl import words
-from rtcfctl.output import Output
+from rtcfctl.terminal import words
+from rtcfctl.terminal.output import Output
 
 _MOST = 20  # lines
 

@@ -7,7 +7,7 @@ from typing import Any
 import rtcf
 from rtcf_shared import durable
 
-from rtcfctl.output import Output
+from rtcfctl.terminal.output import Output
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:

@@ -6,7 +6,7 @@ import rtcf
 from rtcf.streams.ports import PortBatch
 from rtcf.v1 import runner_pb2
 
-from rtcfctl.output import Output
+from rtcfctl.terminal.output import Output
 
 _RUNS = (runner_pb2.RUNNER_STATE_RUNNING, runner_pb2.RUNNER_STATE_STEPPING)
 

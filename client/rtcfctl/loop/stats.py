@@ -7,8 +7,8 @@ from typing import Any
 import rtcf
 from rtcf.v1 import runner_pb2
 
-from rtcfctl.output import Output
-from rtcfctl.words import amount, counted, microseconds
+from rtcfctl.terminal.output import Output
+from rtcfctl.terminal.words import amount, counted, microseconds
 
 _FIGURES = ("min_ns", "mean_ns", "p50_ns", "p99_ns", "p999_ns", "max_ns")
 _SHORTEST_WATCH_S, _LONGEST_WATCH_S = 0.1, 86400.0

@@ -8,9 +8,9 @@ import rtcf
 from rtcf.streams.events import Lost, Place
 from rtcf.v1 import control_pb2
 
-from rtcfctl.output import Output
-from rtcfctl.plain import enumerator
-from rtcfctl.words import date
+from rtcfctl.terminal.output import Output
+from rtcfctl.terminal.plain import enumerator
+from rtcfctl.terminal.words import date
 
 _STYLES = {
     control_pb2.Event.KIND_LOOP_FAULT: "bold red",

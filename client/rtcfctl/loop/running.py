@@ -6,8 +6,8 @@ from typing import Any
 
 import rtcf
 
-from rtcfctl import words
-from rtcfctl.output import Output
+from rtcfctl.terminal import words
+from rtcfctl.terminal.output import Output
 
 _MOST_CYCLES = 10**18
 

@@ -9,9 +9,9 @@ from rtcf.v1 import runner_pb2
 from rtcf_shared.enums import choices
 from rtcf_shared.quantities import ROS, RUNNER
 
-from rtcfctl.output import Output
-from rtcfctl.status import print_runners
-from rtcfctl.words import amount
+from rtcfctl.loop.status import print_runners
+from rtcfctl.terminal.output import Output
+from rtcfctl.terminal.words import amount
 
 # Fields of RunnerSettings whose values are words.
 _CHOICES = {

@@ -11,8 +11,8 @@ from typing import IO, Any
 import rtcf
 from rtcf.v1 import incidents_pb2
 
-from rtcfctl.output import Output
-from rtcfctl.words import counted, date, microseconds
+from rtcfctl.terminal.output import Output
+from rtcfctl.terminal.words import counted, date, microseconds
 
 _CYCLES = 10  # that are shown
 _SIGNALS = 40  # of the culprit, or of all

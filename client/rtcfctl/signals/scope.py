@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 
 import rtcf
 
-from rtcfctl.output import Output
+from rtcfctl.terminal.output import Output
 
 _PACKAGE = "rtcfctl scope is in a package of its own: apt install rtcf-scope"
 

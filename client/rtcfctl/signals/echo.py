@@ -9,9 +9,9 @@ from typing import Any
 import rtcf
 from rtcf.streams.ports import PortBatch
 
-from rtcfctl.idle_loop import say_if_ended, say_if_idle
-from rtcfctl.output import Output
-from rtcfctl.words import amount, counted, figure
+from rtcfctl.signals.idle_loop import say_if_ended, say_if_idle
+from rtcfctl.terminal.output import Output
+from rtcfctl.terminal.words import amount, counted, figure
 
 _TOLD_HZ = 10.0  # what a person can read
 _MOST_EVERY = 2**32 - 1

@@ -10,8 +10,8 @@ from typing import Any, TextIO
 
 from rtcf.v1 import control_pb2
 
-from rtcfctl.plain import number, plain
-from rtcfctl.table import Cell, format_table
+from rtcfctl.terminal.plain import number, plain
+from rtcfctl.terminal.table import Cell, format_table
 
 _ANSI = {"bold": "1", "red": "31", "green": "32", "yellow": "33"}
 

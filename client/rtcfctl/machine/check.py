@@ -10,7 +10,7 @@ import rtcf
 from rtcf.checking import check, executor_of
 from rtcf.sanitizer import Frame, Violation
 
-from rtcfctl.output import Output
+from rtcfctl.terminal.output import Output
 
 _EXECUTOR_FRAMES = 5  # of a stack that is not the component's
 

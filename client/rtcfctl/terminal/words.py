@@ -9,7 +9,7 @@ from typing import Any
 from rtcf.v1 import graph_pb2
 from rtcf_shared.quantities import parse
 
-from rtcfctl.plain import plain
+from rtcfctl.terminal.plain import plain
 
 # Of what somebody has chosen, and of what is measured or computed.
 _CHOSEN_DIGITS, _MEASURED_DIGITS = 10, 6

@@ -6,8 +6,8 @@ from typing import Any
 
 import rtcf
 
-from rtcfctl.component import print_parameters, print_ports
-from rtcfctl.output import Output
+from rtcfctl.graph.component import print_parameters, print_ports
+from rtcfctl.terminal.output import Output
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:

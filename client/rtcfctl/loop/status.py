@@ -6,9 +6,9 @@ from typing import Any
 import rtcf
 from rtcf.v1 import runner_pb2
 
-from rtcfctl.output import Output
-from rtcfctl.plain import enumerator
-from rtcfctl.words import counted
+from rtcfctl.terminal.output import Output
+from rtcfctl.terminal.plain import enumerator
+from rtcfctl.terminal.words import counted
 
 STYLES = {
     runner_pb2.RUNNER_STATE_RUNNING: "green",

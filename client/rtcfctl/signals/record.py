@@ -15,9 +15,9 @@ from rtcf.recording.mcap_writer import McapWriter
 from rtcf.recording.recorder import Recorder
 from rtcf.streams.ports import PortStream
 
-from rtcfctl.idle_loop import say_if_ended, say_if_idle
-from rtcfctl.output import Output
-from rtcfctl.words import amount, counted
+from rtcfctl.signals.idle_loop import say_if_ended, say_if_idle
+from rtcfctl.terminal.output import Output
+from rtcfctl.terminal.words import amount, counted
 
 _TOLD_S = 1.0
 _LONGEST_S = 1e9

@@ -12,8 +12,8 @@ import rtcf
 from rtcf.diagnosis import Finding, Grade, Host, Loop, cpu_of_next_loop, diagnose
 from rtcf.v1 import control_pb2, runner_pb2
 
-from rtcfctl.output import Output
-from rtcfctl.words import amount
+from rtcfctl.terminal.output import Output
+from rtcfctl.terminal.words import amount
 
 _SECONDS = 10.0
 _FREQUENCY_HZ = 1000.0

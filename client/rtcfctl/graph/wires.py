@@ -7,7 +7,7 @@ from typing import Any
 import rtcf
 from rtcf.v1 import graph_pb2
 
-from rtcfctl.output import Output
+from rtcfctl.terminal.output import Output
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:

@@ -8,9 +8,10 @@ from typing import Any
 import rtcf
 from rtcf.v1 import graph_pb2
 
-from rtcfctl import python_source, words
-from rtcfctl.output import Output
-from rtcfctl.plain import enumerator
+from rtcfctl.graph import python_source
+from rtcfctl.terminal import words
+from rtcfctl.terminal.output import Output
+from rtcfctl.terminal.plain import enumerator
 
 _LOOKS_PER_CHECK = 5  # at a source that is watched, until one whether its component is there
 _STYLES = {

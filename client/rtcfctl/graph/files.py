@@ -8,8 +8,8 @@ import rtcf
 from rtcf.v1 import control_pb2
 from rtcf_shared import durable
 
-from rtcfctl.output import Output
-from rtcfctl.plain import enumerator
+from rtcfctl.terminal.output import Output
+from rtcfctl.terminal.plain import enumerator
 
 _STYLES = {
     control_pb2.Difference.KIND_LOAD: "green",

@@ -76,16 +76,16 @@ def fingerprint(source: Path) -> str:
     # Libraries that it needs have other names in another release of Debian.
     digest = hashlib.sha256(f"{rtcf.__version__} {_release()}\n".encode())
     compiler = importlib.util.find_spec("rtcf_compile")
-    folders = [source.parent]
+    files = sorted(source.parent.glob("*.py"))
     if compiler is not None and compiler.origin is not None:
-        folders.append(Path(compiler.origin).parent)
-    for folder in folders:
-        for file in sorted(folder.glob("*.py")):
-            try:
-                content = file.read_bytes()
-            except OSError:
-                continue  # just being saved
-            digest.update(f"{file.name} {len(content)}\n".encode() + content)
+        folder = Path(compiler.origin).parent
+        files += sorted(each for each in folder.rglob("*") if each.suffix in (".py", ".hpp"))
+    for file in files:
+        try:
+            content = file.read_bytes()
+        except OSError:
+            continue  # just being saved
+        digest.update(f"{file.name} {len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 

@@ -1,0 +1,1 @@
+"""Verbs about what a loop consists of: components, wires, parameters, state, graph files."""

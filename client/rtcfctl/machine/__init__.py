@@ -1,0 +1,1 @@
+"""Verbs about the machine and the code on it: doctor, check."""

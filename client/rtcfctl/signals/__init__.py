@@ -1,0 +1,1 @@
+"""Verbs about what happens in a loop: values of every cycle, recordings, incidents, events."""
