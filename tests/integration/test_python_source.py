@@ -1,7 +1,10 @@
 """A component's Python source given to rtcfctl: compiled, kept, swapped when it is saved."""
 
+import importlib.machinery
+import importlib.util
 import platform
 import re
+import shutil
 import subprocess
 import threading
 from collections.abc import Iterator
@@ -10,7 +13,7 @@ from pathlib import Path
 import pytest
 import rtcf
 from daemon_process import BUILD_TREE, DEADLINE_S, Daemon, wait_for
-from rtcfctl import python_source
+from rtcfctl.graph import python_source
 
 COMPILE_DEADLINE_S = 900.0
 
@@ -109,6 +112,26 @@ def test_a_library_of_another_debian_counts_as_of_another_source(
     assert python_source.fingerprint(source) == ours
     monkeypatch.setattr(platform, "freedesktop_os_release", lambda: {"VERSION_ID": "14"})
     assert python_source.fingerprint(source) != ours
+
+
+@pytest.mark.parametrize("changed", ["main.py", "library/shim.py", "library/runtime.hpp"])
+def test_a_library_of_another_compiler_counts_as_of_another_source(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: str
+) -> None:
+    found = importlib.util.find_spec("rtcf_compile")
+    assert found is not None and found.origin is not None
+    compiler = shutil.copytree(Path(found.origin).parent, tmp_path / "python" / "rtcf_compile")
+    monkeypatch.setattr(
+        importlib.util,
+        "find_spec",
+        lambda name: importlib.machinery.ModuleSpec(name, None, origin=str(compiler / "main.py")),
+    )
+    source = tmp_path / "counts.py"
+    source.write_text(COUNTS)
+    before = python_source.fingerprint(source)
+    with (compiler / changed).open("a") as file:
+        file.write("\n")
+    assert python_source.fingerprint(source) != before
 
 
 def test_a_source_that_is_wrong_is_refused_in_one_line(own_cache: Path, daemon: Daemon) -> None:

@@ -32,12 +32,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error("say what to do with it: -o LIB, --verify")
     from rtcf.component import DeclarationError
 
-    from rtcf_compile.mistake import Mistake
+    from rtcf_compile.source.mistake import Mistake
 
     try:
         classes = _classes(args.sources)
         # numba takes a second to import: only for what is well up to here.
-        from rtcf_compile import build, lowering
+        from rtcf_compile.library import build
+        from rtcf_compile.machine_code import lowering
 
         compiled = [lowering.compile_component(each) for each in classes]
         if args.verify is not None and not _verified(classes, compiled, args):
@@ -51,7 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _verified(classes: list[type], compiled: list[Any], args: argparse.Namespace) -> bool:
-    from rtcf_compile import verify
+    from rtcf_compile.comparison import verify
 
     good = True
     for cls, machine_code in zip(classes, compiled, strict=True):
@@ -62,8 +63,8 @@ def _verified(classes: list[type], compiled: list[Any], args: argparse.Namespace
 
 
 def _classes(files: list[Path]) -> list[type]:
-    from rtcf_compile import source
-    from rtcf_compile.mistake import Mistake
+    from rtcf_compile.source import modules as source
+    from rtcf_compile.source.mistake import Mistake
 
     found: dict[str, type] = {}
     for file in files:

@@ -10,7 +10,7 @@ from numba.core.errors import TypingError
 from numba.extending import overload
 from numba.np.numpy_support import as_dtype
 
-from rtcf_compile import helpers
+from rtcf_compile.rewriting import helpers
 
 # numba takes an overload apart by its parameters' names and reads its returned function as source.
 _OPTIONS = {"boundscheck": False, "error_model": "numpy"}

@@ -8,9 +8,9 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from rtcf_compile import shim
-from rtcf_compile.lowering import Compiled
-from rtcf_compile.mistake import Mistake
+from rtcf_compile.library import shim
+from rtcf_compile.machine_code.lowering import Compiled
+from rtcf_compile.source.mistake import Mistake
 
 _HERE = Path(__file__).resolve().parent
 _FLAGS = (

@@ -8,7 +8,7 @@ from numba import types
 from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
-from rtcf_compile.logs import Logs
+from rtcf_compile.rewriting.logs import Logs
 
 _CPP = {types.boolean: "bool", types.int64: "std::int64_t", types.float64: "double"}
 _PRESENT: list[Logs] = []

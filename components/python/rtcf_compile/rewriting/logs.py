@@ -3,8 +3,8 @@
 import ast
 from dataclasses import dataclass, field
 
-from rtcf_compile.mistake import at
-from rtcf_compile.source import Source
+from rtcf_compile.source.mistake import at
+from rtcf_compile.source.modules import Source
 
 
 @dataclass

@@ -9,8 +9,8 @@ import numpy as np
 from rtcf.component.declaration import Description, Input, Member, Output, Parameter, State
 from rtcf.component.value_type import ValueType
 
-from rtcf_compile.lowering import Compiled
-from rtcf_compile.mistake import display, source_line
+from rtcf_compile.machine_code.lowering import Compiled
+from rtcf_compile.source.mistake import display, source_line
 
 _NUMBER = {"float32": "float", "float64": "double"}
 

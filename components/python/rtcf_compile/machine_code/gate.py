@@ -5,7 +5,7 @@ Whatever else it would need at run time is refused, with the line that it comes 
 
 from typing import Any
 
-from rtcf_compile.mistake import Mistake
+from rtcf_compile.source.mistake import Mistake
 
 _MATHEMATICS = [
     "acos",

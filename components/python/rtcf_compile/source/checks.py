@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from rtcf_compile.mistake import Mistake, at
-from rtcf_compile.source import Source
+from rtcf_compile.source.mistake import Mistake, at
+from rtcf_compile.source.modules import Source
 
 _REFUSED: dict[type[ast.AST], tuple[str, str]] = {
     ast.List: ("a list allocates", "use np.array((…)), or an array of State"),

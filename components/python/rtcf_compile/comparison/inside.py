@@ -6,10 +6,10 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from rtcf_compile.build import compiler
-from rtcf_compile.lowering import Compiled
-from rtcf_compile.mistake import Mistake
-from rtcf_compile.raises import hash_of
+from rtcf_compile.library.build import compiler
+from rtcf_compile.machine_code.lowering import Compiled
+from rtcf_compile.machine_code.raises import hash_of
+from rtcf_compile.source.mistake import Mistake
 
 
 class Inside:

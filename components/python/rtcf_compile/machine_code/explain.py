@@ -4,7 +4,7 @@ import re
 from types import FunctionType
 from typing import Any
 
-from rtcf_compile.mistake import Mistake
+from rtcf_compile.source.mistake import Mistake
 
 _MARK = re.compile(r"RTCF:([^:\n]+):([^\n]+?)(?:\x1b|\n|$)")
 _KNOWN: tuple[tuple[str, str, str], ...] = (

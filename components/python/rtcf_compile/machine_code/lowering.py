@@ -21,12 +21,13 @@ from numba.core import errors
 from rtcf.component import Component, describe
 from rtcf.component.declaration import Description
 
-import rtcf_compile.overloads  # noqa: F401, registers them
-from rtcf_compile import arena, backend, explain, gate, log_calls, trial
-from rtcf_compile.functions import Functions
-from rtcf_compile.logs import Logs
-from rtcf_compile.mistake import Mistake
-from rtcf_compile.raises import Raise, raises_in
+import rtcf_compile.machine_code.overloads  # noqa: F401, registers them
+from rtcf_compile.machine_code import arena, backend, explain, gate, trial
+from rtcf_compile.machine_code.raises import Raise, raises_in
+from rtcf_compile.rewriting import log_calls
+from rtcf_compile.rewriting.functions import Functions
+from rtcf_compile.rewriting.logs import Logs
+from rtcf_compile.source.mistake import Mistake
 
 warnings.filterwarnings("ignore", category=errors.NumbaWarning)
 

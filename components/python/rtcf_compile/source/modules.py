@@ -14,7 +14,7 @@ from typing import Any
 
 from rtcf.component import Component, DeclarationError
 
-from rtcf_compile.mistake import Mistake
+from rtcf_compile.source.mistake import Mistake
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from rtcf.component import Component
 from rtcf.component.declaration import Input, describe
 
-from rtcf_compile.mistake import Mistake
+from rtcf_compile.source.mistake import Mistake
 
 _CYCLES = 20
 _SHAPES = re.compile(r"matmul|broadcast|shape|dimension|size \d", re.IGNORECASE)

@@ -15,12 +15,12 @@ import numpy as np
 from rtcf.component import Component
 from rtcf.component.declaration import Input, Member, Output, Parameter
 
-from rtcf_compile import helpers
-from rtcf_compile.functions import made
-from rtcf_compile.inside import Inside
-from rtcf_compile.lowering import Compiled
-from rtcf_compile.rewrite import Products
-from rtcf_compile.source import is_own, read
+from rtcf_compile.comparison.inside import Inside
+from rtcf_compile.machine_code.lowering import Compiled
+from rtcf_compile.rewriting import helpers
+from rtcf_compile.rewriting.functions import made
+from rtcf_compile.rewriting.rewrite import Products
+from rtcf_compile.source.modules import is_own, read
 
 LARGEST_ULP = 4
 _ANEW = 200  # cycles from one start to the next

@@ -21,11 +21,11 @@ from rtcf.component.declaration import (
     Parameter,
 )
 
-from rtcf_compile.checks import resolve
-from rtcf_compile.helpers import INSTEAD
-from rtcf_compile.logs import Logs
-from rtcf_compile.mistake import at
-from rtcf_compile.source import Source
+from rtcf_compile.rewriting.helpers import INSTEAD
+from rtcf_compile.rewriting.logs import Logs
+from rtcf_compile.source.checks import resolve
+from rtcf_compile.source.mistake import at
+from rtcf_compile.source.modules import Source
 
 _Node = TypeVar("_Node", bound=ast.AST)
 _INPUT_FIELDS = {"value": "", "new": "__new", "valid": "__valid", "age": "__age"}

@@ -12,12 +12,12 @@ import numpy as np
 from rtcf.component import Component, Fault
 from rtcf.component.declaration import HOOKS, Description
 
-from rtcf_compile import helpers
-from rtcf_compile.checks import check, resolve
-from rtcf_compile.logs import Logs
-from rtcf_compile.mistake import Mistake, at
-from rtcf_compile.rewrite import Hook, Products
-from rtcf_compile.source import Source, is_own, read
+from rtcf_compile.rewriting import helpers
+from rtcf_compile.rewriting.logs import Logs
+from rtcf_compile.rewriting.rewrite import Hook, Products
+from rtcf_compile.source.checks import check, resolve
+from rtcf_compile.source.mistake import Mistake, at
+from rtcf_compile.source.modules import Source, is_own, read
 
 # What makes a compiled function of a Python one, and what stands for a log call.
 Compiler = Callable[[FunctionType], Any]
@@ -187,6 +187,6 @@ def made(tree: ast.FunctionDef, scope: dict[str, Any], source: Source) -> Functi
 
 
 def _log(number: int, count: int) -> Any:
-    from rtcf_compile.log_calls import log_call
+    from rtcf_compile.rewriting.log_calls import log_call
 
     return log_call(number, count)

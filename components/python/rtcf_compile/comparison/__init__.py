@@ -1,0 +1,1 @@
+"""Compiled code beside the interpreter: the same inputs for both."""

@@ -1,0 +1,1 @@
+"""From an object file to a library of components, by a C++ shim around it."""
