@@ -176,8 +176,9 @@ async function slow() {
   $("freeze").classList.toggle("frozen", frozen);
   $("freeze").disabled = scope.mode !== "roll";
   const { overruns = 0 } = figures.state;
-  const lost = scope.live.lost;
-  $("figures").textContent = `${overruns} overruns   ${lost ? `${lost} cycles not seen here   ` : ""}${Math.round(figures.perSecond)} frames/s`;
+  const { lost } = scope.live;
+  $("figures").textContent = [`${overruns} overrun${overruns === 1 ? "" : "s"}`, ...(lost ? [`${lost} cycles not seen here`] : []),
+    `${Math.round(figures.perSecond)} frames/s`].join(" · ");
 }
 
 async function layouts() {
@@ -207,9 +208,11 @@ function apply(found) {
   if (["measurements", "spectrum", "cycles", "graph", "events"].includes(found.drawer)) open(found.drawer);
 }
 
-function theme(name) {
-  document.documentElement.dataset.theme = name;
-  localStorage.setItem("theme", name);
+const systemsLight = matchMedia("(prefers-color-scheme: light)");
+
+// The theme that was chosen, else the system's.
+function theme() {
+  document.documentElement.dataset.theme = localStorage.getItem("theme") ?? (systemsLight.matches ? "light" : "dark");
   for (const pane of scope.panes) pane.describe();
   tree.show();
   scope.changed();
@@ -219,7 +222,10 @@ const trying = (does) => Promise.resolve().then(does).then(() => told.trouble(""
 
 function buttons() {
   const freeze = () => (scope.view.follows ? scope.freeze() : scope.run());
-  const other = () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
+  const other = () => {
+    localStorage.setItem("theme", document.documentElement.dataset.theme === "dark" ? "light" : "dark");
+    theme();
+  };
   $("roll").onclick = () => mode("roll");
   $("triggered").onclick = () => mode("trigger");
   $("freeze").onclick = freeze;
@@ -253,7 +259,8 @@ function frame() {
 }
 
 async function begin() {
-  theme(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
+  theme();
+  systemsLight.onchange = theme;
   buttons();
   const asked = layout.ofAddress();
   const about = await ask("/api/about");
