@@ -7,8 +7,9 @@ from urllib.parse import quote
 import pytest
 import rtcf
 from browser import Browser, Page
-from daemon_process import Daemon
+from daemon_process import Daemon, wait_for
 from rtcf.v1 import runner_pb2
+from rtcf_shared import spec
 from scope_process import ScopeProcess
 
 _WAVES = 8
@@ -67,6 +68,11 @@ def _open(browser: Browser, scope: ScopeProcess, layout: str = "") -> Page:
     return browser.page(scope.address + (f"#{quote(layout)}" if layout else ""))
 
 
+def _amplitude(client: rtcf.Client) -> float:
+    parameters = client.get_component("w1").parameters
+    return next(each.value.double_value for each in parameters if each.name == "amplitude")
+
+
 def _press(page: Page, element: str) -> None:
     page.ask(f"document.querySelector({element!r}).click()")
 
@@ -112,6 +118,31 @@ def test_what_is_so_for_one_cycle_is_shown_in_the_middle(
     assert shot["found"] == [[100, 0, True]]
     assert shot["count"] == 200
     assert abs(shot["begin"] + shot["end"]) < 0.02 * (shot["end"] - shot["begin"])
+    assert page.errors == []
+
+
+def test_a_slider_sets_the_parameter_of_the_running_component(
+    visit: Opener, scope: ScopeProcess, loop: Daemon
+) -> None:
+    page = visit(scope)
+    _press(page, "aside [data-tab=parameters]")
+    page.wait("document.querySelector('[data-slider=\"/w1.amplitude\"]') !== null")
+    page.ask(
+        """(() => {
+          const slider = document.querySelector('[data-slider="/w1.amplitude"]');
+          for (const value of [2, 3, 1.5]) {
+            slider.value = value;
+            slider.dispatchEvent(new Event("input", { bubbles: true }));
+          }
+        })()"""
+    )
+    with rtcf.Client(loop.socket) as client:
+        wait_for(lambda: _amplitude(client) == 1.5, "the slider's value in the loop")
+    # The page says who it was, and follows what others set.
+    page.wait("document.querySelector('[data-who=\"/w1.amplitude\"]').textContent")
+    with rtcf.Client(loop.socket) as client:
+        client.set_parameters("w1", [spec.parse_parameter("amplitude:=0.5")])
+    page.wait("document.querySelector('[data-key=\"/w1.amplitude\"]').value === '0.5'")
     assert page.errors == []
 
 

@@ -94,7 +94,20 @@ export class Parameters {
     let timer = null;
     const read = (input) => parameter.type === "bool" ? input.checked
       : parameter.type === "int" || parameter.type === "double" ? Number(input.value) : input.value;
+    // One at a time, so that the last one said is the last one set.
+    let saying = false, next;
     const say = async (value) => {
+      next = { value };
+      if (saying) return;
+      saying = true;
+      while (next) {
+        const { value } = next;
+        next = undefined;
+        await set(value);
+      }
+      saying = false;
+    };
+    const set = async (value) => {
       try {
         await ask(`/api/parameter?${query({ runner: this.told.runner() })}`, {
           method: "POST", headers: { "Content-Type": "application/json" },
