@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-_STATE = re.compile(r"^(bool|float|double|u?int(?:8|16|32|64))(?:\[(\d+)(?:x(\d+))?\])?$")
+_STATE = re.compile(
+    r"^(bool|float|double|u?int(?:8|16|32|64))(?:\[(\d+)(?:x(\d+)(,RowMajor)?)?\])?$"
+)
 _FORMATS = {"bool": "?", "float": "<f4", "double": "<f8"}
 
 
@@ -189,12 +191,14 @@ def _signals(number: int, name: str, column: ports_pb2.PortColumn) -> Iterator[S
     match = _STATE.match(column.type)
     if match is None:
         return  # a structure, of which nobody has told the fields
-    kind, rows, columns = match.groups()
+    kind, rows, columns, by_rows = match.groups()
     form = _FORMATS.get(kind) or f"<{'u' if kind[0] == 'u' else 'i'}{int(kind.strip('uint')) // 8}"
     if rows is None:
         yield Signal(name, column.unit, number, form, (), 0)
     elif columns is None or "1" in (rows, columns):
         yield Signal(name, column.unit, number, form, (int(rows) * int(columns or 1),), 0)
+    elif by_rows:
+        yield Signal(name, column.unit, number, form, (int(rows), int(columns)), 0)
     else:
         shape = (int(columns), int(rows))
         yield Signal(name, column.unit, number, form, shape, 0, transposed=True)

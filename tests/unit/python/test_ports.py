@@ -70,6 +70,14 @@ def test_arrays_of_bytes_are_read_byte_by_byte(tmp_path: Path) -> None:
             assert recording["/c.s"].tolist() == expected.reshape(2, -1).tolist(), type_name
 
 
+def test_a_matrix_that_lies_row_by_row_is_not_transposed(tmp_path: Path) -> None:
+    expected = np.arange(12, dtype="u1").reshape(2, 2, 3)
+    told = batch(schema(state("uint8[2x3,RowMajor]", 6)), 0, expected.tobytes())
+    assert told["/c.s"].tolist() == expected.tolist()
+    with recorded(tmp_path / "x.mcap", told) as recording:
+        assert recording["/c.s"].tolist() == expected.reshape(2, -1).tolist()
+
+
 def test_an_output_and_a_state_of_one_name_are_both_there(tmp_path: Path) -> None:
     made = output("float64 data\n", "1", bytes(8), name="s")
     for columns in ((made, state("double", 8)), (state("double", 8), made)):

@@ -151,9 +151,10 @@ struct StateType<T, std::enable_if_t<detail::IsEigenMatrix<T>::value>> {
         return detail::stateHash(static_cast<std::uint64_t>(T::IsRowMajor), hash);
     }
     static std::string name() {
-        return fmt::format("{}[{}x{}]", StateType<typename T::Scalar>::name(),
+        constexpr bool kByRows = T::IsRowMajor != 0 && T::RowsAtCompileTime > 1;
+        return fmt::format("{}[{}x{}{}]", StateType<typename T::Scalar>::name(),
                            static_cast<int>(T::RowsAtCompileTime),
-                           static_cast<int>(T::ColsAtCompileTime));
+                           static_cast<int>(T::ColsAtCompileTime), kByRows ? ",RowMajor" : "");
     }
     static void print(const T& value, std::string& text) { detail::printMatrix(value, text); }
 };

@@ -108,6 +108,9 @@ TEST(State, TypesAndValuesHaveNames) {
     EXPECT_EQ(StateType<std::uint8_t>::name(), "uint8");
     EXPECT_EQ(StateType<Mode>::name(), "Mode");
     EXPECT_EQ(StateType<Eigen::Matrix4f>::name(), "float[4x4]");
+    EXPECT_EQ((StateType<Eigen::Matrix<float, 2, 3, Eigen::RowMajor>>::name()),
+              "float[2x3,RowMajor]");
+    EXPECT_EQ(StateType<Eigen::RowVector2d>::name(), "double[1x2]");
     EXPECT_EQ((StateType<std::array<Pair, 2>>::name()), "{a: double, b: double}[2]");
     EXPECT_EQ(print(std::array<Pair, 2>{}), "[{a: 0, b: 0}, {a: 0, b: 0}]");
     EXPECT_EQ(print(Eigen::Vector3d(1.0, 0.1, -2.5)), "[1; 0.1; -2.5]");
