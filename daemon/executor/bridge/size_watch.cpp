@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <iterator>
+
 namespace rtcf::executor {
 
 namespace {
@@ -14,20 +16,21 @@ constexpr std::size_t kKilo = 1024;
 void SizeWatch::look(const std::map<std::string, std::shared_ptr<Tap>>& taps,
                      const std::map<std::string, std::shared_ptr<Injector>>& injectors,
                      std::size_t largest, std::int64_t now_ns) {
+    for (auto known = known_.begin(); known != known_.end();)
+        known = known->first.expired() ? known_.erase(known) : std::next(known);
     for (const auto& [topic, tap] : taps) {
         if (const std::uint64_t count = tap->tooLarge(); count != 0)
-            note(topic, tap.get(), count, "not published", largest, now_ns);
+            note(topic, tap, count, "not published", largest, now_ns);
     }
     for (const auto& [topic, injector] : injectors) {
         if (const std::uint64_t count = injector->tooLarge(); count != 0)
-            note(topic, injector.get(), count, "not taken", largest, now_ns);
+            note(topic, injector, count, "not taken", largest, now_ns);
     }
 }
 
-void SizeWatch::note(const std::string& topic, const void* connection, std::uint64_t count,
+void SizeWatch::note(const std::string& topic, const Connection& connection, std::uint64_t count,
                      const char* what, std::size_t largest, std::int64_t now_ns) {
     Known& known = known_[connection];
-    if (count < known.counted) known = {};  // another one at the address of an old one
     total_ += count - known.counted;
     known.counted = count;
     if (count == known.reported || now_ns < known.next_report_ns) return;

@@ -33,18 +33,20 @@ class SizeWatch {
     std::uint64_t total() const noexcept { return total_; }
 
    private:
+    using Connection = std::weak_ptr<const void>;
     struct Known {
         std::uint64_t counted = 0;
         std::uint64_t reported = 0;
         std::int64_t next_report_ns = 0;
     };
 
-    void note(const std::string& topic, const void* connection, std::uint64_t count,
+    void note(const std::string& topic, const Connection& connection, std::uint64_t count,
               const char* what, std::size_t largest, std::int64_t now_ns);
 
     std::string runner_;
     Report report_;
-    std::map<const void*, Known> known_;
+    // Forgotten with their connections. One that leaves a plan and comes back goes on counting.
+    std::map<Connection, Known, std::owner_less<Connection>> known_;
     std::uint64_t total_ = 0;
 };
 
