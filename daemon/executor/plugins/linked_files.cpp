@@ -63,10 +63,14 @@ class LinkCheck {
         if (run_path.empty()) return folders;
         for (std::size_t begin = 0; begin <= run_path.size();) {
             const std::size_t end = std::min(run_path.find(':', begin), run_path.size());
-            folders.push_back(expanded(run_path.substr(begin, end - begin), origin));
+            const std::string entry = run_path.substr(begin, end - begin);
+            // Those of build trees end in an empty one. To the loader it is the current folder.
+            folders.push_back(entry.empty() ? std::filesystem::current_path().string()
+                                            : expanded(entry, origin));
             requireTrustedFolder(
                 folders.back(), owners_,
-                fmt::format("library {}, with {} in its run path", library_, folders.back()));
+                fmt::format("library {}, with {}{} in its run path", library_,
+                            entry.empty() ? "an empty entry, thus " : "", folders.back()));
             begin = end + 1;
         }
         return folders;
@@ -78,7 +82,6 @@ class LinkCheck {
                  at = folder.find(word, at + origin.size()))
                 folder.replace(at, word.size(), origin);
         }
-        // An empty one is the current folder.
         if (folder.empty() || folder.front() != '/' || folder.find('$') != std::string::npos)
             refuse(fmt::format("its run path has \"{}\", which is no absolute folder", folder));
         return folder;
