@@ -1,12 +1,11 @@
 """`rtcfctl apply|save`: graph files, see docs/graph-files.md."""
 
 import argparse
-import sys
 from typing import Any
 
 import rtcf
 from rtcf.v1 import control_pb2
-from rtcf_shared import durable
+from rtcf_shared import bounded_file, durable
 
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.plain import enumerator
@@ -122,15 +121,13 @@ def _print(
 
 def _read(file: str) -> tuple[str, str]:
     """Return the text of a file, and its name for messages."""
+    name = "standard input" if file == "-" else file
     try:
-        if file == "-":
-            return sys.stdin.read(), "standard input"
-        with open(file, encoding="utf-8") as opened:
-            return opened.read(), file
+        return bounded_file.read(file).decode(), name
     except OSError as error:
-        raise rtcf.GraphFileError(f"{file}: {error.strerror}") from None
+        raise rtcf.GraphFileError(f"{name}: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise rtcf.GraphFileError(f"{file}: it is not UTF-8 text") from None
+        raise rtcf.GraphFileError(f"{name}: it is not UTF-8 text") from None
 
 
 def _write(file: str, text: str) -> None:

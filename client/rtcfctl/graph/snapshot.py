@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import rtcf
-from rtcf_shared import durable
+from rtcf_shared import bounded_file, durable
 
 from rtcfctl.terminal.output import Output
 
@@ -47,7 +47,7 @@ def take(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 def restore(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Restore a snapshot."""
     try:
-        snapshot = args.file.read_bytes()
+        snapshot = bounded_file.read(args.file)
     except OSError as error:
         raise rtcf.RtcfError(f"{args.file}: {error.strerror}") from None
     result = client.restore_snapshot(snapshot, args.runner, output.progress)
