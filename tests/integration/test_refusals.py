@@ -125,7 +125,16 @@ REFUSALS = {
     ),
     "value above its maximum": Refusal("set knobs count:=11", ["/knobs", "count", "11", "10"]),
     "value of another type": Refusal("set knobs count:=1.5", ["count", "an int", "a double"]),
-    "text for a bool": Refusal("set knobs enabled:=perhaps", ["enabled", "a bool", "a string"]),
+    "text for a bool": Refusal(
+        "set knobs enabled:=perhaps", ["enabled", "a bool", 'the text "perhaps"']
+    ),
+    "a number that is none, as text": Refusal("set knobs rate:=nan", ["rate", 'the text "nan"']),
+    "one parameter twice": Refusal("set knobs count:=1 count:=2", ["count", "twice"]),
+    "one parameter twice at a load": Refusal(
+        f"load {TEST} Knobs --name k --param count:=1 --param count:=2", ["count", "twice"]
+    ),
+    "graph file without an end": Refusal("apply /dev/zero", ["/dev/zero", "more than 16 MiB"]),
+    "snapshot without an end": Refusal("restore /dev/zero", ["/dev/zero", "more than 16 MiB"]),
     "number for a string": Refusal("set knobs label:=5", ["label", "a string", "an int"]),
     "not a number": Refusal("set knobs rate:=.nan", ["rate", "finite"]),
     "unknown enumerator": Refusal("set knobs mode:=walk", ["mode", "walk", "idle, run"]),

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <set>
+
 #include "messages/parameter_value.hpp"
 #include "messages/settings_messages.hpp"
 #include "messages/to_wire.hpp"
@@ -83,8 +85,14 @@ ComponentDefinition replacementFrom(const pb::ComponentSpec& spec, const Compone
 std::vector<std::pair<std::string, ParameterValue>> parametersFrom(
     const google::protobuf::RepeatedPtrField<pb::ParameterSetting>& settings) {
     std::vector<std::pair<std::string, ParameterValue>> parameters;
+    std::set<std::string> names;
     for (const auto& setting : settings) {
         requireLength("parameter", setting.name());
+        if (!names.insert(setting.name()).second) {
+            throw Refusal(RefusalKind::InvalidArgument,
+                          fmt::format("parameter {} is set twice in one change: give it one value",
+                                      setting.name()));
+        }
         parameters.emplace_back(setting.name(),
                                 parameterValueFrom(setting.value(), setting.name()));
     }

@@ -344,9 +344,11 @@ inline std::string ParameterBase::check(ParameterValue& value) const {
     if (value.index() != initial.index()) {
         static constexpr std::array<const char*, 4> kNames{"a bool", "an int", "a double",
                                                            "a string"};
-        return fmt::format("parameter {} takes {}, not {}", name,
-                           type == "enum" ? "a name" : kNames[initial.index()],
-                           kNames[value.index()]);
+        const auto* text = std::get_if<std::string>(&value);
+        return fmt::format(
+            "parameter {} takes {}, not {}", name,
+            type == "enum" ? "a name" : kNames[initial.index()],
+            text ? fmt::format("the text \"{:.40}\"", *text) : kNames[value.index()]);
     }
     double number = 0.0;
     if (const auto* real = std::get_if<double>(&value)) {
