@@ -23,9 +23,8 @@ from rtcfd.common.aside import Aside
 from rtcfd.common.names import DEFAULT_RUNNER
 from rtcfd.common.refusals import FailedPrecondition, Refusal, Unavailable
 from rtcfd.configuration import options
-from rtcfd.executor import frames
+from rtcfd.executor import frames, left_over
 from rtcfd.executor.command import ExecutorCommand
-from rtcfd.executor.executor import left_overs
 from rtcfd.incidents.incidents import Incidents
 from rtcfd.notify import Notify, machine_goes_down
 from rtcfd.operations.runner_core import Surroundings
@@ -155,7 +154,7 @@ class Daemon:
         self._options.settings.keep()
         self._serve_privately()
         self._shared.rules = await self._reloads.rules()
-        self._left_over = left_overs(self._command.folder)
+        self._left_over = left_over.runners(self._command.folder)
         states = self._store.load(self._left_over)
         if self._options.default_runner and DEFAULT_RUNNER not in [s.runner for s in states]:
             states.append(Desired(DEFAULT_RUNNER))

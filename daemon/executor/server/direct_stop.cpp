@@ -53,23 +53,20 @@ std::vector<gid_t> groupsOf(int fd, gid_t primary) {
 }  // namespace
 
 DirectStop::DirectStop(std::string path, std::string mark, const Access& access)
-    : path_(std::move(path)), mark_(std::move(mark)), access_(access) {
-    if (path_.empty()) return;
-    listener_.emplace(path_, 256);
-    ::chmod(path_.c_str(), kSocketMode);
+    : mark_(std::move(mark)), access_(access) {
+    if (path.empty()) return;
+    listener_.emplace(std::move(path), 256, kSocketMode);
     wake_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     if (wake_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
 }
 
 DirectStop::~DirectStop() {
     close();
-    if (path_.empty()) return;
-    ::close(wake_);
-    ::unlink(path_.c_str());
+    if (listener_) ::close(wake_);
 }
 
 void DirectStop::serve(Stoppable what) {
-    if (path_.empty()) return;
+    if (!listener_) return;
     what_ = std::move(what);
     thread_ = std::thread([this] { threadMain(); });
 }
@@ -98,7 +95,7 @@ void DirectStop::threadMain() {
         if (clients_.size() >= kMostClients) polled[1].events = 0;
         for (const Client& client : clients_)
             polled.push_back({client.asked ? -1 : client.fd, POLLIN, 0});  // nothing more is heard
-        const int at_most_ms = clients_.empty() && !full ? -1 : 100;
+        const int at_most_ms = clients_.empty() && !full ? 1000 : 100;
         ::poll(polled.data(), polled.size(), waits ? kLookMs : at_most_ms);
         for (std::size_t i = clients_.size(); i-- > 0;) {
             if (attend(clients_[i], polled[i + 2].revents != 0)) continue;
@@ -106,6 +103,7 @@ void DirectStop::threadMain() {
             clients_.erase(clients_.begin() + static_cast<std::ptrdiff_t>(i));
         }
         if ((polled[1].revents & POLLIN) != 0) accept();
+        listener_->renew(monotonicNow());
         if (unsynced_ && clients_.empty()) {
             // After the answers: a busy disk is no reason to say "stopped" late.
             unsynced_ = false;

@@ -69,7 +69,6 @@ class DirectStop {
     bool attend(Client& client, bool readable);
     void stop(const Client& client);
 
-    const std::string path_;
     const std::string mark_;
     const Access& access_;
     Stoppable what_;

@@ -66,8 +66,7 @@ v1::Response lostRecords(std::uint64_t count) {
 }  // namespace
 
 Server::Server(const std::string& socket_path)
-    : path_(socket_path),
-      listener_(socket_path, kBacklog),
+    : listener_(socket_path, kBacklog),
       signals_(takeSignals()),
       wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
     if (wake_ < 0) fail("eventfd");
@@ -77,7 +76,6 @@ Server::~Server() {
     connections_.clear();
     ::close(wake_);
     ::close(signals_);
-    ::unlink(path_.c_str());
 }
 
 void Server::post(std::uint64_t connection, v1::Response response, bool last) {
@@ -183,6 +181,7 @@ void Server::serve(Runner& runner, Log& log, Access& access, const DirectStop& d
         servePorts();
         goOnWithResets();
         expire();
+        listener_.renew(monotonicNow());
         if (orphaned()) exiting_ = true;
     }
     runner.onFramesWaiting({});

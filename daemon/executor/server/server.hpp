@@ -85,7 +85,6 @@ class Server {
     std::string stuck() const;
     void requireNotStuck() const;
 
-    std::string path_;
     Listener listener_;
     int signals_ = -1;
     int wake_ = -1;

@@ -10,6 +10,7 @@ import logging
 import os
 import signal
 import subprocess
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from rtcfd import VERSION
 from rtcfd.common.limits import Limits
 from rtcfd.common.refusals import FailedPrecondition, Refusal, Silent, Unavailable
 from rtcfd.common.tasks import looked_at
+from rtcfd.executor import left_over
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.flight_recorder import FlightRecorder, Note
 from rtcfd.executor.link import (
@@ -43,6 +45,8 @@ QUERY_TIMEOUT_S = 5.0
 STOP_TIMEOUT_S = 10.0  # for the loop to end and the stop hooks to return
 EXIT_TIMEOUT_S = 5.0  # from the exit frame, and then from SIGTERM, to the end
 _RETRY_S = 0.01
+_RENEW_S = 3.0  # for an executor to make a socket that was removed, or to end
+_RENEW_LOOK_S = 0.1
 
 OnEnd = Callable[["Executor", End], None]
 
@@ -125,12 +129,8 @@ class Executor:
         not ours is `foreign`: its loop goes on, and can be stopped.
         """
         socket = command.socket(runner)
-        try:
-            link = await Link.connect(f"left-over executor of {runner}", socket, on_unasked)
-        except FileNotFoundError:
-            return None
-        except ConnectionRefusedError:
-            _remove_dead(socket)
+        link = await _link_to(runner, socket, on_unasked)
+        if link is None:
             return None
         try:
             process = Process(link.peer_pid)
@@ -369,6 +369,33 @@ async def _end(process: Process, peer: str) -> None:
     await process.wait()
 
 
+async def _link_to(runner: str, socket: Path, on_unasked: Unasked) -> Link | None:
+    """Connect to an executor that was left at a socket; None if there is none any more.
+
+    One whose socket was removed makes it anew within a second, and one that ends takes a while:
+    both are waited for.  Raises Silent for one that does neither.
+    """
+    deadline = time.monotonic() + _RENEW_S
+    while True:
+        try:
+            return await Link.connect(f"left-over executor of {runner}", socket, on_unasked)
+        except FileNotFoundError:
+            pass
+        except ConnectionRefusedError:
+            _remove_dead(socket)
+        pid = await asyncio.to_thread(left_over.process, socket)
+        if pid is None:
+            return None
+        if time.monotonic() > deadline:
+            raise Silent(
+                f"an executor of runner {runner} is there (pid {pid}), and its socket {socket} is "
+                "not; its loop may be running: it is looked for again and again, "
+                f"`kill {pid}` ends it in order",
+                errors_pb2.REASON_EXECUTOR_SILENT,
+            )
+        await asyncio.sleep(_RENEW_LOOK_S)
+
+
 def _remove_dead(socket: Path) -> None:
     try:
         socket.unlink(missing_ok=True)
@@ -377,11 +404,3 @@ def _remove_dead(socket: Path) -> None:
             f"{socket} is in the way and is no socket of an executor: remove it ({error.strerror})",
             errors_pb2.REASON_EXECUTOR_FAILED,
         ) from None
-
-
-def left_overs(folder: Path) -> list[str]:
-    """Return the runners that have a socket in the folder of the executors."""
-    try:
-        return sorted(each.stem for each in folder.glob("*.sock") if each.is_socket())
-    except OSError:
-        return []

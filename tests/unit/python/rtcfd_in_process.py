@@ -26,7 +26,7 @@ from rtcfd.catalog.catalog import Catalog, Folder
 from rtcfd.catalog.describe import Describer
 from rtcfd.common import runner_settings
 from rtcfd.common.event_log import EventLog
-from rtcfd.executor import executor
+from rtcfd.executor import executor, left_over
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.link import Link
 from rtcfd.executor.process import End
@@ -180,7 +180,7 @@ class Rtcfd:
         if "rt_runner" not in [state.runner for state in states]:
             states.append(Desired("rt_runner"))
         self.runners.adopt(states)
-        await self.runners.bring_up(executor.left_overs(self.folder / "executors"))
+        await self.runners.bring_up(left_over.runners(self.folder / "executors"))
         for runner in self.runners.all():
             await_holder(self.runners, runner)
 

@@ -4,11 +4,15 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace rtcf {
@@ -66,7 +70,59 @@ TEST(Listener, LetsOneInWhenNoDescriptorIsLeftAndTheOthersWait) {
     ::close(next);
     ::close(first);
     ::close(second);
-    ::unlink(path.c_str());
+}
+
+TEST(Listener, MakesItsSocketAnewWhereSomebodyHasRemovedIt) {
+    const std::string path = ::testing::TempDir() + "renewed-" + std::to_string(::getpid());
+    constexpr std::int64_t kSecond = 1'000'000'000;
+    struct stat made{};
+    {
+        executor::Listener listener(path, 8, 0600);
+        const int before = connectTo(path);
+        ::close(listener.accept());
+        ::unlink(path.c_str());
+        listener.renew(5 * kSecond);
+        ASSERT_EQ(::stat(path.c_str(), &made), 0);
+        EXPECT_EQ(made.st_mode & 0777U, 0600U);
+        const int after = connectTo(path);
+        const int accepted = listener.accept();
+        EXPECT_GE(accepted, 0);
+        for (const int fd : {before, after, accepted}) ::close(fd);
+        // It looks once a second, as a call of the system is one.
+        ::unlink(path.c_str());
+        listener.renew(5 * kSecond + 1);
+        EXPECT_NE(::stat(path.c_str(), &made), 0);
+        listener.renew(6 * kSecond);
+        EXPECT_EQ(::stat(path.c_str(), &made), 0);
+    }
+    EXPECT_NE(::stat(path.c_str(), &made), 0);
+}
+
+TEST(Listener, LeavesAloneWhatAnotherHasPutInItsPlace) {
+    const std::string path = ::testing::TempDir() + "others-" + std::to_string(::getpid());
+    std::optional<executor::Listener> first(std::in_place, path, 8);
+    executor::Listener second(path, 8);
+    first->renew(5'000'000'000);
+    first.reset();
+    const int client = connectTo(path);
+    const int accepted = second.accept();
+    EXPECT_GE(accepted, 0);
+    ::close(accepted);
+    ::close(client);
+}
+
+TEST(Listener, WaitsForItsFolderToBeThereAgain) {
+    const std::string folder = ::testing::TempDir() + "folder-" + std::to_string(::getpid());
+    ASSERT_EQ(::mkdir(folder.c_str(), 0700), 0);
+    executor::Listener listener(folder + "/socket", 8);
+    ::unlink((folder + "/socket").c_str());
+    ASSERT_EQ(::rmdir(folder.c_str()), 0);
+    listener.renew(5'000'000'000);
+    ASSERT_EQ(::mkdir(folder.c_str(), 0700), 0);
+    listener.renew(6'000'000'000);
+    ::close(connectTo(folder + "/socket"));
+    ::unlink((folder + "/socket").c_str());
+    ::rmdir(folder.c_str());
 }
 
 }  // namespace
