@@ -50,22 +50,35 @@ class Witness final : public rtcf::Component {
     }
 };
 
+// Waits for a file. Not real-time safe.
+bool comes(const std::string& file) {
+    const auto until = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+    while (!std::filesystem::exists(file)) {
+        if (std::chrono::steady_clock::now() > until) return false;
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return true;
+}
+
 class StartsOnceThereIs final : public rtcf::Component {
     rtcf::Parameter<std::string> file{this, "file", "", rtcf::Doc("start() waits for it")};
 
     bool start() override {
         RTCF_INFO(this, "waits for {}", "a file");
-        const auto until = std::chrono::steady_clock::now() + std::chrono::minutes(1);
-        while (!std::filesystem::exists(file.value())) {
-            if (std::chrono::steady_clock::now() > until) return fail("it does not come");
-            std::this_thread::sleep_for(std::chrono::milliseconds(1));
-        }
-        return true;
+        return comes(file.value()) || fail("it does not come");
     }
+    void update() override {}
+};
+
+class ConfiguresOnceThereIs final : public rtcf::Component {
+    rtcf::Parameter<std::string> file{this, "file", "", rtcf::Doc("configure() waits for it")};
+
+    bool configure() override { return comes(file.value()) || fail("it does not come"); }
     void update() override {}
 };
 
 }  // namespace
 
+RTCF_COMPONENT(ConfiguresOnceThereIs, "Waits in configure() for a file")
 RTCF_COMPONENT(StartsOnceThereIs, "Waits in start() for a file")
 RTCF_COMPONENT(Witness, "Tells of each hook")

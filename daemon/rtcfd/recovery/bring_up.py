@@ -112,6 +112,7 @@ async def _restore(runner: RunnerCore) -> None:
     wanted = [name for name in runner.desired.components if name not in runner.left_out]
     if not wanted:
         return
+    runner.trouble = restoring = f"its components are being restored: {len(wanted)}"
     try:
         # All at once, for speed; one by one if that finds something to refuse.
         every = await loads(runner.catalog, [runner.desired.components[name] for name in wanted])
@@ -119,6 +120,9 @@ async def _restore(runner: RunnerCore) -> None:
     except Refusal:
         if runner.up:
             await _load_each(runner, wanted)
+    finally:
+        if runner.trouble == restoring:  # else it has died since
+            runner.trouble = ""
     if runner.up:
         count = len(runner.desired.components) - len(runner.left_out)
         runner.log.info("%d of its components restored, held", count)
