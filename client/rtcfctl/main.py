@@ -185,7 +185,7 @@ def _global_options(to: argparse.ArgumentParser, defaults: bool) -> None:
         "--verbose",
         action="store_true",
         default=default(False),
-        help="show what long calls are doing (always on a terminal)",
+        help="show what long calls are doing (always on a terminal, and after 10 s)",
     )
 
 

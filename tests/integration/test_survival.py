@@ -5,7 +5,9 @@ import functools
 import json
 import os
 import random
+import shutil
 import signal
+import subprocess
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +15,9 @@ from pathlib import Path
 import pytest
 import rtcf
 from daemon_process import Daemon, stopped, wait_for
+from rtcf import direct_stop
 from rtcf.v1 import runner_pb2
+from rtcfd.executor import left_over
 from values import state
 
 # As long as the system's, other than a private daemon's own default.
@@ -82,6 +86,93 @@ def test_an_executor_that_was_held_up_is_adopted_when_it_goes_on(daemon: Daemon)
         wait_for(lambda: state(client).pid == before.pid, "its adoption")
         assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
         assert client.get_order() == ["/steady"]
+
+
+def test_the_status_says_that_a_graph_is_being_restored(daemon: Daemon, tmp_path: Path) -> None:
+    file = tmp_path / "plugged in"
+    file.touch()
+    with rtcf.Client(daemon.socket) as client:
+        client.load(
+            rtcf.component(
+                "rtcf_test", "ConfiguresOnceThereIs", name="slow", parameters=[f"file:={file}"]
+            )
+        )
+        file.unlink()
+        os.kill(state(client).pid, signal.SIGKILL)
+        said = "its components are being restored: 1"
+        wait_for(lambda: said in state(client).status, "what it does")
+        file.touch()
+        wait_for(lambda: client.get_order() == ["/slow"], "the component")
+        wait_for(lambda: said not in state(client).status, "the end of it")
+
+
+def folders(daemon: Daemon) -> list[Path]:
+    return [Path(f"{daemon.socket}.d") / each for each in ("executors", "stop")]
+
+
+@pytest.mark.parametrize("all_of_them", [False, True])
+def test_a_loop_whose_socket_was_removed_is_adopted_and_gets_no_twin(
+    daemon: Daemon, all_of_them: bool
+) -> None:
+    with rtcf.Client(daemon.socket) as client:
+        client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
+        client.start()
+        before = state(client)
+        for folder in folders(daemon):
+            for each in [folder] if all_of_them else list(folder.iterdir()):
+                shutil.rmtree(each) if each.is_dir() else each.unlink()
+        if not all_of_them:
+            # It stops without rtcfd as ever.
+            daemon.end(signal.SIGKILL)
+            wait_for(lambda: list(folders(daemon)[1].iterdir()), "the socket for stops")
+        else:
+            daemon.end(signal.SIGKILL)
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        wait_for(lambda: state(client).pid == before.pid, "its adoption")
+        assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
+    assert left_over.runners(folders(daemon)[0]) == ["rt_runner"]
+    wait_for(lambda: list(folders(daemon)[1].iterdir()), "the socket for stops")
+    assert [each.error for each in direct_stop.stop_all(daemon.socket)] == [None]
+    with rtcf.Client(daemon.socket) as client:
+        assert state(client).pid == before.pid
+        assert state(client).state == runner_pb2.RUNNER_STATE_STOPPED
+
+
+def test_an_executor_that_neither_answers_nor_has_a_socket_keeps_its_place(daemon: Daemon) -> None:
+    with rtcf.Client(daemon.socket) as client:
+        client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
+        client.start()
+        before = state(client)
+    daemon.end(signal.SIGKILL)
+    with stopped(before.pid):
+        shutil.rmtree(folders(daemon)[0])
+        daemon.start()
+        with rtcf.Client(daemon.socket) as client:
+            wait_for(lambda: f"`kill {before.pid}` ends it" in state(client).status, "its line")
+            with pytest.raises(rtcf.RefusedError, match=f"is there .pid {before.pid}., and its so"):
+                client.start()
+    with rtcf.Client(daemon.socket) as client:
+        wait_for(lambda: state(client).pid == before.pid, "its adoption")
+        assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
+
+
+def test_a_change_that_waits_for_its_executor_says_so(daemon: Daemon) -> None:
+    with rtcf.Client(daemon.socket) as client:
+        client.load(rtcf.component("rtcf_test", "Knobs", name="knobs"))
+        executor = state(client).pid
+    with stopped(executor):
+        setting = subprocess.Popen(
+            ["rtcfctl", "-v", "set", "knobs", "count:=7"],
+            env=daemon.environment(),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        assert setting.stderr is not None
+        assert "status` tells what is waited for" in setting.stderr.readline()
+    _, rest = setting.communicate()
+    assert setting.returncode == 0, rest
 
 
 def test_the_crash_of_an_adopted_executor_is_told_by_its_flight_recorder(daemon: Daemon) -> None:

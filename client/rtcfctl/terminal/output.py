@@ -5,6 +5,7 @@ yaml and json are imported only where they are used: a call of rtcfctl is short.
 
 import os
 import sys
+import time
 from collections.abc import Iterable, Sequence
 from typing import Any, TextIO
 
@@ -13,6 +14,7 @@ from rtcf.v1 import control_pb2
 from rtcfctl.terminal.plain import number, plain
 from rtcfctl.terminal.table import Cell, format_table
 
+_PATIENCE_S = 10.0  # of somebody who is told nothing
 _ANSI = {"bold": "1", "red": "31", "green": "32", "yellow": "33"}
 
 
@@ -22,6 +24,7 @@ class Output:
     def __init__(self, kind: str, verbose: bool = False) -> None:
         self._kind = kind
         self._verbose = verbose or sys.stderr.isatty()
+        self._since = time.monotonic()
 
     @property
     def for_people(self) -> bool:
@@ -81,8 +84,8 @@ class Output:
             print("\x1b[2J\x1b[H", end="")
 
     def progress(self, line: str) -> None:
-        """Show what a long call is doing."""
-        if self._verbose:
+        """Show what a long call is doing; unasked only if it takes very long."""
+        if self._verbose or time.monotonic() - self._since > _PATIENCE_S:
             print(line, file=sys.stderr)
 
     def alarm(self, runner: str, reasons: Iterable[str], to: TextIO | None = None) -> None:

@@ -5,6 +5,7 @@ Decorators, and the one place that knows when a call's caller has left.
 
 import asyncio
 import functools
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
 from typing import Any, Protocol
 
@@ -14,6 +15,9 @@ from rtcfd.common.refusals import InvalidArgument
 from rtcfd.common.status_codes import abort
 from rtcfd.executor.link import Progress
 from rtcfd.runners.outbox import Outbox
+
+_SILENCE_S = 2.0  # of a call, until it says that it waits
+_LONGEST_SILENCE_S = 16.0
 
 Work = Callable[[Progress], Coroutine[Any, Any, Any]]
 
@@ -33,7 +37,8 @@ def answering(method: Callable[..., Awaitable[Any]]) -> Any:
 
 def lasting(response: Any, last: str) -> Callable[[Callable[..., Work]], Any]:
     """Stream what a call does, as `response`, then its result in the field `last`; or turn its
-    refusal into a status.  The method returns the work, which tells of its progress."""
+    refusal into a status.  The method returns the work, which tells of its progress; what is
+    silent for long is said to be waited for."""
 
     def decorate(method: Callable[..., Work]) -> Any:
         @functools.wraps(method)
@@ -43,7 +48,7 @@ def lasting(response: Any, last: str) -> Callable[[Callable[..., Work]], Any]:
             try:
                 task = asyncio.ensure_future(method(self, request)(lines.put_nowait))
                 task.add_done_callback(lambda _: lines.put_nowait(None))
-                while (line := await lines.get()) is not None:
+                async for line in _with_word_of_waiting(lines):
                     yield response(progress=line)
                 yield response(**{last: task.result()})
             except Exception as error:
@@ -55,6 +60,22 @@ def lasting(response: Any, last: str) -> Callable[[Callable[..., Work]], Any]:
         return wrapper
 
     return decorate
+
+
+async def _with_word_of_waiting(lines: "asyncio.Queue[str | None]") -> AsyncIterator[str]:
+    """Yield lines until None comes, and one of ours for each silence that lasts."""
+    since, silence_s = time.monotonic(), _SILENCE_S
+    while True:
+        try:
+            line = await asyncio.wait_for(lines.get(), silence_s)
+        except TimeoutError:
+            waited_s = time.monotonic() - since
+            yield f"not done after {waited_s:.0f} s: `rtcfctl status` tells what is waited for"
+            silence_s = min(2 * silence_s, _LONGEST_SILENCE_S)
+            continue
+        if line is None:
+            return
+        yield line
 
 
 changing = lasting(control_pb2.ChangeResponse, "result")

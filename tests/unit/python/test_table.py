@@ -1,10 +1,12 @@
 """Tables that rtcfctl prints: they fit the terminal, and no figure is cut."""
 
 import json
+import time
 
 import pytest
 from rtcf.v1 import graph_pb2
 from rtcfctl.terminal import words
+from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.plain import plain
 from rtcfctl.terminal.table import Cell, format_table
 
@@ -76,3 +78,14 @@ def test_state_is_numbers_too_and_no_value_is_null() -> None:
     state = plain(graph_pb2.StateInfo(type="double[2]", initial="[0, 1e-05]"))
     assert (state["initial"], state["value"]) == ([0, 1e-05], None)
     assert plain(graph_pb2.PortInfo())["value"] is None
+
+
+def test_what_takes_very_long_tells_what_it_does_unasked(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    now = time.monotonic()
+    output = Output("table")
+    output.progress("a")
+    monkeypatch.setattr(time, "monotonic", lambda: now + 11.0)
+    output.progress("b")
+    assert capsys.readouterr().err == "b\n"
