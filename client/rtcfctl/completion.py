@@ -52,6 +52,15 @@ def _declared(client: rtcf.Client, package: str, type_name: str, source: str) ->
             yield from (str(port.name) for port in inputs)
 
 
+def _ports(client: rtcf.Client, runner: str, direction: graph_pb2.Direction) -> Iterator[str]:
+    """Yield the ports of all components that are of one direction."""
+    for component in client.list_components(runner):
+        name = component.full_name.removeprefix("/")
+        yield from (
+            f"{name}.{port.name}" for port in component.ports if port.direction == direction
+        )
+
+
 class _Line:
     """What the words before the one that is completed mean."""
 
@@ -136,13 +145,9 @@ class _Line:
         elif source in ("NAME:=VALUE", "FROM:=TO", "PORT") and len(self._given) > 1:
             yield from _declared(client, self._given[-2], self._given[-1], source)
         elif source == "COMPONENT.PORT":
-            for component in client.list_components(runner):
-                name = component.full_name.removeprefix("/")
-                yield from (
-                    f"{name}.{port.name}"
-                    for port in component.ports
-                    if port.direction == graph_pb2.DIRECTION_INPUT
-                )
+            yield from _ports(client, runner, graph_pb2.DIRECTION_INPUT)
+        elif source == "CONDITION":
+            yield from _ports(client, runner, graph_pb2.DIRECTION_OUTPUT)
         elif source in ("PARAMETER", "PARAMETER:=VALUE") and self._given:
             with contextlib.suppress(rtcf.RefusedError):
                 info = client.get_component(self._given[0], runner)

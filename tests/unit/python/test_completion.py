@@ -45,6 +45,8 @@ def offered(daemon: DaemonUnderTest) -> DaemonUnderTest:
         ("history alpha ", ["kp"]),
         ("undo al", ["alpha"]),
         ("break ", ["alpha.in1"]),
+        ("get al", ["alpha"]),
+        ("wait al", ["alpha.out1"]),
         ("nonsense ", [""]),
     ],
 )
