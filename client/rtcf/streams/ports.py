@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import grpc
@@ -34,6 +34,7 @@ class Signal:
     shape: tuple[int, ...]  # () = one number
     offset: int  # bytes, in a value of the column
     transposed: bool = False  # a matrix, which lies in memory column by column
+    number: int = 0  # of the first one, among the numbers of a value of the column
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,8 @@ class PortSchema:
 
 @dataclass(frozen=True)
 class PortBatch:
-    """Some cycles one after the other, `every` apart."""
+    """Some cycles one after the other, `every` apart; or, of a stream of minima and maxima, windows
+    of so many cycles, told by their first ones."""
 
     schema: PortSchema
     every: int
@@ -58,6 +60,11 @@ class PortBatch:
 
     def __len__(self) -> int:
         return len(self.message.stamps_ns)
+
+    @property
+    def is_min_max(self) -> bool:
+        """Tell whether it is of windows."""
+        return len(self.message.counts) > 0
 
     @property
     def cycles(self) -> "NDArray[np.int64]":
@@ -82,24 +89,59 @@ class PortBatch:
 
     def __getitem__(self, name: str) -> "NDArray[Any]":
         """Return the values of a signal: by cycle, then as the signal is shaped."""
-        np = _numpy()
+        if self.is_min_max:
+            raise RtcfError(f"{name}: a stream of minima and maxima has minima() and maxima()")
+        return self._values(name, len(self))
+
+    def minima(self, name: str) -> "NDArray[Any]":
+        """Return the smallest value of each number of a signal: by window, then as shaped."""
+        return self._values(name, 2 * len(self))[0::2]
+
+    def maxima(self, name: str) -> "NDArray[Any]":
+        """Return the largest values; NaN is above all numbers."""
+        return self._values(name, 2 * len(self))[1::2]
+
+    def minima_at(self, name: str) -> "NDArray[np.int64]":
+        """Return the cycle in which each minimum was there first."""
+        return self._places(name)[0::2]
+
+    def maxima_at(self, name: str) -> "NDArray[np.int64]":
+        """Return the cycle in which each maximum was there first."""
+        return self._places(name)[1::2]
+
+    def _values(self, name: str, count: int) -> "NDArray[Any]":
         signal = self.schema.signals[name]
-        data = self.message.values[signal.column]
-        if not data:
-            return np.zeros((0, *signal.shape), signal.format)  # type: ignore[no-any-return]
-        each = ros_layout.size_of(signal.format)
-        strides = [each] * len(signal.shape)
-        for axis in range(len(signal.shape) - 1, 0, -1):
-            strides[axis - 1] = strides[axis] * signal.shape[axis]
-        values = np.ndarray(
-            (len(self), *signal.shape),
-            dtype=signal.format,
-            buffer=data,
-            offset=signal.offset,
-            strides=(self.schema.columns[signal.column].size, *strides),
-        )
-        columns: NDArray[Any] = values.swapaxes(1, 2) if signal.transposed else values
-        return columns
+        size = self.schema.columns[signal.column].size
+        return _column(self.message.values[signal.column], count, size, signal, signal.offset)
+
+    def _places(self, name: str) -> "NDArray[np.int64]":
+        signal = self.schema.signals[name]
+        data, count = self.message.places[signal.column], 2 * len(self)
+        size = len(data) // max(count, 1)
+        places = _column(data, count, size, replace(signal, format="<u4"), 4 * signal.number)
+        first = self.cycles.repeat(2).reshape(-1, *(1 for _ in signal.shape))
+        found: NDArray[np.int64] = first + places
+        return found
+
+
+def _column(data: bytes, count: int, size: int, signal: Signal, offset: int) -> "NDArray[Any]":
+    """Return one signal of `count` values of `size` bytes, in which it lies at `offset`."""
+    np = _numpy()
+    if not data:
+        return np.zeros((0, *signal.shape), signal.format)  # type: ignore[no-any-return]
+    each = ros_layout.size_of(signal.format)
+    strides = [each] * len(signal.shape)
+    for axis in range(len(signal.shape) - 1, 0, -1):
+        strides[axis - 1] = strides[axis] * signal.shape[axis]
+    values = np.ndarray(
+        (count, *signal.shape),
+        dtype=signal.format,
+        buffer=data,
+        offset=offset,
+        strides=(size, *strides),
+    )
+    columns: NDArray[Any] = values.swapaxes(1, 2) if signal.transposed else values
+    return columns
 
 
 class PortStream(Closing):
@@ -109,28 +151,28 @@ class PortStream(Closing):
     DaemonUnreachableError if the connection is lost.
     """
 
-    def __init__(
-        self, method: Any, socket: str, runner: str, selection: Iterable[str], every: int
-    ) -> None:
+    def __init__(self, method: Any, socket: str, request: ports_pb2.WatchPortsRequest) -> None:
         _numpy()
-        request = ports_pb2.WatchPortsRequest(runner=runner, selection=selection, every=every)
         self.schema = PortSchema()
         self._socket = socket
-        self._every = max(every, 1)
+        self._every = max(request.every, 1)
+        self._min_max = request.min_max
         self._call = method(request)
         self._next()  # the schema: from here on nothing is missed
 
     def __iter__(self) -> Iterator[PortBatch]:
         while (response := self._next()) is not None:
-            if response.WhichOneof("kind") == "batch":
-                yield PortBatch(
-                    self.schema,
-                    self._every,
-                    response.batch.first_cycle,
-                    response.batch.lost,
-                    response.batch.last_of_loop,
-                    response.batch,
+            if response.WhichOneof("kind") != "batch":
+                continue
+            batch = response.batch
+            if self._min_max and len(batch.counts) != len(batch.stamps_ns):
+                raise RtcfError(
+                    "its executor is older and tells no minima: `rtcfctl runner restart` "
+                    "stops the loop and starts one that does"
                 )
+            yield PortBatch(
+                self.schema, self._every, batch.first_cycle, batch.lost, batch.last_of_loop, batch
+            )
 
     def close(self) -> None:
         """End the stream.  Any thread."""
@@ -180,7 +222,9 @@ def _signals(number: int, name: str, column: ports_pb2.PortColumn) -> Iterator[S
         for leaf in ros_layout.leaves(column.ros_definition, column.sample):
             full = f"{name}.{leaf.path}" if leaf.path else name
             shape = () if leaf.count is None else (leaf.count,)
-            yield Signal(full, column.unit, number, leaf.format, shape, leaf.offset)
+            yield Signal(
+                full, column.unit, number, leaf.format, shape, leaf.offset, number=leaf.number
+            )
         return
     if column.type in ("quaternion", "transform"):
         numbers = 4 if column.type == "quaternion" else 16

@@ -7,7 +7,7 @@ serialises is told in http://wiki.ros.org/msg.
 import re
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 _NUMBERS = {
     "bool": "?", "int8": "i1", "byte": "i1", "uint8": "u1", "char": "u1", "int16": "<i2",
@@ -27,6 +27,7 @@ class Leaf:
     format: str  # as NumPy writes it
     count: int | None  # None: one number
     offset: int  # bytes
+    number: int = 0  # of the first one, among all numbers of the message
 
 
 def size_of(form: str) -> int:
@@ -46,7 +47,7 @@ def leaves(definition: str, sample: bytes) -> list[Leaf]:
     data = [leaf for leaf in found if leaf.path == "data"]
     rest = {leaf.path.partition(".")[0] for leaf in found} - {"data", "layout"}
     if len(data) == 1 and not rest:
-        return [Leaf("", data[0].format, data[0].count, data[0].offset)]
+        return [replace(data[0], path="")]
     return found
 
 
@@ -57,6 +58,7 @@ class _Walk:
         self._types = types
         self._sample = sample
         self._at = 0
+        self._number = 0
 
     def message(self, name: str, package: str, path: str) -> Iterator[Leaf]:
         for line in self._types[name].splitlines():
@@ -74,8 +76,10 @@ class _Walk:
             if kind in _TIMES:
                 form, each = _TIMES[kind], 2  # seconds and nanoseconds
                 count = each * (1 if count is None else count)
-            yield Leaf(path, form, count, self._at)
-            self._at += size_of(form) * (1 if count is None else count)
+            yield Leaf(path, form, count, self._at, self._number)
+            numbers = 1 if count is None else count
+            self._at += size_of(form) * numbers
+            self._number += numbers
             return
         for index in range(1 if count is None else count):
             each_path = path if count is None else f"{path}[{index}]"

@@ -9,7 +9,7 @@ from rtcf_shared.spec import several
 from rtcf import failures
 from rtcf.connection import Connection
 from rtcf.streams.events import EventStream, Place
-from rtcf.v1 import control_pb2, runner_pb2
+from rtcf.v1 import control_pb2, ports_pb2, runner_pb2
 
 if TYPE_CHECKING:
     from rtcf.streams.ports import PortStream
@@ -50,9 +50,15 @@ class Watching(Connection):
         )
 
     def watch_ports(
-        self, selection: Iterable[str] = (), runner: str = "", every: int = 1
+        self,
+        selection: Iterable[str] = (),
+        runner: str = "",
+        every: int = 1,
+        *,
+        min_max: bool = False,
     ) -> "PortStream":
-        """Watch values of outputs and declared state, of each `every`-th cycle.
+        """Watch values of outputs and declared state, of each `every`-th cycle, or (`min_max`) the
+        minima and maxima of each `every` cycles, which hide no value: see PortBatch.minima().
 
         `selection` names them with the wildcards of a shell, e.g. "/arm/*.effort"; all without.
         Nothing is missed from here on; what the caller does not take in time is counted.
@@ -61,5 +67,12 @@ class Watching(Connection):
         from rtcf.streams.ports import PortStream
 
         return PortStream(
-            self._stub.WatchPorts, self.socket, runner, several("selection", selection), every
+            self._stub.WatchPorts,
+            self.socket,
+            ports_pb2.WatchPortsRequest(
+                runner=runner,
+                selection=several("selection", selection),
+                every=every,
+                min_max=min_max,
+            ),
         )

@@ -37,6 +37,11 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
         help=f"cycles to print a second, 0 = every cycle (default: {_TOLD_HZ:g} for people, every "
         "cycle for machines)",
     )
+    echo.add_argument(
+        "--min-max",
+        action="store_true",
+        help="of the cycles between two that are printed, minima and maxima: nothing is hidden",
+    )
     echo.set_defaults(run=show)
 
 
@@ -53,7 +58,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         every = max(1, round(min(runner.settings.frequency_hz / rate_hz, _MOST_EVERY)))
     left = args.n
     try:
-        with client.watch_ports(args.selection, args.runner, every) as stream:
+        with client.watch_ports(args.selection, args.runner, every, min_max=args.min_max) as stream:
             for note in stream.schema.notes:
                 output.line(f"rtcfctl: note: {note}", to=sys.stderr)
             say_if_idle(client, args.runner, output)
@@ -61,7 +66,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
                 if batch.lost:
                     _say_lost(batch.lost, output)
                 for index in range(len(batch)):
-                    _print(batch, index, output)
+                    (_print_extremes if batch.is_min_max else _print)(batch, index, output)
                     left = None if left is None else left - 1
                     if left == 0:
                         return
@@ -84,6 +89,31 @@ def _print(batch: PortBatch, index: int, output: Output) -> None:
     for name, signal in batch.schema.signals.items():
         unit = f" {signal.unit}" if signal.unit else ""
         output.line(f"  {name}: {_text(values[name])}{unit}")
+
+
+def _print_extremes(batch: PortBatch, index: int, output: Output) -> None:
+    found = {
+        name: tuple(
+            method(name)[index].tolist()
+            for method in (batch.minima, batch.minima_at, batch.maxima, batch.maxima_at)
+        )
+        for name in batch.schema.signals
+    }
+    cycle, count = batch.first_cycle + index * batch.every, batch.message.counts[index]
+    if not output.for_people:
+        values = {
+            name: {"min": least, "min_cycle": least_at, "max": most, "max_cycle": most_at}
+            for name, (least, least_at, most, most_at) in found.items()
+        }
+        stamp_ns = batch.message.stamps_ns[index]
+        output.record({"cycle": cycle, "cycles": count, "stamp_ns": stamp_ns, "values": values})
+        return
+    output.line(f"cycles {cycle} to {cycle + count - 1}", "bold")
+    for name, (least, least_at, most, most_at) in found.items():
+        unit = batch.schema.signals[name].unit
+        where = f" (cycle {least_at}, {most_at})" if not isinstance(least, list) else ""
+        line = f"  {name}: {_text(least)} to {_text(most)}{f' {unit}' if unit else ''}{where}"
+        output.line(line)
 
 
 def _text(value: Any) -> str:

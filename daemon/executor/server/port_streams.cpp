@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
 #include <string>
 #include <utility>
 
@@ -19,58 +18,36 @@ constexpr std::size_t kLargestBatch = std::size_t{512} * 1024;  // bytes of valu
 constexpr int kMostCycles = 4096;                               // of a batch
 constexpr std::size_t kMostTables = 8;                          // that a stream is behind
 
-// Values of one column, as they travel: of outputs as ROS messages, of states as they lie in
-// memory.
-class Packer {
-   public:
-    Packer(const FrameColumn& column, std::size_t offset) : column_(column), offset_(offset) {
-        if (column.output == nullptr) return;
-        slot_ = column.output->make_slot(nullptr);
-        length_ = column.output->length(*slot_);
-    }
-
-    std::size_t length() const { return column_.output == nullptr ? column_.size : length_; }
-
-    void pack(const std::uint8_t* values, std::string& to) const {
-        const std::uint8_t* value = values + offset_;
-        if (column_.output == nullptr) {
-            to.append(reinterpret_cast<const char*>(value), column_.size);
-            return;
-        }
-        std::memcpy(const_cast<std::uint8_t*>(valueOf(*column_.output, *slot_)), value,
-                    column_.size);
-        const std::size_t before = to.size();
-        to.resize(before + length_);
-        column_.output->serialize(*slot_, reinterpret_cast<std::uint8_t*>(to.data() + before),
-                                  length_);
-    }
-
-   private:
-    const FrameColumn& column_;
-    std::size_t offset_;
-    std::shared_ptr<SlotHeader> slot_;
-    std::uint32_t length_ = 0;
-};
-
-std::vector<Packer> packersOf(const FrameTable& table, const std::vector<std::size_t>& columns) {
-    std::vector<Packer> packers;
+std::vector<PortPacker> packersOf(const FrameTable& table,
+                                  const std::vector<std::size_t>& columns) {
+    std::vector<PortPacker> packers;
     packers.reserve(columns.size());
     for (const std::size_t column : columns)
         packers.emplace_back(table.columns[column], table.ring->offset(column));
     return packers;
 }
 
+// What is about to be written anew is left to the writer.
+void skipGone(std::uint64_t& next, std::uint64_t& lost, const FrameRing& ring, std::uint32_t step) {
+    const std::uint64_t kept = ring.capacity() - ring.capacity() / 8;
+    const std::uint64_t waiting = ring.end() - next;
+    if (waiting <= kept) return;
+    const std::uint64_t gone = waiting - kept;
+    lost += (gone + step - 1) / step;
+    next += gone;
+}
+
 }  // namespace
 
 void PortStreams::begin(const Id& id, std::uint64_t watch, const PortSelection& selection,
-                        std::uint32_t every) {
+                        std::uint32_t every, bool min_max) {
     if (streams_.size() >= kMost) {
         throw Refusal(RefusalKind::ResourceExhausted,
                       fmt::format("{} streams of ports are open, which is all that there can be: "
                                   "end another",
                                   kMost));
     }
-    streams_.insert({id, {id, watch, selection, every == 0 ? 1 : every}});
+    streams_.insert({id, {id, watch, selection, every == 0 ? 1 : every, min_max}});
 }
 
 std::uint64_t PortStreams::end(const Id& id) {
@@ -146,6 +123,8 @@ void PortStreams::chooseColumns(Stream& stream) {
         if (stream.selection.matches(table.columns[i].fullName())) stream.columns.push_back(i);
     }
     stream.told = false;
+    stream.windows.reset();
+    if (stream.min_max) stream.windows.emplace(table, stream.columns, stream.every);
 }
 
 void PortStreams::serve(Stream& stream, const Send& send) {
@@ -156,8 +135,12 @@ void PortStreams::serve(Stream& stream, const Send& send) {
             const v1::Response schema = schemaOf(stream);
             if (!send(id, schema)) return;
         }
-        if (!sendFrames(stream, send)) return;
+        if (!(stream.min_max ? sendWindows(stream, send) : sendFrames(stream, send))) return;
         if (stream.tables.size() == 1) return;
+        if (stream.windows && stream.tables[1]->ring != stream.tables[0]->ring) {
+            stream.windows->end();
+            if (!sendWindows(stream, send)) return;
+        }
         goOn(stream);
     }
 }
@@ -168,7 +151,8 @@ void PortStreams::goOn(Stream& stream) {
     stream.tables.pop_front();
     const FrameRing& left = *retired_.back()->ring;
     if (stream.tables.front()->ring.get() == &left) return;
-    stream.lost += (left.end() - stream.next + stream.every - 1) / stream.every;
+    stream.lost += (left.end() - stream.next + stream.step() - 1) / stream.step();
+    if (stream.windows) stream.lost += stream.windows->count();
     stream.next = 0;
     chooseColumns(stream);
 }
@@ -178,18 +162,12 @@ bool PortStreams::sendFrames(Stream& stream, const Send& send) {
     const Id id = stream.id;
     const FrameTable& table = *stream.tables.front();
     const FrameRing& ring = *table.ring;
-    const std::vector<Packer> packers = packersOf(table, stream.columns);
+    const std::vector<PortPacker> packers = packersOf(table, stream.columns);
     std::size_t bytes_of_cycle = 64;
-    for (const Packer& packer : packers) bytes_of_cycle += packer.length();
+    for (const PortPacker& packer : packers) bytes_of_cycle += packer.length();
     const std::uint64_t end = ring.end();
-    // What is about to be written anew is left to the writer.
-    const std::uint64_t kept = ring.capacity() - ring.capacity() / 8;
     while (stream.next < end) {
-        if (end - stream.next > kept) {
-            const std::uint64_t gone = end - stream.next - kept;
-            stream.lost += (gone + stream.every - 1) / stream.every;
-            stream.next += gone;
-        }
+        skipGone(stream.next, stream.lost, ring, stream.step());
         v1::Response response;
         response.set_id(id.second);
         pb::PortBatch& batch = *response.mutable_ports()->mutable_batch();
@@ -228,6 +206,57 @@ bool PortStreams::sendFrames(Stream& stream, const Send& send) {
         batch.set_lost(std::exchange(stream.lost, 0));
         if (!send(id, response)) return false;
     }
+    return true;
+}
+
+// The same of minima and maxima: a window that is not whole waits for more.
+bool PortStreams::sendWindows(Stream& stream, const Send& send) {
+    const Id id = stream.id;
+    const std::vector<PortPacker> packers = packersOf(*stream.tables.front(), stream.columns);
+    const std::uint64_t end = stream.tables.front()->ring->end();
+    for (;;) {
+        v1::Response response;
+        response.set_id(id.second);
+        if (!fill(stream, response, packers, end)) return true;
+        if (!send(id, response)) return false;
+    }
+}
+
+// @return whether there is a window in the batch
+bool PortStreams::fill(Stream& stream, v1::Response& response,
+                       const std::vector<PortPacker>& packers, std::uint64_t end) {
+    const FrameRing& ring = *stream.tables.front()->ring;
+    PortWindows& windows = *stream.windows;
+    pb::PortBatch& batch = *response.mutable_ports()->mutable_batch();
+    for (std::size_t i = 0; i < packers.size(); ++i) {
+        batch.add_values();
+        batch.add_places();
+    }
+    std::size_t bytes = 0;
+    while (batch.counts_size() < kMostCycles && bytes < kLargestBatch && !batch.last_of_loop()) {
+        if (windows.whole()) {
+            const int before = batch.counts_size();
+            if (before == 0) batch.set_first_cycle(windows.first());
+            if (windows.first() !=
+                batch.first_cycle() + static_cast<std::uint64_t>(before) * stream.every)
+                break;
+            bytes += windows.close(batch);
+            continue;
+        }
+        if (stream.next >= end) break;
+        skipGone(stream.next, stream.lost, ring, 1);
+        if (!ring.read(stream.next, frame_)) {
+            ++stream.next;
+            ++stream.lost;
+        } else if (windows.takes(frame_)) {
+            windows.add(frame_, packers);
+            ++stream.next;
+        } else {
+            windows.end();
+        }
+    }
+    if (batch.counts_size() == 0) return false;
+    batch.set_lost(std::exchange(stream.lost, 0));
     return true;
 }
 

@@ -8,10 +8,12 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "rtcf/executor/v1/executor.pb.h"
+#include "server/port_windows.hpp"
 #include "watch/frame_table.hpp"
 
 namespace rtcf::executor {
@@ -29,9 +31,10 @@ class PortStreams {
     static constexpr std::size_t kMost = 64;
 
     /// Begins a stream; it is silent until a table is for `watch`.
+    /// @param min_max minima and maxima of each window of `every` cycles, not each `every`-th cycle
     /// @throws Refusal if there are too many
     void begin(const Id& id, std::uint64_t watch, const PortSelection& selection,
-               std::uint32_t every);
+               std::uint32_t every, bool min_max);
     /// @return the number of its watch; 0 = there is no such stream
     std::uint64_t end(const Id& id);
     /// Ends those of a connection. @return the numbers of their watches
@@ -47,14 +50,19 @@ class PortStreams {
         std::uint64_t watch;
         PortSelection selection;
         std::uint32_t every;
+        bool min_max;
         // NOLINTBEGIN(readability-redundant-member-init): gcc's
-        std::deque<Table> tables = {};          // the first one is being read
-        std::vector<std::size_t> columns = {};  // of it
+        std::deque<Table> tables = {};            // the first one is being read
+        std::vector<std::size_t> columns = {};    // of it
+        std::optional<PortWindows> windows = {};  // of minima and maxima
         // NOLINTEND(readability-redundant-member-init)
         bool begun = false;      // the first one has come
         bool told = false;       // its schema
         std::uint64_t next = 0;  // frame of it
         std::uint64_t lost = 0;  // cycles, since the last batch
+
+        // Of so many cycles one is told, or would be: lost ones are counted like this.
+        std::uint32_t step() const noexcept { return min_max ? 1 : every; }
     };
 
     void chooseColumns(Stream& stream);
@@ -63,6 +71,9 @@ class PortStreams {
     void retire(Stream& stream);
     void noteTaken(FrameRing& ring) const;
     bool sendFrames(Stream& stream, const Send& send);
+    bool sendWindows(Stream& stream, const Send& send);
+    bool fill(Stream& stream, v1::Response& response, const std::vector<PortPacker>& packers,
+              std::uint64_t end);
     v1::Response schemaOf(const Stream& stream) const;
 
     std::map<Id, Stream> streams_;

@@ -253,7 +253,8 @@ void Server::beginWatch(std::uint64_t connection, const v1::Request& request) {
     const std::uint64_t watch = next_watch_++;
     const auto& patterns = request.watch_ports().selection();
     const PortSelection selection({patterns.begin(), patterns.end()});
-    ports_.begin({connection, id}, watch, selection, request.watch_ports().every());
+    ports_.begin({connection, id}, watch, selection, request.watch_ports().every(),
+                 request.watch_ports().min_max());
     const auto nothing = [id] {
         return errorResponse(id, RefusalKind::Unavailable, "the stream has ended");
     };

@@ -39,6 +39,8 @@ class _Waiting:
             self._bytes -= self._responses.pop()[1]
             if self._lost is not None:
                 self._lost.values[:] = [b""] * len(response.schema.columns)
+                if self._lost.places:
+                    self._lost.places[:] = self._lost.values
         elif self._lost is not None:
             # Of the schema before.
             self._responses.append((ports_pb2.WatchPortsResponse(batch=self._lost), 0))
@@ -59,12 +61,13 @@ class _Waiting:
         return response
 
     def _lose(self, batch: ports_pb2.PortBatch) -> None:
-        cycles = len(batch.stamps_ns)
+        told = len(batch.stamps_ns)
         before = 0 if self._lost is None else self._lost.lost
         self._lost = ports_pb2.PortBatch(
-            first_cycle=batch.first_cycle + cycles * self._every,
-            lost=before + batch.lost + cycles,
+            first_cycle=batch.first_cycle + told * self._every,
+            lost=before + batch.lost + (sum(batch.counts) if batch.counts else told),
             values=[b""] * len(batch.values),
+            places=[b""] * len(batch.places),
         )
 
 
