@@ -1,13 +1,12 @@
 """Cycles one after the other, as the tabs of a runner get them, and the last ones of them."""
 
 from collections import deque
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from rtcf.streams.ports import PortBatch, PortSchema
-from rtcf.v1 import ports_pb2
 
 ELEMENTS = 64  # of an array that are told, each as a signal of its own
 
@@ -59,23 +58,6 @@ class Chunk:
         if index >= values.shape[1]:
             return np.full(len(self), np.nan)
         return values[:, index].astype(np.float64)
-
-
-def later(batch: PortBatch, skip: int) -> PortBatch:
-    """Return a batch without its first cycles."""
-    old = batch.message
-    message = ports_pb2.PortBatch(
-        first_cycle=batch.first_cycle + skip * batch.every,
-        last_of_loop=old.last_of_loop,
-        stamps_ns=old.stamps_ns[skip:],
-        latencies_ns=old.latencies_ns[skip:],
-        durations_ns=old.durations_ns[skip:],
-        values=[
-            values[skip * column.size :]
-            for values, column in zip(old.values, batch.schema.columns, strict=True)
-        ],
-    )
-    return replace(batch, first_cycle=message.first_cycle, lost=0, message=message)
 
 
 class Memory:

@@ -11,7 +11,7 @@ import rtcf
 from rtcf.streams.ports import PortBatch, PortStream
 from rtcf_shared.errors import RtcfError
 
-from rtcf_scope.chunk import Chunk, Memory, column_of, later
+from rtcf_scope.chunk import Chunk, Memory, column_of
 
 _AHEAD = 32  # batches that the reader may be before the event loop
 _AGAIN_S = 1.0
@@ -166,7 +166,7 @@ class Hub:
         if skip < len(batch):
             self._overlap = False
         lost = 0 if skip or cycle < 0 else max(batch.first_cycle - cycle - 1, 0)
-        return Chunk(later(batch, skip) if skip else batch, self.told, lost)
+        return Chunk(batch.part(skip) if skip else batch, self.told, lost)
 
     def trouble(self, reader: _Reader, text: str) -> None:
         """Tell the tabs what is wrong, or that nothing is any more."""

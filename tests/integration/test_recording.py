@@ -217,6 +217,85 @@ def test_where_there_is_no_room_at_all_it_is_said_in_one_line(running: Daemon) -
     ]
 
 
+def _cycles(*files: Path) -> list[int]:
+    found: list[int] = []
+    for file in files:
+        with rtcf.read_recording(file) as recording:
+            found += recording.cycles.tolist()
+    return found
+
+
+@pytest.mark.parametrize("bound", [("--duration", "300ms"), ("--size", "16KiB")])
+def test_files_that_follow_each_other_miss_no_cycle(
+    running: Daemon, tmp_path: Path, bound: tuple[str, str]
+) -> None:
+    files = [tmp_path / name for name in ("run.mcap", "run-1.mcap", "run-2.mcap")]
+    process = subprocess.Popen(
+        [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "record", "-o", files[0],
+         *bound, "--split"],
+        env=clean_environment(),
+        stdout=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    wait_for(lambda: files[2].exists(), "the third file")
+    process.send_signal(signal.SIGINT)
+    said, _ = process.communicate()
+    assert process.returncode == 0
+    assert "run.mcap to run-" in said
+    cycles = _cycles(*files)
+    assert cycles == list(range(cycles[0], cycles[0] + len(cycles)))
+
+
+def test_a_file_ends_when_it_is_large_enough(running: Daemon, tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    _recorded(running, file, "--size", "32KiB")
+    assert file.stat().st_size >= 32 * 1024
+    assert len(_cycles(file)) > 10
+
+
+def test_what_is_around_a_moment_is_in_the_file(running: Daemon, tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    done = running.ctl(
+        "record", "-o", str(file), "wave.wave", "--trigger", "wave.phase < 0.0005", "--pre",
+        "200ms", "--post", "100ms", "--output", "json",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    hit = json.loads(done.stdout)["cycle"]
+    with rtcf.read_recording(file) as recording:
+        cycles = recording.cycles
+        phase = recording["/wave.phase"]
+        stamps_ns = recording.read("/wave.phase").stamps_ns
+    (place,) = (cycles == hit).nonzero()[0].tolist()
+    assert phase[place] < 0.0005
+    # It may have begun within so much of the hit.
+    assert (phase[:place] >= 0.0005).all()
+    assert stamps_ns[place] - stamps_ns[0] <= 200_000_000
+    assert 99_000_000 <= stamps_ns[-1] - stamps_ns[place] <= 100_000_000
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--size", "0"), "--size 0: more than 0 MiB"),
+        (("--split",), "--split: after how much? give --duration or --size"),
+        (("--pre", "1s"), "--pre and --post are before and after a --trigger"),
+        (("--trigger", "wave.phase > 1", "--pre=-1s"), "--pre -1: 0 or more"),
+        (("--trigger", "wave.phase > 1", "--duration", "1s"), "not --duration or --split"),
+        (("--trigger", "wave.phase >"), "is no condition"),
+        (("--trigger", "wave.nothing > 1"), "/wave.nothing is no number of this stream"),
+    ],
+)
+def test_what_cannot_be_recorded_is_refused_before_there_is_a_file(
+    running: Daemon, tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    file = tmp_path / "run.mcap"
+    done = running.ctl("record", "-o", str(file), *words)
+    assert done.returncode == 2
+    assert said in done.stderr.splitlines()[-1]
+    assert not file.exists()
+
+
 def test_the_last_cycles_of_a_loop_are_in_the_file_at_once(
     running: Daemon, client: rtcf.Client, tmp_path: Path
 ) -> None:

@@ -109,6 +109,31 @@ class PortBatch:
         """Return the cycle in which each maximum was there first."""
         return self._places(name)[1::2]
 
+    def part(self, begin: int, end: int | None = None) -> "PortBatch":
+        """Return some of its cycles as a batch; not of minima and maxima."""
+        end = len(self) if end is None else end
+        old = self.message
+        message = ports_pb2.PortBatch(
+            first_cycle=self.first_cycle + begin * self.every,
+            lost=old.lost if begin == 0 else 0,
+            last_of_loop=old.last_of_loop and end == len(self),
+            stamps_ns=old.stamps_ns[begin:end],
+            latencies_ns=old.latencies_ns[begin:end],
+            durations_ns=old.durations_ns[begin:end],
+            values=[
+                values[begin * column.size : end * column.size]
+                for values, column in zip(old.values, self.schema.columns, strict=True)
+            ],
+        )
+        return PortBatch(
+            self.schema,
+            self.every,
+            message.first_cycle,
+            message.lost,
+            message.last_of_loop,
+            message,
+        )
+
     def _values(self, name: str, count: int) -> "NDArray[Any]":
         signal = self.schema.signals[name]
         size = self.schema.columns[signal.column].size

@@ -8,19 +8,21 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import rtcf
-from rtcf.recording.mcap_writer import McapWriter
-from rtcf.recording.recorder import Recorder
-from rtcf.streams.ports import PortStream
+from rtcf.recording.files import Files
+from rtcf.recording.moment import Moment
+from rtcf.streams.condition import Condition
+from rtcf.streams.ports import PortBatch, PortStream
 
 from rtcfctl.signals.idle_loop import say_if_ended, say_if_idle
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import amount, counted
 
 _TOLD_S = 1.0
-_LONGEST_S = 1e9
+_LONGEST = 1e9  # s, MiB
+_AROUND_S = 1.0  # of a trigger
 _KEPT_S = 1.0  # in memory: what a writer that is killed loses at most
 
 
@@ -45,62 +47,94 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     record.add_argument(
         "--duration", type=amount("s"), metavar="S", help="end after so much loop time"
     )
+    record.add_argument(
+        "--size", type=amount("MiB"), metavar="MIB", help="end when the file is that large"
+    )
+    record.add_argument(
+        "--split",
+        action="store_true",
+        help="begin another file (FILE-1, FILE-2, …) after each --duration or --size",
+    )
+    record.add_argument(
+        "--trigger",
+        metavar="CONDITION",
+        help="only what is around the first cycle in which that is true, as in 'wave.phase > 0.9'",
+    )
+    record.add_argument(
+        "--pre", type=amount("s"), metavar="S", help=f"with --trigger: before it ({_AROUND_S:g})"
+    )
+    record.add_argument(
+        "--post", type=amount("s"), metavar="S", help=f"with --trigger: after it ({_AROUND_S:g})"
+    )
     record.add_argument("--force", action="store_true", help="write over a file that is there")
     record.set_defaults(run=run)
 
 
 def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Record until Ctrl-C, or for a while."""
-    if args.duration is not None and not 0 < args.duration <= _LONGEST_S:
-        raise ValueError(f"--duration {args.duration:g}: more than 0 s, and {_LONGEST_S:g} at most")
+    """Record until Ctrl-C, for a while, or around a moment."""
+    moment = _checked(args)
+    selection = list(args.selection)
+    if moment is not None and selection:
+        selection += moment.condition.columns
     # Refused before there is a file.
-    with client.watch_ports(args.selection, args.runner) as stream:
+    with client.watch_ports(selection, args.runner) as stream:
         for note in stream.schema.notes:
             _note(output, note)
+        if moment is not None:
+            moment.condition.check(stream.schema)
         say_if_idle(client, args.runner, output)
-        recorder = _record(stream, _opened(args.file, args.force), args, output)
-    size_mb = args.file.stat().st_size / 1e6
-    lost = f"{counted(recorder.lost, 'cycle')} lost" if recorder.lost else "none lost"
-    if output.for_people:
-        output.line(
-            f"{args.file}: {counted(recorder.cycles, 'cycle')}, {size_mb:.1f} MB, {lost}",
-            "bold red" if recorder.lost else "",
-        )
-    else:
+        runner = args.runner or "rt_runner"
+        with Files(args.file, runner, force=args.force) as files, _ended_by_signals(stream):
+            _follow(stream, files, moment, args, output)
+    _tell(files, moment, output)
+
+
+def _checked(args: argparse.Namespace) -> Moment | None:
+    """Return the moment to wait for, if there is one; raises ValueError."""
+    _require("--duration", args.duration, "s")
+    _require("--size", args.size, "MiB")
+    if args.split and args.duration is None and args.size is None:
+        raise ValueError("--split: after how much? give --duration or --size")
+    if args.trigger is None:
+        if args.pre is not None or args.post is not None:
+            raise ValueError("--pre and --post are before and after a --trigger")
+        return None
+    if args.split or args.duration is not None:
+        raise ValueError("--trigger: --pre and --post say how long, not --duration or --split")
+    _require("--pre", args.pre, "s", or_none=True)
+    _require("--post", args.post, "s", or_none=True)
+    pre_s, post_s = (_AROUND_S if each is None else each for each in (args.pre, args.post))
+    return Moment(Condition(args.trigger), pre_s, post_s)
+
+
+def _require(option: str, value: float | None, unit: str, *, or_none: bool = False) -> None:
+    if value is None or 0 < value <= _LONGEST or (or_none and value == 0):
+        return
+    least = "0 or more" if or_none else f"more than 0 {unit}"
+    raise ValueError(f"{option} {value:g}: {least}, and {_LONGEST:g} at most")
+
+
+def _tell(files: Files, moment: Moment | None, output: Output) -> None:
+    lost = f"{counted(files.lost, 'cycle')} lost" if files.lost else "none lost"
+    if moment is not None and moment.cut:
+        _note(output, "less than was asked for: more came before it than may be kept")
+    if not output.for_people:
         output.data(
-            {"file": str(args.file), "cycles": recorder.cycles, "lost": recorder.lost,
-             "bytes": args.file.stat().st_size}
+            {"file": str(files.paths[0]), "files": [str(path) for path in files.paths],
+             "cycles": files.cycles, "lost": files.lost, "bytes": files.bytes}
+            | ({} if moment is None else {"cycle": moment.cycle})
         )  # fmt: skip
-
-
-def _opened(path: Path, force: bool) -> BinaryIO:
-    try:
-        return path.open("wb" if force else "xb")
-    except FileExistsError:
-        raise ValueError(f"{path} is there already: --force writes over it") from None
-    except OSError as error:
-        raise ValueError(f"{path}: {error.strerror}") from None
-
-
-def _record(
-    stream: PortStream, file: BinaryIO, args: argparse.Namespace, output: Output
-) -> Recorder:
-    try:
-        # Closing writes what is left, and may find no room either.
-        with file:
-            writer = McapWriter(file)
-            recorder = Recorder(writer, args.runner or "rt_runner")
-            try:
-                with _ended_by_signals(stream):
-                    _follow(stream, writer, recorder, args, output)
-            finally:
-                recorder.flush()
-                writer.close()
-    except OSError as error:
-        raise rtcf.RtcfError(
-            f"{args.file}: {error.strerror}: what was written before can be read"
-        ) from None
-    return recorder
+        return
+    more = f" to {files.paths[-1].name}" if len(files.paths) > 1 else ""
+    about = ""
+    if moment is not None:
+        cycle = moment.cycle
+        about = ", the condition was never true" if cycle is None else f", true in cycle {cycle}"
+    output.line(
+        f"{files.paths[0]}{more}: {counted(files.cycles, 'cycle')}, {files.bytes / 1e6:.1f} MB, "
+        f"{lost}{about}",
+        "bold red" if files.lost else "",
+    )
 
 
 @contextlib.contextmanager
@@ -132,41 +166,48 @@ def _ended_by_signals(stream: PortStream) -> Iterator[None]:
 
 def _follow(
     stream: PortStream,
-    writer: McapWriter,
-    recorder: Recorder,
+    files: Files,
+    moment: Moment | None,
     args: argparse.Namespace,
     output: Output,
 ) -> None:
-    until_ns = None
     told = flushed = time.monotonic()
     try:
         for batch in stream:
-            for note in recorder.add(batch):
-                _note(output, note)
+            for part in [batch] if moment is None else moment.take(batch):
+                for note in files.add(part):
+                    _note(output, note)
             now = time.monotonic()
             say_if_ended(batch, args.runner, output)
             if now - flushed >= _KEPT_S or batch.last_of_loop:
-                recorder.flush()
+                files.flush()
                 flushed = now
             if now - told >= _TOLD_S and sys.stderr.isatty():
                 told = now
+                waits = moment is not None and moment.cycle is None
                 print(
-                    f"\r{counted(recorder.cycles, 'cycle')}, {writer.size / 1e6:.1f} MB, "
-                    f"{recorder.lost} lost ",
+                    f"\r{counted(files.cycles, 'cycle')}, {files.size / 1e6:.1f} MB, "
+                    f"{files.lost} lost{', waiting for the condition' if waits else ''} ",
                     end="",
                     file=sys.stderr,
                     flush=True,
                 )
-            if args.duration is None or not len(batch):
-                continue
-            stamps = batch.message.stamps_ns
-            if until_ns is None:
-                until_ns = stamps[0] + round(args.duration * 1e9)
-            if stamps[-1] >= until_ns:
+            if moment is not None and moment.over:
                 return
+            if not _is_full(files, batch, args):
+                continue
+            if not args.split:
+                return
+            files.next()
     finally:
         if sys.stderr.isatty():
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+
+
+def _is_full(files: Files, batch: PortBatch, args: argparse.Namespace) -> bool:
+    """Tell whether a file has what it is to have."""
+    full = args.size is not None and files.size >= args.size * 1024 * 1024
+    return full or (args.duration is not None and files.taken_ns(batch) >= args.duration * 1e9)
 
 
 def _note(output: Output, text: str) -> None:

@@ -1,0 +1,113 @@
+"""Recordings in one file, or in several of a bounded size or time each."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO, TypeVar
+
+from rtcf_shared.errors import RtcfError
+
+from rtcf.closing import Closing
+from rtcf.recording.mcap_writer import McapWriter
+from rtcf.recording.recorder import Recorder
+from rtcf.streams.ports import PortBatch
+
+Result = TypeVar("Result")
+
+
+class Files(Closing):
+    """What a stream tells, written into `path`, and after next() into others of its name with -1,
+    -2, …; each can be read by itself.  Raises RtcfError of what the disk refuses."""
+
+    def __init__(self, path: Path, runner: str, *, force: bool = False) -> None:
+        """Make the first file: what is there already is refused by ValueError, unless `force`."""
+        self.paths: list[Path] = []
+        self._cycles = self._lost = 0  # of the files that are closed
+        self._first = path
+        self._runner = runner
+        self._force = force
+        self._begun_ns = 0
+        self._open()
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file that is being written."""
+        return self._writer.size
+
+    @property
+    def bytes(self) -> int:
+        """Bytes of all files that are closed."""
+        return sum(path.stat().st_size for path in self.paths)
+
+    def taken_ns(self, batch: PortBatch) -> int:
+        """Return the loop time from the first cycle in this file to the end of a batch."""
+        if not len(batch):
+            return 0
+        if not self._begun_ns:
+            self._begun_ns = int(batch.message.stamps_ns[0])
+        return int(batch.message.stamps_ns[-1]) - self._begun_ns
+
+    def add(self, batch: PortBatch) -> list[str]:
+        """Write a batch; return a line for each state that no message can hold."""
+        return self._doing(lambda: self._recorder.add(batch))
+
+    def flush(self) -> None:
+        """Write what is still in memory."""
+        self._doing(self._recorder.flush)
+
+    def next(self) -> None:
+        """End this file and begin another."""
+        self.close()
+        self._open()
+
+    def close(self) -> None:
+        """End the file; what the disk does not take is not counted."""
+        if self._file.closed:
+            return
+        self._doing(self._finish)
+        self._cycles += self._recorder.cycles
+        self._lost += self._recorder.lost
+
+    @property
+    def cycles(self) -> int:
+        """Cycles in all files, and in memory."""
+        return self._cycles + (0 if self._file.closed else self._recorder.cycles)
+
+    @property
+    def lost(self) -> int:
+        """Cycles that were not taken in time, so far."""
+        return self._lost + (0 if self._file.closed else self._recorder.lost)
+
+    def _open(self) -> None:
+        number = len(self.paths)
+        stem, suffix = self._first.stem, self._first.suffix
+        path = self._first.with_name(f"{stem}-{number}{suffix}") if number else self._first
+        self._file = _opened(path, self._force)
+        self.paths.append(path)
+        self._begun_ns = 0
+        self._writer = McapWriter(self._file)
+        self._recorder = Recorder(self._writer, self._runner)
+
+    def _finish(self) -> None:
+        # Closing writes what is left, and may find no room either.
+        with self._file:
+            try:
+                self._recorder.flush()
+            finally:
+                self._writer.close()
+
+    def _doing(self, work: Callable[[], Result]) -> Result:
+        try:
+            return work()
+        except OSError as error:
+            raise RtcfError(
+                f"{self.paths[-1]}: {error.strerror}: what was written before can be read"
+            ) from None
+
+
+def _opened(path: Path, force: bool) -> BinaryIO:
+    try:
+        return path.open("wb" if force else "xb")
+    except FileExistsError:
+        raise ValueError(f"{path} is there already: --force writes over it") from None
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror}") from None
