@@ -100,8 +100,8 @@ class Tab:
 
     def _retune(self) -> None:
         wanted = [*self._names]
-        if self._armed is not None and not self._armed.trigger.signal.startswith("~"):
-            wanted.append(self._armed.trigger.signal)
+        if self._armed is not None:
+            wanted += [each for each in self._armed.trigger.signals if not each.startswith("~")]
         self.columns = columns_of(wanted)
         self._hub.changed()
 
@@ -164,10 +164,12 @@ class _Armed:
     def search(self, chunk: Chunk) -> list[tuple[int, int, int]]:
         """Return begin, hit and end of the shots that are complete with this chunk."""
         shots = []
-        name = self.trigger.signal
         special = {"~latency": chunk.latencies_us, "~duration": chunk.durations_us}
-        values = special[name] if name in special else chunk.values(name)
-        hits = self._search.hits(values) + chunk.at
+        columns = (
+            special[name] if name in special else chunk.values(name)
+            for name in self.trigger.signals
+        )  # fmt: skip
+        hits = self._search.hits(*columns) + chunk.at
         while not self.done:
             if self._hit < 0:
                 left = hits[hits >= self._from]

@@ -1,15 +1,17 @@
 """Finds the cycle that a trigger waits for, looking at every one."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rtcf.streams.condition import Condition, ConditionError
 
 MOST_CYCLES = 200_000  # of one shot
-KINDS = ("edge", "level", "window", "nan")
+KINDS = ("edge", "level", "window", "nan", "condition")
 _SLOPES = {"edge": ("rising", "falling", "either"), "level": ("above", "below"),
-           "window": ("leaves", "enters"), "nan": ("",)}  # fmt: skip
+           "window": ("leaves", "enters"), "nan": ("",), "condition": ("",)}  # fmt: skip
 
 
 class TriggerError(ValueError):
@@ -29,6 +31,12 @@ class Trigger:
     after: int  # from the hit on
     holdoff: int  # cycles after a shot in which nothing hits
     single: bool
+    condition: Condition | None = None  # in place of the signal
+
+    @property
+    def signals(self) -> list[str]:
+        """The signals that it looks at."""
+        return [self.signal] if self.condition is None else self.condition.signals
 
 
 def parse(told: Any) -> Trigger:
@@ -40,12 +48,15 @@ def parse(told: Any) -> Trigger:
         slope = str(told.get("slope") or _SLOPES[kind][0])
         if slope not in _SLOPES[kind]:
             raise TriggerError(f"{kind} {slope!r}: one of {', '.join(_SLOPES[kind])}")
+        condition = Condition(str(told["condition"])) if kind == "condition" else None
         trigger = Trigger(
-            str(told["signal"]), kind, slope,
+            str(told["signal"]) if condition is None else "", kind, slope,
             float(told.get("low", 0.0)), float(told.get("high", 0.0)),
             int(told["before"]), int(told["after"]), int(told.get("holdoff", 0)),
-            bool(told.get("single", False)),
+            bool(told.get("single", False)), condition,
         )  # fmt: skip
+    except ConditionError as error:
+        raise TriggerError(str(error)) from None
     except (KeyError, TypeError, AttributeError, OverflowError):
         raise TriggerError("a trigger has signal, kind, before and after") from None
     except TriggerError:
@@ -64,15 +75,19 @@ def parse(told: Any) -> Trigger:
 
 
 class Search:
-    """A trigger at work on one stream of values."""
+    """A trigger at work on one stream of cycles."""
 
     def __init__(self, trigger: Trigger) -> None:
         self._trigger = trigger
         self._last = np.nan
+        self._was_true = True  # as far as is known: it hits where it becomes true
 
-    def hits(self, values: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return the places at which it hits, in values that follow those of the last call."""
-        trigger = self._trigger
+    def hits(self, *columns: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return the places at which it hits, in the values of its signals, which follow those of
+        the last call."""
+        trigger, values = self._trigger, columns[0]
+        if trigger.condition is not None:
+            return self._becomes_true(trigger.condition, columns)
         before: NDArray[np.float64] = np.concatenate((np.array([self._last]), values[:-1]))
         before = before[: len(values)]
         if len(values):
@@ -96,6 +111,15 @@ class Search:
                 trigger.slope
             ]
         return np.flatnonzero(found)
+
+    def _becomes_true(
+        self, condition: Condition, columns: Sequence[NDArray[np.float64]]
+    ) -> NDArray[np.int64]:
+        true = condition.over(list(columns), len(columns[0]))
+        before = np.append(self._was_true, true)[:-1]
+        if len(true):
+            self._was_true = bool(true[-1])
+        return np.flatnonzero(true & ~before)
 
 
 def _inside(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.bool_]:

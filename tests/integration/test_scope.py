@@ -272,11 +272,34 @@ def test_a_trigger_shows_the_cycle_that_it_waits_for_and_its_neighbours(
     asyncio.run(look())
 
 
+def test_a_trigger_on_several_signals_shows_its_cycle(scope: ScopeProcess) -> None:
+    async def look() -> None:
+        async with _Visit(scope) as page:
+            await page.say(
+                watch=["/wave.phase", "/wave.wave"],
+                trigger={"kind": "condition", "condition": "wave.phase > 0.5 and wave.wave < -0.9",
+                         "before": 10, "after": 10, "single": True},
+            )  # fmt: skip
+            head, columns = await page.binary(_SHOT)
+            hit, phase, wave = int(head[7]), columns[4], columns[5]
+            assert phase[hit] > 0.5 and wave[hit] < -0.9
+            assert wave[hit - 1] >= -0.9
+
+    asyncio.run(look())
+
+
 @pytest.mark.parametrize(
     ("told", "said"),
     [
+        (
+            {"trigger": {"kind": "condition", "condition": "a.x >", "before": 1, "after": 1}},
+            '"a.x >" is no condition: write one as in `wave.phase > 0.5`',
+        ),
         ({"trigger": 3}, "a trigger has signal, kind, before and after"),
-        ({"trigger": {"kind": "loud"}}, "trigger on 'loud': one of edge, level, window, nan"),
+        (
+            {"trigger": {"kind": "loud"}},
+            "trigger on 'loud': one of edge, level, window, nan, condition",
+        ),
         (
             {"trigger": {"kind": "window", "signal": "/wave.wave", "low": 2, "high": 1,
                          "before": 1, "after": 1}},

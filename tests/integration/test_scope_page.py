@@ -125,6 +125,7 @@ def test_a_slider_sets_the_parameter_of_the_running_component(
     visit: Opener, scope: ScopeProcess, loop: Daemon
 ) -> None:
     page = visit(scope)
+    page.wait("scope.rate")
     _press(page, "aside [data-tab=parameters]")
     page.wait("document.querySelector('[data-slider=\"/w1.amplitude\"]') !== null")
     page.ask(

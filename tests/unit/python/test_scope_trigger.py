@@ -47,6 +47,23 @@ def test_it_hits_the_same_cycles_however_they_come(kind: str) -> None:
         assert found == whole
 
 
+@pytest.mark.parametrize("size", [1, 3, 100])
+def test_a_condition_hits_where_it_becomes_true(size: int) -> None:
+    trigger = parse(_BASE | {"kind": "condition", "condition": "a.x > 1 and not b.y"})
+    assert trigger.signals == ["/a.x", "/b.y"]
+    x, y = np.array([2.0, 2, 0, 2, 2, 2, _NAN, 2]), np.array([0.0, 0, 0, 0, 1, 0, 0, 0])
+    search, found = Search(trigger), []
+    for at in range(0, len(x), size):
+        found += (search.hits(x[at : at + size], y[at : at + size]) + at).tolist()
+    # Not in the first cycle: nobody knows whether it was true before.
+    assert found == [3, 5, 7]
+
+
+def test_a_condition_that_is_none_is_refused() -> None:
+    with pytest.raises(TriggerError, match="is no condition"):
+        parse(_BASE | {"kind": "condition", "condition": "a.x >"})
+
+
 def test_a_slope_that_a_kind_has_not_is_refused() -> None:
     with pytest.raises(TriggerError, match="edge 'above': one of rising, falling, either"):
         parse(_BASE | {"kind": "edge", "slope": "above"})

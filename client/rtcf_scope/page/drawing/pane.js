@@ -197,7 +197,7 @@ export class Pane {
     const { trigger } = this.scope;
     if (this.scope.mode !== "trigger") return;
     if (this.scope.shot) drawMark(g, area, x(0), ink("hit"), this.traces.length ? "trigger" : "", true);
-    if (!this.has(trigger.told.signal) || trigger.told.kind === "nan") return;
+    if (!this.has(trigger.told.signal) || !["edge", "level", "window"].includes(trigger.told.kind)) return;
     g.strokeStyle = ink("hit");
     g.setLineDash([8, 4]);
     for (const level of trigger.told.kind === "window" ? [trigger.told.low, trigger.told.high] : [trigger.told.low]) {

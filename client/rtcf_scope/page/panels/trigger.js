@@ -1,7 +1,7 @@
 // The trigger's settings; the server looks at every cycle.
 import { figure } from "../drawing/axes.js";
 
-const SLOPES = { edge: ["rising", "falling", "either"], level: ["above", "below"], window: ["leaves", "enters"], nan: [] };
+const SLOPES = { edge: ["rising", "falling", "either"], level: ["above", "below"], window: ["leaves", "enters"], nan: [], condition: [] };
 
 export class TriggerPanel {
   constructor(scope, box, arm) { // arm(told or null)
@@ -21,7 +21,7 @@ export class TriggerPanel {
     const names = [...new Set([...this.scope.traces().map((each) => each.name), ...this.scope.catalog.map((each) => each.name)])];
     if (!told.signal) told.signal = names[0] ?? "";
     this.part("signal").replaceChildren(...names.map((name) => new Option(name, name, false, name === told.signal)));
-    for (const name of ["kind", "low", "high", "single", "window", "position", "holdoff"]) {
+    for (const name of ["kind", "low", "high", "single", "window", "position", "holdoff", "condition"]) {
       const input = this.part(name);
       if (told[name] === undefined) continue;
       if (input.type === "checkbox") input.checked = told[name]; else input.value = told[name];
@@ -30,7 +30,9 @@ export class TriggerPanel {
     if (!slopes.includes(told.slope)) told.slope = slopes[0] ?? "";
     this.part("slope").replaceChildren(...slopes.map((each) => new Option(each, each, false, each === told.slope)));
     this.part("slope").hidden = !slopes.length;
-    this.part("low").parentElement.hidden = told.kind === "nan";
+    this.part("signal").parentElement.hidden = told.kind === "condition";
+    this.part("condition").hidden = told.kind !== "condition";
+    this.part("low").parentElement.hidden = told.kind === "nan" || told.kind === "condition";
     this.part("high").parentElement.hidden = told.kind !== "window";
     this.tell();
   }
@@ -66,7 +68,7 @@ export class TriggerPanel {
 
   #read() {
     const { told } = this.scope.trigger;
-    for (const name of ["signal", "kind", "slope"]) told[name] = this.part(name).value;
+    for (const name of ["signal", "kind", "slope", "condition"]) told[name] = this.part(name).value;
     for (const name of ["low", "high", "window", "position", "holdoff"]) {
       const number = Number(this.part(name).value);
       if (isFinite(number)) told[name] = number;
