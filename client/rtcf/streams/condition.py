@@ -54,9 +54,7 @@ class Condition:
         try:
             tree = ast.parse(source, mode="eval")
         except (SyntaxError, RecursionError, MemoryError):
-            raise ConditionError(
-                f'"{text}" is no condition: write one as in `a.out > 0.5`'
-            ) from None
+            raise ConditionError(_no_condition(text)) from None
         if _depth(tree) > _DEEPEST:
             raise ConditionError(f'"{text[:40]}…" has too many parentheses')
         for node in ast.walk(tree):
