@@ -15,7 +15,8 @@ from rtcfctl.terminal.plain import number, plain
 from rtcfctl.terminal.table import Cell, format_table
 
 _PATIENCE_S = 10.0  # of somebody who is told nothing
-_ANSI = {"bold": "1", "red": "31", "green": "32", "yellow": "33"}
+_ANSI = {"bold": "1", "red": "31", "green": "32", "yellow": "33", "blue": "34",
+         "magenta": "35", "cyan": "36"}  # fmt: skip
 
 
 class Output:
@@ -56,7 +57,7 @@ class Output:
     def line(self, text: str, style: str = "", to: TextIO | None = None) -> None:
         """Print a line for people; `style` is of words like "bold red"."""
         stream = to or sys.stdout
-        print(_styled(text, style, _coloured(stream)), file=stream)
+        print(styled(text, style, coloured(stream)), file=stream)
 
     def table(
         self, columns: Sequence[str], rows: Iterable[Sequence[Any]], right: Sequence[str] = ()
@@ -70,9 +71,9 @@ class Output:
             [(each[0], each[1]) if isinstance(each, tuple) else (str(each), "") for each in row]
             for row in rows
         ]
-        coloured = _coloured(sys.stdout)
+        in_colours = coloured(sys.stdout)
         for text_of_line in format_table(columns, cells, right, _width()):
-            print("".join(_styled(text, style, coloured) for text, style in text_of_line).rstrip())
+            print("".join(styled(text, style, in_colours) for text, style in text_of_line).rstrip())
 
     def begin_anew(self) -> None:
         """Before output that takes the place of the last: clear a terminal; elsewhere begin
@@ -120,13 +121,15 @@ def _width() -> int | None:
         return 80
 
 
-def _coloured(stream: TextIO) -> bool:
+def coloured(stream: TextIO) -> bool:
+    """Tell whether a stream shows colours."""
     return stream.isatty() and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"
 
 
-def _styled(text: str, style: str, coloured: bool) -> str:
+def styled(text: str, style: str, in_colours: bool) -> str:
+    """Return a text in a style of words like "bold red"."""
     codes = ";".join(_ANSI[word] for word in style.split())
-    return f"\x1b[{codes}m{text}\x1b[0m" if coloured and codes and text.strip() else text
+    return f"\x1b[{codes}m{text}\x1b[0m" if in_colours and codes and text.strip() else text
 
 
 def _plain(value: Any) -> Any:

@@ -1,0 +1,70 @@
+"""Numbers as pictures of characters: a row of blocks, and curves of braille dots."""
+
+import math
+from collections.abc import Sequence
+
+_BLOCKS = "▁▂▃▄▅▆▇█"
+# Of a braille character's 2 by 4 dots, by column and row.
+_DOTS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
+_BLANK = 0x2800
+
+
+def spark(values: Sequence[float], width: int) -> str:
+    """Return the last values as blocks from zero to the largest; a space for what is no number."""
+    shown = list(values)[-width:]
+    most = max((each for each in shown if math.isfinite(each)), default=0.0)
+
+    def block(value: float) -> str:
+        if not math.isfinite(value):
+            return " "
+        return _BLOCKS[round(max(value, 0.0) / most * (len(_BLOCKS) - 1)) if most > 0 else 0]
+
+    return "".join(block(each) for each in shown)
+
+
+class Curves:
+    """A field of dots, two a column and four a line, for several curves."""
+
+    def __init__(self, width: int, height: int, low: float, high: float) -> None:
+        self._width, self._height = width, height
+        self._low, self._high = low, high
+        self._dots: dict[tuple[int, int], int] = {}
+        self._owner: dict[tuple[int, int], int] = {}
+
+    @property
+    def columns(self) -> int:
+        """Dots beside each other."""
+        return 2 * self._width
+
+    def column(self, x: int, low: float, high: float, owner: int) -> None:
+        """Set the dots from `low` to `high` in one of the columns of dots."""
+        if not (math.isfinite(low) and math.isfinite(high)):
+            return
+        top, bottom = self._row(high), self._row(low)
+        for row in range(top, bottom + 1):
+            place = x // 2, row // 4
+            self._dots[place] = self._dots.get(place, 0) | _DOTS[x % 2][row % 4]
+            self._owner[place] = owner
+
+    def lines(self) -> list[list[tuple[str, int]]]:
+        """Return lines of runs of characters, each with its owner; -1 = nobody's."""
+        found = []
+        for line in range(self._height):
+            runs: list[tuple[str, int]] = []
+            for x in range(self._width):
+                dots = self._dots.get((x, line), 0)
+                owner = self._owner.get((x, line), -1)
+                character = chr(_BLANK + dots) if dots else " "
+                if runs and runs[-1][1] == owner:
+                    runs[-1] = (runs[-1][0] + character, owner)
+                else:
+                    runs.append((character, owner))
+            found.append(runs)
+        return found
+
+    def _row(self, value: float) -> int:
+        rows = 4 * self._height
+        # By halves: the difference of two numbers may be none any more.
+        span = self._high / 2 - self._low / 2
+        above = min(max(value, self._low), self._high) / 2 - self._low / 2
+        return rows - 1 - round(above / span * (rows - 1) if span > 0 else 0.0)
