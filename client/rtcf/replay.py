@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rtcf_shared.errors import RtcfError
-
 from rtcf.client import Client
+from rtcf.recording import bags
+from rtcf.recording.reader import RecordingError
 from rtcf.replay_call import ReplayCall
 from rtcf.v1 import control_pb2
 
@@ -22,10 +22,6 @@ _MAX_MESSAGES = 2000
 _MAX_BYTES = 2 * 1024 * 1024
 
 OnProgress = Callable[[str], None]
-
-
-class RecordingError(RtcfError):
-    """A bag cannot be read or written."""
 
 
 @dataclass
@@ -133,21 +129,15 @@ class _Writer:
 
     def __init__(self, path: Path | None, topics: Any) -> None:
         self._path = path
-        # What rosbag wants of a message class.
         self._types = {
-            each.topic: type(
-                each.type.replace("/", "_"),
-                (),
-                {"_type": each.type, "_md5sum": each.md5, "_full_text": each.definition},
-            )
-            for each in topics
+            each.topic: bags.MessageType(each.type, each.md5, each.definition) for each in topics
         }
         self._bag: Any = None
 
     def __enter__(self) -> "_Writer":
         if self._path is not None:
             try:
-                self._bag = _rosbag().Bag(str(self._path), "w")
+                self._bag = bags.rosbag().Bag(str(self._path), "w")
             except OSError as error:
                 raise RecordingError(
                     f"{self._path} cannot be written: {error.strerror or error}"
@@ -162,16 +152,14 @@ class _Writer:
         """Append messages."""
         if self._bag is None:
             return
-        genpy = _module("genpy", "python3-genpy")
         for each in outputs:
-            kind: Any = self._types[each.topic]
-            raw = (kind._type, each.data, kind._md5sum, None, kind)
-            self._bag.write(each.topic, raw, genpy.Time(0, each.time_ns), raw=True)
+            raw = self._types[each.topic].raw(each.data)
+            self._bag.write(each.topic, raw, bags.time(each.time_ns), raw=True)
 
 
 @contextlib.contextmanager
 def _reader(path: Path) -> Iterator[Any]:
-    rosbag = _rosbag()
+    rosbag = bags.rosbag()
     try:
         bag = rosbag.Bag(str(path))
     except rosbag.ROSBagUnindexedException:
@@ -184,14 +172,3 @@ def _reader(path: Path) -> Iterator[Any]:
         raise RecordingError(f"{path} cannot be read: {error.strerror or error}") from None
     with bag:
         yield bag
-
-
-def _rosbag() -> Any:
-    return _module("rosbag", "python3-rosbag")
-
-
-def _module(name: str, package: str) -> Any:
-    try:
-        return __import__(name)
-    except ImportError:
-        raise RecordingError(f"bags need {name}: sudo apt install {package}") from None

@@ -52,6 +52,7 @@ _MODULES = {
     "plot": "signals.plot",
     "wait": "signals.wait",
     "record": "signals.record",
+    "convert": "signals.convert",
     "scope": "signals.scope",
     "incident": "signals.incident",
     "check": "machine.check",

@@ -12,6 +12,7 @@ from rtcf_shared.errors import RtcfError
 
 from rtcf.closing import Closing
 from rtcf.recording import mcap_writer as mcap
+from rtcf.recording.fields import Fields
 from rtcf.streams import ros_layout
 from rtcf.streams.ports import signal_name
 
@@ -48,11 +49,15 @@ class RecordedColumn:
     values: "NDArray[Any]"  # by cycle, then as the signal is shaped
 
 
-@dataclass
-class _Channel:
-    topic: str
+@dataclass(frozen=True, eq=False)
+class RecordedTopic:
+    """The messages of one output or state, or of the cycles; two may have one name."""
+
+    number: int
+    name: str
+    ros_type: str
+    definition: str  # with those of the types in it
     metadata: dict[str, str]
-    definition: str
 
 
 @dataclass
@@ -77,7 +82,7 @@ class Recording(Closing):
         self.whole = False
         self.signals: dict[str, RecordedSignal] = {}
         self.metadata: dict[str, dict[str, str]] = {}
-        self._channels: dict[int, _Channel] = {}
+        self._channels: dict[int, RecordedTopic] = {}
         self._chunks: list[_Chunk] = []
         self._cycle_channel = 0
         self._cache: tuple[int, bytes] = (-1, b"")
@@ -97,40 +102,70 @@ class Recording(Closing):
         self._file.close()
 
     @property
+    def chunks(self) -> int:
+        """How many parts the file has, one after the other, that are read at once each."""
+        return len(self._chunks)
+
+    @property
     def cycles(self) -> "NDArray[np.int64]":
         """The numbers of all cycles, in the order in which they were recorded."""
-        return self._of_cycles("iteration")
+        return self.read_cycles("iteration").values
 
     @property
     def stamps_ns(self) -> "NDArray[np.int64]":
         """CLOCK_REALTIME of each cycle's deadline, or the simulated time; ns."""
-        return self._column_of_cycles("iteration").stamps_ns
+        return self.read_cycles("iteration").stamps_ns
 
     @property
     def durations_ns(self) -> "NDArray[np.int64]":
         """Calculation in each cycle; ns."""
-        return self._of_cycles("duration_ns")
+        return self.read_cycles("duration_ns").values
 
     @property
     def latencies_ns(self) -> "NDArray[np.int64]":
         """Wake-up after each deadline; ns."""
-        return self._of_cycles("latency_ns")
+        return self.read_cycles("latency_ns").values
 
     def __getitem__(self, name: str) -> "NDArray[Any]":
         """Return all values of a signal."""
         return self.read(name).values
 
     def read(
-        self, name: str, begin_ns: int | None = None, end_ns: int | None = None
+        self,
+        name: str,
+        begin_ns: int | None = None,
+        end_ns: int | None = None,
+        chunk: int | None = None,
     ) -> RecordedColumn:
-        """Return the values of a signal whose stamps are from `begin_ns` to before `end_ns`; of
-        the file no more than that is read."""
+        """Return the values of a signal whose stamps are from `begin_ns` to before `end_ns`, or
+        those in one chunk; of the file no more than that is read."""
         signal = self.signals.get(name)
         if signal is None:
             known = ", ".join(list(self.signals)[:8])
             raise RecordingError(f"{self.path} has no signal {name}; it has {known or 'none'}")
         with self._whole_only():
-            return self._read(signal.channel, signal.leaf, begin_ns, end_ns)
+            return self._read(signal.channel, signal.leaf, begin_ns, end_ns, chunk)
+
+    def read_cycles(self, name: str, chunk: int | None = None) -> RecordedColumn:
+        """Return `iteration`, `duration_ns` or `latency_ns` of all cycles, or of those in one
+        chunk."""
+        if not self._cycle_channel:
+            raise RecordingError(f"{self.path} tells no cycles: rtcfctl record has not written it")
+        with self._whole_only():
+            return self._read(self._cycle_channel, self._leaf_of_cycles(name), chunk=chunk)
+
+    def messages(self, chunk: int) -> list[tuple[RecordedTopic, int, bytes]]:
+        """Return the messages of a chunk as ROS 1 serialises them, with their stamps (ns), in the
+        order of these."""
+        found = []
+        with self._whole_only():
+            for number in self._chunks[chunk].offsets:
+                topic = self._channels[number]
+                index = self._index(self._chunks[chunk], number).tolist()
+                found += [(time, at, topic) for time, at in index]
+            found.sort(key=lambda each: each[:2])
+            records = self._records(chunk)
+            return [(topic, time, self._data(records, at)) for time, at, topic in found]
 
     def to_pandas(self, names: Iterable[str] | None = None) -> Any:
         """Return a pandas.DataFrame of signals that are numbers, by cycle."""
@@ -142,15 +177,6 @@ class Recording(Closing):
             if column.values.ndim == 1:
                 columns[name] = pandas.Series(column.values, index=column.cycles)
         return pandas.DataFrame(columns)
-
-    def _of_cycles(self, name: str) -> "NDArray[np.int64]":
-        return self._column_of_cycles(name).values
-
-    def _column_of_cycles(self, name: str) -> RecordedColumn:
-        if not self._cycle_channel:
-            raise RecordingError(f"{self.path} tells no cycles: rtcfctl record has not written it")
-        with self._whole_only():
-            return self._read(self._cycle_channel, self._leaf_of_cycles(name))
 
     @contextlib.contextmanager
     def _whole_only(self) -> Iterator[None]:
@@ -169,20 +195,22 @@ class Recording(Closing):
         leaf: ros_layout.Leaf,
         begin_ns: int | None = None,
         end_ns: int | None = None,
+        chunk: int | None = None,
     ) -> RecordedColumn:
         import numpy as np
 
         shape = () if leaf.count is None else (leaf.count,)
         size = ros_layout.size_of(leaf.format) * (1 if leaf.count is None else leaf.count)
         cycles, stamps, values = [], [], []
-        for number, chunk in enumerate(self._chunks):
-            if channel not in chunk.offsets:
+        for number in range(self.chunks) if chunk is None else (chunk,):
+            part = self._chunks[number]
+            if channel not in part.offsets:
                 continue
-            if (end_ns is not None and chunk.start_ns >= end_ns) or (
-                begin_ns is not None and chunk.end_ns < begin_ns
+            if (end_ns is not None and part.start_ns >= end_ns) or (
+                begin_ns is not None and part.end_ns < begin_ns
             ):
                 continue
-            index = self._index(chunk, channel)
+            index = self._index(part, channel)
             keep = np.ones(len(index), bool)
             if begin_ns is not None:
                 keep &= index["time"] >= begin_ns
@@ -192,7 +220,7 @@ class Recording(Closing):
             records = np.frombuffer(self._records(number), "u1")
             at = index["offset"].astype("i8")[:, None]
             low = records[at + 11 + np.arange(4)].reshape(-1).view("<u4").astype("i8")
-            cycles.append(self._cycles_of(chunk, records, low))
+            cycles.append(self._cycles_of(part, records, low))
             stamps.append(index["time"].astype("i8"))
             data = records[at + mcap.MESSAGE_HEAD + leaf.offset + np.arange(size)]
             values.append(data.reshape(-1).view(leaf.format).reshape(len(index), *shape))
@@ -257,7 +285,7 @@ class Recording(Closing):
         self._file.seek(0)
         if self._file.read(len(mcap.MAGIC)) != mcap.MAGIC:
             raise RecordingError(f"{self.path} is no MCAP file")
-        definitions: dict[int, str] = {}
+        schemas: dict[int, tuple[str, str]] = {}
         at = len(mcap.MAGIC)
         chunk: _Chunk | None = None
         while at + _RECORD.size <= size:
@@ -276,17 +304,19 @@ class Recording(Closing):
                 (channel,) = struct.unpack("<H", self._file.read(2))
                 chunk.offsets[channel] = content_at - _RECORD.size
             elif opcode == mcap.SCHEMA:
-                reader = _Reader(self._file.read(length))
+                reader = Fields(self._file.read(length))
                 (number,) = reader.numbers("<H")
-                reader.text(), reader.text()
-                definitions[number] = reader.text()
+                ros_type, _ = reader.text(), reader.text()
+                schemas[number] = ros_type, reader.text()
             elif opcode == mcap.CHANNEL:
-                reader = _Reader(self._file.read(length))
+                reader = Fields(self._file.read(length))
                 number, schema = reader.numbers("<HH")
                 topic, _ = reader.text(), reader.text()
-                self._channels[number] = _Channel(topic, reader.pairs(), definitions[schema])
+                self._channels[number] = RecordedTopic(
+                    number, topic, *schemas[schema], reader.pairs()
+                )
             elif opcode == mcap.METADATA:
-                reader = _Reader(self._file.read(length))
+                reader = Fields(self._file.read(length))
                 name = reader.text()
                 self.metadata[name] = reader.pairs()
         self._find_signals()
@@ -311,7 +341,7 @@ class Recording(Closing):
             sample = self._sample(number)
             if sample is None:
                 continue
-            name = channel.topic
+            name = channel.name
             if "component" in channel.metadata:
                 component, own = channel.metadata["component"], channel.metadata["name"]
                 is_state = channel.metadata.get("kind") == "state"
@@ -325,38 +355,14 @@ class Recording(Closing):
         for number, chunk in enumerate(self._chunks):
             if channel in chunk.offsets:
                 offset = int(self._index(chunk, channel)["offset"][0])
-                records = self._records(number)
-                (_, length) = _RECORD.unpack_from(records, offset)
-                return records[offset + mcap.MESSAGE_HEAD : offset + _RECORD.size + length]
+                return self._data(self._records(number), offset)
         return None
 
-
-class _Reader:
-    """What stands in a record, one after the other."""
-
-    def __init__(self, data: bytes) -> None:
-        self._data = data
-        self._at = 0
-
-    def numbers(self, form: str) -> tuple[int, ...]:
-        values = struct.unpack_from(form, self._data, self._at)
-        self._at += struct.calcsize(form)
-        return values
-
-    def text(self) -> str:
-        (length,) = self.numbers("<I")
-        text = self._data[self._at : self._at + length].decode(errors="replace")
-        self._at += length
-        return text
-
-    def pairs(self) -> dict[str, str]:
-        return dict(self._pairs())
-
-    def _pairs(self) -> Iterator[tuple[str, str]]:
-        (length,) = self.numbers("<I")
-        end = self._at + length
-        while self._at < end:
-            yield self.text(), self.text()
+    @staticmethod
+    def _data(records: bytes, at: int) -> bytes:
+        """Return the message of a record."""
+        (_, length) = _RECORD.unpack_from(records, at)
+        return records[at + mcap.MESSAGE_HEAD : at + _RECORD.size + length]
 
 
 def read_recording(path: str | os.PathLike[str]) -> Recording:

@@ -1,0 +1,153 @@
+"""Recordings as files of other programs: CSV, and bags of ROS 1."""
+
+import csv
+import io
+import os
+import stat
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from rtcf.recording import bags
+from rtcf.recording.reader import RecordedColumn, RecordedTopic, Recording, RecordingError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_CYCLE = ("iteration", "duration_ns", "latency_ns")
+
+OnProgress = Callable[[str], None]
+
+
+def convert(
+    recording: Recording, to: Path, *, force: bool = False, on_progress: OnProgress | None = None
+) -> int:
+    """Write a recording into a file whose suffix says of what kind: .csv or .bag.
+
+    Return how many cycles or messages are in it.  A file that is there is written over if
+    `force`; one that cannot be written whole is removed.  Raises ValueError of a file name, and
+    RecordingError.
+    """
+    write = _KINDS.get(to.suffix)
+    if write is None:
+        raise ValueError(f"{to}: end its name in {' or '.join(_KINDS)}, which says what to write")
+    if to.exists() and to.samefile(recording.path):
+        raise ValueError(f"{to} is the recording itself: write to another file")
+    if write is _write_bag:
+        bags.rosbag()  # said before there is a file
+    with _new_file(to, force) as file:
+        written = 0
+        for count in write(recording, file):
+            written += count
+            if on_progress is not None:
+                on_progress(f"{to}: {written}")
+        return written
+
+
+def _write_csv(recording: Recording, file: BinaryIO) -> Iterator[int]:
+    """Write a line for each cycle; cells of what was not there then are empty."""
+    text = io.TextIOWrapper(file, encoding="utf-8", newline="", write_through=True)
+    writer = csv.writer(text, lineterminator="\n")
+    head = ["cycle", "stamp_ns", *_CYCLE[1:]]
+    for name, signal in recording.signals.items():
+        count = signal.leaf.count
+        head += [name] if count is None else [f"{name}[{index}]" for index in range(count)]
+    recording.read_cycles("iteration")  # refused before a line is written
+    writer.writerow(head)
+    for chunk in range(recording.chunks):
+        first, *others = (recording.read_cycles(name, chunk) for name in _CYCLE)
+        columns = [first.values.tolist(), first.stamps_ns.tolist()]
+        columns += [other.values.tolist() for other in others]
+        for name in recording.signals:
+            columns += _cells(recording.read(name, chunk=chunk), first)
+        writer.writerows(zip(*columns, strict=True))
+        yield len(first.values)
+    text.detach()
+
+
+def _cells(column: RecordedColumn, cycles: RecordedColumn) -> list[list[Any]]:
+    """Return the columns of a signal, in a line for each cycle."""
+    import numpy as np
+
+    values = column.values.reshape(len(column.values), -1 if column.values.ndim > 1 else 1)
+    shown = [_shown(values[:, index]) for index in range(values.shape[1])]
+    if np.array_equal(column.cycles, cycles.values):
+        return shown
+    # A number alone may come again, after the loop was started anew.
+    keys = zip(cycles.values.tolist(), cycles.stamps_ns.tolist(), strict=True)
+    line = {key: number for number, key in enumerate(keys)}
+    keys = zip(column.cycles.tolist(), column.stamps_ns.tolist(), strict=True)
+    lines = [line.get(key) for key in keys]
+    aligned = []
+    for cells in shown:
+        all_cells = [""] * len(cycles.values)
+        for number, cell in zip(lines, cells, strict=True):
+            if number is not None:
+                all_cells[number] = cell
+        aligned.append(all_cells)
+    return aligned
+
+
+def _shown(values: "NDArray[Any]") -> list[Any]:
+    """Return numbers as the shortest text that is read as the same number; truth as 0 and 1."""
+    if values.dtype == bool:
+        return values.astype(int).tolist()  # type: ignore[no-any-return]
+    return (values.astype(str) if values.dtype.itemsize == 4 else values).tolist()  # type: ignore[no-any-return]
+
+
+def _write_bag(recording: Recording, file: BinaryIO) -> Iterator[int]:
+    """Write the messages of each output and state."""
+    topics: dict[str, tuple[str, ...]] = {}
+    types: dict[int, tuple[str, bags.MessageType]] = {}
+    bag = bags.rosbag().Bag(file, "w")
+    try:
+        for chunk in range(recording.chunks):
+            last_ns, stamp = -1, None
+            messages = recording.messages(chunk)
+            for topic, time_ns, data in messages:
+                if topic.number not in types:
+                    types[topic.number] = _named(topic, topics)
+                if time_ns != last_ns:
+                    last_ns, stamp = time_ns, bags.time(time_ns)
+                name, kind = types[topic.number]
+                bag.write(name, kind.raw(data), stamp, raw=True)
+            yield len(messages)
+    finally:
+        bag.close()
+
+
+def _named(
+    topic: RecordedTopic, topics: dict[str, tuple[str, ...]]
+) -> tuple[str, bags.MessageType]:
+    """Return the name and type of a topic; in a bag each name has one type."""
+    md5 = bags.md5_of(topic.ros_type, topic.definition)
+    kind = topic.metadata.get("kind", "other")
+    own = topic.ros_type, md5, kind
+    name, number = topic.name, 1
+    while topics.setdefault(name, own) != own:
+        name = f"{topic.name}/{kind}" if number == 1 else f"{topic.name}/{kind}_{number}"
+        number += 1
+    return name, bags.MessageType(topic.ros_type, md5, topic.definition)
+
+
+_KINDS = {".csv": _write_csv, ".bag": _write_bag}
+
+
+@contextmanager
+def _new_file(path: Path, force: bool) -> Iterator[BinaryIO]:
+    try:
+        file = path.open("w+b" if force else "x+b")
+    except FileExistsError:
+        raise ValueError(f"{path} is there already: --force writes over it") from None
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror}") from None
+    try:
+        with file:
+            yield file
+    except BaseException as error:
+        if stat.S_ISREG(os.lstat(path).st_mode):
+            path.unlink()
+        if isinstance(error, OSError):
+            raise RecordingError(f"{path}: {error.strerror or error}") from None
+        raise

@@ -1,0 +1,215 @@
+"""`rtcfctl convert`: recordings in files of other programs, with each value of each cycle."""
+
+import csv
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rosbag
+import rtcf
+import std_msgs.msg
+from daemon_process import Daemon
+from rtcf.recording.bags import md5_of
+from rtcf.recording.convert import convert
+from rtcf.recording.mcap_writer import Column, McapWriter
+from rtcf.recording.recorder import Recorder
+from rtcf.streams.ports import PortBatch, schema_of
+from rtcf.v1 import ports_pb2
+
+
+@pytest.fixture
+def recorded(running: Daemon, tmp_path: Path) -> Path:
+    """Give a recording of half a second."""
+    file = tmp_path / "run.mcap"
+    done = running.ctl("record", "-o", str(file), "--duration", "0.5s")
+    assert done.returncode == 0, done.stderr
+    return file
+
+
+def _lines(file: Path) -> list[dict[str, str]]:
+    with file.open(newline="") as text:
+        return list(csv.DictReader(text))
+
+
+def test_a_line_of_csv_is_a_cycle_with_the_same_numbers(running: Daemon, recorded: Path) -> None:
+    file = recorded.with_suffix(".csv")
+    done = running.ctl("convert", str(recorded), str(file))
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = _lines(file)
+    with rtcf.read_recording(recorded) as recording:
+        assert f"{file}: {len(lines)} cycles" in done.stdout
+        assert [int(line["cycle"]) for line in lines] == recording.cycles.tolist()
+        assert [int(line["stamp_ns"]) for line in lines] == recording.stamps_ns.tolist()
+        assert [int(line["duration_ns"]) for line in lines] == recording.durations_ns.tolist()
+        assert [int(line["latency_ns"]) for line in lines] == recording.latencies_ns.tolist()
+        for name in recording.signals:
+            values = recording[name]
+            assert values.ndim == 1, name
+            assert np.array_equal([float(line[name]) for line in lines], values), name
+
+
+def _batch(first: int, begin_ns: int, **states: tuple[str, "np.ndarray[Any, Any]"]) -> PortBatch:
+    """Return cycles as a stream tells them, 1 ms apart; `states`: type and values by name."""
+    count = len(next(iter(states.values()))[1])
+    columns = [
+        ports_pb2.PortColumn(
+            component="/a",
+            name=name,
+            kind=ports_pb2.PortColumn.KIND_STATE,
+            type=kind,
+            size=values.nbytes // count,
+        )
+        for name, (kind, values) in states.items()
+    ]
+    message = ports_pb2.PortBatch(
+        first_cycle=first,
+        stamps_ns=range(begin_ns, begin_ns + count * 1_000_000, 1_000_000),
+        latencies_ns=[0] * count,
+        durations_ns=[0] * count,
+        values=[values.tobytes() for _, values in states.values()],
+    )
+    schema = schema_of(ports_pb2.PortSchema(columns=columns))
+    return PortBatch(schema, 1, first, 0, False, message)
+
+
+def test_cells_of_what_was_not_there_are_empty_and_numbers_of_arrays_have_their_own(
+    running: Daemon, tmp_path: Path
+) -> None:
+    gains = np.array([[0.1, 1e30], [np.nan, -np.inf], [3.0, 0.25]], "<f4")
+    late = np.array([2**63 + 1, 0], "<u8")
+    with (tmp_path / "run.mcap").open("xb") as out:
+        writer = McapWriter(out)
+        recorder = Recorder(writer, "rt_runner")
+        recorder.add(_batch(6, 10**18, gains=("float[2]", gains)))
+        # The loop was started anew: cycles 7 and 8 come again.
+        recorder.add(
+            _batch(7, 10**18 + 10**10, gains=("float[2]", gains[:2]), late=("uint64", late))
+        )
+        recorder.flush()
+        writer.close()
+    done = running.ctl("convert", str(tmp_path / "run.mcap"), str(tmp_path / "run.csv"))
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "run.csv").read_text().splitlines() == [
+        "cycle,stamp_ns,duration_ns,latency_ns,/a.gains[0],/a.gains[1],/a.late",
+        "6,1000000000000000000,0,0,0.1,1e+30,",
+        "7,1000000000001000000,0,0,nan,-inf,",
+        "8,1000000000002000000,0,0,3.0,0.25,",
+        "7,1000000010000000000,0,0,0.1,1e+30,9223372036854775809",
+        "8,1000000010001000000,0,0,nan,-inf,0",
+    ]
+
+
+def test_a_bag_has_the_messages_with_their_stamps(running: Daemon, recorded: Path) -> None:
+    file = recorded.with_suffix(".bag")
+    done = running.ctl("convert", str(recorded), str(file), "-o", "json")
+    assert (done.returncode, done.stderr) == (0, "")
+    with rosbag.Bag(str(file)) as bag, rtcf.read_recording(recorded) as recording:
+        topics = bag.get_type_and_topic_info().topics
+        assert topics["/wave/phase"].msg_type == "std_msgs/Float64"
+        assert topics["/wave/above"].msg_type == "std_msgs/Bool"
+        assert topics["/rt_runner/cycles"].msg_type == "rtcf_msgs/Cycle"
+        assert {each.message_count for each in topics.values()} == {len(recording.cycles)}
+        for name in ("/wave/phase", "/wave/wave", "/wave/above", "/mimo/out1"):
+            found = [(time.to_nsec(), message.data) for _, message, time in bag.read_messages(name)]
+            column = recording.read(name.replace("/", ".").replace(".", "/", 1))
+            assert found == list(
+                zip(column.stamps_ns.tolist(), column.values.tolist(), strict=True)
+            ), name
+        cycles = [each.message.iteration for each in bag.read_messages("/rt_runner/cycles")]
+        assert cycles == recording.cycles.tolist()
+
+
+def test_a_state_that_has_the_name_of_an_output_is_a_topic_of_its_own(tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    with file.open("xb") as out:
+        writer = McapWriter(out)
+        columns = []
+        for kind in ("output", "state", "state"):
+            metadata = {"component": "/a", "name": "x", "kind": kind}
+            channel = writer.channel("/a/x", "std_msgs/Float64", "float64 data\n", metadata)
+            data = np.array([float(channel)]).view("u1").reshape(1, 8)
+            columns.append(Column(channel, np.array([7]), np.array([10**9]), data))
+        writer.chunk(columns)
+        writer.close()
+    with rtcf.read_recording(file) as recording:
+        assert convert(recording, tmp_path / "run.bag") == 3
+    with rosbag.Bag(str(tmp_path / "run.bag")) as bag:
+        found = [(each.topic, each.message.data) for each in bag.read_messages()]
+    assert found == [("/a/x", 1.0), ("/a/x/state", 2.0), ("/a/x/state", 3.0)]
+
+
+@pytest.mark.parametrize("name", ["Float64", "Header", "Float64MultiArray", "UInt8MultiArray"])
+def test_md5_sums_are_those_of_ros(name: str) -> None:
+    kind = getattr(std_msgs.msg, name)
+    assert md5_of(kind._type, kind._full_text) == kind._md5sum
+
+
+def test_refused_in_a_line_and_nothing_is_left(running: Daemon, recorded: Path) -> None:
+    there = recorded.with_name("there.csv")
+    there.write_text("mine")
+    itself = recorded.with_name("itself.csv")
+    itself.symlink_to(recorded)
+    before = set(recorded.parent.iterdir())
+    for source, to, words, code, reason in (
+        (
+            recorded,
+            Path("run.txt"),
+            (),
+            2,
+            "end its name in .csv or .bag, which says what to write",
+        ),
+        (recorded, there, (), 2, "is there already: --force writes over it"),
+        (recorded, itself, ("--force",), 2, "is the recording itself: write to another file"),
+        (recorded, Path("no/where.csv"), (), 2, "No such file or directory"),
+        (there, Path("run.csv"), (), 1, "is no MCAP file"),
+        (recorded.with_name("none"), Path("run.csv"), (), 1, "No such file or directory"),
+    ):
+        done = running.ctl("convert", str(source), str(recorded.parent / to), *words)
+        assert done.returncode == code, done.stderr
+        assert reason in done.stderr
+        assert len(done.stderr.splitlines()) == 1
+    assert set(recorded.parent.iterdir()) == before
+    assert there.read_text() == "mine"
+    assert running.ctl("convert", str(recorded), str(there), "--force").returncode == 0
+    assert len(_lines(there)) > 0
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".bag"])
+def test_where_there_is_no_room_it_is_said_in_one_line(
+    running: Daemon, recorded: Path, suffix: str
+) -> None:
+    to = recorded.with_name(f"full{suffix}")
+    to.symlink_to("/dev/full")
+    done = running.ctl("convert", str(recorded), str(to), "--force")
+    assert done.returncode == 1
+    assert done.stderr.splitlines() == [f"rtcfctl: {to}: No space left on device"]
+    assert os.path.exists("/dev/full")
+    assert to.is_symlink()
+
+
+def test_a_recording_of_somebody_else_has_no_lines(running: Daemon, tmp_path: Path) -> None:
+    file = tmp_path / "other.mcap"
+    with file.open("xb") as out:
+        writer = McapWriter(out)
+        writer.close()
+    done = running.ctl("convert", str(file), str(tmp_path / "x.csv"))
+    assert done.returncode == 1
+    assert "tells no cycles: rtcfctl record has not written it" in done.stderr
+    assert not (tmp_path / "x.csv").exists()
+
+
+def test_without_rosbag_it_is_said_what_to_install(
+    recorded: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "rosbag", None)  # type: ignore[misc]
+    with (
+        rtcf.read_recording(recorded) as recording,
+        pytest.raises(
+            rtcf.RecordingError, match="bags need rosbag: sudo apt install python3-rosbag"
+        ),
+    ):
+        convert(recording, recorded.with_suffix(".bag"))
+    assert not recorded.with_suffix(".bag").exists()
