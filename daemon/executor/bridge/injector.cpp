@@ -13,8 +13,10 @@ bool Injector::deliver(const std::uint8_t* bytes, std::uint32_t size, std::int64
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!queueing_) return store(bytes, size);
     while (!waiting_.empty() &&
-           (waiting_.size() >= kMaxWaiting || waiting_bytes_ + size > kMaxWaitingBytes))
+           (waiting_.size() >= kMaxWaiting || waiting_bytes_ + size > kMaxWaitingBytes)) {
         dropOldest();
+        passed_over_.fetch_add(1, std::memory_order_relaxed);
+    }
     waiting_.push_back({arrived_ns, {bytes, bytes + size}});
     waiting_bytes_ += size;
     return true;
@@ -44,20 +46,33 @@ void Injector::deliverUntil(std::int64_t arrived_ns, double rate) {
     const auto ready = [&](std::size_t at) {
         return waiting_.size() > at && waiting_[at].arrived_ns <= arrived_ns;
     };
-    while (ready(1)) dropOldest();
-    if (!ready(0)) return;
-    const auto& [came_ns, bytes] = waiting_.front();
-    const double age_ns = rate * static_cast<double>(arrived_ns - came_ns);
-    store(bytes.data(), static_cast<std::uint32_t>(bytes.size()),
-          static_cast<std::int64_t>(age_ns));
-    waiting_bytes_ -= bytes.size();
-    waiting_.pop_front();
+    if (backlogs_.empty()) {
+        while (ready(1)) {
+            dropOldest();
+            passOver();
+        }
+    }
+    while (ready(0)) {
+        const auto& [came_ns, bytes] = waiting_.front();
+        const double age_ns = rate * static_cast<double>(arrived_ns - came_ns);
+        store(bytes.data(), static_cast<std::uint32_t>(bytes.size()),
+              static_cast<std::int64_t>(age_ns));
+        dropOldest();
+    }
+}
+
+void Injector::setBacklogs(std::vector<std::shared_ptr<Backlog>> backlogs) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    backlogs_ = std::move(backlogs);
 }
 
 void Injector::dropOldest() {
     waiting_bytes_ -= waiting_.front().bytes.size();
     waiting_.pop_front();
-    passed_over_.fetch_add(1, std::memory_order_relaxed);
+}
+
+void Injector::passOver() noexcept {
+    if (backlogs_.empty()) passed_over_.fetch_add(1, std::memory_order_relaxed);
 }
 
 bool Injector::store(const std::uint8_t* bytes, std::uint32_t size, std::int64_t age_ns) {
@@ -65,9 +80,10 @@ bool Injector::store(const std::uint8_t* bytes, std::uint32_t size, std::int64_t
         refused_.fetch_add(1, std::memory_order_relaxed);
         return false;
     }
+    for (const auto& backlog : backlogs_) backlog->store(bytes, size, age_ns);
     slots_[back_]->time_ns = age_ns;
     const std::uint32_t before = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel);
-    if ((before & kFresh) != 0) passed_over_.fetch_add(1, std::memory_order_relaxed);
+    if ((before & kFresh) != 0) passOver();
     back_ = before & ~kFresh;
     delivered_.fetch_add(1, std::memory_order_relaxed);
     return true;

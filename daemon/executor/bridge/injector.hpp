@@ -1,7 +1,8 @@
 /// @file
 /// An injector brings values into the loop: one thread deserialises a message
 /// into the free slot of a triple buffer, the real-time thread takes the newest
-/// at the next cycle boundary. Neither ever waits; only the newest value counts.
+/// at the next cycle boundary. Neither ever waits; only the newest value counts, but for
+/// queues, which get every one.
 /// Under a simulated clock, whose cycles come in bursts, values queue up until
 /// it is known which cycle is the first after them.
 #pragma once
@@ -15,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "bridge/backlog.hpp"
 #include "loop/cycle_counter.hpp"
 #include "rtcf/port.hpp"
 #include "rtcf/port_type.hpp"
@@ -52,6 +54,8 @@ class Injector {
     /// Any thread; not real-time safe.
     /// @param rate of the loop's time in real time; what came earlier is older by so much
     void deliverUntil(std::int64_t arrived_ns, double rate = 0.0);
+    /// Where messages go besides, each one and in order. Any thread; not real-time safe.
+    void setBacklogs(std::vector<std::shared_ptr<Backlog>> backlogs);
     /// Bytes that a message of a type of variable size may have. Any thread.
     void setLargest(std::uint32_t bytes) noexcept {
         largest_.store(bytes, std::memory_order_relaxed);
@@ -62,7 +66,8 @@ class Injector {
     /// Messages delivered and refused so far. Any thread.
     std::uint64_t delivered() const noexcept { return delivered_.load(std::memory_order_relaxed); }
     std::uint64_t refused() const noexcept { return refused_.load(std::memory_order_relaxed); }
-    /// Messages that no cycle has seen, as a newer one was there. Any thread.
+    /// Messages that no cycle has seen, as a newer one was there; none where a queue gets each one.
+    /// Any thread.
     std::uint64_t passedOver() const noexcept {
         return passed_over_.load(std::memory_order_relaxed);
     }
@@ -103,6 +108,7 @@ class Injector {
     static constexpr std::size_t kMaxWaitingBytes = 1024 * 1024;
 
     void dropOldest();
+    void passOver() noexcept;
     bool store(const std::uint8_t* bytes, std::uint32_t size, std::int64_t age_ns = 0);
 
     static constexpr std::uint32_t kFresh =
@@ -116,8 +122,9 @@ class Injector {
     std::uint32_t front_ = 0;       // loop side
     std::uint64_t sequence_ = 0;    // loop side
     std::atomic<std::uint32_t> middle_{1};
-    std::mutex mutex_;  // of the delivering side: back_ and what waits
+    std::mutex mutex_;  // of the delivering side: back_, backlogs_ and what waits
     std::uint32_t back_ = 2;
+    std::vector<std::shared_ptr<Backlog>> backlogs_;
     bool queueing_ = false;
     std::deque<Waiting> waiting_;
     std::size_t waiting_bytes_ = 0;

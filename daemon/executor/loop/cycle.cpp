@@ -100,6 +100,7 @@ void Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     }
     notes_.leaveComponents();
     if (exchanges_ && before != kAbandoned) {
+        for (QueueBase* queue : schedule.queues) queue->receive();
         for (Tap* tap : schedule.taps) tap->push(clock_.stamp_ns);
     }
     FrameRing* const frames = frames_;
@@ -328,6 +329,7 @@ bool Cycle::restore(Restoration& restoration) noexcept {
         topic.slot->time_ns += later;
         topic.injector->restore(topic.slot, topic.sequence);
         for (Restoration::Input& reader : topic.readers) {
+            if (QueueBase* const queue = reader.input->queue()) queue->clear();
             reader.reading.source = topic.injector->front();
             if (reader.reading.current == nullptr) reader.reading.current = reader.reading.source;
             reader.input->setReading(reader.reading);
@@ -335,6 +337,7 @@ bool Cycle::restore(Restoration& restoration) noexcept {
     }
     for (Restoration::Input& input : restoration.inputs) {
         InputBase::Reading& reading = input.reading;
+        if (QueueBase* const queue = input.input->queue()) queue->clear();
         if (reading.source == nullptr) reading.source = input.input->reading().source;
         if (reading.current == nullptr) reading.current = reading.source;
         input.input->setReading(reading);
@@ -357,14 +360,16 @@ bool Cycle::restore(Restoration& restoration) noexcept {
 }
 
 void Cycle::noteSchedule() noexcept RTCF_NONBLOCKING {
-    exchanges_ =
-        !schedule_->feeds.empty() || !schedule_->latches.empty() || !schedule_->taps.empty();
+    exchanges_ = !schedule_->feeds.empty() || !schedule_->latches.empty() ||
+                 !schedule_->queues.empty() || !schedule_->taps.empty();
 }
 
 void Cycle::feed() noexcept RTCF_NONBLOCKING {
     for (const Feed& feed : schedule_->feeds) {
         if (!feed.injector->adopt(clock_)) continue;
+        for (const auto& backlog : feed.backlogs) backlog->enter(clock_.time_ns);
         for (InputBase* input : feed.readers) input->inject(feed.injector->front());
+        for (const auto& backlog : feed.backlogs) backlog->queue().skip();
     }
 }
 

@@ -124,7 +124,7 @@ class Cycle {
     const FlightRecorder::RealtimeNotes notes_;
     LoopClock clock_;
     std::uint64_t warmup_cycles_ = 0;
-    bool exchanges_ = false;       // the schedule has feeds, latches or taps
+    bool exchanges_ = false;       // the schedule has feeds, latches, queues or taps
     bool active_ = false;          // between begin() and the last cycle
     FrameRing* frames_ = nullptr;  // that the cycles fill
     bool counted_ = false;         // the present cycle's durations

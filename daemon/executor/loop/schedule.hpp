@@ -67,6 +67,7 @@ struct Latch {
 struct Feed {
     Injector* injector;
     std::vector<InputBase*> readers;
+    std::vector<std::shared_ptr<Backlog>> backlogs;  ///< of the queues among them
 };
 
 /// The immutable list of a cycle's work. What it points to lives in the Plan that it is part of.
@@ -74,6 +75,7 @@ struct Schedule {
     std::uint64_t generation = 0;  ///< transactions adopted; the graph thread's
     std::vector<Feed> feeds;
     std::vector<Latch> latches;
+    std::vector<QueueBase*> queues;  ///< that components of this loop feed
     std::vector<Step> steps;
     std::vector<Tap*> taps;
     Source* source = nullptr;  ///< paces the loop instead of the clock
@@ -104,12 +106,15 @@ struct Rewire {
     const SlotHeader* kept = nullptr;  ///< filled at the boundary: where its present value stays
 
     void apply() noexcept {
+        QueueBase* const queue = input->queue();
+        if (queue != nullptr) queue->receive();
         if (source == nullptr && injector == nullptr) {
             input->disconnect();
         } else {
             input->rewire(injector != nullptr ? injector->front() : source, continued);
+            if (queue != nullptr && !continued) queue->skip();
         }
-        kept = input->current();
+        kept = queue != nullptr ? source : input->current();  // a queue's are copies
     }
 };
 

@@ -129,10 +129,12 @@ class Builder {
             injector = std::make_shared<Injector>(name, *connection.type);
         }
         injector->setLargest(bridge_.largest_message);
-        Feed feed{injector.get(), {}};
+        Feed feed{injector.get(), {}, {}};
         for (const Reader& reader : connection.readers) {
             feed.readers.push_back(reader.input);
             Binding binding = present(reader.input);
+            if (reader.input->queue() != nullptr)
+                feed.backlogs.push_back(backlogOf(*injector, *reader.input->queue()));
             if (binding.writer != injector.get()) {
                 adoption_.rewires.push_back({reader.input, nullptr, injector.get(), false});
                 binding.writer = injector.get();
@@ -145,7 +147,17 @@ class Builder {
         plan_.injectors.emplace(name, std::move(injector));
     }
 
+    std::shared_ptr<Backlog> backlogOf(const Injector& injector, QueueBase& queue) const {
+        for (const Feed& feed : previous_.schedule.feeds) {
+            if (feed.injector != &injector) continue;
+            for (const auto& backlog : feed.backlogs)
+                if (&backlog->queue() == &queue) return backlog;
+        }
+        return std::make_shared<Backlog>(queue);
+    }
+
     void bindToWriter(const ConnectionPlan& connection, const Reader& reader) {
+        if (QueueBase* const queue = reader.input->queue()) plan_.schedule.queues.push_back(queue);
         const std::shared_ptr<SlotHeader>& slot = connection.writer->output->slot();
         // A loop break means the previous cycle, also where the writer runs earlier in this one.
         const bool latched =

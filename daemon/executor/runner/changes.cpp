@@ -153,6 +153,7 @@ void Runner::adopted(const Change& change) {
     if (!change.values.empty()) {
         for (const GraphNode& node : plan_->graph.nodes()) node.instance->releaseStaged();
     }
+    for (const Feed& feed : plan_->schedule.feeds) feed.injector->setBacklogs(feed.backlogs);
     if (simulated_) {
         for (const auto& injector : plan_->bridgeTable().inputs) injector->setQueueing(true);
     }

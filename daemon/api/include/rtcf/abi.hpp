@@ -54,7 +54,12 @@ struct AbiProbe {
              offsetof(OutputBase::Rest, examined), offsetof(OutputBase::Rest, policy)});
         add({sizeof(PortIdentity), offsetof(PortIdentity, owner), offsetof(PortIdentity, name),
              offsetof(PortIdentity, unit), offsetof(PortIdentity, type),
-             offsetof(PortIdentity, connected), offsetof(PortIdentity, kept_is_new)});
+             offsetof(PortIdentity, connected), offsetof(PortIdentity, kept_is_new),
+             offsetof(PortIdentity, queue), sizeof(QueueBase), offsetof(QueueBase, ring_),
+             sizeof(QueueBase::Ring), offsetof(QueueBase::Ring, capacity),
+             offsetof(QueueBase::Ring, at), offsetof(QueueBase::Ring, slots),
+             offsetof(QueueBase::Ring, oldest), offsetof(QueueBase::Ring, count),
+             offsetof(QueueBase::Ring, dropped)});
         add({sizeof(SlotHeader), offsetof(SlotHeader, sequence), offsetof(SlotHeader, time_ns),
              offsetof(Slot<double>, value)});
         add({sizeof(TypeInfo), offsetof(TypeInfo, name), offsetof(TypeInfo, size),

@@ -23,6 +23,7 @@
 #include "rtcf/node_gate.hpp"
 #include "rtcf/parameter.hpp"
 #include "rtcf/port.hpp"
+#include "rtcf/queue.hpp"
 #include "rtcf/realtime.hpp"
 #include "rtcf/registration.hpp"
 #include "rtcf/slot.hpp"
@@ -308,6 +309,12 @@ inline std::int64_t InputBase::age() const noexcept RTCF_NONBLOCKING {
     return current_->sequence == 0
                ? -1
                : std::max<std::int64_t>(0, identity_->owner->time() - current_->time_ns);
+}
+
+inline std::int64_t QueueBase::age() noexcept {
+    const SlotHeader* const slot = oldest();
+    if (slot == nullptr) return -1;
+    return std::max<std::int64_t>(0, owner().time() - slot->time_ns);
 }
 
 inline OutputBase::OutputBase(Component* owner, std::string name, std::string unit,

@@ -19,6 +19,7 @@
 namespace rtcf {
 
 class Component;
+class QueueBase;
 
 /// What a read found. Ordered, so that `status >= DataStatus::Old` means "there is a value".
 enum class DataStatus {
@@ -37,6 +38,7 @@ struct PortIdentity {
     bool connected = false;  ///< an input's: something feeds it; an output's: something reads it
     bool kept_is_new =
         false;  ///< an input's: its component has not read what an earlier writer left
+    QueueBase* queue = nullptr;  ///< an input's that keeps every message: itself
 };
 
 /// What the executor handles of any input.
@@ -58,6 +60,8 @@ class InputBase {
 
     /// @name For the executor, at a cycle boundary
     /// @{
+    /// Itself as a queue; null if it is none.
+    QueueBase* queue() const noexcept RTCF_NONBLOCKING { return identity_->queue; }
     /// Reads from `source` on. A new writer's value counts once it writes; until then the last
     /// value stays, as new data if it has not been read. `continued`: the same writer's values by
     /// another slot.
@@ -111,6 +115,9 @@ class InputBase {
 
    protected:
     ~InputBase() = default;
+
+    void setQueue(QueueBase* queue) noexcept { identity_->queue = queue; }
+    Component& owner() const noexcept { return *identity_->owner; }
 
     DataStatus readStatus() noexcept RTCF_NONBLOCKING {
         if (__builtin_expect(static_cast<long>(source_->sequence != seen_), 1) != 0) {

@@ -82,7 +82,7 @@ class Bench {
         release();
     }
 
-    /// Gives an input a new value.
+    /// Gives an input a new value, a queue one more message.
     template <typename T>
     void write(const std::string& name, const T& value) {
         InputBase& input = named(component_->inputs(), name, "input");
@@ -91,6 +91,7 @@ class Bench {
         static_cast<Slot<T>&>(*slot).value = value;
         ++slot->sequence;
         slot->time_ns = clock_.time_ns;
+        if (QueueBase* const queue = input.queue()) queue->receive();
     }
 
     /// Runs cycles, the first after start().

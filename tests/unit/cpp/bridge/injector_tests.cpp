@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "rtcf/component.hpp"
+#include "support/bare_component.hpp"
 
 namespace rtcf::test {
 namespace {
@@ -36,6 +37,31 @@ TEST(Injector, HasNothingAtFirst) {
     Injector injector("/x", typeInfo<double>());
     EXPECT_FALSE(injector.adopt(LoopClock{}));
     EXPECT_EQ(injector.front()->sequence, 0U);
+}
+
+TEST(Injector, GivesABacklogWhatItPassesOver) {
+    Injector injector("/x", typeInfo<double>());
+    BareComponent component;
+    Queue<double, 8> queue(&component, "queue");
+    const auto backlog = std::make_shared<executor::Backlog>(queue);
+    injector.setBacklogs({backlog});
+    for (const double value : {1.0, 2.0, 3.0}) EXPECT_TRUE(deliver(injector, value));
+    injector.setQueueing(true);
+    for (const double value : {4.0, 5.0}) EXPECT_TRUE(deliver(injector, value));
+    injector.deliverUntil(INT64_MAX);
+    backlog->enter(100);
+    for (const double value : {1.0, 2.0, 3.0, 4.0, 5.0}) {
+        ASSERT_NE(queue.front(), nullptr);
+        EXPECT_EQ(*queue.front(), value);
+        queue.pop();
+    }
+    EXPECT_EQ(queue.front(), nullptr);
+    EXPECT_EQ(injector.passedOver(), 0U);
+    injector.setQueueing(false);
+    const std::uint8_t short_one[] = {1, 2};
+    EXPECT_FALSE(injector.deliver(short_one, sizeof short_one));
+    backlog->enter(200);
+    EXPECT_EQ(queue.size(), 0U) << "bytes that are no message are none for a queue either";
 }
 
 TEST(Injector, CountsAndRefusesWhatIsLargerThanAllowed) {

@@ -58,6 +58,27 @@ TEST_F(RealtimeSafety, Fig1WithTopicsLogsAndHotSwapsBreaksNoRule) {
     EXPECT_EQ(state(), RunnerState::Stopped);
 }
 
+TEST_F(RealtimeSafety, QueuesBreakNoRule) {
+    configure([](RunnerSettings& settings) { settings.whitelist = "/texts"; });
+    load(definition("Digits", "D"));
+    ComponentDefinition collector = definition("Collector", "C");
+    collector.remaps = {{"in", "out"}};
+    collector.every = 3;
+    load(collector);
+    start();
+    double letters = 0.0;
+    for (std::uint8_t length = 0; length < 100; ++length) {
+        std::vector<std::uint8_t> text(4U + length, 'x');
+        std::fill_n(text.begin(), 4, std::uint8_t{0});
+        text[0] = length;
+        bridge().injector("/texts")->deliver(text.data(), static_cast<std::uint32_t>(text.size()));
+        letters += length;
+        ASSERT_TRUE(runs(6));
+    }
+    stop();
+    EXPECT_EQ(value("/C", "letters"), letters);
+}
+
 TEST_F(RealtimeSafety, SteppedCyclesBreakNoRule) {
     loadFig1();
     step(5000);

@@ -1,0 +1,65 @@
+/// @file
+/// What waits to enter a queue (rtcf::Queue): messages from outside the loop, each deserialised
+/// where it arrives, which the real-time thread takes over, in order, at the next cycle boundary.
+/// Neither side waits; what does not fit is counted as the queue's drops.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "rtcf/queue.hpp"
+
+namespace rtcf::executor {
+
+class Backlog {
+   public:
+    /// For a queue; as long as it.
+    explicit Backlog(QueueBase& queue) : type_(queue.type()), queue_(queue) {
+        for (std::size_t i = 0; i < queue.capacity(); ++i)
+            slots_.push_back(type_.make_slot(nullptr));
+    }
+
+    /// Takes a message; bytes that are none are passed over. One thread at a time; not real-time
+    /// safe. @param age_ns of the message at the next boundary
+    void store(const std::uint8_t* bytes, std::uint32_t size, std::int64_t age_ns) {
+        const std::size_t head = head_.load(std::memory_order_relaxed);
+        if (head - tail_.load(std::memory_order_acquire) == slots_.size()) {
+            lost_.fetch_add(1, std::memory_order_relaxed);
+            return;
+        }
+        SlotHeader& slot = *slots_[head % slots_.size()];
+        if (!type_.deserialize(slot, bytes, size)) return;
+        slot.time_ns = age_ns;
+        head_.store(head + 1, std::memory_order_release);
+    }
+
+    /// Hands over all that waits. Loop side only; real-time safe.
+    void enter(std::int64_t now_ns) noexcept {
+        std::size_t tail = tail_.load(std::memory_order_relaxed);
+        for (const std::size_t head = head_.load(std::memory_order_acquire); tail != head; ++tail) {
+            SlotHeader& slot = *slots_[tail % slots_.size()];
+            queue_.take(slot, now_ns - slot.time_ns);
+        }
+        tail_.store(tail, std::memory_order_release);
+        if (const std::uint64_t lost = lost_.load(std::memory_order_relaxed); lost != told_) {
+            queue_.noteDropped(lost - told_);
+            told_ = lost;
+        }
+    }
+
+    QueueBase& queue() const noexcept { return queue_; }
+
+   private:
+    const TypeInfo& type_;
+    QueueBase& queue_;
+    std::vector<std::shared_ptr<SlotHeader>> slots_;
+    std::atomic<std::size_t> head_{0};  // delivering side
+    std::atomic<std::size_t> tail_{0};  // loop side
+    std::atomic<std::uint64_t> lost_{0};
+    std::uint64_t told_ = 0;  // loop side
+};
+
+}  // namespace rtcf::executor

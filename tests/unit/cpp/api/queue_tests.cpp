@@ -1,0 +1,143 @@
+// Queues wired by hand, and in a bench of rtcf/test.hpp.
+#include <gtest/gtest.h>
+#include <std_msgs/String.h>
+
+#include <string>
+#include <vector>
+
+#include "rtcf/queue.hpp"
+#include "rtcf/test.hpp"
+#include "support/bare_component.hpp"
+
+namespace rtcf::test {
+namespace {
+
+class QueueAlone : public ::testing::Test {
+   protected:
+    // As at a boundary, as in Rewire::apply().
+    void connect(OutputBase& output) {
+        queue.receive();
+        queue.rewire(output.slot().get(), false);
+        queue.skip();
+    }
+    void write(Output<int>& output, int value, std::int64_t time_ns = 0) {
+        component.loop_clock.time_ns = time_ns;
+        output.write(value);
+        queue.receive();
+    }
+    std::vector<int> taken() {
+        std::vector<int> values;
+        while (const int* value = queue.front()) {
+            values.push_back(*value);
+            queue.pop();
+        }
+        return values;
+    }
+
+    BareComponent component;
+    Queue<int, 3> queue{&component, "queue"};
+    Output<int> first{&component, "first"};
+    Output<int> second{&component, "second"};
+};
+
+TEST_F(QueueAlone, IsEmptyAtFirst) {
+    EXPECT_EQ(queue.front(), nullptr);
+    EXPECT_EQ(queue.size(), 0U);
+    EXPECT_EQ(queue.age(), -1);
+    queue.pop();
+    EXPECT_EQ(queue.size(), 0U);
+    EXPECT_FALSE(queue.connected());
+}
+
+TEST_F(QueueAlone, KeepsMessagesInOrder) {
+    connect(first);
+    for (int round = 0; round < 5; ++round) {
+        write(first, 3 * round);
+        write(first, 3 * round + 1);
+        EXPECT_EQ(queue.size(), 2U);
+        EXPECT_EQ(taken(), (std::vector<int>{3 * round, 3 * round + 1}));
+    }
+    EXPECT_EQ(queue.dropped(), 0U);
+}
+
+TEST_F(QueueAlone, AWriteIsSeenAtOnceAndOnce) {
+    connect(first);
+    first.write(7);
+    ASSERT_NE(queue.front(), nullptr);
+    EXPECT_EQ(*queue.front(), 7);
+    EXPECT_EQ(queue.size(), 1U);
+    queue.pop();
+    EXPECT_EQ(queue.front(), nullptr);
+}
+
+TEST_F(QueueAlone, CountsWhatItHasNoRoomFor) {
+    connect(first);
+    for (int i = 0; i < 8; ++i) write(first, i);
+    EXPECT_EQ(queue.dropped(), 5U);
+    EXPECT_EQ(taken(), (std::vector<int>{0, 1, 2}));
+    write(first, 9);
+    EXPECT_EQ(taken(), std::vector<int>{9});
+    EXPECT_EQ(queue.dropped(), 5U);
+}
+
+TEST_F(QueueAlone, WhatWasWrittenBeforeItWasConnectedIsNoMessage) {
+    first.write(1);
+    connect(first);
+    EXPECT_EQ(queue.size(), 0U);
+    write(first, 2);
+    second.write(3);
+    connect(second);
+    write(second, 4);
+    EXPECT_EQ(taken(), (std::vector<int>{2, 4}));
+}
+
+TEST_F(QueueAlone, AgeIsThatOfTheOldest) {
+    connect(first);
+    write(first, 1, 100);
+    write(first, 2, 300);
+    component.loop_clock.time_ns = 450;
+    EXPECT_EQ(queue.age(), 350);
+    queue.pop();
+    EXPECT_EQ(queue.age(), 150);
+}
+
+TEST_F(QueueAlone, MessagesOfVariableSizeKeepTheirCapacity) {
+    Queue<std_msgs::String, 2> texts{&component, "texts"};
+    Output<std_msgs::String> output{&component, "output"};
+    std_msgs::String longest;
+    longest.data = std::string(100, 'x');
+    texts.reserve(longest);
+    texts.rewire(output.slot().get(), false);
+    for (int round = 0; round < 4; ++round) {
+        output.value().data = "a text that is longer than what a string has at hand";
+        output.publish();
+        const char* const place = texts.front()->data.data();
+        EXPECT_EQ(texts.front()->data.substr(0, 6), "a text");
+        EXPECT_GE(texts.front()->data.capacity(), 100U) << static_cast<const void*>(place);
+        texts.pop();
+    }
+}
+
+class Summing final : public Component {
+    Queue<double, 4> in{this, "in"};
+    Output<double> sum{this, "sum"};
+
+    void update() override {
+        double total = 0.0;
+        for (; const double* value = in.front(); in.pop()) total += *value;
+        sum.write(total);
+    }
+};
+RTCF_COMPONENT(Summing, "sums up a queue")
+
+TEST(QueueInABench, GetsEachWrite) {
+    Bench bench("Summing");
+    for (const double value : {1.0, 2.0, 4.0}) bench.write("in", value);
+    bench.cycle();
+    EXPECT_EQ(*bench.read<double>("sum"), 7.0);
+    bench.cycle();
+    EXPECT_EQ(*bench.read<double>("sum"), 0.0);
+}
+
+}  // namespace
+}  // namespace rtcf::test
