@@ -83,6 +83,21 @@ def test_it_computes_in_the_loop_what_it_says(daemon: Daemon, client: rtcf.Clien
     assert [float(each) for each in shown] == pytest.approx([x, estimate], rel=1e-5)
 
 
+def test_a_queue_gets_each_message_of_cycles_that_its_reader_skips(
+    client: rtcf.Client, daemon: Daemon
+) -> None:
+    client.load(rtcf.component("py", "Ramp", name="ramp"))
+    client.load(rtcf.component("py", "Gatherer", name="gatherer", every=4))
+    client.step(40)
+    states = _states(client, "gatherer")
+    messages = int(states["messages"])
+    assert 37 <= messages <= 40  # the last ones may wait for its next turn
+    assert (states["last"], states["in_order"]) == (str(messages), "1")
+    seconds = sum(each * 0.001 for each in range(1, messages + 1))
+    assert float(states["seconds"]) == pytest.approx(seconds)
+    assert states["oldest"] == "3000000"
+
+
 def test_its_declarations_are_those_of_any_component(client: rtcf.Client, daemon: Daemon) -> None:
     _load_both(client)
     ramp = client.get_component("ramp")

@@ -8,7 +8,14 @@ import sys
 from types import ModuleType
 from typing import Any
 
-from rtcf.component.declaration import Input, Output, Parameter, State, describe
+from rtcf.component.declaration import (
+    Input,
+    Output,
+    Parameter,
+    Queue,
+    State,
+    describe,
+)
 from rtcf.component.interpreter import Component, Fault
 from rtcf.component.value_type import DeclarationError
 
@@ -19,6 +26,7 @@ __all__ = [
     "Input",
     "Output",
     "Parameter",
+    "Queue",
     "State",
     "describe",
 ]

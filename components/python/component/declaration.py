@@ -56,14 +56,22 @@ class Declarable:
                     f"{type(self).__name__} knows no option {option!r}: "
                     f"it has {', '.join(self.allowed) or 'none'}"
                 )
-        if initial is not None and type(self) in (Input, Output):
-            raise DeclarationError(f"an {type(self).__name__} has no initial value")
+        if initial is not None and type(self) in PORTS:
+            raise DeclarationError(f"{_a(type(self))} has no initial value")
         self.initial = initial
         self.options = options
 
 
 class Input(Declarable):
     """An input: `self.u.value`, `.new`, `.valid`, `.age` (ns), `.connected`."""
+
+
+class Queue(Declarable):
+    """An input that keeps up to `size` messages, in order: `self.goals.size`, `.front`, `.pop()`,
+    `.age` (ns, of the front one), `.dropped`, `.connected`.
+    """
+
+    allowed = ("size",)
 
 
 class Output(Declarable):
@@ -84,6 +92,9 @@ class State(Declarable):
     allowed = ("unit", "doc")
 
 
+PORTS = (Input, Output, Queue)
+
+
 @dataclass(frozen=True)
 class Member:
     """One port, parameter or state of a class."""
@@ -94,6 +105,11 @@ class Member:
     initial: np.ndarray[Any, Any]
     options: dict[str, Any]
     line: int
+
+    @property
+    def size(self) -> int:
+        """Return how many messages a queue keeps."""
+        return int(self.options["size"])
 
 
 @dataclass
@@ -116,6 +132,9 @@ class Description:
         fields += [(f"_{name}", dtype) for name, dtype in TIME_FIELDS.items()]
         fields.append(("_line", np.int64))
         for member in self.members.values():
+            if member.kind is Queue:
+                fields += _queue_fields(member)
+                continue
             fields.append((member.name, member.type.scalar, member.type.shape))
             if member.kind is Input:
                 fields.append((f"{member.name}__age", np.int64))
@@ -163,7 +182,7 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
         raise DeclarationError(f"says no type: write {annotation.__name__}[float]")
     if not isinstance(annotation, Declared):
         raise DeclarationError(
-            "is neither Input, Output, Parameter nor State: what is kept is a State[…], "
+            "is neither Input, Queue, Output, Parameter nor State: what is kept is a State[…], "
             "what never changes stands without annotation"
         )
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or "__" in name or keyword.iskeyword(name):
@@ -180,14 +199,41 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
             raise DeclarationError(f"is declared as {kind.__name__} and as {type(given).__name__}")
         options, initial = given.options, given.initial
     elif given is not None:
-        if kind in (Input, Output):
-            raise DeclarationError(f"is an {kind.__name__} and has no initial value")
+        if kind in PORTS:
+            raise DeclarationError(f"is {_a(kind)} and has no initial value")
         initial = given
     if kind is Parameter and initial is None:
         raise DeclarationError(f"has no default: write {name}: Parameter[…] = Parameter(1.0)")
+    if kind is Queue:
+        _check_size(name, options.get("size"))
     if kind is Parameter and declared.shape and declared.is_bool:
         raise DeclarationError("is an array of bools: a parameter is a number or an array of them")
     return Member(name, kind, declared, _initial(declared, initial), options, line)
+
+
+def _queue_fields(member: Member) -> list[tuple[Any, ...]]:
+    """Return a ring of messages, when each was written, and how many of them count."""
+    name, size = member.name, member.size
+    return [
+        (name, member.type.scalar, (size, *member.type.shape)),
+        (f"{name}__times", np.int64, (size,)),
+        *((f"{name}__{count}", np.int64) for count in ("oldest", "count", "dropped")),
+        (f"{name}__connected", np.bool_),
+    ]
+
+
+def _check_size(name: str, size: Any) -> None:
+    if size is None:
+        raise DeclarationError(
+            f"says not how many it keeps: write {name}: Queue[…] = Queue(size=8)"
+        )
+    if not isinstance(size, int) or isinstance(size, bool) or not 1 <= size <= 1024:
+        raise DeclarationError(f"keeps 1 to 1024 messages, not {size!r}")
+
+
+def _a(kind: type) -> str:
+    """Return the kind with its article."""
+    return f"{'an' if kind.__name__[0] in 'IO' else 'a'} {kind.__name__}"
 
 
 def _initial(declared: ValueType, given: Any) -> np.ndarray[Any, Any]:

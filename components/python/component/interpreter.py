@@ -16,6 +16,7 @@ from rtcf.component.declaration import (
     MemberAttribute,
     Output,
     Parameter,
+    Queue,
     State,
     describe,
 )
@@ -40,18 +41,22 @@ class _Value:
         return enumeration(plain) if enumeration else plain
 
     def set(self, value: Any) -> None:
-        member = self._member
-        new = np.asarray(value)
-        if new.shape not in (member.type.shape, ()):
-            raise ValueError(f"{member.name} has shape {member.type.shape}, not {new.shape}")
-        scalar = member.type.scalar
-        if (new.dtype.kind == "f" and scalar.kind != "f") or (
-            (new.dtype.kind == "b") != (scalar.kind == "b")
-        ):
-            raise TypeError(f"{member.name} is {scalar.name}, not {new.dtype.name}")
-        if new.dtype.kind == "O":
-            raise OverflowError(f"{member.name} is {scalar.name}: {value} does not fit")
-        self._record[member.name] = new
+        self._record[self._member.name] = checked(value, self._member)
+
+
+def checked(value: Any, member: Member) -> Any:
+    """Return a value that fits a member; raise what Python would."""
+    new = np.asarray(value)
+    if new.shape not in (member.type.shape, ()):
+        raise ValueError(f"{member.name} has shape {member.type.shape}, not {new.shape}")
+    scalar = member.type.scalar
+    if (new.dtype.kind == "f" and scalar.kind != "f") or (
+        (new.dtype.kind == "b") != (scalar.kind == "b")
+    ):
+        raise TypeError(f"{member.name} is {scalar.name}, not {new.dtype.name}")
+    if new.dtype.kind == "O":
+        raise OverflowError(f"{member.name} is {scalar.name}: {value} does not fit")
+    return new
 
 
 class InputPort:
@@ -93,6 +98,63 @@ class InputPort:
         self._record[f"{self._name}__age"] = 0
 
 
+class QueuePort:
+    """A queue as the interpreter sees it."""
+
+    def __init__(self, record: Any, member: Member) -> None:
+        self._record, self._member, self._name = record, member, member.name
+
+    @property
+    def size(self) -> int:
+        """Return how many messages there are."""
+        return int(self._record[f"{self._name}__count"])
+
+    @property
+    def front(self) -> Any:
+        """Return the oldest message; IndexError without one."""
+        if self.size == 0:
+            raise IndexError("front of an empty queue")
+        value = self._record[self._name][self._record[f"{self._name}__oldest"]]
+        return value if self._member.type.shape else value.item()
+
+    @property
+    def age(self) -> int:
+        """Return how long ago the oldest was written, ns; -1 without one."""
+        if self.size == 0:
+            return -1
+        written = self._record[f"{self._name}__times"][self._record[f"{self._name}__oldest"]]
+        return max(0, int(self._record["_time"] - written))
+
+    @property
+    def dropped(self) -> int:
+        """Return how many came while it was full."""
+        return int(self._record[f"{self._name}__dropped"])
+
+    @property
+    def connected(self) -> bool:
+        """Tell whether something feeds it."""
+        return bool(self._record[f"{self._name}__connected"])
+
+    def pop(self) -> None:
+        """Remove the oldest message, if there is one."""
+        if self.size:
+            oldest = self._record[f"{self._name}__oldest"] + 1
+            self._record[f"{self._name}__oldest"] = oldest % self._member.size
+            self._record[f"{self._name}__count"] -= 1
+
+    def put(self, value: Any) -> None:
+        """For tests: write one message more, as another component would."""
+        name, size = self._name, self._member.size
+        self._record[f"{name}__connected"] = True
+        if self.size == size:
+            self._record[f"{name}__dropped"] += 1
+            return
+        place = (self._record[f"{name}__oldest"] + self._record[f"{name}__count"]) % size
+        self._record[name][place] = checked(value, self._member)
+        self._record[f"{name}__times"][place] = self._record["_time"]
+        self._record[f"{name}__count"] += 1
+
+
 class OutputPort:
     """An output as the interpreter sees it."""
 
@@ -128,6 +190,8 @@ class _Attribute(MemberAttribute):
             return InputPort(component._record, self._member)
         if self._member.kind is Output:
             return OutputPort(component._record, self._member)
+        if self._member.kind is Queue:
+            return QueuePort(component._record, self._member)
         return _Value(component._record, self._member).get()
 
     def __set__(self, component: Any, value: Any) -> None:
@@ -159,7 +223,8 @@ class Component:
             setattr(type(self), name, _Attribute(member))
         record = np.zeros((), description.record)
         for member in description.members.values():
-            record[member.name] = member.initial
+            if member.kind is not Queue:
+                record[member.name] = member.initial
         for name in parameters:
             if name not in {member.name for member in description.of(Parameter)}:
                 raise TypeError(f"{type(self).__name__} has no parameter {name!r}")

@@ -4,7 +4,7 @@ import enum
 from dataclasses import dataclass
 
 import numpy as np
-from rtcf.component import Component, Input, Output, Parameter, State
+from rtcf.component import Component, Input, Output, Parameter, Queue, State
 
 A = np.array([[1.0, 0.001], [0.0, 0.98]])
 B = np.array([0.0, 0.02])
@@ -98,6 +98,30 @@ class Observer(Component):
             if abs(self.estimate[i]) > bound:
                 self.mode = Mode.LIMITED
             self.estimate[i] = clamp(self.estimate[i], -bound, bound)
+
+
+class Gatherer(Component):
+    """Takes each message of a ramp, though it may not run every cycle."""
+
+    count: Queue[int] = Queue(size=8)
+    pair: Queue[np.float64, 2] = Queue(size=8)
+    messages: State[int]
+    in_order: State[bool] = State(True)
+    last: State[int]
+    seconds: State[float]
+    oldest: State[int] = State(0, doc="ns; of a message that it took")
+
+    def update(self):
+        """Take all that is there."""
+        while self.count.size > 0:
+            self.in_order = self.in_order and self.count.front == self.last + 1
+            self.last = self.count.front
+            self.oldest = max(self.oldest, self.count.age)
+            self.messages += 1
+            self.count.pop()
+        while self.pair.size > 0:
+            self.seconds += self.pair.front[0]
+            self.pair.pop()
 
 
 def quotient(a, b):

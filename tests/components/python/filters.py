@@ -3,7 +3,7 @@
 import enum
 
 import numpy as np
-from rtcf.component import Component, Input, Output, Parameter, State
+from rtcf.component import Component, Input, Output, Parameter, Queue, State
 
 
 class Pid(Component):
@@ -167,3 +167,61 @@ class Chooser(Component):
         self.narrow.write(np.where(self.first.value, f, 0.5))
         self.number.write(np.where(self.first.value, 1.0, a[0]))
         self.flags.write(np.where(a > 1.0, True, n > 2))
+
+
+class Trajectory(Component):
+    """Follows waypoints (place, speed, duration) one after the other by cubic polynomials."""
+
+    waypoints: Queue[np.float64, 3] = Queue(size=4)
+    hold: Input[bool]
+    place: Output[float] = Output(unit="rad")
+    speed: Output[float] = Output(unit="rad/s")
+    coefficients: State[np.float64, 4]
+    since: State[float] = State(0.0, unit="s", doc="the present waypoint was taken")
+    duration: State[float]
+    late: State[int] = State(0, doc="ns that the present one has waited")
+    skipped: State[int]
+
+    def update(self):
+        """Go on, and take the next waypoint when the present one is reached."""
+        if self.hold.value:
+            while self.waypoints.size > 2:
+                self.waypoints.pop()
+                self.skipped += 1
+            return
+        self.since += self.dt
+        while self.since >= self.duration and self.waypoints.size:
+            begin, velocity = self.at(self.duration)
+            self.since = 0.0
+            self.late = self.waypoints.age
+            self.take(begin, velocity, self.waypoints.front)
+            self.waypoints.pop()
+        place, speed = self.at(min(self.since, self.duration))
+        self.place.write(place)
+        self.speed.write(speed)
+        if self.waypoints.dropped > 1000:
+            self.warn("{} waypoints lost", self.waypoints.dropped)
+
+    def at(self, time):
+        """Return place and speed at a time of the present polynomial."""
+        a, b = self.coefficients[0], self.coefficients[1]
+        c, d = self.coefficients[2], self.coefficients[3]
+        return a + time * (b + time * (c + time * d)), b + time * (2.0 * c + time * 3.0 * d)
+
+    def take(self, begin, velocity, waypoint):
+        """Begin the polynomial to a waypoint."""
+        goal, speed = waypoint[0], waypoint[1]
+        self.duration = min(max(waypoint[2], 0.002), 2.0)
+        if not (np.isfinite(goal) and np.isfinite(speed) and np.isfinite(self.duration)):
+            goal, speed = begin, 0.0
+            self.duration = 0.002
+        t = self.duration
+        far = goal - begin
+        self.coefficients[:] = np.array(
+            (
+                begin,
+                velocity,
+                (3.0 * far / t - 2.0 * velocity - speed) / t,
+                (velocity + speed - 2.0 * far / t) / (t * t),
+            )
+        )

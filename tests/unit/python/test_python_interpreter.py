@@ -15,6 +15,11 @@ TREE = Path(__file__).parents[3]
 CONTROLLERS = load(TREE / "tests" / "components" / "python" / "controllers.py")
 CLASSES = {each.__name__: each for each in components(CONTROLLERS)}
 
+FILTERS = {
+    each.__name__: each
+    for each in components(load(TREE / "tests" / "components" / "python" / "filters.py"))
+}
+
 
 def made(name: str, **parameters: object) -> Any:
     return CLASSES[name](**parameters)
@@ -57,6 +62,33 @@ def test_what_is_not_declared_is_refused() -> None:
         ramp.pair.write([1.0, 2.0, 3.0])
     with pytest.raises(TypeError, match="no parameter"):
         made("Ramp", steps=2)
+
+
+def test_a_queue_keeps_messages_in_order_and_counts_those_it_has_no_room_for() -> None:
+    queue = FILTERS["Trajectory"]().waypoints
+    assert (queue.size, queue.age, queue.connected) == (0, -1, False)
+    with pytest.raises(IndexError, match="empty queue"):
+        _ = queue.front
+    for number in range(6):
+        queue.put([number, 0.0, 1.0])
+    assert (queue.size, queue.dropped, queue.connected) == (4, 2, True)
+    for number in range(3):
+        assert queue.front[0] == number
+        queue.pop()
+    queue.put([7.0, 0.0, 1.0])
+    queue.pop()
+    assert (queue.front[0], queue.size) == (7.0, 1)
+    with pytest.raises(ValueError, match="has shape"):
+        queue.put([1.0, 2.0])
+
+
+def test_the_age_of_a_queue_is_that_of_its_oldest_message() -> None:
+    trajectory = FILTERS["Trajectory"]()
+    trajectory.hold.put(True)
+    for number in range(3):
+        trajectory.waypoints.put([float(number), 0.0, 1.0])
+        trajectory.cycle()
+    assert (trajectory.skipped, trajectory.waypoints.age) == (1, 2_000_000)
 
 
 def test_a_fault_is_an_exception() -> None:

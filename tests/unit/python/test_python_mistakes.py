@@ -14,7 +14,7 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from rtcf.component import Component, Input, Output, Parameter, State
+from rtcf.component import Component, Input, Output, Parameter, Queue, State
 
 A = np.eye(2)
 GAINS = {"kp": 1.0}
@@ -33,6 +33,7 @@ class Faulty(Component):
     z: State[np.float64, 2]
     n: State[int]
     on: State[bool]
+    q: Queue[float] = Queue(size=4)
 """
 
 # What is written in update (a mark {} is where the line is expected), what is said of it.
@@ -99,6 +100,11 @@ IN_UPDATE = {
     "np.where of other shapes": ("self.z[:] = np.where(self.on, np.zeros(3), self.z)", "shape"),
     "misspelled function of NumPy": ("a = np.sinn(1.0)", "numpy has no sinn"),
     "read call": ("self.u.read()", "inputs are read before each update"),
+    "queue as value": ("self.y.write(self.q)", "is a Queue"),
+    "queue's unknown field": ("self.n = self.q.value", "a Queue has no value"),
+    "pop as value": ("self.y.write(self.q.pop())", "a pop is no value"),
+    "pop of an array": ("self.z.pop()", "shrinks"),
+    "queue assigned": ("self.q = 2.0", "is a Queue"),
     "fault with a variable": ("self.fault(self.n)", "a fault has one constant text"),
     "isinstance": ("a = isinstance(self.n, int)", "types are fixed when compiled"),
     "time set": ("self.dt = 1.0", "is the loop's"),
@@ -107,13 +113,15 @@ IN_UPDATE = {
 IN_CLASS = {
     "missing annotation": ("    v = State(0.0)", "has no annotation"),
     "annotation without a type": ("    v: State", "says no type"),
-    "annotation of another kind": ("    v: float = 0.0", "is neither Input, Output"),
+    "annotation of another kind": ("    v: float = 0.0", "is neither Input, Queue"),
     "list as a type": ("    v: State[list]", "says its elements and its size"),
     "size of a variable": ("    v: State[np.float64, -1]", "a size is a whole number"),
     "parameter without default": ("    v: Parameter[float]", "has no default"),
     "initial value of another shape": ("    v: State[np.float64, 3] = State([1.0, 2.0])", "shape"),
     "initial value of another type": ("    v: State[int] = State(0.5)", "is int64"),
     "unknown option": ("    v: State[int] = State(unitt='m')", "knows no option"),
+    "queue without size": ("    v: Queue[float]", "says not how many it keeps"),
+    "queue of no size": ("    v: Queue[float] = Queue(size=0)", "keeps 1 to 1024 messages"),
     "reserved name": ("    dt: State[float]", "a word that every component has"),
 }
 

@@ -36,9 +36,9 @@ def compared(name: str, compiled: dict[str, lowering.Compiled], cycles: int) -> 
 def test_machine_code_and_interpreter_agree(
     name: str, compiled: dict[str, lowering.Compiled]
 ) -> None:
-    found = compared(name, compiled, 2000)
+    found = compared(name, compiled, 10_000)
     assert found.differences == []
-    assert found.cycles == 2000
+    assert found.cycles == 10_000
     assert (found.raised > 0) == (name == "Raiser")
 
 

@@ -13,13 +13,15 @@ from typing import Any
 
 import numpy as np
 from rtcf.component import Component
-from rtcf.component.declaration import Input, Member, Output, Parameter
+from rtcf.component.declaration import Input, Member, Output, Parameter, Queue
+from rtcf.component.interpreter import QueuePort
+from rtcf.component.value_type import ValueType
 
 from rtcf_compile.comparison.inside import Inside
 from rtcf_compile.machine_code.lowering import Compiled
 from rtcf_compile.rewriting import helpers
 from rtcf_compile.rewriting.functions import made
-from rtcf_compile.rewriting.rewrite import Products
+from rtcf_compile.rewriting.products import Products
 from rtcf_compile.source.modules import is_own, read
 
 LARGEST_ULP = 4
@@ -62,7 +64,7 @@ def compare(
     fresh = component._record.copy()
     writes = [f"{each.name}__written" for each in description.of(Output)]
     record = fresh.copy()
-    inputs: list[_Inputs] = []
+    inputs: list[_Inputs | _Messages] = []
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         for cycle in range(cycles):
@@ -75,6 +77,7 @@ def compare(
                 # Every other time without special values: one NaN stays in a filter's state.
                 share = edges if cycle // _ANEW % 2 else 0.0
                 inputs = [_Inputs(each, draw, share) for each in description.of(Input)]
+                inputs += [_Messages(each, draw, share) for each in description.of(Queue)]
             for each in inputs:
                 each.put(record, cycle % _ANEW)
             for name in writes:
@@ -173,19 +176,7 @@ class _Inputs:
         self._name, self._age_name = name, f"{name}__age"
         self._new = (draw.random(_ANEW) < 0.8).tolist()
         self._age = (draw.integers(0, 3, _ANEW) * 1_000_000).tolist()
-        if kind.is_bool:
-            values = draw.random(shape) < 0.5
-        elif kind.enumeration:
-            values = draw.choice([int(each) for each in kind.enumeration], shape)
-        elif kind.is_float:
-            scale = 10.0 ** draw.integers(-3, 4, (_ANEW, *(1 for _ in kind.shape)))
-            values = draw.normal(0.0, 1.0, shape) * scale
-            values = np.where(draw.random(shape) < edges, draw.choice(_EDGES, shape), values)
-        else:
-            limits = np.iinfo(kind.scalar)
-            low, high = max(limits.min, -1000), min(limits.max, 1000)
-            values = draw.integers(low, high, shape, dtype=np.int64, endpoint=True)
-        self._values = values.astype(kind.scalar)
+        self._values = _drawn(kind, shape, draw, edges)
 
     def put(self, record: Any, cycle: int) -> None:
         """Set the input's fields for a cycle."""
@@ -195,6 +186,40 @@ class _Inputs:
             record[self._flags[1]] = record[self._flags[2]] = True
             record[self._age_name] = self._age[cycle]
             record[self._name] = self._values[cycle]
+
+
+class _Messages:
+    """What a queue gets: none to three messages a cycle, now and then more than it keeps."""
+
+    def __init__(self, member: Member, draw: Any, edges: float) -> None:
+        """Draw all at once."""
+        self._member = member
+        self._counts = draw.choice((0, 0, 0, 1, 1, 2, 3, member.size + 1), _ANEW).tolist()
+        shape = (_ANEW, member.size + 3, *member.type.shape)
+        self._values = _drawn(member.type, shape, draw, edges)
+
+    def put(self, record: Any, cycle: int) -> None:
+        """Put the messages of a cycle."""
+        port = QueuePort(record, self._member)
+        for number in range(self._counts[cycle]):
+            port.put(self._values[cycle][number])
+
+
+def _drawn(kind: ValueType, shape: tuple[int, ...], draw: Any, edges: float) -> Any:
+    """Draw values of a type, the first size by their own scale."""
+    if kind.is_bool:
+        values = draw.random(shape) < 0.5
+    elif kind.enumeration:
+        values = draw.choice([int(each) for each in kind.enumeration], shape)
+    elif kind.is_float:
+        scale = 10.0 ** draw.integers(-3, 4, (shape[0], *(1 for _ in shape[1:])))
+        values = draw.normal(0.0, 1.0, shape) * scale
+        values = np.where(draw.random(shape) < edges, draw.choice(_EDGES, shape), values)
+    else:
+        limits = np.iinfo(kind.scalar)
+        low, high = max(limits.min, -1000), min(limits.max, 1000)
+        values = draw.integers(low, high, shape, dtype=np.int64, endpoint=True)
+    return values.astype(kind.scalar)
 
 
 def _parameters(record: Any, parameters: list[Member], draw: Any) -> None:

@@ -6,12 +6,14 @@
 #include <rtcf/component.hpp>
 #include <rtcf/eigen_type.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstring>
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 namespace rtcf::python {
@@ -118,5 +120,31 @@ void store(T& value, const T& field) noexcept {
     value = field;
 }
 /// @}
+
+/// Moves the messages of a queue into the record's ring; real-time safe.
+/// @tparam Elements of one message @return how many found it full, and are lost
+template <std::size_t Elements, typename T, std::size_t Messages, typename Scalar>
+std::uint64_t receive(Queue<T, Messages>& port, std::int64_t now_ns,
+                      std::array<Scalar, Messages * Elements>& ring,
+                      std::array<std::int64_t, Messages>& written, std::int64_t oldest,
+                      std::int64_t& count) noexcept {
+    std::uint64_t lost = 0;
+    for (const T* message = port.front(); message != nullptr; port.pop(), message = port.front()) {
+        if (count == static_cast<std::int64_t>(Messages)) {
+            ++lost;
+            continue;
+        }
+        const std::size_t place = static_cast<std::size_t>(oldest + count++) % Messages;
+        if constexpr (std::is_arithmetic_v<T>) {
+            ring[place] = *message;
+        } else {
+            std::array<Scalar, Elements> values;
+            load(values, *message);
+            std::copy(values.begin(), values.end(), ring.begin() + place * Elements);
+        }
+        written[place] = now_ns - port.age();
+    }
+    return lost;
+}
 
 }  // namespace rtcf::python

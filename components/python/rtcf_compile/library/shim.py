@@ -6,7 +6,15 @@ import math
 from typing import Any
 
 import numpy as np
-from rtcf.component.declaration import Description, Input, Member, Output, Parameter, State
+from rtcf.component.declaration import (
+    Description,
+    Input,
+    Member,
+    Output,
+    Parameter,
+    Queue,
+    State,
+)
 from rtcf.component.value_type import ValueType
 
 from rtcf_compile.machine_code.lowering import Compiled
@@ -155,6 +163,18 @@ def _steps(compiled: Compiled) -> list[str]:
         if f"{name}__connected" in used:
             lines.append(f"            record_.{name}__connected = port_{name}.connected();")
         lines.append("        }")
+    for member in about.of(Queue):
+        name = member.name
+        fields = ", ".join(
+            f"record_.{name}{each}" for each in ("", "__times", "__oldest", "__count")
+        )
+        lines += [
+            f"        lost_{name} += rtcf::python::receive<{member.type.count}>("
+            f"port_{name}, time(), {fields});",
+            f"        record_.{name}__dropped = "
+            f"static_cast<std::int64_t>(port_{name}.dropped() + lost_{name});",
+            f"        record_.{name}__connected = port_{name}.connected();",
+        ]
     lines += [f"        record_.{each.name}__written = false;" for each in about.of(Output)]
     lines += ["    }", "    void writePorts() noexcept {"]
     for member in about.of(Output):
@@ -179,6 +199,9 @@ def _member(member: Member) -> list[str]:
     name, text = member.name, _text(member.name)
     if member.kind is Input:
         return [f"rtcf::Input<{_port_type(member)}> port_{name}{{this, {text}}};"]
+    if member.kind is Queue:
+        queue = f"rtcf::Queue<{_port_type(member)}, {member.size}>"
+        return [f"{queue} port_{name}{{this, {text}}};", f"std::uint64_t lost_{name} = 0;"]
     if member.kind is Output:
         finite = ", rtcf::Finite()" if member.options.get("finite") else ""
         return [

@@ -164,6 +164,28 @@ def _assign(target: Any, value: Any) -> Any:
     return matrix
 
 
+@_compiled_as(helpers.rtcf_front)
+def _front(ring: Any, oldest: Any, count: Any) -> Any:
+    def front(ring: Any, oldest: Any, count: Any) -> Any:
+        if count == 0:
+            raise IndexError("front of an empty queue")
+        return ring[oldest]
+
+    return front
+
+
+@_compiled_as(helpers.rtcf_age)
+def _age(now: Any, written: Any, oldest: Any, count: Any) -> Any:
+    return lambda now, written, oldest, count: (
+        -1 if count == 0 else max(np.int64(0), now - written[oldest])
+    )
+
+
+@_compiled_as(helpers.rtcf_after)
+def _after(place: Any, size: Any) -> Any:
+    return lambda place, size: 0 if place + 1 == size else place + 1
+
+
 @_compiled_as(helpers.rtcf_where)
 def _where(condition: Any, x: Any, y: Any) -> Any:
     given = (condition, x, y)

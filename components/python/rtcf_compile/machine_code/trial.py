@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from rtcf.component import Component
-from rtcf.component.declaration import Input, describe
+from rtcf.component.declaration import Input, Queue, describe
 
 from rtcf_compile.source.mistake import Mistake
 
@@ -21,7 +21,8 @@ def run(cls: type[Component], file: str) -> None:
     """Run some cycles with values drawn from a fixed seed; raise Mistake if shapes do not fit."""
     draw = np.random.default_rng(1)
     component = cls()
-    inputs = describe(cls).of(Input)
+    about = describe(cls)
+    inputs = about.of(Input) + about.of(Queue)
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         try:

@@ -14,7 +14,8 @@ from rtcf.component.declaration import HOOKS, Description
 
 from rtcf_compile.rewriting import helpers
 from rtcf_compile.rewriting.logs import Logs
-from rtcf_compile.rewriting.rewrite import Hook, Products
+from rtcf_compile.rewriting.products import Products
+from rtcf_compile.rewriting.rewrite import Hook
 from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import Mistake, at
 from rtcf_compile.source.modules import Source, is_own, read

@@ -54,6 +54,23 @@ def rtcf_bool(value: Any) -> Any:
     return bool(value)
 
 
+def rtcf_front(ring: Any, oldest: Any, count: Any) -> Any:
+    """Return the oldest message of a queue."""
+    if count == 0:
+        raise IndexError("front of an empty queue")
+    return ring[oldest]
+
+
+def rtcf_age(now: Any, written: Any, oldest: Any, count: Any) -> Any:
+    """Return how long ago the oldest message of a queue was written, ns; -1 without one."""
+    return max(0, now - written[oldest]) if count else -1
+
+
+def rtcf_after(place: Any, size: Any) -> Any:
+    """Return the place behind another in a ring."""
+    return (place + 1) % size
+
+
 def rtcf_where(condition: Any, x: Any, y: Any) -> Any:
     """Return x where the condition holds, else y: arrays of one shape, or numbers."""
     shapes = {np.shape(each) for each in (condition, x, y)} - {()}
@@ -120,5 +137,9 @@ INSTEAD = {
 }
 BY_NAME = {
     each.__name__: each
-    for each in (rtcf_matmul, rtcf_assign, rtcf_float, rtcf_int, rtcf_bool, *INSTEAD.values())
+    for each in (
+        *(rtcf_matmul, rtcf_assign, rtcf_float, rtcf_int, rtcf_bool),
+        *(rtcf_front, rtcf_age, rtcf_after),
+        *INSTEAD.values(),
+    )
 }

@@ -5,101 +5,28 @@
 """
 
 import ast
-import copy
-import dataclasses
-import enum
-from typing import Any, TypeVar
+from typing import Any
 
-import numpy as np
 from rtcf.component.declaration import (
     LOG_LEVELS,
+    PORTS,
     TIME_FIELDS,
     Description,
     Input,
     Member,
     Output,
     Parameter,
+    Queue,
 )
 
-from rtcf_compile.rewriting.helpers import INSTEAD
 from rtcf_compile.rewriting.logs import Logs
-from rtcf_compile.source.checks import resolve
-from rtcf_compile.source.mistake import at
+from rtcf_compile.rewriting.products import Products, call_of, like, loaded
+from rtcf_compile.source.checks import METHODS
 from rtcf_compile.source.modules import Source
 
-_Node = TypeVar("_Node", bound=ast.AST)
 _INPUT_FIELDS = {"value": "", "new": "__new", "valid": "__valid", "age": "__age"}
 _INPUT_FIELDS["connected"] = "__connected"
-
-
-class Products(ast.NodeTransformer):
-    """Puts the helpers in the place of `@`, np.linalg and assignment to slices."""
-
-    def __init__(self, source: Source) -> None:
-        """Rewrite a function of that source."""
-        self.source = source
-        self.constants: dict[str, Any] = {}
-
-    def mistake(self, node: ast.AST, what: str, way_out: str) -> Exception:
-        """Return a mistake at a node."""
-        return at(self.source.file, node, what, way_out)
-
-    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
-        """`GAINS.kp` of a dataclass of constants, `Mode.RUN` of an enum."""
-        owner = resolve(node.value, self.source)
-        if isinstance(member := resolve(node, self.source), enum.IntEnum):
-            return _like(node, ast.Constant(int(member)))
-        if dataclasses.is_dataclass(owner) and not isinstance(owner, type):
-            name = f"constant_{ast.unparse(node).replace('.', '_')}"
-            self.constants[name] = getattr(owner, node.attr)
-            return _like(node, ast.Name(name, ast.Load()))
-        self.generic_visit(node)
-        return node
-
-    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
-        """`a @ b`."""
-        self.generic_visit(node)
-        if isinstance(node.op, ast.MatMult):
-            return _like(node, _call("rtcf_matmul", node.left, node.right))
-        return node
-
-    def visit_Call(self, node: ast.Call) -> ast.AST:
-        """`np.linalg.solve(a, b)`, `a.dot(b)`."""
-        target = resolve(node.func, self.source)
-        instead = next((own for each, own in INSTEAD.items() if each is target), None)
-        if instead is not None:
-            arguments = [self.visit(each) for each in node.args]
-            return _like(node, _call(instead.__name__, *arguments))
-        if isinstance(node.func, ast.Attribute) and target is None and node.func.attr == "dot":
-            arguments = [self.visit(each) for each in node.args]
-            return _like(node, _call("rtcf_matmul", self.visit(node.func.value), *arguments))
-        if getattr(target, "__module__", "") == "numpy.linalg" or (
-            isinstance(node.func, ast.Attribute)
-            and resolve(node.func.value, self.source) is np.linalg
-        ):
-            raise self.mistake(
-                node, "calls LAPACK, which allocates", "np.linalg has solve, inv and cholesky here"
-            )
-        self.generic_visit(node)
-        return node
-
-    def visit_Assign(self, node: ast.Assign) -> ast.AST | list[ast.stmt]:
-        """`x[1:3] = value`."""
-        if len(node.targets) == 1 and _is_slice(node.targets[0]):
-            target = node.targets[0]
-            read = self.visit(_loaded(target))
-            return _like(node, ast.Expr(_call("rtcf_assign", read, self.visit(node.value))))
-        self.generic_visit(node)
-        return node
-
-    def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST:
-        """`x[1:3] += value`, `x @= m`."""
-        if _is_slice(node.target) or isinstance(node.op, ast.MatMult):
-            value = ast.BinOp(_loaded(node.target), node.op, node.value)
-            plain = ast.Assign([node.target], _like(node, value))
-            return self.visit(_like(node, plain))  # type: ignore[no-any-return]
-        self.generic_visit(node)
-        return node
+_QUEUE_FIELDS = {"size": "__count", "dropped": "__dropped", "connected": "__connected"}
 
 
 class Hook(Products):
@@ -132,7 +59,7 @@ class Hook(Products):
             kw_defaults=[],
             defaults=tree.args.defaults,
         )
-        return _like(tree, ast.FunctionDef(tree.name, arguments, body, []))
+        return like(tree, ast.FunctionDef(tree.name, arguments, body, []))
 
     def visit(self, node: ast.AST) -> Any:
         """Note the line before a statement that calls something: what it calls has other lines."""
@@ -142,7 +69,7 @@ class Hook(Products):
         if isinstance(node, simple) and any(isinstance(each, calls) for each in ast.walk(node)):
             self.lines.add(node.lineno)
             target = ast.Attribute(ast.Name(self._self, ast.Load()), "_line", ast.Store())
-            mark = _like(node, ast.Assign([target], ast.Constant(node.lineno)))
+            mark = like(node, ast.Assign([target], ast.Constant(node.lineno)))
             return [mark, *(new if isinstance(new, list) else [new])]
         return new
 
@@ -157,8 +84,8 @@ class Hook(Products):
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         """`self.name` and `self.port.value`."""
         port = self._member(node.value)
-        if port is not None and port.kind in (Input, Output):
-            return self._port(node, port)
+        if port is not None and port.kind in PORTS:
+            return self._queue(node, port) if port.kind is Queue else self._port(node, port)
         if self._is_self(node.value):
             return self._own(node)
         return super().visit_Attribute(node)
@@ -171,21 +98,29 @@ class Hook(Products):
                 arguments = [self.visit(each) for each in node.args[1:]]
                 number = self._logs.add(called.attr, node, self.source)
                 component = self._field("_component")
-                return _like(node, _call(f"rtcf_log_{number}", component, *arguments))
+                return like(node, call_of(f"rtcf_log_{number}", component, *arguments))
             if called.attr == "fault":
                 raise self.mistake(node, "ends the hook", "write it as a statement of its own")
             if called.attr in self._methods:
                 self.called[called.attr] = node
                 arguments = [self.visit(each) for each in node.args]
                 own = ast.Name(self._self, ast.Load())
-                new = _call(f"method_{called.attr}", own, *arguments)
+                new = call_of(f"method_{called.attr}", own, *arguments)
                 new.keywords = [self.visit(each) for each in node.keywords]
-                return _like(node, new)
+                return like(node, new)
         if isinstance(called, ast.Attribute):
             port = self._member(called.value)
             if port is not None and port.kind is Output and called.attr == "write":
                 raise self.mistake(
                     node, "a write is no value", "write it as a statement of its own"
+                )
+            if port is not None and port.kind is not Queue and called.attr == "pop":
+                raise self.mistake(node, *METHODS["pop"])
+            if port is not None and called.attr == "pop":
+                raise self.mistake(
+                    node,
+                    "a pop is no value",
+                    f"look at self.{port.name}.front, then write it as a statement of its own",
                 )
             if port is not None and port.kind is Input and called.attr == "read":
                 raise self.mistake(
@@ -204,7 +139,11 @@ class Hook(Products):
                 if len(call.args) != 1 or call.keywords:
                     raise self.mistake(call, "writes one value", f"self.{port.name}.write(value)")
                 flag = ast.Assign([self._field(f"{port.name}__written")], ast.Constant(True))
-                return [self._set(node, port, self.visit(call.args[0])), _like(node, flag)]
+                return [self._set(node, port, self.visit(call.args[0])), like(node, flag)]
+            if port is not None and port.kind is Queue and call.func.attr == "pop":
+                if call.args or call.keywords:
+                    raise self.mistake(call, "takes nothing", f"self.{port.name}.pop()")
+                return self._pop(node, port)
             if self._is_self(call.func.value) and call.func.attr == "fault":
                 return self._fault(node, call)
         return super().generic_visit(node)
@@ -226,16 +165,16 @@ class Hook(Products):
         if self._owned(node.target):
             raise self.mistake(node, "declares in a hook", "declare it in the class")
         if node.value is None:
-            return _like(node, ast.Pass())
+            return like(node, ast.Pass())
         plain = ast.Assign([node.target], node.value)
-        return self.visit(_like(node, plain))  # type: ignore[no-any-return]
+        return self.visit(like(node, plain))  # type: ignore[no-any-return]
 
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST:
         """`self.name += value`."""
         target = node.target
         if isinstance(target, ast.Attribute) and self._is_self(target.value):
             member = self._settable(target)
-            value = self.visit(_like(node, ast.BinOp(_loaded(target), node.op, node.value)))
+            value = self.visit(like(node, ast.BinOp(loaded(target), node.op, node.value)))
             return self._set(node, member, value)
         return super().visit_AugAssign(node)
 
@@ -253,18 +192,18 @@ class Hook(Products):
             )
         if member.kind is Parameter:
             raise self.mistake(node, "a parameter is set from outside", "declare a State for it")
-        if member.kind in (Input, Output):
+        if member.kind in PORTS:
             way = ".write(…)" if member.kind is Output else "only read"
-            raise self.mistake(node, f"is an {member.kind.__name__}", f"it is {way}")
+            raise self.mistake(node, f"is {_a(member)}", f"it is {way}")
         return member
 
     def _set(self, node: ast.stmt, member: Member, value: ast.expr) -> ast.stmt:
         kind = member.type
         if kind.shape:
-            call = _call("rtcf_assign", self._field(member.name, ast.Load()), value)
-            return _like(node, ast.Expr(call))
+            call = call_of("rtcf_assign", self._field(member.name, ast.Load()), value)
+            return like(node, ast.Expr(call))
         convert = "rtcf_float" if kind.is_float else "rtcf_bool" if kind.is_bool else "rtcf_int"
-        return _like(node, ast.Assign([self._field(member.name)], _call(convert, value)))
+        return like(node, ast.Assign([self._field(member.name)], call_of(convert, value)))
 
     def _fault(self, node: ast.Expr, call: ast.Call) -> ast.stmt:
         text = call.args[0] if len(call.args) == 1 else None
@@ -272,33 +211,67 @@ class Hook(Products):
             raise self.mistake(
                 call, "a fault has one constant text", "log the values before it by self.error(…)"
             )
-        return _like(node, ast.Raise(_call("rtcf_fault", text)))
+        return like(node, ast.Raise(call_of("rtcf_fault", text)))
 
     def _port(self, node: ast.Attribute, port: Member) -> ast.AST:
         fields = _INPUT_FIELDS if port.kind is Input else {"value": ""}
         if node.attr not in fields:
             has = ", ".join(f".{each}" for each in fields)
             has += ", .write(…)" if port.kind is Output else ""
-            raise self.mistake(node, f"an {port.kind.__name__} has no {node.attr}", f"it has {has}")
+            raise self.mistake(node, f"{_a(port)} has no {node.attr}", f"it has {has}")
         if isinstance(node.ctx, ast.Store):
             raise self.mistake(node, "a port's value is not set", f"self.{port.name}.write(…)")
-        return _like(node, self._field(port.name + fields[node.attr], node.ctx))
+        return like(node, self._field(port.name + fields[node.attr], node.ctx))
+
+    def _queue(self, node: ast.Attribute, port: Member) -> ast.AST:
+        """`self.goals.front`, `.size`, `.age`, `.dropped`, `.connected`."""
+        name = port.name
+        if isinstance(node.ctx, ast.Store):
+            raise self.mistake(node, "a queue is only read", f"self.{name}.pop() removes one")
+        ring = [
+            self._field(f"{name}{each}", ast.Load())
+            for each in ("__times" if node.attr == "age" else "", "__oldest", "__count")
+        ]
+        if node.attr == "front":
+            return like(node, call_of("rtcf_front", *ring))
+        if node.attr == "age":
+            self.used.add("_time")
+            return like(node, call_of("rtcf_age", self._field("_time", ast.Load()), *ring))
+        if node.attr in _QUEUE_FIELDS:
+            return like(node, self._field(name + _QUEUE_FIELDS[node.attr], node.ctx))
+        raise self.mistake(
+            node,
+            f"{_a(port)} has no {node.attr}",
+            "it has .size, .front, .pop(), .age, .dropped, .connected",
+        )
+
+    def _pop(self, node: ast.Expr, port: Member) -> ast.stmt:
+        call = call_of("rtcf_after", self._field(f"{port.name}__oldest"), ast.Constant(port.size))
+        count = self._field(f"{port.name}__count", ast.Load())
+        steps: list[ast.stmt] = [
+            ast.Assign([self._field(f"{port.name}__oldest")], call),
+            ast.Assign(
+                [self._field(f"{port.name}__count")],
+                ast.BinOp(loaded(count), ast.Sub(), ast.Constant(1)),
+            ),
+        ]
+        some = ast.Compare(count, [ast.Gt()], [ast.Constant(0)])
+        return like(node, ast.If(some, steps, []))
 
     def _own(self, node: ast.Attribute) -> ast.AST:
         name = node.attr
         if name in TIME_FIELDS:
             self.used.add(f"_{name}")
-            return _like(node, self._field(f"_{name}", node.ctx))
+            return like(node, self._field(f"_{name}", node.ctx))
         member = self._description.members.get(name)
         if member is not None:
-            if member.kind in (Input, Output):
-                raise self.mistake(
-                    node, f"is an {member.kind.__name__}", f"write self.{name}.value"
-                )
-            return _like(node, self._field(name, node.ctx))
+            if member.kind in PORTS:
+                value = "front" if member.kind is Queue else "value"
+                raise self.mistake(node, f"is {_a(member)}", f"write self.{name}.{value}")
+            return like(node, self._field(name, node.ctx))
         if name in self._description.constants:
             self.constants[f"constant_{name}"] = self._description.constants[name]
-            return _like(node, ast.Name(f"constant_{name}", ast.Load()))
+            return like(node, ast.Name(f"constant_{name}", ast.Load()))
         if name in self._methods:
             raise self.mistake(node, "a method is no value", f"call it: self.{name}(…)")
         raise self.mistake(node, "is not declared", f"write `{name}: State[float]` in the class")
@@ -322,31 +295,7 @@ class Hook(Products):
         return [target] if isinstance(target, ast.Attribute) and self._is_self(target.value) else []
 
 
-def _is_slice(node: ast.AST) -> bool:
-    if not isinstance(node, ast.Subscript):
-        return False
-    parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
-    return any(isinstance(each, ast.Slice) or _is_ellipsis(each) for each in parts)
-
-
-def _is_ellipsis(node: ast.AST) -> bool:
-    return isinstance(node, ast.Constant) and node.value is ...
-
-
-def _loaded(target: ast.expr) -> ast.expr:
-    """Return a target as an expression that reads it."""
-    new = copy.deepcopy(target)
-    new.ctx = ast.Load()  # type: ignore[attr-defined]
-    return new
-
-
-def _call(function: str, *arguments: Any) -> ast.Call:
-    for each in arguments:
-        if isinstance(each, ast.Attribute):
-            each.ctx = ast.Load()
-    return ast.Call(ast.Name(function, ast.Load()), list(arguments), [])
-
-
-def _like(node: ast.AST, new: _Node) -> _Node:
-    ast.copy_location(new, node)
-    return ast.fix_missing_locations(new)
+def _a(member: Member) -> str:
+    """Return a member's kind with its article."""
+    kind = member.kind.__name__
+    return f"{'an' if kind[0] in 'IO' else 'a'} {kind}"
