@@ -4,20 +4,25 @@ import re
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 import rtcf
 from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for
+from geometry_msgs.msg import TwistStamped
 from rtcf.v1 import graph_pb2, runner_pb2
+from rtcf_compile.source.modules import components, load
+from sensor_msgs.msg import JointState
 from values import state
 
 SOURCE = Path(__file__).parents[1] / "components" / "python" / "controllers.py"
+MESSAGES = SOURCE.with_name("messages.py")
 RTCF_DIR = BUILD_TREE / "cmake" / "rtcf"
 PROJECT = """\
 cmake_minimum_required(VERSION 3.25)
 project(controllers LANGUAGES CXX)
 find_package(rtcf REQUIRED)
-rtcf_add_python_components(controllers PACKAGE py SOURCES {source})
+rtcf_add_python_components(controllers PACKAGE py SOURCES {source} {messages})
 """
 COMPILE_DEADLINE_S = 900.0
 
@@ -26,7 +31,7 @@ COMPILE_DEADLINE_S = 900.0
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build the components once, as anyone's project does; return the folder of packages."""
     project = tmp_path_factory.mktemp("project")
-    (project / "CMakeLists.txt").write_text(PROJECT.format(source=SOURCE))
+    (project / "CMakeLists.txt").write_text(PROJECT.format(source=SOURCE, messages=MESSAGES))
     for arguments in (["-S", ".", "-B", "build", f"-Drtcf_DIR={RTCF_DIR}"], ["--build", "build"]):
         done = subprocess.run(
             ["cmake", *arguments],
@@ -96,6 +101,44 @@ def test_a_queue_gets_each_message_of_cycles_that_its_reader_skips(
     seconds = sum(each * 0.001 for each in range(1, messages + 1))
     assert float(states["seconds"]) == pytest.approx(seconds)
     assert states["oldest"] == "3000000"
+
+
+def test_messages_are_those_of_any_component(client: rtcf.Client, daemon: Daemon) -> None:
+    client.load(rtcf.component("py", "Joints", name="joints"))
+    client.load(rtcf.component("py", "Arm", name="arm"))
+    client.step(20)
+    model: Any = next(each for each in components(load(MESSAGES)) if each.__name__ == "Arm")()
+    wanted = TwistStamped()
+    wanted.twist.linear.x, wanted.twist.linear.y = 0.1, -0.2
+    for cycle in range(1, 21):
+        message = JointState(position=[0.01 * cycle * joint for joint in (1, 2, 3)])
+        model.joints.put(message)
+        model.wanted.put(wanted)
+        model.cycle()
+    shown = re.findall(r"[-\d.e]+", _states(client, "arm")["filtered"])
+    assert abs(model.filtered[0]) > 0.01
+    assert [float(each) for each in shown] == pytest.approx(list(model.filtered), rel=1e-4)
+    assert _states(client, "arm")["incomplete"] == "0"
+    ports = _ports(client, "arm")
+    assert ports["command"].type == "sensor_msgs/JointState"
+    command = ports["command"].value
+    for text in ("seq: 20 ", "frame_id: base ", "name[1]: elbow ", "velocity[2]: "):
+        assert text in command
+    assert command.endswith("effort[]")
+    assert f" x: {model.tip.value.pose.position.x:.5f}" in ports["tip"].value
+    joints = _ports(client, "joints")["joints"].value
+    assert "position[1]: 0.4 " in joints and "stamp: 0.018999995 " in joints
+
+
+def test_a_message_with_more_than_is_declared_is_not_taken(
+    client: rtcf.Client, daemon: Daemon
+) -> None:
+    client.load(rtcf.component("py", "Crowd", name="crowd"))
+    client.load(rtcf.component("py", "Arm", name="arm"))
+    client.step(5)
+    assert _states(client, "arm")["incomplete"] == "5"
+    said = "a message of joints has more elements than declared, and is not taken"
+    wait_for(lambda: said in daemon.log(), "the warning")
 
 
 def test_its_declarations_are_those_of_any_component(client: rtcf.Client, daemon: Daemon) -> None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
+from rtcf.component.message_type import Leaf, MessageType, is_message, message_type
 from rtcf.component.value_type import DeclarationError, ValueType, value_type
 
 # Fields of the record that every component has, beside those of its members.
@@ -75,9 +76,12 @@ class Queue(Declarable):
 
 
 class Output(Declarable):
-    """An output: `self.x.write(value)`. `finite=True` has values checked for NaN and infinity."""
+    """An output: `self.x.write(value)`; of a message `self.x.value.linear.x = …`, and then
+    `self.x.publish()`. `finite=True` has values checked for NaN and infinity; `texts` are those of
+    a message, `{"header.frame_id": "base"}`.
+    """
 
-    allowed = ("unit", "finite")
+    allowed = ("unit", "finite", "texts")
 
 
 class Parameter(Declarable):
@@ -105,6 +109,12 @@ class Member:
     initial: np.ndarray[Any, Any]
     options: dict[str, Any]
     line: int
+    message: MessageType | None = None  # then `type` says nothing
+
+    @property
+    def leaves(self) -> tuple[Leaf, ...]:
+        """Return the numbers, and arrays of numbers, of a value."""
+        return self.message.leaves if self.message else (Leaf((), self.type),)
 
     @property
     def size(self) -> int:
@@ -135,7 +145,10 @@ class Description:
             if member.kind is Queue:
                 fields += _queue_fields(member)
                 continue
-            fields.append((member.name, member.type.scalar, member.type.shape))
+            for leaf in member.leaves:
+                fields.append((member.name + leaf.field, leaf.type.scalar, leaf.type.shape))
+                if leaf.is_variable and member.kind is Input:
+                    fields.append((member.name + leaf.count, np.int64))
             if member.kind is Input:
                 fields.append((f"{member.name}__age", np.int64))
                 fields += [
@@ -189,7 +202,8 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
         raise DeclarationError("is no name: a letter, then letters, digits and single _")
     if name in _RESERVED:
         raise DeclarationError("is a word that every component has: take another name")
-    kind, declared = annotation.kind, value_type(annotation.declared)
+    kind, message = annotation.kind, _message(annotation)
+    declared = ValueType(np.dtype(np.bool_)) if message else value_type(annotation.declared)
     given = vars(owner).get(f"_declared_{name}", vars(owner).get(name))
     if isinstance(given, MemberAttribute):
         given = None
@@ -208,7 +222,28 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
         _check_size(name, options.get("size"))
     if kind is Parameter and declared.shape and declared.is_bool:
         raise DeclarationError("is an array of bools: a parameter is a number or an array of them")
-    return Member(name, kind, declared, _initial(declared, initial), options, line)
+    if options.get("texts") is not None:
+        _check_texts(message, options["texts"])
+    return Member(name, kind, declared, _initial(declared, initial), options, line, message)
+
+
+def _message(annotation: Declared) -> MessageType | None:
+    """Return the message type of a port; `JointState, 7` says the size of its arrays."""
+    declared = annotation.declared
+    cls, *sizes = declared if isinstance(declared, tuple) else (declared,)
+    if not is_message(cls):
+        return None
+    if annotation.kind not in (Input, Output):
+        raise DeclarationError(f"{cls._type}: a message is carried by an Input or an Output")
+    if len(sizes) > 1 or not all(type(each) is int and each > 0 for each in sizes):
+        raise DeclarationError(f"{cls._type} takes one size, of all its arrays")
+    return message_type(cls, sizes[0] if sizes else None)
+
+
+def _check_texts(message: MessageType | None, texts: Any) -> None:
+    known = [".".join(each) for each in message.texts] if message else []
+    if not isinstance(texts, dict) or not all(each in known for each in texts):
+        raise DeclarationError(f"texts are {{name: text}} of: {', '.join(known) or 'a message'}")
 
 
 def _queue_fields(member: Member) -> list[tuple[Any, ...]]:

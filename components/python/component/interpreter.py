@@ -20,6 +20,7 @@ from rtcf.component.declaration import (
     State,
     describe,
 )
+from rtcf.component.message_view import MessageView, checked, put
 
 
 class Fault(Exception):
@@ -33,6 +34,9 @@ class _Value:
         self._record, self._member = record, member
 
     def get(self) -> Any:
+        if self._member.message:
+            is_output = self._member.kind is Output
+            return MessageView(self._record, self._member.name, self._member.message, is_output)
         value = self._record[self._member.name]
         if self._member.type.shape:
             return value
@@ -40,23 +44,20 @@ class _Value:
         enumeration = self._member.type.enumeration
         return enumeration(plain) if enumeration else plain
 
+    def put(self, value: Any) -> bool:
+        message = self._member.message
+        if message:
+            return put(self._record, self._member.name, message, value)
+        self.set(value)
+        return True
+
     def set(self, value: Any) -> None:
-        self._record[self._member.name] = checked(value, self._member)
-
-
-def checked(value: Any, member: Member) -> Any:
-    """Return a value that fits a member; raise what Python would."""
-    new = np.asarray(value)
-    if new.shape not in (member.type.shape, ()):
-        raise ValueError(f"{member.name} has shape {member.type.shape}, not {new.shape}")
-    scalar = member.type.scalar
-    if (new.dtype.kind == "f" and scalar.kind != "f") or (
-        (new.dtype.kind == "b") != (scalar.kind == "b")
-    ):
-        raise TypeError(f"{member.name} is {scalar.name}, not {new.dtype.name}")
-    if new.dtype.kind == "O":
-        raise OverflowError(f"{member.name} is {scalar.name}: {value} does not fit")
-    return new
+        if self._member.message:
+            raise TypeError(
+                f"{self._member.name} is a {self._member.message.name}: "
+                f"set .value.…, then .publish()"
+            )
+        self._record[self._member.name] = checked(value, self._member.type, self._member.name)
 
 
 class InputPort:
@@ -92,7 +93,8 @@ class InputPort:
 
     def put(self, value: Any) -> None:
         """For tests: write it as another component would."""
-        self._value.set(value)
+        if not self._value.put(value):
+            return
         self._record[f"{self._name}__new"] = self._record[f"{self._name}__valid"] = True
         self._record[f"{self._name}__connected"] = True
         self._record[f"{self._name}__age"] = 0
@@ -150,7 +152,7 @@ class QueuePort:
             self._record[f"{name}__dropped"] += 1
             return
         place = (self._record[f"{name}__oldest"] + self._record[f"{name}__count"]) % size
-        self._record[name][place] = checked(value, self._member)
+        self._record[name][place] = checked(value, self._member.type, self._member.name)
         self._record[f"{name}__times"][place] = self._record["_time"]
         self._record[f"{name}__count"] += 1
 
@@ -164,6 +166,10 @@ class OutputPort:
     def write(self, value: Any) -> None:
         """Write a value; it is seen when the hook has ended."""
         self._value.set(value)
+        self._record[f"{self._name}__written"] = True
+
+    def publish(self) -> None:
+        """Make what `.value` was set to the new value."""
         self._record[f"{self._name}__written"] = True
 
     @property
@@ -223,7 +229,7 @@ class Component:
             setattr(type(self), name, _Attribute(member))
         record = np.zeros((), description.record)
         for member in description.members.values():
-            if member.kind is not Queue:
+            if member.kind is not Queue and not member.message:
                 record[member.name] = member.initial
         for name in parameters:
             if name not in {member.name for member in description.of(Parameter)}:

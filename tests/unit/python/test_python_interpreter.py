@@ -6,10 +6,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import genpy
 import pytest
 import rtcf
+from geometry_msgs.msg import TwistStamped
 from rtcf.component import Fault
 from rtcf_compile.source.modules import components, load
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
 
 TREE = Path(__file__).parents[3]
 CONTROLLERS = load(TREE / "tests" / "components" / "python" / "controllers.py")
@@ -19,6 +23,11 @@ FILTERS = {
     each.__name__: each
     for each in components(load(TREE / "tests" / "components" / "python" / "filters.py"))
 }
+ARM: Any = next(
+    each
+    for each in components(load(TREE / "tests" / "components" / "python" / "messages.py"))
+    if each.__name__ == "Arm"
+)
 
 
 def made(name: str, **parameters: object) -> Any:
@@ -91,6 +100,45 @@ def test_the_age_of_a_queue_is_that_of_its_oldest_message() -> None:
     assert (trajectory.skipped, trajectory.waypoints.age) == (1, 2_000_000)
 
 
+def test_messages_are_read_and_filled_by_their_names() -> None:
+    arm = ARM()
+    arm.joints.put(JointState(position=[0.1, 0.2, 0.3]))
+    arm.torques.put(Float64MultiArray(data=[1.0, 2.0]))
+    wanted = TwistStamped()
+    wanted.header.seq, wanted.header.stamp = 7, genpy.Time(3, 4)
+    wanted.twist.linear.x = 0.5
+    arm.wanted.put(wanted)
+    arm.cycle()
+    assert arm.total.value == 3.0
+    assert arm.wanted.value.header.stamp == 3_000_000_004
+    assert arm.command.value.header.seq == 7
+    assert arm.command.written and arm.tip.written
+    assert 0.7 < arm.tip.value.pose.position.x < 0.8
+    assert list(arm.joints.value.velocity) == []
+
+
+def test_a_message_with_more_than_is_declared_is_not_taken() -> None:
+    arm = ARM()
+    arm.joints.put(JointState(position=[0.1, 0.2, 0.3, 0.4]))
+    assert not arm.joints.new and not arm.joints.valid
+    arm.cycle()
+    assert arm.incomplete == 1
+
+
+def test_what_a_message_has_not_is_refused() -> None:
+    arm = ARM()
+    with pytest.raises(AttributeError, match="linear.w is no number of geometry_msgs/Twist"):
+        _ = arm.wanted.value.twist.linear.w
+    with pytest.raises(AttributeError, match="is an input"):
+        arm.wanted.value.twist.linear.x = 1.0
+    with pytest.raises(AttributeError, match="twist is no number"):
+        arm.tip.value.twist = 1.0
+    with pytest.raises(TypeError, match="seq is uint32"):
+        arm.command.value.header.seq = 0.5
+    with pytest.raises(TypeError, match="set .value"):
+        arm.tip.write(1.0)
+
+
 def test_a_fault_is_an_exception() -> None:
     failing = made("Failing", way=4, after=1)
     with pytest.raises(Fault, match="no reply from the drive"):
@@ -105,7 +153,8 @@ def test_instances_have_state_of_their_own() -> None:
 
 def test_the_pages_example_runs_as_it_stands(tmp_path: Path) -> None:
     page = (TREE / "docs" / "python-components.md").read_text()
-    source, trial = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)[:2]
+    source, *others = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    (trial,) = (each for each in others if "import Observer" in each)
     (tmp_path / "observer.py").write_text(source)
     done = subprocess.run(
         [sys.executable, "-c", trial],

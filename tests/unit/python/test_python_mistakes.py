@@ -14,7 +14,9 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+from geometry_msgs.msg import PoseStamped, Twist
 from rtcf.component import Component, Input, Output, Parameter, Queue, State
+from std_msgs.msg import Float64MultiArray
 
 A = np.eye(2)
 GAINS = {"kp": 1.0}
@@ -34,6 +36,8 @@ class Faulty(Component):
     n: State[int]
     on: State[bool]
     q: Queue[float] = Queue(size=4)
+    t: Input[Twist]
+    p: Output[PoseStamped]
 """
 
 # What is written in update (a mark {} is where the line is expected), what is said of it.
@@ -105,6 +109,16 @@ IN_UPDATE = {
     "pop as value": ("self.y.write(self.q.pop())", "a pop is no value"),
     "pop of an array": ("self.z.pop()", "shrinks"),
     "queue assigned": ("self.q = 2.0", "is a Queue"),
+    "message as value": ("self.y.write(self.t.value)", "geometry_msgs/Twist is no number"),
+    "part of a message": ("a = self.t.value.linear", "geometry_msgs/Twist.linear is no number"),
+    "field that a message has not": ("a = self.t.value.linear.w", "Twist.linear.w is not there"),
+    "text of a message": ("self.p.value.header.frame_id = 'base'", "header.frame_id is text"),
+    "message of an input set": ("self.t.value.linear.x = 1.0", "is of an Input"),
+    "message written": ("self.p.write(1.0)", "a message is not written as a whole"),
+    "float to a message's int": (
+        "self.p.value.header.seq = 0.5",
+        "a whole number is set to a float",
+    ),
     "fault with a variable": ("self.fault(self.n)", "a fault has one constant text"),
     "isinstance": ("a = isinstance(self.n, int)", "types are fixed when compiled"),
     "time set": ("self.dt = 1.0", "is the loop's"),
@@ -122,6 +136,13 @@ IN_CLASS = {
     "unknown option": ("    v: State[int] = State(unitt='m')", "knows no option"),
     "queue without size": ("    v: Queue[float]", "says not how many it keeps"),
     "queue of no size": ("    v: Queue[float] = Queue(size=0)", "keeps 1 to 1024 messages"),
+    "message of any size": ("    v: Input[Float64MultiArray]", "of any size: declare the largest"),
+    "size of a fixed message": ("    v: Input[Twist, 3]", "has no array of variable size"),
+    "message as state": ("    v: State[Twist]", "a message is carried by an Input or an Output"),
+    "unknown text of a message": (
+        "    v: Output[Twist] = Output(texts={'frame': 'base'})",
+        "texts are",
+    ),
     "reserved name": ("    dt: State[float]", "a word that every component has"),
 }
 

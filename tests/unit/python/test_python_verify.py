@@ -10,7 +10,7 @@ from rtcf_compile.machine_code import lowering
 from rtcf_compile.source import modules as source
 
 FOLDER = Path(__file__).parents[2] / "components" / "python"
-FILES = [source.load(FOLDER / f"{name}.py") for name in ("controllers", "filters")]
+FILES = [source.load(FOLDER / f"{name}.py") for name in ("controllers", "filters", "messages")]
 # One way of Failing fills the arena, which the interpreter does not have.
 CLASSES = {
     each.__name__: each

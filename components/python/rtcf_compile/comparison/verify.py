@@ -170,13 +170,20 @@ class _Inputs:
 
     def __init__(self, member: Member, draw: Any, edges: float) -> None:
         """Draw all at once, as NumPy is slow one by one."""
-        name, kind = member.name, member.type
-        shape = (_ANEW, *kind.shape)
+        name = member.name
         self._flags = [f"{name}__{flag}" for flag in ("new", "valid", "connected")]
-        self._name, self._age_name = name, f"{name}__age"
+        self._age_name = f"{name}__age"
         self._new = (draw.random(_ANEW) < 0.8).tolist()
         self._age = (draw.integers(0, 3, _ANEW) * 1_000_000).tolist()
-        self._values = _drawn(kind, shape, draw, edges)
+        self._values: dict[str, Any] = {}
+        for leaf in member.leaves:
+            shape = (_ANEW, *leaf.type.shape)
+            self._values[name + leaf.field] = _drawn(leaf.type, shape, draw, edges)
+            if leaf.is_variable:
+                counts = draw.integers(0, leaf.type.count, _ANEW, endpoint=True)
+                # Most messages are whole.
+                whole = draw.random(_ANEW) < 0.8
+                self._values[name + leaf.count] = np.where(whole, leaf.type.count, counts)
 
     def put(self, record: Any, cycle: int) -> None:
         """Set the input's fields for a cycle."""
@@ -185,7 +192,8 @@ class _Inputs:
         if new:
             record[self._flags[1]] = record[self._flags[2]] = True
             record[self._age_name] = self._age[cycle]
-            record[self._name] = self._values[cycle]
+            for name, values in self._values.items():
+                record[name] = values[cycle]
 
 
 class _Messages:

@@ -1,6 +1,7 @@
 """From compiled components to a library, by g++ and the flags that rtcf_add_components uses."""
 
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -63,6 +64,9 @@ def _libraries() -> list[str]:
 
 
 def _way_out(line: str) -> str:
+    message = re.search(r"error: ([a-z]\w*)/\w+\.h: No such file", line)
+    if message:
+        return f"sudo apt install lib{message[1].replace('_', '-')}-dev, or build {message[1]}"
     if "rtcf/component.hpp" in line or "No such file" in line:
         return "sudo apt install librtcf-dev"
     return "this is rtcf-compile's to mend: say so with the source"

@@ -121,6 +121,17 @@ void store(T& value, const T& field) noexcept {
 }
 /// @}
 
+/// Sets a ros::Time or a ros::Duration; what it has no room for is its nearest. Real-time safe.
+template <typename Time>
+void setTime(Time& time, std::int64_t ns) noexcept {
+    using Seconds = std::numeric_limits<decltype(time.sec)>;
+    constexpr std::int64_t kSecond = 1'000'000'000;
+    const std::int64_t rest = (ns % kSecond + kSecond) % kSecond;
+    time.sec = static_cast<decltype(time.sec)>(
+        std::clamp<std::int64_t>((ns - rest) / kSecond, Seconds::min(), Seconds::max()));
+    time.nsec = static_cast<decltype(time.nsec)>(rest);
+}
+
 /// Moves the messages of a queue into the record's ring; real-time safe.
 /// @tparam Elements of one message @return how many found it full, and are lost
 template <std::size_t Elements, typename T, std::size_t Messages, typename Scalar>

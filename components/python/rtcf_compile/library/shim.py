@@ -17,6 +17,7 @@ from rtcf.component.declaration import (
 )
 from rtcf.component.value_type import ValueType
 
+from rtcf_compile.library import messages
 from rtcf_compile.machine_code.lowering import Compiled
 from rtcf_compile.source.mistake import display, source_line
 
@@ -28,6 +29,7 @@ def source(compiled: list[Compiled]) -> str:
     parts = [
         "// Made by rtcf-compile. What it says is in the Python source.",
         '#include "runtime.hpp"',
+        *sorted({line for each in compiled for line in messages.includes(each.description)}),
         "",
     ]
     for each in compiled:
@@ -96,6 +98,7 @@ def _class(compiled: Compiled) -> list[str]:
     for member in about.of(State) + about.of(Parameter):
         lines.append(f"        record_.{member.name} = {_initial(member)};")
     lines.append("        record_._component = reinterpret_cast<std::intptr_t>(this);")
+    lines += messages.prepare(about, _text, compiled.used)
     for member in about.of(State):
         lines.append(
             f"        rtcf::python::declareState<{_state_type(member)}>(*this, "
@@ -151,6 +154,9 @@ def _steps(compiled: Compiled) -> list[str]:
     lines += ["    }", "    void readPorts() noexcept {", "        prepareRecord();"]
     for member in about.of(Input):
         name = member.name
+        if member.message:
+            lines += messages.read(member, _text, used)
+            continue
         lines += [
             "        {",
             f"            const rtcf::DataStatus status = port_{name}.read();",
@@ -179,9 +185,10 @@ def _steps(compiled: Compiled) -> list[str]:
     lines += ["    }", "    void writePorts() noexcept {"]
     for member in about.of(Output):
         name = member.name
+        value = [f"            rtcf::python::store(port_{name}.value(), record_.{name});"]
         lines += [
             f"        if (record_.{name}__written) {{",
-            f"            rtcf::python::store(port_{name}.value(), record_.{name});",
+            *(messages.write(member, used) if member.message else value),
             f"            port_{name}.publish();",
             "        }",
         ]
@@ -224,6 +231,8 @@ def _member(member: Member) -> list[str]:
 
 def _port_type(member: Member) -> str:
     kind = member.type
+    if member.message:
+        return member.message.cpp
     if not kind.shape:
         return kind.cpp
     rows, columns = (*kind.shape, 1)[:2]

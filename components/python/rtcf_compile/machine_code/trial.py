@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 from rtcf.component import Component
-from rtcf.component.declaration import Input, Queue, describe
+from rtcf.component.declaration import Input, Member, Queue, describe
+from rtcf.component.value_type import ValueType
 
 from rtcf_compile.source.mistake import Mistake
 
@@ -20,19 +21,17 @@ _SHAPES = re.compile(r"matmul|broadcast|shape|dimension|size \d", re.IGNORECASE)
 def run(cls: type[Component], file: str) -> None:
     """Run some cycles with values drawn from a fixed seed; raise Mistake if shapes do not fit."""
     draw = np.random.default_rng(1)
-    component = cls()
+    component: Any = cls()
     about = describe(cls)
-    inputs = about.of(Input) + about.of(Queue)
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         try:
             component.start()
             for cycle in range(_CYCLES):
-                for member in inputs:
-                    value: Any = draw.normal(0.0, 10.0 ** (cycle % 4), member.type.shape)
-                    if member.type.is_bool:
-                        value = value > 0
-                    getattr(component, member.name).put(value.astype(member.type.scalar))
+                for member in about.of(Input):
+                    _draw(component._record, member, draw, cycle)
+                for member in about.of(Queue):
+                    getattr(component, member.name).put(_value(member.type, draw, cycle))
                 component.cycle()
             component.safe()
         except Exception as error:
@@ -42,6 +41,22 @@ def run(cls: type[Component], file: str) -> None:
                 if "matmul" in text:
                     text = "@ of shapes that do not fit"
                 raise Mistake(file, _line(error, file), text, "make the shapes fit") from None
+
+
+def _draw(record: Any, member: Member, draw: Any, cycle: int) -> None:
+    for leaf in member.leaves:
+        record[member.name + leaf.field] = _value(leaf.type, draw, cycle)
+        if leaf.is_variable:
+            record[member.name + leaf.count] = leaf.type.count
+    for flag in ("new", "valid", "connected"):
+        record[f"{member.name}__{flag}"] = True
+
+
+def _value(kind: ValueType, draw: Any, cycle: int) -> Any:
+    value = draw.normal(0.0, 10.0 ** (cycle % 4), kind.shape)
+    if kind.is_bool:
+        value = value > 0
+    return np.asarray(value).astype(kind.scalar)
 
 
 def _line(error: BaseException, file: str) -> int:

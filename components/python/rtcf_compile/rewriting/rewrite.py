@@ -18,6 +18,8 @@ from rtcf.component.declaration import (
     Parameter,
     Queue,
 )
+from rtcf.component.message_type import MessageType
+from rtcf.component.value_type import ValueType
 
 from rtcf_compile.rewriting.logs import Logs
 from rtcf_compile.rewriting.products import Products, call_of, like, loaded
@@ -82,7 +84,10 @@ class Hook(Products):
         return node
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
-        """`self.name` and `self.port.value`."""
+        """`self.name`, `self.port.value` and `self.port.value.linear.x`."""
+        message, path = self._message(node)
+        if message is not None:
+            return self._part(node, message, path)
         port = self._member(node.value)
         if port is not None and port.kind in PORTS:
             return self._queue(node, port) if port.kind is Queue else self._port(node, port)
@@ -135,7 +140,18 @@ class Hook(Products):
         call = node.value
         if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute):
             port = self._member(call.func.value)
+            if port is not None and port.kind is Output and call.func.attr == "publish":
+                if call.args or call.keywords:
+                    raise self.mistake(call, "takes nothing", f"self.{port.name}.publish()")
+                flag = ast.Assign([self._field(f"{port.name}__written")], ast.Constant(True))
+                return like(node, flag)
             if port is not None and port.kind is Output and call.func.attr == "write":
+                if port.message:
+                    raise self.mistake(
+                        call,
+                        "a message is not written as a whole",
+                        f"self.{port.name}.value.… = …, then self.{port.name}.publish()",
+                    )
                 if len(call.args) != 1 or call.keywords:
                     raise self.mistake(call, "writes one value", f"self.{port.name}.write(value)")
                 flag = ast.Assign([self._field(f"{port.name}__written")], ast.Constant(True))
@@ -151,6 +167,8 @@ class Hook(Products):
     def visit_Assign(self, node: ast.Assign) -> ast.AST | list[ast.stmt]:
         """`self.name = value`."""
         own = [each for target in node.targets for each in self._owned(target)]
+        if len(node.targets) == 1 and (part := self._settable_part(node.targets[0])):
+            return self._set_field(node, *part, self.visit(node.value))
         if not own:
             return super().visit_Assign(node)
         if len(node.targets) > 1 or isinstance(node.targets[0], ast.Tuple | ast.List):
@@ -176,6 +194,9 @@ class Hook(Products):
             member = self._settable(target)
             value = self.visit(like(node, ast.BinOp(loaded(target), node.op, node.value)))
             return self._set(node, member, value)
+        if part := self._settable_part(target):
+            value = self.visit(like(node, ast.BinOp(loaded(target), node.op, node.value)))
+            return self._set_field(node, *part, value)
         return super().visit_AugAssign(node)
 
     def _settable(self, node: ast.Attribute) -> Member:
@@ -198,12 +219,14 @@ class Hook(Products):
         return member
 
     def _set(self, node: ast.stmt, member: Member, value: ast.expr) -> ast.stmt:
-        kind = member.type
+        return self._set_field(node, member.name, member.type, value)
+
+    def _set_field(self, node: ast.stmt, name: str, kind: ValueType, value: ast.expr) -> ast.stmt:
         if kind.shape:
-            call = call_of("rtcf_assign", self._field(member.name, ast.Load()), value)
+            call = call_of("rtcf_assign", self._field(name, ast.Load()), value)
             return like(node, ast.Expr(call))
         convert = "rtcf_float" if kind.is_float else "rtcf_bool" if kind.is_bool else "rtcf_int"
-        return like(node, ast.Assign([self._field(member.name)], call_of(convert, value)))
+        return like(node, ast.Assign([self._field(name)], call_of(convert, value)))
 
     def _fault(self, node: ast.Expr, call: ast.Call) -> ast.stmt:
         text = call.args[0] if len(call.args) == 1 else None
@@ -221,7 +244,59 @@ class Hook(Products):
             raise self.mistake(node, f"{_a(port)} has no {node.attr}", f"it has {has}")
         if isinstance(node.ctx, ast.Store):
             raise self.mistake(node, "a port's value is not set", f"self.{port.name}.write(…)")
+        if port.message and node.attr == "value":
+            raise self._no_number(node, port.message, ())
         return like(node, self._field(port.name + fields[node.attr], node.ctx))
+
+    def _message(self, node: ast.AST) -> tuple[Member | None, tuple[str, ...]]:
+        """Return the port and the path of `self.port.value.path`, if it carries a message."""
+        names: list[str] = []
+        while isinstance(node, ast.Attribute):
+            port = self._member(node)
+            if port is not None and port.message and len(names) > 1 and names[-1] == "value":
+                return port, tuple(reversed(names[:-1]))
+            names.append(node.attr)
+            node = node.value
+        return None, ()
+
+    def _part(self, node: ast.Attribute, port: Member, path: tuple[str, ...]) -> ast.AST:
+        assert port.message is not None
+        leaf = port.message.leaf(path)
+        if leaf is None:
+            # An attribute of an array, as .shape, belongs to what is before it.
+            if port.message.leaf(path[:-1]) is not None:
+                return super().visit_Attribute(node)
+            raise self._no_number(node, port.message, path)
+        field = self._field(port.name + leaf.field, ast.Load() if leaf.is_variable else node.ctx)
+        if not leaf.is_variable or port.kind is Output:
+            return like(node, field)
+        count = self._field(port.name + leaf.count, ast.Load())
+        return like(node, ast.Subscript(field, ast.Slice(None, count), ast.Load()))
+
+    def _settable_part(self, target: ast.expr) -> tuple[str, ValueType] | None:
+        """Return the field and the type of a part of a message that is set."""
+        port, path = self._message(target)
+        if port is None or port.message is None:
+            return None
+        if port.kind is Input:
+            raise self.mistake(target, "is of an Input", "it is only read")
+        leaf = port.message.leaf(path)
+        if leaf is None:
+            raise self._no_number(target, port.message, path)
+        return port.name + leaf.field, leaf.type
+
+    def _no_number(self, node: ast.AST, message: MessageType, path: tuple[str, ...]) -> Exception:
+        name = ".".join((message.name, *path))
+        if path in message.texts:
+            return self.mistake(
+                node, f"{name} is text", 'declare it: Output(texts={"header.frame_id": "base"})'
+            )
+        if path in message.others:
+            return self.mistake(node, f"{name} is a list of messages", "read it in C++")
+        if below := message.below(path):
+            return self.mistake(node, f"{name} is no number", f"it has .{', .'.join(below)}")
+        has = ", .".join(message.below(path[:-1]))
+        return self.mistake(node, f"{name} is not there", f"there is .{has}")
 
     def _queue(self, node: ast.Attribute, port: Member) -> ast.AST:
         """`self.goals.front`, `.size`, `.age`, `.dropped`, `.connected`."""

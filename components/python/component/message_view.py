@@ -1,0 +1,86 @@
+"""A port's message in the interpreter: `self.twist.value.linear.x`, as fields of the record."""
+
+import operator
+from typing import Any
+
+import numpy as np
+from rtcf.component.message_type import MessageType
+from rtcf.component.value_type import ValueType
+
+
+class MessageView:
+    """A message, or a part of one."""
+
+    __slots__ = ("_is_output", "_message", "_path", "_port", "_record")
+
+    def __init__(
+        self, record: Any, port: str, message: MessageType, is_output: bool, path: Any = ()
+    ) -> None:
+        """Look at a port's fields, below a path."""
+        for name, value in (
+            ("_record", record),
+            ("_port", port),
+            ("_message", message),
+            ("_is_output", is_output),
+            ("_path", path),
+        ):
+            object.__setattr__(self, name, value)
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a number, an array or a part."""
+        path = (*self._path, name)
+        leaf = self._message.leaf(path)
+        if leaf is None:
+            if not self._message.below(path):
+                raise AttributeError(f"{'.'.join(path)} is no number of {self._message.name}")
+            return MessageView(self._record, self._port, self._message, self._is_output, path)
+        value = self._record[self._port + leaf.field]
+        if leaf.is_variable and not self._is_output:
+            return value[: self._record[self._port + leaf.count]]
+        return value if leaf.type.shape else value.item()
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set a number or an array of an output's message."""
+        path = (*self._path, name)
+        leaf = self._message.leaf(path)
+        if not self._is_output:
+            raise AttributeError(f"{self._port} is an input: it is only read")
+        if leaf is None:
+            raise AttributeError(f"{'.'.join(path)} is no number of {self._message.name}")
+        self._record[self._port + leaf.field] = checked(value, leaf.type, ".".join(path))
+
+
+def put(record: Any, port: str, message: MessageType, given: Any) -> bool:
+    """For tests: take a message over; False if it has more elements than are declared."""
+    found = {}
+    for leaf in message.leaves:
+        value = operator.attrgetter(".".join(leaf.path))(given)
+        if leaf.is_time:
+            value = value.to_nsec()
+        if isinstance(value, bytes):
+            value = np.frombuffer(value, np.uint8)
+        if leaf.is_variable and len(value) > leaf.type.count:
+            return False
+        found[leaf] = value
+    for leaf, value in found.items():
+        if leaf.is_variable:
+            record[port + leaf.field][: len(value)] = value
+            record[port + leaf.count] = len(value)
+        else:
+            record[port + leaf.field] = value
+    return True
+
+
+def checked(value: Any, kind: ValueType, name: str) -> Any:
+    """Return a value that fits a type; raise what Python would."""
+    new = np.asarray(value)
+    if new.shape not in (kind.shape, ()):
+        raise ValueError(f"{name} has shape {kind.shape}, not {new.shape}")
+    scalar = kind.scalar
+    if (new.dtype.kind == "f" and scalar.kind != "f") or (
+        (new.dtype.kind == "b") != (scalar.kind == "b")
+    ):
+        raise TypeError(f"{name} is {scalar.name}, not {new.dtype.name}")
+    if new.dtype.kind == "O":
+        raise OverflowError(f"{name} is {scalar.name}: {value} does not fit")
+    return new
