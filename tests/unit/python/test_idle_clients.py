@@ -29,6 +29,7 @@ class Front:
             Doors(folder / "trusted", folder / "others"), Limits(), lambda _: level
         )
         self.shown: list[str] = []  # of each connection, as gRPC shows it
+        self._writers: list[asyncio.StreamWriter] = []  # Python 3.13 hangs up when they go
 
     async def serve(self) -> None:
         async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -45,10 +46,16 @@ class Front:
         listener.listen()
         await self.clients.serve(listener)
 
+    @property
+    def writer(self) -> asyncio.StreamWriter:
+        """What the newest client writes by."""
+        return self._writers[-1]
+
     async def connect(self) -> asyncio.StreamReader:
         """Return what a new client reads; it is kept as long as the front is."""
         number = len(self.shown)
-        reader, self.writer = await asyncio.open_unix_connection(self._folder / "s")
+        reader, writer = await asyncio.open_unix_connection(self._folder / "s")
+        self._writers.append(writer)
         while len(self.shown) == number:
             await asyncio.sleep(0.001)
         return reader
