@@ -133,28 +133,48 @@ class _Writer:
             each.topic: bags.MessageType(each.type, each.md5, each.definition) for each in topics
         }
         self._bag: Any = None
+        self._part = Path()
 
     def __enter__(self) -> "_Writer":
         if self._path is not None:
-            try:
-                self._bag = bags.rosbag().Bag(str(self._path), "w")
-            except OSError as error:
-                raise RecordingError(
-                    f"{self._path} cannot be written: {error.strerror or error}"
-                ) from None
+            # Half a bag would take the place of a whole one.
+            target = self._path.resolve()
+            special = target.exists() and not target.is_file()
+            self._part = target if special else target.with_name(f".{target.name}.part")
+            with self._said():
+                self._bag = bags.rosbag().Bag(str(self._part), "w")
         return self
 
-    def __exit__(self, *_: object) -> None:
-        if self._bag is not None:
-            self._bag.close()
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if self._bag is None or self._path is None:
+            return
+        target = self._path.resolve()
+        try:
+            with self._said():
+                self._bag.close()
+                if kind is None and self._part != target:
+                    self._part.replace(target)
+        finally:
+            if self._part != target:
+                self._part.unlink(missing_ok=True)
 
     def write(self, outputs: Any) -> None:
         """Append messages."""
         if self._bag is None:
             return
-        for each in outputs:
-            raw = self._types[each.topic].raw(each.data)
-            self._bag.write(each.topic, raw, bags.time(each.time_ns), raw=True)
+        with self._said():
+            for each in outputs:
+                raw = self._types[each.topic].raw(each.data)
+                self._bag.write(each.topic, raw, bags.time(each.time_ns), raw=True)
+
+    @contextlib.contextmanager
+    def _said(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise RecordingError(
+                f"{self._path} cannot be written: {error.strerror or error}"
+            ) from None
 
 
 @contextlib.contextmanager

@@ -1,6 +1,7 @@
 """`rtcfctl replay`: what a recording makes of a loop, and that it does so again."""
 
 import json
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -130,6 +131,28 @@ def test_a_bag_that_cannot_be_replayed_is_refused_in_one_line(
     done = daemon.ctl("replay", str(good))
     assert (done.returncode, done.stderr.count("\n")) == (1, 1)
     assert "runs in real time: stop it first" in done.stderr
+
+
+def test_a_full_disk_leaves_no_half_bag(daemon: Daemon, tmp_path: Path) -> None:
+    messages: list[tuple[str, int, object]] = [
+        ("/G2_R2", k * PERIOD_NS, Float64(1)) for k in range(3000)
+    ]
+    bag = _write(tmp_path / "in.bag", messages)
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "none", disk], check=True)
+    try:
+        output = disk / "out.bag"
+        output.write_text("of before")
+        done = daemon.ctl("replay", str(bag), "--write", str(output))
+        assert done.returncode == 1
+        assert done.stderr.splitlines() == [
+            f"rtcfctl: {output} cannot be written: No space left on device"
+        ]
+        assert [each.name for each in disk.iterdir()] == ["out.bag"]
+        assert output.read_text() == "of before"
+    finally:
+        subprocess.run(["umount", disk], check=True)
 
 
 def test_a_graph_is_not_changed_while_it_replays(daemon: Daemon) -> None:
