@@ -121,8 +121,13 @@ void FrameMemory::announce(const std::shared_ptr<FrameBlock>& block, std::size_t
     const auto unused = std::find_if(entries.begin(), entries.end(), [](const auto& entry) {
         return entry.sequence.load(std::memory_order_relaxed) == 0;
     });
-    const std::shared_ptr<FrameBlock> text = this->block(layout.size());
-    if (unused == entries.end() || text == nullptr) return;
+    const std::shared_ptr<FrameBlock> text =
+        unused == entries.end() ? nullptr : this->block(layout.size());
+    if (text == nullptr) {
+        // Nobody can read it, and yet it takes room until it is filled no more.
+        rings_.push_back({block, nullptr, kRings});
+        return;
+    }
     std::memcpy(static_cast<void*>(text->words()), layout.data(), layout.size());
     unused->words_offset = block->offset();
     unused->frames = frames;
@@ -138,9 +143,11 @@ bool FrameMemory::forgetOldest() {
     const auto oldest = std::find_if(rings_.begin(), rings_.end(),
                                      [](const Ring& ring) { return ring.block.use_count() == 1; });
     if (oldest == rings_.end()) return false;
-    directory_->entries[oldest->entry].sequence.store(0, std::memory_order_release);
     free_.push_back(std::move(oldest->block));
-    free_.push_back(std::move(oldest->layout));
+    if (oldest->layout != nullptr) {
+        directory_->entries[oldest->entry].sequence.store(0, std::memory_order_release);
+        free_.push_back(std::move(oldest->layout));
+    }
     rings_.erase(oldest);
     return true;
 }

@@ -74,6 +74,18 @@ TEST(FrameMemory, KeepsTheRingsOfGraphsBefore) {
     EXPECT_EQ(newest, 3 * FrameMemory::kRings);
 }
 
+TEST(FrameMemory, HasRoomAgainAfterRingsWhoseLayoutFoundNone) {
+    FrameMemory memory;
+    const double value = 0.0;
+    const std::string endless(FrameMemory::kMost + 1, 'x');
+    constexpr std::size_t kSmallest = 4096;  // bytes of a block
+    for (std::size_t i = 0; i < 2 * FrameMemory::kMost / kSmallest; ++i)
+        ASSERT_NE(ringIn(memory, value, endless)->block(), nullptr) << i;
+    EXPECT_TRUE(entriesOf(memory).empty()) << "nobody knows what is in them";
+    const auto last = ringIn(memory, value, "known");
+    EXPECT_EQ(entriesOf(memory).size(), 1U);
+}
+
 TEST(FrameMemory, TakesNoRingFromWhoStillReadsIt) {
     FrameMemory memory;
     const double value = 0.0;
