@@ -11,7 +11,7 @@ from rtcf_service import Service
 DEBS = Path(os.environ.get("RTCF_DEBS", Path(__file__).parents[2] / "build" / "deb"))
 collect_ignore = ["virtual"]  # runs in another machine: see run-virtual
 # What changes the packages themselves comes last, in this order.
-_LAST = ("test_upgrade", "test_purge")
+_LAST = ("test_upgrade", "test_purge", "test_debian_upgrade")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

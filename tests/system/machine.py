@@ -99,7 +99,12 @@ class Machine:
         return [*enter, "env", "-i", *_ENVIRONMENT, *as_user, *command]
 
     def run(
-        self, *command: str, user: str = "root", check: bool = True, text: str | None = None
+        self,
+        *command: str,
+        user: str = "root",
+        check: bool = True,
+        text: str | None = None,
+        deadline_s: float = 300.0,
     ) -> Done:
         """Run a command inside; what it said is in the failure if it fails."""
         done = subprocess.run(
@@ -108,7 +113,7 @@ class Machine:
             stdin=subprocess.DEVNULL if text is None else None,
             capture_output=True,
             text=True,
-            timeout=300,
+            timeout=deadline_s,
             check=False,
         )
         if check:
@@ -117,9 +122,11 @@ class Machine:
             )
         return done
 
-    def shell(self, script: str, user: str = "root", check: bool = True) -> Done:
+    def shell(
+        self, script: str, user: str = "root", check: bool = True, deadline_s: float = 300.0
+    ) -> Done:
         """Run a line of shell inside."""
-        return self.run("bash", "-c", script, user=user, check=check)
+        return self.run("bash", "-c", script, user=user, check=check, deadline_s=deadline_s)
 
     def start(self, *command: str, user: str = "root") -> "subprocess.Popen[str]":
         """Begin a command inside."""
