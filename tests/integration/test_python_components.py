@@ -141,6 +141,41 @@ def test_a_message_with_more_than_is_declared_is_not_taken(
     wait_for(lambda: said in daemon.log(), "the warning")
 
 
+def test_what_derives_from_parameters_changes_with_them(
+    client: rtcf.Client, daemon: Daemon
+) -> None:
+    client.load(rtcf.component("py", "Ramp", name="ramp"))
+    parameters = ["length:=0.2", "gains_1:=3.0"]
+    spec = rtcf.component(
+        "py", "Pendulum", name="p", parameters=parameters, remaps=["angle:=seconds"]
+    )
+    client.load(spec)
+    pendulum: Any = next(each for each in components(load(SOURCE)) if each.__name__ == "Pendulum")
+    model = pendulum(length=0.2, gains=[20.0, 3.0])
+    seconds = 0.0
+
+    def agrees_after(cycles: int) -> None:
+        nonlocal seconds
+        client.step(cycles)
+        for _ in range(cycles):
+            seconds += 0.001
+            model.angle.put(seconds)
+            model.cycle()
+        shown = re.findall(r"[-\d.e]+", _states(client, "p")["x"])
+        assert [float(each) for each in shown] == pytest.approx(list(model.x), rel=1e-4)
+
+    agrees_after(50)
+    assert daemon.ctl("set", "p", "length:=1.5", "gains_0:=7").returncode == 0
+    longer = pendulum(length=1.5, gains=[7.0, 3.0])
+    longer.x[:] = model.x
+    model = longer
+    agrees_after(50)
+    refused = daemon.ctl("set", "p", "gains_0:=99.5")
+    assert refused.returncode == 1
+    assert re.search(r"controllers\.py:\d+: .*: ValueError: stiffer than the drive", refused.stderr)
+    agrees_after(50)
+
+
 def test_its_declarations_are_those_of_any_component(client: rtcf.Client, daemon: Daemon) -> None:
     _load_both(client)
     ramp = client.get_component("ramp")

@@ -9,6 +9,7 @@ from types import ModuleType
 from typing import Any
 
 from rtcf.component.declaration import (
+    Derived,
     Input,
     Output,
     Parameter,
@@ -22,6 +23,7 @@ from rtcf.component.value_type import DeclarationError
 __all__ = [
     "Component",
     "DeclarationError",
+    "Derived",
     "Fault",
     "Input",
     "Output",

@@ -23,9 +23,9 @@ TIME_FIELDS = {
     "dt": np.dtype(np.float64),
     "frequency": np.dtype(np.float64),
 }
-HOOKS = ("start", "update", "safe")
+HOOKS = ("prepare", "start", "update", "safe")
 LOG_LEVELS = ("debug", "info", "warn", "error", "fatal")
-_RESERVED = {*TIME_FIELDS, *HOOKS, *LOG_LEVELS, "prepare", "configure", "stop", "cleanup", "fault"}
+_RESERVED = {*TIME_FIELDS, *HOOKS, *LOG_LEVELS, "configure", "stop", "cleanup", "fault"}
 
 
 class MemberAttribute:
@@ -57,7 +57,7 @@ class Declarable:
                     f"{type(self).__name__} knows no option {option!r}: "
                     f"it has {', '.join(self.allowed) or 'none'}"
                 )
-        if initial is not None and type(self) in PORTS:
+        if initial is not None and type(self) in (*PORTS, Derived):
             raise DeclarationError(f"{_a(type(self))} has no initial value")
         self.initial = initial
         self.options = options
@@ -96,6 +96,10 @@ class State(Declarable):
     allowed = ("unit", "doc")
 
 
+class Derived(Declarable):
+    """What prepare() computes of parameters, and only it sets; constant during a cycle."""
+
+
 PORTS = (Input, Output, Queue)
 
 
@@ -115,6 +119,14 @@ class Member:
     def leaves(self) -> tuple[Leaf, ...]:
         """Return the numbers, and arrays of numbers, of a value."""
         return self.message.leaves if self.message else (Leaf((), self.type),)
+
+    @property
+    def elements(self) -> list[str]:
+        """Return the names by which a parameter is set: those of an array's elements, `gain_0`."""
+        if not self.type.shape:
+            return [self.name]
+        places = np.ndindex(self.type.shape)
+        return ["_".join([self.name, *map(str, place)]) for place in places]
 
     @property
     def size(self) -> int:
@@ -187,6 +199,12 @@ def describe(cls: type) -> Description:
                 )
             if not isinstance(value, staticmethod | classmethod | property):
                 result.constants[name] = value
+    taken: dict[str, str] = {}
+    for member in result.of(Parameter):
+        for name in member.elements:
+            if (other := taken.setdefault(name, member.name)) != member.name:
+                both = DeclarationError(f"and {other} both have a parameter {name}: rename one")
+                raise _at(both, cls, member.line, member.name)
     return result
 
 
@@ -195,7 +213,8 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
         raise DeclarationError(f"says no type: write {annotation.__name__}[float]")
     if not isinstance(annotation, Declared):
         raise DeclarationError(
-            "is neither Input, Queue, Output, Parameter nor State: what is kept is a State[…], "
+            "is neither Input, Queue, Output, Parameter, Derived nor State: what is kept is a "
+            "State[…], "
             "what never changes stands without annotation"
         )
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or "__" in name or keyword.iskeyword(name):
@@ -213,7 +232,7 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
             raise DeclarationError(f"is declared as {kind.__name__} and as {type(given).__name__}")
         options, initial = given.options, given.initial
     elif given is not None:
-        if kind in PORTS:
+        if kind in (*PORTS, Derived):
             raise DeclarationError(f"is {_a(kind)} and has no initial value")
         initial = given
     if kind is Parameter and initial is None:

@@ -10,6 +10,7 @@ import numpy as np
 from rtcf.component.declaration import (
     LOG_LEVELS,
     TIME_FIELDS,
+    Derived,
     Description,
     Input,
     Member,
@@ -201,7 +202,7 @@ class _Attribute(MemberAttribute):
         return _Value(component._record, self._member).get()
 
     def __set__(self, component: Any, value: Any) -> None:
-        if self._member.kind is State:
+        if self._member.kind in (State, Derived):
             _Value(component._record, self._member).set(value)
         elif self._member.kind is Parameter:
             raise AttributeError(f"{self._member.name} is a parameter: it is set from outside")
@@ -238,6 +239,7 @@ class Component:
         record["_period"], record["_dt"], record["_frequency"] = 1_000_000, 1e-3, 1e3
         object.__setattr__(self, "_record", record)
         object.__setattr__(self, "log", [])
+        self.prepare()
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Refuse what is not declared."""
@@ -247,6 +249,9 @@ class Component:
                 f"{type(self).__name__}"
             )
         object.__setattr__(self, name, value)
+
+    def prepare(self) -> None:
+        """Compute what derives from parameters; not in the real-time thread."""
 
     def start(self) -> None:
         """Prepare for the loop to run; not in the real-time thread."""

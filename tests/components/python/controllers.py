@@ -4,7 +4,8 @@ import enum
 from dataclasses import dataclass
 
 import numpy as np
-from rtcf.component import Component, Input, Output, Parameter, Queue, State
+from rtcf.component import Component, Derived, Input, Output, Parameter, Queue, State
+from rtcf.signal import c2d
 
 A = np.array([[1.0, 0.001], [0.0, 0.98]])
 B = np.array([0.0, 0.02])
@@ -122,6 +123,43 @@ class Gatherer(Component):
         while self.pair.size > 0:
             self.seconds += self.pair.front[0]
             self.pair.pop()
+
+
+class Pendulum(Component):
+    """State feedback on a model that is discretised when parameters change."""
+
+    angle: Input[float]
+    torque: Output[float] = Output(unit="N m")
+    length: Parameter[float] = Parameter(0.5, min=0.1, max=2.0, unit="m")
+    damping: Parameter[float] = Parameter(0.1, min=0.0, max=5.0)
+    step: Parameter[float] = Parameter(0.001, min=0.0001, max=0.1, unit="s")
+    gains: Parameter[np.float64, 2] = Parameter([20.0, 2.0], min=0.0, max=100.0)
+    ad: Derived[np.float64, 2, 2]
+    bd: Derived[np.float64, 2, 1]
+    slow: Derived[bool]
+    x: State[np.float64, 2]
+
+    def prepare(self):
+        """Discretise."""
+        if self.gains[0] > 99.0:
+            raise ValueError("stiffer than the drive")
+        ad, bd = c2d(self.model(), np.array(((0.0,), (1.0,))), self.step)
+        self.ad = ad
+        self.bd = bd
+        self.slow = self.length > 1.0
+
+    def model(self):
+        """Return the matrix of the continuous system."""
+        return np.array(((0.0, 1.0), (-9.81 / self.length, -self.damping)))
+
+    def update(self):
+        """Estimate, and feed back."""
+        gain = 0.1 if self.slow else 0.3
+        torque = min(max(-self.gains @ self.x, -10.0), 10.0)
+        self.x[:] = self.ad @ self.x + self.bd[:, 0] * torque
+        if self.angle.new and np.isfinite(self.angle.value):
+            self.x[0] += gain * (min(max(self.angle.value, -3.0), 3.0) - self.x[0])
+        self.torque.write(torque)
 
 
 def quotient(a, b):

@@ -100,6 +100,14 @@ def test_the_age_of_a_queue_is_that_of_its_oldest_message() -> None:
     assert (trajectory.skipped, trajectory.waypoints.age) == (1, 2_000_000)
 
 
+def test_what_derives_from_parameters_is_there_from_the_beginning() -> None:
+    short, long = made("Pendulum", length=0.2), made("Pendulum", length=1.5)
+    assert (short.slow, long.slow) == (False, True)
+    assert short.ad[1, 0] < long.ad[1, 0] < 0.0
+    with pytest.raises(ValueError, match="stiffer than the drive"):
+        made("Pendulum", gains=[99.5, 1.0])
+
+
 def test_messages_are_read_and_filled_by_their_names() -> None:
     arm = ARM()
     arm.joints.put(JointState(position=[0.1, 0.2, 0.3]))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, Twist
-from rtcf.component import Component, Input, Output, Parameter, Queue, State
+from rtcf.component import Component, Derived, Input, Output, Parameter, Queue, State
 from std_msgs.msg import Float64MultiArray
 
 A = np.eye(2)
@@ -36,6 +36,9 @@ class Faulty(Component):
     n: State[int]
     on: State[bool]
     q: Queue[float] = Queue(size=4)
+    d: Derived[float]
+    g: Parameter[np.float64, 2] = Parameter([1.0, 2.0])
+    w: Input[np.float64, 2]
     t: Input[Twist]
     p: Output[PoseStamped]
 """
@@ -119,10 +122,18 @@ IN_UPDATE = {
         "self.p.value.header.seq = 0.5",
         "a whole number is set to a float",
     ),
+    "element of a parameter set": ("self.g[0] = 2.0", "a parameter is set from outside"),
+    "element of an input set": ("self.w.value[0] = 2.0", "is of an Input"),
+    "derived value set": ("self.d = 2.0", "is Derived: prepare alone sets it"),
     "fault with a variable": ("self.fault(self.n)", "a fault has one constant text"),
     "isinstance": ("a = isinstance(self.n, int)", "types are fixed when compiled"),
     "time set": ("self.dt = 1.0", "is the loop's"),
     "complex number": ("a = 1j", "a complex number"),
+}
+IN_PREPARE = {
+    "input in prepare": ("self.d = self.u.value", "prepare runs beside the loop"),
+    "state in prepare": ("self.n += 1", "prepare runs beside the loop"),
+    "period in prepare": ("self.d = self.twice_dt()", "prepare runs beside the loop"),
 }
 IN_CLASS = {
     "missing annotation": ("    v = State(0.0)", "has no annotation"),
@@ -142,6 +153,10 @@ IN_CLASS = {
     "unknown text of a message": (
         "    v: Output[Twist] = Output(texts={'frame': 'base'})",
         "texts are",
+    ),
+    "parameter's name taken": (
+        "    g_0: Parameter[float] = Parameter(1.0)",
+        "both have a parameter",
     ),
     "reserved name": ("    dt: State[float]", "a word that every component has"),
 }
@@ -184,6 +199,20 @@ def test_a_declaration_is_refused_at_its_line(
     assert f"faulty.py:{HEAD.count(chr(10)) + 1}: " in said
 
 
+@pytest.mark.parametrize("name", IN_PREPARE)
+def test_prepare_knows_parameters_alone(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, expected = IN_PREPARE[name]
+    method = "    def twice_dt(self):\n        return 2.0 * self.dt\n"
+    source = f"{HEAD}\n    def prepare(self):\n        {text}\n\n{method}"
+    source += "\n    def update(self):\n        self.n += 1\n"
+    said = compiled(tmp_path, source, capsys)
+    assert expected in said
+    wanted = "2.0 * self.dt" if "twice" in text else text
+    assert f"faulty.py:{source.split(wanted)[0].count(chr(10)) + 1}: " in said
+
+
 def test_a_class_without_update_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -196,5 +225,5 @@ def test_a_class_without_update_is_refused(
 def test_each_of_them_is_in_the_documentation() -> None:
     page = PAGE.read_text()
     listed = re.findall(r"^\| ([^|]+?) \|", page, re.MULTILINE)
-    for name in (*IN_UPDATE, *(name for name, (_, said) in IN_CLASS.items() if said)):
+    for name in (*IN_UPDATE, *IN_PREPARE, *(name for name, (_, said) in IN_CLASS.items() if said)):
         assert name in listed, name

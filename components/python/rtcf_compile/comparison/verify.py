@@ -72,6 +72,8 @@ def compare(
                 record[...] = fresh
                 if cycle:
                     _parameters(record, description.of(Parameter), draw)
+                if "prepare" in compiled.hooks:
+                    _both(result, inside, component, record, "prepare", cycle)
                 if "start" in compiled.hooks:
                     _both(result, inside, component, record, "start", cycle)
                 # Every other time without special values: one NaN stays in a filter's state.
@@ -236,9 +238,9 @@ def _parameters(record: Any, parameters: list[Member], draw: Any) -> None:
         if member.type.is_bool:
             record[member.name] = draw.random() < 0.5
         elif low is not None and high is not None and member.type.is_float:
-            record[member.name] = draw.uniform(low, high)
+            record[member.name] = draw.uniform(low, high, member.type.shape)
         elif low is not None and high is not None:
-            record[member.name] = draw.integers(low, high, endpoint=True)
+            record[member.name] = draw.integers(low, high, member.type.shape, endpoint=True)
 
 
 def _interpreted(cls: type[Component]) -> type[Component]:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from rtcf.component.declaration import (
+    Derived,
     Description,
     Input,
     Member,
@@ -98,6 +99,8 @@ def _class(compiled: Compiled) -> list[str]:
     for member in about.of(State) + about.of(Parameter):
         lines.append(f"        record_.{member.name} = {_initial(member)};")
     lines.append("        record_._component = reinterpret_cast<std::intptr_t>(this);")
+    if "prepare" in compiled.hooks:
+        lines.append("        proposed_ = record_;")
     lines += messages.prepare(about, _text, compiled.used)
     for member in about.of(State):
         lines.append(
@@ -106,12 +109,14 @@ def _class(compiled: Compiled) -> list[str]:
             f"{_option(member, 'doc')});"
         )
     lines += ["    }", ""]
+    if "prepare" in compiled.hooks:
+        lines += _prepare(compiled)
     if "start" in compiled.hooks:
         lines += [
             "    bool start() override {",
             "        prepareRecord();",
             f"        const void* const raised = {compiled.symbol('start')}(&record_);",
-            '        return raised == nullptr || fail("{}", said(raised));',
+            '        return raised == nullptr || fail("{}", said(raised, record_._line));',
             "    }",
             "",
         ]
@@ -120,7 +125,7 @@ def _class(compiled: Compiled) -> list[str]:
         "        readPorts();",
         f"        const void* const raised = {compiled.symbol('update')}(&record_);",
         "        if (__builtin_expect(static_cast<long>(raised != nullptr), 0) != 0)",
-        "            throw std::runtime_error(said(raised));",
+        "            throw std::runtime_error(said(raised, record_._line));",
         "        writePorts();",
         "    }",
         "",
@@ -138,8 +143,28 @@ def _class(compiled: Compiled) -> list[str]:
         ]
     lines += ["   private:", *_steps(compiled), ""]
     lines += [f"    {line}" for member in about.members.values() for line in _member(member)]
-    lines += ["    Record record_;", "};"]
+    lines.append("    Record record_;")
+    if "prepare" in compiled.hooks:
+        lines.append("    Record proposed_;")
+    lines.append("};")
     return lines
+
+
+def _prepare(compiled: Compiled) -> list[str]:
+    about = compiled.description
+    return [
+        "    bool prepare(const rtcf::Values& /*proposed*/) override {",
+        *_parameters(about, "proposed_", "proposed"),
+        f"        const void* const raised = {compiled.symbol('prepare')}(&proposed_);",
+        '        if (raised != nullptr) return fail("{}", said(raised, proposed_._line));',
+        *(
+            f"        derived_{each.name}.stage(proposed_.{each.name});"
+            for each in about.of(Derived)
+        ),
+        "        return true;",
+        "    }",
+        "",
+    ]
 
 
 def _steps(compiled: Compiled) -> list[str]:
@@ -149,8 +174,8 @@ def _steps(compiled: Compiled) -> list[str]:
         if f"_{name}" in used:
             cast = "static_cast<std::int64_t>(iteration())" if name == "iteration" else f"{name}()"
             lines.append(f"        record_._{name} = {cast};")
-    for member in about.of(Parameter):
-        lines.append(f"        record_.{member.name} = parameter_{member.name}.value();")
+    lines += _parameters(about, "record_", "value")
+    lines += [f"        record_.{each.name} = *derived_{each.name};" for each in about.of(Derived)]
     lines += ["    }", "    void readPorts() noexcept {", "        prepareRecord();"]
     for member in about.of(Input):
         name = member.name
@@ -194,8 +219,8 @@ def _steps(compiled: Compiled) -> list[str]:
         ]
     lines += [
         "    }",
-        "    std::string said(const void* raised) const {",
-        f"        return rtcf::python::say(raised, record_._line, "
+        "    static std::string said(const void* raised, std::int64_t line) {",
+        f"        return rtcf::python::say(raised, line, "
         f"{_text(display(compiled.file))}, kMeanings, kLines);",
         "    }",
     ]
@@ -215,18 +240,37 @@ def _member(member: Member) -> list[str]:
             f"rtcf::Output<{_port_type(member)}> port_{name}{{this, {text}, "
             f"{_option(member, 'unit')}{finite}}};"
         ]
+    if member.kind is Derived:
+        field = _field_type(member.type.scalar, member.type.shape)
+        return [f"rtcf::Derived<{field}> derived_{name}{{this}};"]
     if member.kind is Parameter:
-        options = "".join(
-            f", rtcf::{option.title()}({_number(float(member.options[option]), 'float64')})"
-            for option in ("min", "max")
-            if option in member.options
-        )
-        return [
-            f"rtcf::Parameter<{member.type.cpp}> parameter_{name}{{this, {text}, "
-            f"{_initial(member)}, rtcf::Unit({_option(member, 'unit')}), "
-            f"rtcf::Doc({_option(member, 'doc')}){options}}};"
-        ]
+        return [_parameter(member, number) for number in range(member.type.count)]
     return []
+
+
+def _parameter(member: Member, number: int) -> str:
+    """Return the declaration of a parameter, or of an element of one that is an array."""
+    name, kind = member.elements[number], member.type
+    options = "".join(
+        f", rtcf::{option.title()}({_number(float(member.options[option]), 'float64')})"
+        for option in ("min", "max")
+        if option in member.options
+    )
+    return (
+        f"rtcf::Parameter<{kind.cpp}> parameter_{name}{{this, {_text(name)}, "
+        f"{_number(member.initial.ravel().tolist()[number], kind.scalar.name)}, "
+        f"rtcf::Unit({_option(member, 'unit')}), rtcf::Doc({_option(member, 'doc')}){options}}};"
+    )
+
+
+def _parameters(about: Description, record: str, which: str) -> list[str]:
+    """Return what brings parameters into a record; `which` of their values."""
+    lines = []
+    for member in about.of(Parameter):
+        for number, name in enumerate(member.elements):
+            place = f"[{number}]" if member.type.shape else ""
+            lines.append(f"        {record}.{member.name}{place} = parameter_{name}.{which}();")
+    return lines
 
 
 def _port_type(member: Member) -> str:

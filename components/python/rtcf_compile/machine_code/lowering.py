@@ -39,7 +39,7 @@ _NRT_COUNTS = re.compile(
 _COUNTS = "declare void @NRT_incref(i8*)\ndeclare void @NRT_decref(i8*)\n"
 _OPTIONS = {"boundscheck": True, "error_model": "python"}
 # What runs in the real-time thread, and beside it: each has an arena of its own.
-_THREADS = (("update", "safe"), ("start",))
+_THREADS = (("update", "safe"), ("prepare", "start"))
 ARENA = 64 * 1024
 
 

@@ -42,6 +42,7 @@ class Functions:
             if inspect.isfunction(value) or isinstance(value, staticmethod | classmethod | property)
         }
         self._made: dict[FunctionType, Any] = {}
+        self._hooks: dict[str, Hook] = {}
         self._making: list[FunctionType] = []
 
     def hooks(self) -> dict[str, FunctionType]:
@@ -57,7 +58,23 @@ class Functions:
                 check(source)
                 self._hook_form(source)
                 found[hook] = self._method(source)
+        if "prepare" in found:
+            self._check_prepare("prepare", set())
         return found
+
+    def _check_prepare(self, name: str, seen: set[str]) -> None:
+        """Refuse what prepare and the methods that it calls cannot know."""
+        seen.add(name)
+        hook = self._hooks[name]
+        for node in hook.touched.values():
+            raise at(
+                hook.source.file,
+                node,
+                "prepare runs beside the loop, with parameters alone",
+                "compute it in update, or declare a Parameter",
+            )
+        for called in set(hook.called) - seen:
+            self._check_prepare(called, seen)
 
     def file(self) -> str:
         """Return the file of the class."""
@@ -100,6 +117,7 @@ class Functions:
         names = set(self._methods) - set(HOOKS)
         hook = Hook(source, self.description, names, self.logs)
         tree = hook.function()
+        self._hooks[source.tree.name] = hook
         self.used |= hook.used
         self.lines |= hook.lines
         scope = self._scope(source, hook.constants)

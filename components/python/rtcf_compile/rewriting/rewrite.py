@@ -11,12 +11,14 @@ from rtcf.component.declaration import (
     LOG_LEVELS,
     PORTS,
     TIME_FIELDS,
+    Derived,
     Description,
     Input,
     Member,
     Output,
     Parameter,
     Queue,
+    State,
 )
 from rtcf.component.message_type import MessageType
 from rtcf.component.value_type import ValueType
@@ -44,6 +46,7 @@ class Hook(Products):
         self.called: dict[str, ast.AST] = {}
         self.used: set[str] = set()
         self.lines: set[int] = set()
+        self.touched: dict[str, ast.AST] = {}
 
     def function(self) -> ast.FunctionDef:
         """Return the rewritten function."""
@@ -166,6 +169,8 @@ class Hook(Products):
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST | list[ast.stmt]:
         """`self.name = value`."""
+        for target in node.targets:
+            self._check_elements(target)
         own = [each for target in node.targets for each in self._owned(target)]
         if len(node.targets) == 1 and (part := self._settable_part(node.targets[0])):
             return self._set_field(node, *part, self.visit(node.value))
@@ -190,6 +195,7 @@ class Hook(Products):
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST:
         """`self.name += value`."""
         target = node.target
+        self._check_elements(target)
         if isinstance(target, ast.Attribute) and self._is_self(target.value):
             member = self._settable(target)
             value = self.visit(like(node, ast.BinOp(loaded(target), node.op, node.value)))
@@ -199,8 +205,22 @@ class Hook(Products):
             return self._set_field(node, *part, value)
         return super().visit_AugAssign(node)
 
+    def _check_elements(self, target: ast.expr) -> None:
+        """Refuse to set elements of what is not a State, an Output or a variable."""
+        while isinstance(target, ast.Subscript):
+            target = target.value
+            if isinstance(target, ast.Attribute) and self._is_self(target.value):
+                self._settable(target)
+            elif isinstance(target, ast.Attribute):
+                port = self._member(target.value)
+                port = self._message(target)[0] if port is None else port
+                if port is not None and port.kind is not Output:
+                    raise self.mistake(target, f"is of {_a(port)}", "it is only read")
+
     def _settable(self, node: ast.Attribute) -> Member:
         member = self._description.members.get(node.attr)
+        if member is not None and member.kind is State:
+            self._touch(node, node.attr)
         if member is None:
             if node.attr in TIME_FIELDS:
                 raise self.mistake(node, "is the loop's", "keep a time of your own in a State")
@@ -213,6 +233,10 @@ class Hook(Products):
             )
         if member.kind is Parameter:
             raise self.mistake(node, "a parameter is set from outside", "declare a State for it")
+        if member.kind is Derived and self.source.tree.name != "prepare":
+            raise self.mistake(
+                node, "is Derived: prepare alone sets it", "set it in prepare, or declare a State"
+            )
         if member.kind in PORTS:
             way = ".write(…)" if member.kind is Output else "only read"
             raise self.mistake(node, f"is {_a(member)}", f"it is {way}")
@@ -336,10 +360,13 @@ class Hook(Products):
     def _own(self, node: ast.Attribute) -> ast.AST:
         name = node.attr
         if name in TIME_FIELDS:
+            self._touch(node, name)
             self.used.add(f"_{name}")
             return like(node, self._field(f"_{name}", node.ctx))
         member = self._description.members.get(name)
         if member is not None:
+            if member.kind is State:
+                self._touch(node, name)
             if member.kind in PORTS:
                 value = "front" if member.kind is Queue else "value"
                 raise self.mistake(node, f"is {_a(member)}", f"write self.{name}.{value}")
@@ -351,13 +378,20 @@ class Hook(Products):
             raise self.mistake(node, "a method is no value", f"call it: self.{name}(…)")
         raise self.mistake(node, "is not declared", f"write `{name}: State[float]` in the class")
 
+    def _touch(self, node: ast.AST, name: str) -> None:
+        """Note what prepare cannot know: all but parameters, what derives from them, constants."""
+        self.touched.setdefault(name, node)
+
     def _field(self, name: str, context: ast.expr_context | None = None) -> ast.Attribute:
         self.used.add(name)
         return ast.Attribute(ast.Name(self._self, ast.Load()), name, context or ast.Store())
 
     def _member(self, node: ast.AST) -> Member | None:
         if isinstance(node, ast.Attribute) and self._is_self(node.value):
-            return self._description.members.get(node.attr)
+            member = self._description.members.get(node.attr)
+            if member is not None and member.kind in PORTS:
+                self._touch(node, node.attr)
+            return member
         return None
 
     def _is_self(self, node: ast.AST) -> bool:

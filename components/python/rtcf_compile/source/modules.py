@@ -92,6 +92,8 @@ def is_own(value: Any) -> bool:
     """Tell whether it is a Python function of the component's author, to be compiled too."""
     if not isinstance(value, FunctionType):
         return False
+    if value.__module__ == "rtcf.signal":
+        return True
     module = sys.modules.get(value.__module__ or "")
     file = getattr(module, "__file__", None) or ""
     packages = ("/dist-packages/", "/site-packages/", "/lib/python3")
