@@ -33,6 +33,7 @@ _MODULES = {
     "restore": "graph.snapshot",
     "list": "graph.component",
     "info": "graph.component",
+    "graph": "graph.picture",
     "order": "graph.wires",
     "connections": "graph.wires",
     "break": "graph.wires",

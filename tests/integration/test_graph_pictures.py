@@ -1,0 +1,99 @@
+"""`rtcfctl graph`: what a loop consists of, as text and as pictures by Graphviz."""
+
+import json
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from pathlib import Path
+
+import fig_1
+import pytest
+import rtcf
+from daemon_process import Daemon
+
+_MANY = 200
+
+
+@pytest.fixture
+def loaded(daemon: Daemon, client: rtcf.Client) -> Iterator[Daemon]:
+    """Give a daemon with Fig. 1 of the paper."""
+    fig_1.load(client)
+    yield daemon
+
+
+def test_the_text_tells_the_order_and_who_feeds_whom(loaded: Daemon) -> None:
+    done = loaded.ctl("graph")
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    heads = [line for line in lines if re.match(r"\d", line)]
+    order = loaded.ctl("order").stdout.split()
+    assert [head.split()[1] for head in heads] == order
+    text = done.stdout
+    assert "out1 → /F1.in1" in text
+    assert "/H1.in2 (loop break)" in text
+    told = json.loads(loaded.ctl("graph", "--output", "json").stdout)
+    assert [each["full_name"] for each in told["components"]] == order
+
+
+def test_pictures_show_every_component(loaded: Daemon, tmp_path: Path) -> None:
+    picture = tmp_path / "fig_1.svg"
+    done = loaded.ctl("graph", "-o", str(picture))
+    assert (done.returncode, done.stdout) == (0, f"{picture}: 5 components\n"), done.stderr
+    titles = [each.text for each in ElementTree.parse(picture).iter() if each.tag.endswith("title")]
+    assert {"/H1", "/F1", "/R1", "/R2", "/R3"} <= set(titles)
+    assert "/R3->/H1" in titles
+    assert loaded.ctl("graph", "-o", str(tmp_path / "fig_1.png")).returncode == 0
+    assert (tmp_path / "fig_1.png").read_bytes().startswith(b"\x89PNG")
+    assert loaded.ctl("graph", "-o", str(tmp_path / "fig_1.dot")).returncode == 0
+    assert "style=dashed" in (tmp_path / "fig_1.dot").read_text()
+
+
+def test_topics_and_namespaces_are_in_it(client: rtcf.Client, daemon: Daemon) -> None:
+    client.load(rtcf.component("rtcf_examples", "Wave", name="w", ns="/arm/left"))
+    file = daemon.folder / "x.dot"
+    assert daemon.ctl("graph", "-o", str(file)).returncode == 0
+    assert 'label="/arm/left"' in file.read_text()
+
+
+def test_large_graphs_can_be_drawn(client: rtcf.Client, daemon: Daemon, tmp_path: Path) -> None:
+    client.apply(
+        [
+            rtcf.component(
+                "rtcf_examples", "Mimo", name=f"m{i}", ns=f"/arm{i // 40}",
+                remaps=[f"out1:=/s{i}", f"in1:=/s{i - 1}"] if i % 8 else [f"out1:=/s{i}"],
+            )
+            for i in range(_MANY)
+        ]
+    )  # fmt: skip
+    picture = tmp_path / "many.svg"
+    done = daemon.ctl("graph", "-o", str(picture))
+    assert done.returncode == 0, done.stderr
+    titles = {each.text for each in ElementTree.parse(picture).iter() if each.tag.endswith("title")}
+    assert {f"/arm{i // 40}/m{i}" for i in range(_MANY)} <= titles
+
+
+@pytest.mark.parametrize(
+    ("file", "code", "said"),
+    [
+        ("x.gif", 2, "a picture is .svg, .png, .dot"),
+        ("no/x.dot", 1, "No such file or directory"),
+    ],
+)
+def test_refused_in_a_line(daemon: Daemon, tmp_path: Path, file: str, code: int, said: str) -> None:
+    done = daemon.ctl("graph", "-o", str(tmp_path / file))
+    assert done.returncode == code
+    assert said in done.stderr.splitlines()[-1]
+
+
+def test_without_graphviz_it_is_said_how_to_get_it(loaded: Daemon, tmp_path: Path) -> None:
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    (programs / "python3").symlink_to("/usr/bin/python3")
+    ctl = loaded.environment()["PATH"].split(":")[0] + "/rtcfctl"
+    done = loaded.run("env", f"PATH={programs}", "/usr/bin/python3", ctl, "graph", "-o",
+                      str(tmp_path / "x.svg"))  # fmt: skip
+    assert done.returncode == 1
+    assert done.stderr == (
+        "rtcfctl: no Graphviz to draw it: sudo apt install graphviz, or write a .dot file\n"
+    )
+    assert not (tmp_path / "x.svg").exists()
