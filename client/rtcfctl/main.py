@@ -143,9 +143,10 @@ def parser(verb: str = "") -> argparse.ArgumentParser:
     verbs = result.add_subparsers(metavar="COMMAND", required=True)
     # Global options may also stand behind the verb; there they have no default,
     # which would hide one that was given before it.
-    common = argparse.ArgumentParser(add_help=False)
-    _global_options(common, defaults=False)
     for module in [_MODULES[verb]] if verb else dict.fromkeys(_MODULES.values()):
+        # Of its own: a verb for which -o is a file takes that word away from it.
+        common = argparse.ArgumentParser(add_help=False)
+        _global_options(common, defaults=False)
         importlib.import_module(f"rtcfctl.{module}").register(verbs, common)
     return result
 
