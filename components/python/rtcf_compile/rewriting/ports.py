@@ -1,0 +1,152 @@
+"""Members of `self` as fields of the component's record: ports, their messages, queues.
+
+`self.u.value` becomes the field `self.u`, `self.twist.value.linear.x` one of its own,
+`self.goals.pop()` a step in a ring.
+"""
+
+import ast
+
+from rtcf.component.declaration import PORTS, Description, Input, Member, Output
+from rtcf.component.message_type import MessageType
+from rtcf.component.value_type import ValueType
+
+from rtcf_compile.rewriting.products import Products, call_of, like, loaded
+from rtcf_compile.source.modules import Source
+
+_INPUT_FIELDS = {"value": "", "new": "__new", "valid": "__valid", "age": "__age"}
+_INPUT_FIELDS["connected"] = "__connected"
+_QUEUE_FIELDS = {"size": "__count", "dropped": "__dropped", "connected": "__connected"}
+
+
+class Ports(Products):
+    """Puts fields of the record in the place of ports."""
+
+    def __init__(self, source: Source, description: Description) -> None:
+        """Rewrite a method of a class that has these members."""
+        super().__init__(source)
+        self._description = description
+        self._self = source.tree.args.args[0].arg if source.tree.args.args else ""
+        self.used: set[str] = set()
+        self.touched: dict[str, ast.AST] = {}
+
+    def _port(self, node: ast.Attribute, port: Member) -> ast.AST:
+        fields = _INPUT_FIELDS if port.kind is Input else {"value": ""}
+        if node.attr not in fields:
+            has = ", ".join(f".{each}" for each in fields)
+            has += ", .write(…)" if port.kind is Output else ""
+            raise self.mistake(node, f"{a_kind(port)} has no {node.attr}", f"it has {has}")
+        if isinstance(node.ctx, ast.Store):
+            raise self.mistake(node, "a port's value is not set", f"self.{port.name}.write(…)")
+        if port.message and node.attr == "value":
+            raise self._no_number(node, port.message, ())
+        return like(node, self._field(port.name + fields[node.attr], node.ctx))
+
+    def _message(self, node: ast.AST) -> tuple[Member | None, tuple[str, ...]]:
+        """Return the port and the path of `self.port.value.path`, if it carries a message."""
+        names: list[str] = []
+        while isinstance(node, ast.Attribute):
+            port = self._member(node)
+            if port is not None and port.message and len(names) > 1 and names[-1] == "value":
+                return port, tuple(reversed(names[:-1]))
+            names.append(node.attr)
+            node = node.value
+        return None, ()
+
+    def _part(self, node: ast.Attribute, port: Member, path: tuple[str, ...]) -> ast.AST:
+        assert port.message is not None
+        leaf = port.message.leaf(path)
+        if leaf is None:
+            # An attribute of an array, as .shape, belongs to what is before it.
+            if port.message.leaf(path[:-1]) is not None:
+                return super().visit_Attribute(node)
+            raise self._no_number(node, port.message, path)
+        field = self._field(port.name + leaf.field, ast.Load() if leaf.is_variable else node.ctx)
+        if not leaf.is_variable or port.kind is Output:
+            return like(node, field)
+        count = self._field(port.name + leaf.count, ast.Load())
+        return like(node, ast.Subscript(field, ast.Slice(None, count), ast.Load()))
+
+    def _settable_part(self, target: ast.expr) -> tuple[str, ValueType] | None:
+        """Return the field and the type of a part of a message that is set."""
+        port, path = self._message(target)
+        if port is None or port.message is None:
+            return None
+        if port.kind is Input:
+            raise self.mistake(target, "is of an Input", "it is only read")
+        leaf = port.message.leaf(path)
+        if leaf is None:
+            raise self._no_number(target, port.message, path)
+        return port.name + leaf.field, leaf.type
+
+    def _no_number(self, node: ast.AST, message: MessageType, path: tuple[str, ...]) -> Exception:
+        name = ".".join((message.name, *path))
+        if path in message.texts:
+            return self.mistake(
+                node, f"{name} is text", 'declare it: Output(texts={"header.frame_id": "base"})'
+            )
+        if path in message.others:
+            return self.mistake(node, f"{name} is a list of messages", "read it in C++")
+        if below := message.below(path):
+            return self.mistake(node, f"{name} is no number", f"it has .{', .'.join(below)}")
+        has = ", .".join(message.below(path[:-1]))
+        return self.mistake(node, f"{name} is not there", f"there is .{has}")
+
+    def _queue(self, node: ast.Attribute, port: Member) -> ast.AST:
+        """`self.goals.front`, `.size`, `.age`, `.dropped`, `.connected`."""
+        name = port.name
+        if isinstance(node.ctx, ast.Store):
+            raise self.mistake(node, "a queue is only read", f"self.{name}.pop() removes one")
+        ring = [
+            self._field(f"{name}{each}", ast.Load())
+            for each in ("__times" if node.attr == "age" else "", "__oldest", "__count")
+        ]
+        if node.attr == "front":
+            return like(node, call_of("rtcf_front", *ring))
+        if node.attr == "age":
+            self.used.add("_time")
+            return like(node, call_of("rtcf_age", self._field("_time", ast.Load()), *ring))
+        if node.attr in _QUEUE_FIELDS:
+            return like(node, self._field(name + _QUEUE_FIELDS[node.attr], node.ctx))
+        raise self.mistake(
+            node,
+            f"{a_kind(port)} has no {node.attr}",
+            "it has .size, .front, .pop(), .age, .dropped, .connected",
+        )
+
+    def _pop(self, node: ast.Expr, port: Member) -> ast.stmt:
+        call = call_of("rtcf_after", self._field(f"{port.name}__oldest"), ast.Constant(port.size))
+        count = self._field(f"{port.name}__count", ast.Load())
+        steps: list[ast.stmt] = [
+            ast.Assign([self._field(f"{port.name}__oldest")], call),
+            ast.Assign(
+                [self._field(f"{port.name}__count")],
+                ast.BinOp(loaded(count), ast.Sub(), ast.Constant(1)),
+            ),
+        ]
+        some = ast.Compare(count, [ast.Gt()], [ast.Constant(0)])
+        return like(node, ast.If(some, steps, []))
+
+    def _touch(self, node: ast.AST, name: str) -> None:
+        """Note what prepare cannot know: all but parameters, what derives from them, constants."""
+        self.touched.setdefault(name, node)
+
+    def _field(self, name: str, context: ast.expr_context | None = None) -> ast.Attribute:
+        self.used.add(name)
+        return ast.Attribute(ast.Name(self._self, ast.Load()), name, context or ast.Store())
+
+    def _member(self, node: ast.AST) -> Member | None:
+        if isinstance(node, ast.Attribute) and self._is_self(node.value):
+            member = self._description.members.get(node.attr)
+            if member is not None and member.kind in PORTS:
+                self._touch(node, node.attr)
+            return member
+        return None
+
+    def _is_self(self, node: ast.AST) -> bool:
+        return isinstance(node, ast.Name) and node.id == self._self
+
+
+def a_kind(member: Member) -> str:
+    """Return a member's kind with its article."""
+    kind = member.kind.__name__
+    return f"{'an' if kind[0] in 'IO' else 'a'} {kind}"
