@@ -47,7 +47,7 @@ void PortStreams::begin(const Id& id, std::uint64_t watch, const PortSelection& 
                                   "end another",
                                   kMost));
     }
-    streams_.insert({id, {id, watch, selection, every == 0 ? 1 : every, min_max}});
+    streams_.try_emplace(id, id, watch, selection, every == 0 ? 1 : every, min_max);
 }
 
 std::uint64_t PortStreams::end(const Id& id) {

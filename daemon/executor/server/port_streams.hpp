@@ -46,20 +46,22 @@ class PortStreams {
 
    private:
     struct Stream {
+        Stream(const Id& of, std::uint64_t number, PortSelection chosen, std::uint32_t step,
+               bool extremes)
+            : id(of), watch(number), selection(std::move(chosen)), every(step), min_max(extremes) {}
+
         Id id;
         std::uint64_t watch;
         PortSelection selection;
         std::uint32_t every;
         bool min_max;
-        // NOLINTBEGIN(readability-redundant-member-init): gcc's
-        std::deque<Table> tables = {};            // the first one is being read
-        std::vector<std::size_t> columns = {};    // of it
-        std::optional<PortWindows> windows = {};  // of minima and maxima
-        // NOLINTEND(readability-redundant-member-init)
-        bool begun = false;      // the first one has come
-        bool told = false;       // its schema
-        std::uint64_t next = 0;  // frame of it
-        std::uint64_t lost = 0;  // cycles, since the last batch
+        std::deque<Table> tables;            // the first one is being read
+        std::vector<std::size_t> columns;    // of it
+        std::optional<PortWindows> windows;  // of minima and maxima
+        bool begun = false;                  // the first one has come
+        bool told = false;                   // its schema
+        std::uint64_t next = 0;              // frame of it
+        std::uint64_t lost = 0;              // cycles, since the last batch
 
         // Of so many cycles one is told, or would be: lost ones are counted like this.
         std::uint32_t step() const noexcept { return min_max ? 1 : every; }
