@@ -1,7 +1,5 @@
 """`python3 -m rtcfd`."""
 
-import sys
+from rtcfd.main import end, main
 
-from rtcfd.main import main
-
-sys.exit(main())
+end(main())

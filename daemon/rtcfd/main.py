@@ -7,8 +7,10 @@ import os
 import signal
 import socket
 import sys
+import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NoReturn
 
 import grpc
 from rtcf.v1 import control_pb2, control_pb2_grpc, errors_pb2
@@ -319,6 +321,19 @@ def _check(arguments: Sequence[str] | None, build_tree: Path | None) -> int:
     return REFUSED if problems else 0
 
 
+def end(status: int) -> NoReturn:
+    """End the process, once main() has returned.
+
+    Not by way of the interpreter's end: a gRPC server that was made and never served waits there
+    for its thread, which runs no more by then, for ever.
+    """
+    logging.shutdown()
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(status)
+
+
 def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None) -> int:
     """Run rtcfd; return its exit status: 0 after an orderly end, 1 if it cannot start."""
     try:
@@ -333,5 +348,8 @@ def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None)
         asyncio.run(_run(given, lambda: options.parse(arguments, build_tree)))
     except Refusal as refusal:
         print(f"rtcfd: {refusal}", file=sys.stderr)
+        return REFUSED
+    except Exception:
+        traceback.print_exc()  # and to the end by end(), as ever
         return REFUSED
     return 0
