@@ -54,8 +54,9 @@ class Runners:
                 await self._bring_up_known(runner)
             except Silent as refusal:
                 runner.log.error("%s", refusal)
-                runner.operations.in_background(
-                    "the search for its executor", self._look_again(runner)
+                # Not an operation of the runner: its end waits for those, and may come of this.
+                self.operations.in_background(
+                    f"the search for the executor of {runner.name}", self._look_again(runner)
                 )
             except Refusal as refusal:
                 runner.log.error("%s", refusal)

@@ -1,0 +1,40 @@
+"""Executors that do not answer a rtcfd that begins, and are looked for again and again."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from rtcf.v1 import errors_pb2, runner_pb2
+from rtcfd.common.refusals import Silent
+from rtcfd.executor.executor import Executor
+from rtcfd.runners import runners
+from rtcfd.state.desired import Desired, HoldTerms
+from rtcfd_in_process import Rtcfd, until
+
+
+def test_the_runner_of_a_launch_goes_when_its_silent_executor_dies(
+    rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks: list[str] = []
+
+    async def adopt(runner: str, *_: Any) -> None:
+        looks.append(runner)
+        if len(looks) < 3:
+            raise Silent("it does not answer", errors_pb2.REASON_EXECUTOR_SILENT)
+
+    monkeypatch.setattr(Executor, "adopt", adopt)
+    monkeypatch.setattr(runners, "_LOOK_AGAIN_S", 0.01)
+
+    async def play() -> None:
+        daemon = rtcfd()
+        desired = Desired("arm")
+        desired.hold = HoldTerms("token", "a launch", runner_pb2.RunnerSettings(), added=True)
+        daemon.runners.adopt([desired])
+        await daemon.runners.bring_up()
+        assert [runner.name for runner in daemon.runners.all()] == ["arm"]
+        await until(lambda: not daemon.runners.all(), "its removal")
+        assert looks == ["arm"] * 3
+        await daemon.runners.close(in_order=True)
+
+    asyncio.run(play())
