@@ -82,11 +82,12 @@ std::chrono::steady_clock::time_point soon() { return std::chrono::steady_clock:
 
 void ParameterMirror::noteWritten(const std::string& key) {
     const std::lock_guard lock(pending_->mutex);
-    // It is the component's own, with a slash at its end, or one below it.
-    for (std::size_t end = key.find('/', 1); end != std::string::npos;
-         end = key.find('/', end + 1)) {
-        const std::string component = key.substr(0, end);
-        if (pending_->followed.count(component) != 0) pending_->written.insert(component);
+    // It is the component's own, with a slash at its end, or one below it. Anybody may say it, and
+    // as long as a message may be: what it costs does not grow with its slashes.
+    for (const std::string& component : pending_->followed) {
+        if (key.size() > component.size() && key[component.size()] == '/' &&
+            key.compare(0, component.size(), component) == 0)
+            pending_->written.insert(component);
     }
 }
 

@@ -86,6 +86,29 @@ TEST_F(ParameterMirrorTest, WritesNoOldValueOverOneThatTheLoopHasJustTaken) {
     EXPECT_EQ(static_cast<double>(answers[0].value), 5.0);
 }
 
+// Anybody may tell of a key, which is as long as a call may be: each of its slashes must not cost
+// as much as all of it.
+TEST_F(ParameterMirrorTest, TakesAKeyOfSlashesAsAnyOther) {
+    int asked = 0;
+    ParameterMirror mirror;
+    mirror.serve([&](const std::string&, const rtcf::executor::ParameterBatch&,
+                     const std::function<void(const std::string&)>& done) {
+        ++asked;
+        done({});
+    });
+    mirror.reconcile(calls(), caller_, {component(2.0)});
+    XmlRpc::XmlRpcValue arguments = texts({"/test", "/C/kp"});
+    arguments[2] = 5.0;
+    ASSERT_TRUE(ask("setParam", arguments)[0]);
+    constexpr std::size_t kLong = 4 * 1024 * 1024;
+    mirror.noteWritten("/D" + std::string(kLong, '/'));
+    mirror.reconcile(calls(), caller_, {component(2.0)});
+    EXPECT_EQ(asked, 0);
+    mirror.noteWritten("/C" + std::string(kLong, '/'));
+    mirror.reconcile(calls(), caller_, {component(2.0)});
+    EXPECT_EQ(asked, 1);
+}
+
 // NaN is a value that a default may have; that it does not equal itself is no change.
 TEST_F(ParameterMirrorTest, AsksForNoNaNThatIsThere) {
     constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
