@@ -151,6 +151,10 @@ std::uint32_t RoscppNode::port() const { return ros::XMLRPCManager::instance()->
 // answer: whoever is connected stays, until it says otherwise.
 void RoscppNode::connect(const std::string& topic, const XmlRpc::XmlRpcValue& publishers) const {
     if (publishers.size() == 0) return;
+    for (int i = 0; i < publishers.size(); ++i) {
+        // What a master answers must never end the executor.
+        if (publishers[i].getType() != XmlRpc::XmlRpcValue::TypeString) return;
+    }
     constexpr auto kTimeout = std::chrono::milliseconds(1000);
     const std::atomic<bool> never{false};
     const MasterAddress here{"127.0.0.1", port()};
