@@ -46,6 +46,8 @@ class Incidents:
         self._folder = folder
         self._limits = limits
         self._threads = ThreadPoolExecutor(1, "rtcfd-incidents")
+        # Of its own: frames are written anew while they wait for the file of another incident.
+        self._copier = ThreadPoolExecutor(1, "rtcfd-frames")
         self._kept: dict[str, float] = {}  # when, by runner
         self._writing = asyncio.Lock()
 
@@ -63,7 +65,7 @@ class Incidents:
         """Write a file of frames, whose descriptor is closed, and of what is known besides."""
         try:
             folder = self._place()
-            frozen = await self._aside(_copied, descriptor)
+            frozen = await self._aside(_copied, descriptor, threads=self._copier)
         finally:
             os.close(descriptor)
         try:
@@ -117,9 +119,12 @@ class Incidents:
             )
         return self._folder
 
-    async def _aside(self, work: Callable[..., Any], *arguments: Any) -> Any:
+    async def _aside(
+        self, work: Callable[..., Any], *arguments: Any, threads: ThreadPoolExecutor | None = None
+    ) -> Any:
+        loop = asyncio.get_running_loop()
         try:
-            return await asyncio.get_running_loop().run_in_executor(self._threads, work, *arguments)
+            return await loop.run_in_executor(threads or self._threads, work, *arguments)
         except OSError as error:
             raise Unavailable(
                 f"incidents in {self._folder}: {error.strerror or error}",

@@ -45,7 +45,11 @@ async def take(runner: RunnerCore, reason: str) -> incidents_pb2.Incident:
     acting = caller.current()
     reason = reason or f"taken by {acting.peer.user if acting else 'rtcfd'}"
     facts = _facts(runner, executor, reason, "", 0)
-    return await _keep(runner, os.dup(executor.frames), facts)
+    descriptor = os.dup(executor.frames)
+    # To its end, also if the caller leaves: threads have what is open then.
+    return await runner.operations.begin(
+        "keeping an incident", lambda: _keep(runner, descriptor, facts)
+    )
 
 
 async def _keep(
