@@ -115,6 +115,7 @@ class Executor:
             process.signal(signal.SIGKILL)
             await process.wait()
             executor._remove_sockets()
+            executor._close_memory()
             raise
         executor._begin_to_watch()
         return executor
@@ -151,6 +152,7 @@ class Executor:
         except BaseException as problem:
             await link.close()
             process.release()
+            executor._close_memory()
             if isinstance(problem, Unavailable):
                 raise Silent(
                     f"{problem}; its loop may be running: it is asked again and again, "
@@ -250,11 +252,11 @@ class Executor:
             try:
                 link = await Link.connect(self._peer, self._socket, self._on_unasked)
                 break
-            except (FileNotFoundError, ConnectionRefusedError):
+            except OSError as error:  # out of descriptors, too: its loop runs meanwhile
                 if loop.time() > deadline:
                     raise Unavailable(
                         f"{self._peer} does not serve {self._socket} "
-                        f"{CONNECT_TIMEOUT_S:g} s after its start",
+                        f"{CONNECT_TIMEOUT_S:g} s after its start ({error.strerror or error})",
                         errors_pb2.REASON_EXECUTOR_SILENT,
                     ) from None
                 await asyncio.sleep(_RETRY_S)
