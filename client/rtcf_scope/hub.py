@@ -68,6 +68,8 @@ class _Reader:
     def _read(self) -> None:
         with self._hub.client.watch_ports(sorted(self.columns), self._hub.runner) as stream:
             self._stream = stream
+            if self._ended.is_set():  # before close() could see it
+                return
             self._call(self._hub.trouble, self, "")
             for batch in stream:
                 self._room.acquire()
