@@ -128,10 +128,17 @@ class Tab:
             self.tell({"kind": "trigger", "state": "done"})
 
     def _queue(self, data: bytes | str, cycles: int) -> None:
+        if _is_shot(data, cycles):
+            # One waits, however large: who asked for it is to see it.
+            self._waiting = deque(each for each in self._waiting if not _is_shot(*each))
+        else:
+            self._bytes += len(data)
         self._waiting.append((data, cycles))
-        self._bytes += len(data)
         while self._bytes > _MOST_WAITING:
-            oldest = next((i for i, each in enumerate(self._waiting) if each[1]), 0)
+            oldest = next(
+                (i for i, each in enumerate(self._waiting) if each[1]),
+                next(i for i, each in enumerate(self._waiting) if not _is_shot(*each)),
+            )
             gone, lost = self._waiting[oldest]
             del self._waiting[oldest]
             self._bytes -= len(gone)
@@ -143,12 +150,17 @@ class Tab:
             await self._news.wait()
             self._news.clear()
             while self._waiting:
-                data, _ = self._waiting.popleft()
-                self._bytes -= len(data)
+                data, cycles = self._waiting.popleft()
+                if not _is_shot(data, cycles):
+                    self._bytes -= len(data)
                 if isinstance(data, str):
                     await socket.send_str(data)
                 else:
                     await socket.send_bytes(data)
+
+
+def _is_shot(data: bytes | str, cycles: int) -> bool:
+    return isinstance(data, bytes) and not cycles
 
 
 class _Armed:

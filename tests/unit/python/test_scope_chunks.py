@@ -100,6 +100,30 @@ def test_a_slow_tab_loses_the_oldest_cycles_and_is_told_how_many() -> None:
     asyncio.run(slow())
 
 
+def test_a_shot_waits_for_a_slow_tab_however_large_it_is() -> None:
+    async def slow() -> None:
+        tab = Tab(_hub(_Ear()))
+        tab._names = ["/a.b"]
+        tab.tell({"kind": "first"})
+        shots = [bytes([number]) * 9_000_000 for number in (1, 2)]
+        for shot in shots:
+            tab._queue(shot, 0)
+            tab.tell({"kind": "done"})
+            for number in range(400):
+                tab.take(Chunk(_batch(number * 1000, 1000), number * 1000, 0))
+        waiting: Any = tab._waiting
+        assert [data for data, cycles in waiting if isinstance(data, bytes) and not cycles] == [
+            shots[1]  # of several the newest
+        ]
+        words = [data for data, _ in waiting if isinstance(data, str)]
+        assert words[0] == '{"kind": "first"}'
+        assert words.count('{"kind": "done"}') == 2
+        cycles = [data for data, cycles in waiting if cycles]
+        assert 0 < sum(map(len, cycles)) <= 8 * 1024 * 1024
+
+    asyncio.run(slow())
+
+
 def test_the_memory_is_bounded_and_finds_what_it_has() -> None:
     memory = Memory(200_000)
     for number in range(100):
