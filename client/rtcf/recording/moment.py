@@ -1,6 +1,7 @@
 """The cycles around one in which something is so: what came before is kept until then."""
 
 from collections import deque
+from itertools import islice
 
 from rtcf.streams.condition import Condition
 from rtcf.streams.ports import PortBatch
@@ -54,15 +55,16 @@ class Moment:
         # One more than is needed: of the first one a part may be.
         newest_ns = batch.message.stamps_ns[-1] if len(batch) else 0
         while len(self._before) > 1 and (
-            self._bytes > self._most or self._is_before(self._before[1], newest_ns - self._pre_ns)
+            self._bytes > self._most or self._second_begins_before(newest_ns - self._pre_ns)
         ):
             self.cut |= self._bytes > self._most
             self._bytes -= _size(self._before.popleft())
 
-    @staticmethod
-    def _is_before(batch: PortBatch, stamp_ns: int) -> bool:
-        """Tell whether a batch begins before a time, so that the one ahead of it is not needed."""
-        return bool(len(batch) and batch.message.stamps_ns[0] < stamp_ns)
+    def _second_begins_before(self, stamp_ns: int) -> bool:
+        """Tell whether the first batch is not needed for what is from a time on.  Some have no
+        cycles: they tell of lost ones."""
+        second = next((each for each in islice(self._before, 1, None) if len(each)), None)
+        return second is not None and second.message.stamps_ns[0] < stamp_ns
 
     def _end(self, batch: PortBatch) -> PortBatch:
         if not len(batch):

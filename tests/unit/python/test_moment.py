@@ -1,0 +1,40 @@
+"""What is kept of a stream until the moment that is waited for."""
+
+import numpy as np
+from numpy.typing import NDArray
+from rtcf.recording.moment import Moment
+from rtcf.streams.ports import PortBatch, PortSchema
+from rtcf.v1 import ports_pb2
+
+
+class _At:
+    """A condition that is true in one cycle."""
+
+    def __init__(self, cycle: int) -> None:
+        self._cycle = cycle
+
+    def where(self, batch: PortBatch) -> NDArray[np.bool_]:
+        found: NDArray[np.bool_] = batch.cycles == self._cycle
+        return found
+
+
+def _batch(first: int, count: int, lost: int = 0) -> PortBatch:
+    """Return cycles of 1 ms."""
+    message = ports_pb2.PortBatch(
+        first_cycle=first,
+        stamps_ns=[1_000_000 * (first + i) for i in range(count)],
+        latencies_ns=[0] * count,
+        durations_ns=[0] * count,
+    )
+    return PortBatch(PortSchema(), 1, first, lost, False, message)
+
+
+def test_no_more_is_kept_than_is_asked_for_also_where_cycles_were_lost() -> None:
+    moment = Moment(_At(9_005), pre_s=0.1, post_s=0.01)  # type: ignore[arg-type]
+    kept: list[PortBatch] = []
+    for first in range(0, 10_000, 10):
+        if first == 500:
+            assert not moment.take(_batch(first, 0, lost=7))
+        kept += moment.take(_batch(first, 10))
+    cycles = [int(cycle) for batch in kept for cycle in batch.cycles]
+    assert cycles == list(range(8_905, 9_016))
