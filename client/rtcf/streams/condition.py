@@ -7,6 +7,7 @@ divides.
 """
 
 import ast
+import math
 import re
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
@@ -224,4 +225,7 @@ def _find(schema: "PortSchema", name: str) -> tuple[str, int | None]:
 def _column(batch: "PortBatch", name: str) -> "NDArray[Any]":
     signal, place = _find(batch.schema, name)
     column: NDArray[Any] = batch[signal]
-    return column if place is None else column.reshape(len(batch), -1)[:, place]
+    if place is None:
+        return column
+    # Not -1 for how many there are: a batch may have no cycles, and only tell of lost ones.
+    return column.reshape(len(batch), math.prod(batch.schema.signals[signal].shape))[:, place]

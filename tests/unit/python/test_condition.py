@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rtcf.streams.condition import Condition, ConditionError
-from rtcf.streams.ports import PortSchema, Signal
+from rtcf.streams.ports import PortBatch, PortSchema, Signal
+from rtcf.v1 import ports_pb2
 
 
 def over(text: str, **columns: list[float]) -> list[bool]:
@@ -97,3 +98,11 @@ def test_signals_are_looked_for_in_the_stream() -> None:
         with pytest.raises(ConditionError) as refused:
             Condition(text).check(schema)
         assert said in str(refused.value)
+
+
+def test_a_batch_that_only_tells_of_lost_cycles_is_true_nowhere() -> None:
+    column = ports_pb2.PortColumn(component="/a", name="q", size=24)
+    schema = PortSchema((column,), (), {"/a.q": Signal("/a.q", "", 0, "<f8", (3,), 0)})
+    message = ports_pb2.PortBatch(first_cycle=7, lost=5, values=[b""])
+    batch = PortBatch(schema, 1, 7, 5, False, message)
+    assert not len(Condition("a.q[2] > 1 or isnan(a.q[0])").where(batch))
