@@ -1,5 +1,6 @@
 """Recordings that pages may open: those that were named at the start, and those of one folder."""
 
+import math
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -71,7 +72,7 @@ def _placed(recording: Recording, trace: str, stamps: Any) -> Any:
     if signal not in recording.signals:
         return values
     column = recording.read(signal)
-    each = column.values.reshape(len(column.values), -1)
+    each = column.values.reshape(len(column.values), math.prod(column.values.shape[1:]))
     if index < each.shape[1]:
         if len(each) == len(values):
             return each[:, index].astype("<f8")

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 import os
 import stat
 from collections.abc import Callable, Iterator
@@ -70,7 +71,8 @@ def _cells(column: RecordedColumn, cycles: RecordedColumn) -> list[list[Any]]:
     """Return the columns of a signal, in a line for each cycle."""
     import numpy as np
 
-    values = column.values.reshape(len(column.values), -1 if column.values.ndim > 1 else 1)
+    # Not -1 for how many there are: there may be none, of what came later.
+    values = column.values.reshape(len(column.values), math.prod(column.values.shape[1:]))
     shown = [_shown(values[:, index]) for index in range(values.shape[1])]
     if np.array_equal(column.cycles, cycles.values):
         return shown
