@@ -70,7 +70,7 @@ def _open(browser: Browser, scope: ScopeProcess, layout: str = "") -> Page:
 
 def _amplitude(client: rtcf.Client) -> float:
     parameters = client.get_component("w1").parameters
-    return next(each.value.double_value for each in parameters if each.name == "amplitude")
+    return float(next(p.value.double_value for p in parameters if p.name == "amplitude"))
 
 
 def _press(page: Page, element: str) -> None:

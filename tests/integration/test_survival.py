@@ -133,7 +133,7 @@ def test_a_loop_whose_socket_was_removed_is_adopted_and_gets_no_twin(
         assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
     assert left_over.runners(folders(daemon)[0]) == ["rt_runner"]
     wait_for(lambda: list(folders(daemon)[1].iterdir()), "the socket for stops")
-    assert [each.error for each in direct_stop.stop_all(daemon.socket)] == [None]
+    assert [each.error for each in direct_stop.stop_all(str(daemon.socket))] == [None]
     with rtcf.Client(daemon.socket) as client:
         assert state(client).pid == before.pid
         assert state(client).state == runner_pb2.RUNNER_STATE_STOPPED
