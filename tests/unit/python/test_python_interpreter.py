@@ -74,7 +74,8 @@ def test_what_is_not_declared_is_refused() -> None:
 
 
 def test_a_queue_keeps_messages_in_order_and_counts_those_it_has_no_room_for() -> None:
-    queue = FILTERS["Trajectory"]().waypoints
+    trajectory: Any = FILTERS["Trajectory"]()
+    queue = trajectory.waypoints
     assert (queue.size, queue.age, queue.connected) == (0, -1, False)
     with pytest.raises(IndexError, match="empty queue"):
         _ = queue.front
@@ -92,7 +93,7 @@ def test_a_queue_keeps_messages_in_order_and_counts_those_it_has_no_room_for() -
 
 
 def test_the_age_of_a_queue_is_that_of_its_oldest_message() -> None:
-    trajectory = FILTERS["Trajectory"]()
+    trajectory: Any = FILTERS["Trajectory"]()
     trajectory.hold.put(True)
     for number in range(3):
         trajectory.waypoints.put([float(number), 0.0, 1.0])
