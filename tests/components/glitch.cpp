@@ -21,7 +21,7 @@ class Glitch final : public rtcf::Component {
             random_ ^= random_ << 17;
         }
         const bool here = iteration() % 1000 == random_ % 1000;
-        const double slow = static_cast<double>(iteration() % 7);
+        const auto slow = static_cast<double>(iteration() % 7);
         out.write(here ? 1000.0 : slow);
         three.write(Eigen::Vector3d(slow, here ? -5.0 : 1.0, 2.0));
         state = here ? -7 : static_cast<std::int32_t>(iteration() % 3);

@@ -118,7 +118,7 @@ std::shared_ptr<FrameBlock> FrameMemory::block(std::size_t bytes) {
 void FrameMemory::announce(const std::shared_ptr<FrameBlock>& block, std::size_t frames,
                            std::size_t words_of_frame, const std::string& layout) {
     auto& entries = directory_->entries;
-    const auto unused = std::find_if(entries.begin(), entries.end(), [](const auto& entry) {
+    auto* const unused = std::find_if(entries.begin(), entries.end(), [](const auto& entry) {
         return entry.sequence.load(std::memory_order_relaxed) == 0;
     });
     const std::shared_ptr<FrameBlock> text =

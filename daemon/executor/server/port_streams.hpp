@@ -46,9 +46,12 @@ class PortStreams {
 
    private:
     struct Stream {
-        Stream(const Id& of, std::uint64_t number, PortSelection chosen, std::uint32_t step,
-               bool extremes)
-            : id(of), watch(number), selection(std::move(chosen)), every(step), min_max(extremes) {}
+        Stream(Id of, std::uint64_t number, PortSelection chosen, std::uint32_t step, bool extremes)
+            : id(std::move(of)),
+              watch(number),
+              selection(std::move(chosen)),
+              every(step),
+              min_max(extremes) {}
 
         Id id;
         std::uint64_t watch;

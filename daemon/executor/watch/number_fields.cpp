@@ -94,7 +94,8 @@ class Walk {
         if (found == types_.end()) return;  // std_msgs/Empty
         const std::string package = name.substr(0, name.find('/'));
         for (const Line& line : found->second) {
-            const std::size_t count = !line.array ? 1 : line.length ? *line.length : length();
+            std::size_t count = 1;
+            if (line.array) count = line.length ? *line.length : length();
             if (const auto number = kRosNumbers.find(line.type); number != kRosNumbers.end()) {
                 take(number->second, count);
             } else if (line.type == "time") {
@@ -116,7 +117,7 @@ class Walk {
         if (types_.count(package + "/" + type) != 0) return package + "/" + type;
         for (const auto& [name, lines] : types_) {
             const std::size_t slash = name.find('/');
-            if (slash != std::string::npos && name.compare(slash + 1, name.npos, type) == 0)
+            if (slash != std::string::npos && name.compare(slash + 1, std::string::npos, type) == 0)
                 return name;
         }
         return type;

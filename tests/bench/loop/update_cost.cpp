@@ -60,9 +60,8 @@ class Contender {
         for (int i = 0; i < kUpdates; ++i) {
             const std::size_t at = static_cast<std::size_t>(i) % kInputs;
             for (std::size_t input = 0; input < slots_.size(); ++input) {
-                std::memcpy(places_[input],
-                            values_[input].data() + at * sizes_[input] / sizeof(double),
-                            sizes_[input]);
+                const std::size_t doubles = sizes_[input] / sizeof(double);
+                std::memcpy(places_[input], &values_[input][at * doubles], sizes_[input]);
                 ++slots_[input]->sequence;
             }
             component_->update();
