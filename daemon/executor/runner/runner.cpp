@@ -173,6 +173,7 @@ std::vector<std::string> Runner::states(const std::string& name) {
 }
 
 std::shared_ptr<const BridgeTable> Runner::bridgeTable() const {
+    if (!bridge_served_) return std::make_shared<BridgeTable>();
     auto table = std::make_shared<BridgeTable>(plan_->bridgeTable());
     for (const auto& component : snapshot_->components) {
         if (!component->parameters.empty()) table->parameters.push_back(component);

@@ -244,6 +244,7 @@ class Runner final : private RunnerView {
     void changeByBridge(const std::string& component, const ParameterBatch& batch,
                         const std::function<void(const std::string&)>& done);
     std::shared_ptr<const BridgeTable> bridgeTable() const;
+    void serveBridge(bool served);
     void tuneSpin();
     const GraphNode* nodeOf(const Component* component) const noexcept;
     void beginStepping(std::int64_t stamp_ns = 0);
@@ -314,6 +315,7 @@ class Runner final : private RunnerView {
     std::uint64_t told_faults_ = 0;    // LoopFigures::faults at the last look
     std::int64_t tuned_spin_ns_ = -1;  // by tuneSpin(); -1 = not yet
     std::unique_ptr<Replay> replay_;   // while one is under way
+    bool bridge_served_ = true;        // not while a replay has the ports to itself
     std::shared_ptr<SimulatedClock> clock_ = std::make_shared<SimulatedClock>();
     bool simulated_ = false;        // the loop follows clock_
     HistogramSnapshot tuned_from_;  // wake-up latency at the last tuneSpin()

@@ -84,13 +84,14 @@ ReplayOutcome Runner::beginReplay(const ReplayChunk& chunk, const Progress& prog
     requireNoLoop();
     if (state_ == RunnerState::Stepping) endStepping();
     Replay::check(plan_->bridgeTable(), chunk.topics);
-    renewComponents(progress);
-    if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>());
+    // Before the components are made anew: ROS never holds an end of what the replay will use.
+    serveBridge(false);
     try {
+        renewComponents(progress);
         startAll(progress);
         beginStepping(chunk.start_ns);
     } catch (...) {
-        if (bridge_) bridge_->setTable(bridgeTable());
+        serveBridge(true);
         throw;
     }
     setState(RunnerState::Stepping);
@@ -100,6 +101,11 @@ ReplayOutcome Runner::beginReplay(const ReplayChunk& chunk, const Progress& prog
     ReplayOutcome outcome;
     replay_->describe(outcome);
     return outcome;
+}
+
+void Runner::serveBridge(bool served) {
+    bridge_served_ = served;
+    if (bridge_) bridge_->setTable(bridgeTable());
 }
 
 // The same components with the same parameters, but nothing that they or their inputs remember.
@@ -135,7 +141,7 @@ void Runner::endStepping() {
     if (replay_) {
         replay_->discardOutputs();  // ROS sees nothing of them
         replay_.reset();
-        if (bridge_) bridge_->setTable(bridgeTable());
+        serveBridge(true);
     }
     noteLoopFault();
     stopAll();

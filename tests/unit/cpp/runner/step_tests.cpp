@@ -1,6 +1,7 @@
 // Cycles on a simulated clock: the same graph gives the same values, every time.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 
@@ -175,6 +176,35 @@ TEST_F(Stepping, StopsInTheCycleThatFails) {
     EXPECT_EQ(iteration(), 4U);
     EXPECT_EQ(state(), RunnerState::Faulted);
     EXPECT_EQ(value("/T", "out"), 2.0) << "the cycle ended where it failed";
+}
+
+// What takes values out for ROS does so at its leisure: it must never have held a replay's taps.
+TEST_F(Stepping, ReplayHasThePortsToItself) {
+    loadFig1();
+    mapPapersTopics();
+    const std::size_t given = bridge().everGiven("/R3_G2H1");
+    ASSERT_GT(given, 0U);
+    const auto replay = [this](const executor::ReplayChunk& chunk) {
+        return onGraphThread([&] { return runner().replay(chunk, [](const std::string&) {}); });
+    };
+    executor::ReplayChunk chunk;
+    chunk.begin = true;
+    chunk.start_ns = 1'000'000'000;
+    replay(chunk);
+    EXPECT_EQ(bridge().tap("/R3_G2H1"), nullptr);
+    EXPECT_EQ(bridge().injector("/G2_R2"), nullptr);
+    chunk.begin = false;
+    chunk.until_ns = 1'100'000'000;
+    const auto outcome = replay(chunk);
+    EXPECT_GT(outcome.cycles, 1U);
+    EXPECT_EQ(bridge().everGiven("/R3_G2H1"), given);
+    EXPECT_EQ(std::count_if(outcome.outputs.begin(), outcome.outputs.end(),
+                            [](const auto& output) { return output.topic == "/R3_G2H1"; }),
+              static_cast<std::ptrdiff_t>(outcome.cycles));
+    chunk.end = true;
+    replay(chunk);
+    EXPECT_EQ(taken("/R3_G2H1"), std::vector<double>{}) << "ROS sees nothing of it";
+    EXPECT_NE(bridge().injector("/G2_R2"), nullptr);
 }
 
 }  // namespace

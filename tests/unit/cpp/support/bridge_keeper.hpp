@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 
 #include "bridge/bridge.hpp"
@@ -18,12 +19,15 @@ class BridgeRecord {
     std::shared_ptr<executor::Tap> tap(const std::string& topic) const;
     std::shared_ptr<executor::Injector> injector(const std::string& topic) const;
     void set(std::shared_ptr<const executor::BridgeTable> table);
+    /// Taps of that topic that the bridge was given, ever.
+    std::size_t everGiven(const std::string& topic) const;
     /// By which the test asks for a change of parameters, as ROS does.
     executor::ParameterRequest request;
 
    private:
     mutable std::mutex mutex_;
     std::shared_ptr<const executor::BridgeTable> table_ = std::make_shared<executor::BridgeTable>();
+    std::set<std::shared_ptr<executor::Tap>> taps_;
 };
 
 class BridgeKeeper final : public executor::Bridge {
