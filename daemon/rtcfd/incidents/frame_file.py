@@ -7,7 +7,6 @@ process of its own: rtcfd itself only holds the descriptor.
 
 import itertools
 import mmap
-import struct
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,12 +15,7 @@ from numpy.typing import NDArray
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import ports_pb2
 
-_MAGIC = 0x42435452
-_VERSION = 1
-_HEAD = struct.Struct("<II")
-_ENTRY = struct.Struct("<6Q")
-_ENTRIES = 8
-_HEAD_WORDS = 6  # mark, iteration, stamp, latency, duration, last of its loop
+from rtcfd.incidents import frame_layout
 
 
 @dataclass(frozen=True)
@@ -118,7 +112,7 @@ class Ring:
         )
 
     def _values(self, value: wire.FrameValue, part: slice) -> bytes:
-        rows = np.ascontiguousarray(self.words[part, _HEAD_WORDS:]).view("u1")
+        rows = np.ascontiguousarray(self.words[part, frame_layout.HEAD_WORDS :]).view("u1")
         raw = rows[:, value.offset : value.offset + value.size]
         if not value.output:
             return raw.tobytes()
@@ -139,10 +133,12 @@ class Ring:
 def read(descriptor: int) -> list[Ring]:
     """Return the rings, from the oldest on; raises OSError, and ValueError of what is no frames."""
     with mmap.mmap(descriptor, 0, prot=mmap.PROT_READ) as memory:
-        if _HEAD.unpack_from(memory) != (_MAGIC, _VERSION):
-            raise ValueError(f"these are no frames of version {_VERSION}")
-        at = _HEAD.size
-        entries = [_ENTRY.unpack_from(memory, at + i * _ENTRY.size) for i in range(_ENTRIES)]
+        if frame_layout.HEAD.unpack_from(memory) != (frame_layout.MAGIC, frame_layout.VERSION):
+            raise ValueError(f"these are no frames of version {frame_layout.VERSION}")
+        entries = [
+            frame_layout.ENTRY.unpack_from(memory, frame_layout.entry_at(index))
+            for index in range(frame_layout.ENTRIES)
+        ]
         return [_ring(memory, *entry[1:]) for entry in sorted(entries) if entry[0]]
 
 

@@ -23,7 +23,7 @@ from rtcf.v1 import errors_pb2, incidents_pb2
 import rtcfd
 from rtcfd.common.limits import Limits
 from rtcfd.common.refusals import FailedPrecondition, NotFound, Unavailable
-from rtcfd.incidents import head
+from rtcfd.incidents import copying, head
 
 log = logging.getLogger(__name__)
 
@@ -65,7 +65,7 @@ class Incidents:
         """Write a file of frames, whose descriptor is closed, and of what is known besides."""
         try:
             folder = self._place()
-            frozen = await self._aside(_copied, descriptor, threads=self._copier)
+            frozen = await self._aside(copying.copied, descriptor, threads=self._copier)
         finally:
             os.close(descriptor)
         try:
@@ -138,32 +138,6 @@ def _unknown(name: str, found: Sequence[incidents_pb2.Incident]) -> NotFound:
         f"there is no incident {name}; there is {there}" if name else "there are no incidents",
         errors_pb2.REASON_INCIDENT_NOT_FOUND,
     )
-
-
-def _copied(descriptor: int) -> int:
-    """Return the memory as it is now; its holes stay holes."""
-    size = os.fstat(descriptor).st_size
-    copy = os.memfd_create("rtcf-incident")
-    try:
-        os.ftruncate(copy, size)
-        # An offset of its own: the descriptor shares its with others.
-        own = os.open(f"/proc/self/fd/{descriptor}", os.O_RDONLY | os.O_CLOEXEC)
-        try:
-            at = 0
-            while at < size:
-                try:
-                    at = os.lseek(own, at, os.SEEK_DATA)
-                except OSError:
-                    break  # no more data
-                end = os.lseek(own, at, os.SEEK_HOLE)
-                while at < end:
-                    at += os.pwrite(copy, os.pread(own, min(end - at, _PIECE), at), at)
-        finally:
-            os.close(own)
-    except BaseException:
-        os.close(copy)
-        raise
-    return copy
 
 
 def _make(folder: Path) -> None:

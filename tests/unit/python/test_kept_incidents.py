@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import struct
 import threading
 import time
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any
 
 import pytest
 from rtcfd.common.limits import Limits
-from rtcfd.incidents import incidents
+from rtcfd.incidents import copying, frame_file, frame_layout, incidents
 from rtcfd.incidents.incidents import Incidents
 from rtcfd_in_process import until
 
@@ -45,14 +46,14 @@ def test_frames_are_copied_while_the_file_of_another_incident_is_written(
         try:
             await until(writing.is_set, "the first file")
             copies = threading.Event()
-            copied = incidents._copied
+            copied = copying.copied
 
             def copy(descriptor: int) -> int:
                 frozen = copied(descriptor)
                 copies.set()
                 return frozen
 
-            monkeypatch.setattr(incidents, "_copied", copy)
+            monkeypatch.setattr(copying, "copied", copy)
             second = asyncio.create_task(kept.keep(os.dup(frames), facts("two")))
             await until(copies.is_set, "the copy of the second one's frames")
             os.pwrite(frames, b"behind", 0)
@@ -63,3 +64,44 @@ def test_frames_are_copied_while_the_file_of_another_incident_is_written(
     asyncio.run(play())
     os.close(frames)
     assert written == [b"other", b"before"]
+
+
+def _memory(rings: int, frames: int) -> int:
+    """Return rings of frames without values, all whole."""
+    words = frame_layout.HEAD_WORDS
+    bytes_of_ring = frames * words * frame_layout.WORD.size
+    begin = frame_layout.entry_at(frame_layout.ENTRIES)
+    memory = bytearray(begin + rings * bytes_of_ring)
+    frame_layout.HEAD.pack_into(memory, 0, frame_layout.MAGIC, frame_layout.VERSION)
+    for ring in range(rings):
+        offset = begin + ring * bytes_of_ring
+        entry = (ring + 1, offset, frames, words, 0, 0)
+        frame_layout.ENTRY.pack_into(memory, frame_layout.entry_at(ring), *entry)
+        for number in range(frames):
+            at = offset + number * words * frame_layout.WORD.size
+            struct.pack_into("<6Q", memory, at, 2 * number + 2, number, 0, 0, 0, 0)
+    return _frames(bytes(memory))
+
+
+def test_what_is_written_anew_during_the_copy_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    live = _memory(rings=2, frames=8)
+    copy_all = copying._copy
+
+    def copy_and_write_on(own: int, copy: int, size: int) -> None:
+        copy_all(own, copy, size)
+        first, second = (
+            frame_layout.ENTRY.unpack(os.pread(live, 48, frame_layout.entry_at(i))) for i in (0, 1)
+        )
+        # The first ring makes room for another one; of the second, frame 0 has become frame 8,
+        # and frame 1 is just being written.
+        os.pwrite(live, struct.pack("<Q", 3), frame_layout.entry_at(0))
+        assert first[0] == 1
+        for place, mark in ((0, 2 * 8 + 2), (1, 2 * 9 + 1)):
+            os.pwrite(live, struct.pack("<Q", mark), second[1] + place * 48)
+
+    monkeypatch.setattr(copying, "_copy", copy_and_write_on)
+    copy = copying.copied(live)
+    (ring,) = frame_file.read(copy)
+    os.close(copy)
+    os.close(live)
+    assert ring.cycles.tolist() == [2, 3, 4, 5, 6, 7]
