@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from rtcf_shared.whole_file import whole_file
+
 from rtcf.client import Client
 from rtcf.recording import bags
 from rtcf.recording.reader import RecordingError
@@ -133,30 +135,20 @@ class _Writer:
             each.topic: bags.MessageType(each.type, each.md5, each.definition) for each in topics
         }
         self._bag: Any = None
-        self._part = Path()
+        self._open = contextlib.ExitStack()
 
     def __enter__(self) -> "_Writer":
         if self._path is not None:
-            # Half a bag would take the place of a whole one.
-            target = self._path.resolve()
-            special = target.exists() and not target.is_file()
-            self._part = target if special else target.with_name(f".{target.name}.part")
-            with self._said():
-                self._bag = bags.rosbag().Bag(str(self._part), "w")
+            with contextlib.ExitStack() as opening, self._said():
+                # Half a bag would take the place of a whole one.
+                part = opening.enter_context(whole_file(self._path, force=True))
+                self._bag = opening.enter_context(bags.rosbag().Bag(str(part), "w"))
+                self._open = opening.pop_all()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if self._bag is None or self._path is None:
-            return
-        target = self._path.resolve()
-        try:
-            with self._said():
-                self._bag.close()
-                if kind is None and self._part != target:
-                    self._part.replace(target)
-        finally:
-            if self._part != target:
-                self._part.unlink(missing_ok=True)
+    def __exit__(self, *why: Any) -> None:
+        with self._said():
+            self._open.__exit__(*why)
 
     def write(self, outputs: Any) -> None:
         """Append messages."""

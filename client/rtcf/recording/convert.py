@@ -3,12 +3,12 @@
 import csv
 import io
 import math
-import os
-import stat
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
+
+from rtcf_shared.whole_file import whole_file
 
 from rtcf.recording import bags
 from rtcf.recording.reader import RecordedColumn, RecordedTopic, Recording, RecordingError
@@ -139,17 +139,16 @@ _KINDS = {".csv": _write_csv, ".bag": _write_bag}
 @contextmanager
 def _new_file(path: Path, force: bool) -> Iterator[BinaryIO]:
     try:
-        file = path.open("w+b" if force else "x+b")
+        with ExitStack() as open_files:
+            try:
+                part = open_files.enter_context(whole_file(path, force=force))
+                file = open_files.enter_context(part.open("w+b"))
+            except FileExistsError:
+                raise
+            except OSError as error:
+                raise ValueError(f"{path}: {error.strerror}") from None
+            yield file
     except FileExistsError:
         raise ValueError(f"{path} is there already: --force writes over it") from None
     except OSError as error:
-        raise ValueError(f"{path}: {error.strerror}") from None
-    try:
-        with file:
-            yield file
-    except BaseException as error:
-        if stat.S_ISREG(os.lstat(path).st_mode):
-            path.unlink()
-        if isinstance(error, OSError):
-            raise RecordingError(f"{path}: {error.strerror or error}") from None
-        raise
+        raise RecordingError(f"{path}: {error.strerror or error}") from None

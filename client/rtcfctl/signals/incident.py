@@ -2,14 +2,16 @@
 
 import argparse
 import json
+import shutil
 import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import rtcf
 from rtcf.v1 import incidents_pb2
+from rtcf_shared.whole_file import whole_file
 
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import counted, date, microseconds
@@ -88,11 +90,17 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 def export(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Copy the file."""
-    with tempfile.TemporaryFile() as whole:
-        incident = client.get_incident(whole, args.name)
-        whole.seek(0)
+    with tempfile.TemporaryFile() as received:
+        incident = client.get_incident(received, args.name)
+        received.seek(0)
         to = args.to or Path(f"{incident.name}.mcap")
-        _copy(whole, to)
+        try:
+            with whole_file(to) as part, part.open("wb") as file:
+                shutil.copyfileobj(received, file)
+        except FileExistsError:
+            raise ValueError(f"{to} is there already: name another file with --to") from None
+        except OSError as error:
+            raise ValueError(f"{to}: {error.strerror or error}") from None
     if output.for_people:
         output.line(f"{incident.name} in {to}")
     else:
@@ -106,17 +114,6 @@ def remove(client: rtcf.Client, args: argparse.Namespace, output: Output) -> Non
         output.line(f"{counted(len(gone), 'incident')} removed")
     else:
         output.data(gone)
-
-
-def _copy(whole: IO[bytes], to: Path) -> None:
-    try:
-        with to.open("xb") as copy:
-            while piece := whole.read(1024 * 1024):
-                copy.write(piece)
-    except FileExistsError:
-        raise ValueError(f"{to} is there already: name another file with --to") from None
-    except OSError as error:
-        raise ValueError(f"{to}: {error.strerror}") from None
 
 
 def _told(incident: incidents_pb2.Incident, recording: "rtcf.Recording") -> dict[str, Any]:
