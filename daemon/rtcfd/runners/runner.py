@@ -103,7 +103,7 @@ class Runner(RunnerCore):
         async def work() -> None:
             # Not in a turn: a change that hangs ends with the executor it hangs in.
             await self.end_executor("its executor is being restarted")
-            self.loop.held = ""
+            self.loop.held = self.loop.fault = ""
             await self.change("the restart of its executor", fresh)
             self.log.info("executor restarted")
 
