@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import logging
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 
 from rtcf.v1 import control_pb2, errors_pb2, runner_pb2
 from rtcf_shared.naming import closest, listing, suggestion
@@ -21,6 +21,8 @@ from rtcfd.runners.runner import LEAVE_TIMEOUT_S, Runner
 from rtcfd.state.desired import Desired
 
 log = logging.getLogger(__name__)
+
+_Take = Callable[[Runner], Awaitable[None]]
 
 _LOOK_AGAIN_S = 2.0  # for an executor that did not answer
 
@@ -53,11 +55,7 @@ class Runners:
             try:
                 await self._bring_up_known(runner)
             except Silent as refusal:
-                runner.log.error("%s", refusal)
-                # Not an operation of the runner: its end waits for those, and may come of this.
-                self.operations.in_background(
-                    f"the search for the executor of {runner.name}", self._look_again(runner)
-                )
+                self._keep_looking(runner, refusal, self._bring_up_known)
             except Refusal as refusal:
                 runner.log.error("%s", refusal)
             except Exception:  # the others are not to suffer for it
@@ -75,7 +73,14 @@ class Runners:
         else:
             await runner.bring_up(boot=True)
 
-    async def _look_again(self, runner: Runner) -> None:
+    def _keep_looking(self, runner: Runner, refusal: Silent, take: _Take) -> None:
+        runner.log.error("%s", refusal)
+        # Not an operation of the runner: its end waits for those, and may come of this.
+        self.operations.in_background(
+            f"the search for the executor of {runner.name}", self._look_again(runner, take)
+        )
+
+    async def _look_again(self, runner: Runner, take: _Take) -> None:
         """Take over an executor that was held up, as by a machine that was suspended: without
         rtcfd its loop would end."""
         while True:
@@ -84,7 +89,7 @@ class Runners:
             if runner.up or runner.closing or self.closing.is_set():
                 return
             try:
-                await self._bring_up_known(runner)
+                await take(runner)
                 return
             except Silent:
                 continue
@@ -105,15 +110,24 @@ class Runners:
     async def _take_left_over(self, name: str) -> None:
         runner = self._runners[name] = Runner(Desired(name), self._shared)
         try:
+            await self._bring_up_unknown(runner)
+        except Silent as refusal:
+            self._keep_looking(runner, refusal, self._bring_up_unknown)
+
+    async def _bring_up_unknown(self, runner: Runner) -> None:
+        try:
             if await runner.bring_up(only_left_over=True, boot=True):
-                runner.log.warning("runner %s was not in the saved state", name)
+                runner.log.warning("runner %s was not in the saved state", runner.name)
                 await runner.save()
                 return
+        except Silent:
+            raise
         except Refusal as refusal:
             runner.log.error("%s", refusal)
         except Exception:
             runner.log.exception("its executor cannot be adopted")
-        del self._runners[name]
+        if self._runners.get(runner.name) is runner:
+            del self._runners[runner.name]
 
     def get(self, name: str) -> Runner:
         """Return a runner; empty is the default one."""

@@ -38,3 +38,27 @@ def test_the_runner_of_a_launch_goes_when_its_silent_executor_dies(
         await daemon.runners.close(in_order=True)
 
     asyncio.run(play())
+
+
+def test_the_silent_executor_of_an_unknown_runner_is_looked_for_until_it_dies(
+    rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks: list[str] = []
+
+    async def adopt(runner: str, *_: Any) -> None:
+        looks.append(runner)
+        if len(looks) < 3:
+            raise Silent("it does not answer", errors_pb2.REASON_EXECUTOR_SILENT)
+
+    monkeypatch.setattr(Executor, "adopt", adopt)
+    monkeypatch.setattr(runners, "_LOOK_AGAIN_S", 0.01)
+
+    async def play() -> None:
+        daemon = rtcfd()
+        await daemon.runners.bring_up(["stranger"])
+        assert [runner.name for runner in daemon.runners.all()] == ["stranger"]
+        await until(lambda: not daemon.runners.all(), "its end")
+        assert looks == ["stranger"] * 3
+        await daemon.runners.close(in_order=True)
+
+    asyncio.run(play())
