@@ -30,6 +30,7 @@ def flooded(daemon: Daemon) -> Iterator[None]:
              f"{daemon.socket}.d/stop/rt_runner"],
             stdout=said, stderr=subprocess.DEVNULL,
             env={"PYTHONPATH": str(BUILD_TREE / "python"), "PATH": os.environ["PATH"]},
+            start_new_session=True,  # as another user's: the scheduler gives it that user's share
         )  # fmt: skip
 
         def there() -> bool:
