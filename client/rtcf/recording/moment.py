@@ -17,7 +17,7 @@ class Moment:
         self, condition: Condition, pre_s: float, post_s: float, most_bytes: int = MOST_BYTES
     ) -> None:
         self.cycle: int | None = None  # in which the condition was true
-        self.over = False
+        self.over = False  # all of it has come, or the loop has ended
         self.cut = False  # more came before than may be kept
         self.condition = condition
         self._pre_ns, self._post_ns = round(pre_s * 1e9), round(post_s * 1e9)
@@ -70,7 +70,8 @@ class Moment:
         if not len(batch):
             return batch
         late = int((batch.stamps_ns > self._until_ns).sum())
-        self.over = late > 0
+        # Another loop's cycles are of another story.
+        self.over = late > 0 or batch.message.last_of_loop
         return batch.part(0, len(batch) - late)
 
 

@@ -170,7 +170,8 @@ def _read(stream: PortStream, plot: _Plot) -> None:
         plot.trouble = "the stream has ended"
     except rtcf.RtcfError as error:
         plot.trouble = str(error)
-    plot.over = True
+    finally:
+        plot.over = True
 
 
 def _legend(names: list[str], newest: _Window, width: int) -> list[str]:

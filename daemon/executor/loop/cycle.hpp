@@ -55,6 +55,8 @@ class Cycle {
     /// @{
     /// Sets clock and counters for cycles from 0 on; while none runs.
     void begin(std::int64_t period_ns, std::uint64_t warmup_cycles);
+    /// Of a loop that has begun and has no thread to run it.
+    void abandon() noexcept { active_ = false; }
     Boundary& boundary() noexcept { return boundary_; }
     /// After the last cycle.
     const LoopFault& fault() const noexcept { return fault_; }

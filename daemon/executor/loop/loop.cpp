@@ -94,6 +94,7 @@ RealtimeProblems Loop::start(const LoopSettings& settings, std::uint64_t stops_k
     const RealtimeAttributes attributes(realtime);
     if (const int error = pthread_create(&thread_, attributes.get(), &Loop::threadMain, this);
         error != 0) {
+        cycle_.abandon();
         running_.store(false, std::memory_order_release);
         joinable_.store(false, std::memory_order_release);
         thread_locals_.reset();

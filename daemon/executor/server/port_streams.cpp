@@ -178,8 +178,8 @@ bool PortStreams::sendFrames(Stream& stream, const Send& send) {
                !batch.last_of_loop()) {
             if (!ring.read(stream.next, frame_)) {
                 if (batch.stamps_ns_size() != 0) break;
+                if (stream.next % stream.step() == 0) ++stream.lost;
                 ++stream.next;
-                ++stream.lost;
                 continue;
             }
             const CycleRecord& cycle = frame_.cycle();

@@ -5,6 +5,7 @@ in rtcfd nor in a loop's process: a crash there is a refusal.
 """
 
 import asyncio
+import contextlib
 import os
 import signal
 import time
@@ -157,9 +158,8 @@ class Describer:
         except TimeoutError:
             raise _Failed(f"loading it did not end within {TIMEOUT_S:g} s") from None
         finally:
-            if process.returncode is None:
-                process.kill()
-                await process.wait()
+            _end(process)
+            await process.wait()
         if len(output) > _LONGEST_ANSWER or len(complaint) > _LONGEST_COMPLAINT:
             raise _Failed("the process that loaded it wrote without end", own=True)
         status = process.returncode or 0
@@ -188,9 +188,15 @@ async def _until_end(
     while more := await pipe.read(_CHUNK):
         if len(data) <= longest:
             data += more
-            if len(data) > longest and process.returncode is None:
-                process.kill()
+            if len(data) > longest:
+                _end(process)
     return data
+
+
+def _end(process: asyncio.subprocess.Process) -> None:
+    """Kill it, and whatever the library has started: its session is its own."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
 
 
 def _problem(text: str) -> wire.LibraryDescription:

@@ -1,6 +1,7 @@
 """The describer of libraries: one process for all who ask, and no answer that stays wrong."""
 
 import asyncio
+import contextlib
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -8,7 +9,7 @@ from pathlib import Path
 import odd_files
 import pytest
 import rtcf
-from daemon_under_test import DaemonUnderTest
+from daemon_under_test import DaemonUnderTest, wait_for
 from rtcfd.catalog import describe
 from rtcfd.catalog.describe import Describer
 
@@ -158,6 +159,17 @@ def test_a_library_that_writes_without_end_is_ended(
         return str((await Describer(binary).describe(library, "pkg")).problem)
 
     assert asyncio.run(work()) == "the process that loaded it wrote without end"
+
+
+def test_what_a_library_has_started_ends_with_its_process(library: Path, tmp_path: Path) -> None:
+    binary = tmp_path / "executor"
+    child = tmp_path / "child"
+    binary.write_text(f"#!/bin/sh\nsleep 1000 >/dev/null 2>&1 &\necho $! > {child}\n")
+    binary.chmod(0o755)
+    asyncio.run(Describer(binary).describe(library, "pkg"))
+    status = Path(f"/proc/{int(child.read_text())}/stat")
+    with contextlib.suppress(FileNotFoundError):  # or its parent has not yet waited for it
+        wait_for(lambda: status.read_text().rpartition(")")[2].split()[0] == "Z", "its end")
 
 
 @pytest.mark.parametrize(

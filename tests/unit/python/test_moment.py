@@ -18,10 +18,11 @@ class _At:
         return found
 
 
-def _batch(first: int, count: int, lost: int = 0) -> PortBatch:
+def _batch(first: int, count: int, lost: int = 0, last: bool = False) -> PortBatch:
     """Return cycles of 1 ms."""
     message = ports_pb2.PortBatch(
         first_cycle=first,
+        last_of_loop=last,
         stamps_ns=[1_000_000 * (first + i) for i in range(count)],
         latencies_ns=[0] * count,
         durations_ns=[0] * count,
@@ -38,3 +39,14 @@ def test_no_more_is_kept_than_is_asked_for_also_where_cycles_were_lost() -> None
         kept += moment.take(_batch(first, 10))
     cycles = [int(cycle) for batch in kept for cycle in batch.cycles]
     assert cycles == list(range(8_905, 9_016))
+
+
+def test_it_is_over_when_the_loop_is() -> None:
+    moment = Moment(_At(5), pre_s=0.1, post_s=60.0)  # type: ignore[arg-type]
+    assert moment.take(_batch(0, 10)) and not moment.over
+    (end,) = moment.take(_batch(10, 10, last=True))
+    assert len(end) == 10 and moment.over
+    # The same if the moment is in the loop's last cycles, and not before there was one.
+    moment = Moment(_At(5), pre_s=0.1, post_s=60.0)  # type: ignore[arg-type]
+    assert not moment.take(_batch(0, 3, last=True)) and not moment.over
+    assert moment.take(_batch(0, 10, last=True)) and moment.over
