@@ -351,9 +351,12 @@ class Client(Incidents):
                 return found
             request.page_token = response.next_page_token
 
-    def get_statistics(self, runner: str = "") -> runner_pb2.RunnerStatistics:
-        """Return the figures of a runner's loop and of its components."""
-        request = control_pb2.GetStatisticsRequest(runner=runner)
+    def get_statistics(
+        self, runner: str = "", buckets: bool = False
+    ) -> runner_pb2.RunnerStatistics:
+        """Return the figures of a runner's loop and of its components; with `buckets`, how often
+        the loop took how long, too."""
+        request = control_pb2.GetStatisticsRequest(runner=runner, buckets=buckets)
         return self._ask(self._stub.GetStatistics, request).statistics  # type: ignore[no-any-return]
 
     def reset_statistics(self, runner: str = "") -> None:

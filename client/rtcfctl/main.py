@@ -58,6 +58,7 @@ _MODULES = {
     "incident": "signals.incident",
     "check": "machine.check",
     "doctor": "machine.doctor",
+    "metrics": "machine.metrics",
 }
 _COMPLETION = "__complete"
 # Global options that are followed by a word of theirs.

@@ -31,7 +31,7 @@ def test_the_control_socket_is_roots_and_the_groups(machine: Machine) -> None:
 
 
 def test_units_are_valid(machine: Machine) -> None:
-    units = ("rtcfd.service", "rtcfd.socket", "rtcf-scope.service")
+    units = ("rtcfd.service", "rtcfd.socket", "rtcf-scope.service", "rtcf-metrics.service")
     done = machine.run("systemd-analyze", "verify", *units)
     assert "rtcf" not in done.stderr
 
@@ -39,6 +39,22 @@ def test_units_are_valid(machine: Machine) -> None:
 def test_the_service_is_little_exposed(machine: Machine) -> None:
     machine.run("systemd-analyze", "security", "--threshold=30", "rtcfd.service")
     machine.run("systemd-analyze", "security", "--threshold=20", "rtcf-scope.service")
+    machine.run("systemd-analyze", "security", "--threshold=20", "rtcf-metrics.service")
+
+
+def test_metrics_are_off_until_somebody_starts_them(machine: Machine) -> None:
+    state = machine.run("systemctl", "is-enabled", "rtcf-metrics.service", check=False).stdout
+    assert state == "disabled\n"
+    try:
+        machine.run("systemctl", "start", "rtcf-metrics.service")
+        ask = (
+            "until /usr/bin/python3 -c 'import urllib.request as u;"
+            'print(u.urlopen("http://127.0.0.1:9464/metrics").read().decode())'
+            "' 2>/dev/null; do sleep 0.2; done"
+        )
+        assert 'rtcf_runner_state{runner="rt_runner"' in machine.shell(ask).stdout
+    finally:
+        machine.run("systemctl", "stop", "rtcf-metrics.service")
 
 
 def test_the_scope_is_off_until_somebody_starts_it(machine: Machine) -> None:

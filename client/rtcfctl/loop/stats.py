@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from pathlib import Path
 from typing import Any
 
 import rtcf
@@ -27,15 +28,25 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
         metavar="S",
         help="again and again, each second or each S seconds (or 500ms), until Ctrl-C",
     )
+    stats.add_argument(
+        "--plot", metavar="FILE", type=Path, help="draw how often the loop took how long, too"
+    )
     stats.set_defaults(run=show)
 
 
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Print the figures of a loop and of its components."""
     if args.watch is not None:
+        if args.plot is not None:
+            raise ValueError("--plot draws one picture: give it without --watch")
         _watch(client, args, output)
         return
-    _print(client.get_statistics(args.runner), output)
+    found = client.get_statistics(args.runner, buckets=args.plot is not None)
+    if args.plot is not None:
+        from rtcfctl.loop import histograms
+
+        histograms.draw(found, args.plot)
+    _print(found, output)
     if args.reset:
         client.reset_statistics(args.runner)
 

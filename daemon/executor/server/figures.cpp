@@ -18,6 +18,17 @@ void setDistribution(pb::Distribution& message, const DistributionSummary& summa
     message.set_max_ns(summary.max);
 }
 
+void addBuckets(google::protobuf::RepeatedPtrField<pb::Bucket>& buckets,
+                const HistogramSnapshot& snapshot, double scale) {
+    for (std::size_t i = 0; i < snapshot.buckets.size(); ++i) {
+        if (snapshot.buckets[i] == 0) continue;
+        pb::Bucket& bucket = *buckets.Add();
+        const std::int64_t last = Histogram::lowerBound(i) + Histogram::width(i) - 1;
+        bucket.set_upper_ns(static_cast<double>(last) * scale);
+        bucket.set_count(snapshot.buckets[i]);
+    }
+}
+
 }  // namespace
 
 void Figures::addTo(pb::RunnerStatus& status, const GraphSnapshot& graph) const {
@@ -31,7 +42,7 @@ void Figures::addTo(pb::RunnerStatus& status, const GraphSnapshot& graph) const 
 }
 
 // Of the same cycles, unless the loop leaves no time between them.
-pb::RunnerStatistics Figures::statistics() const {
+pb::RunnerStatistics Figures::statistics(bool buckets) const {
     const std::shared_ptr<const GraphSnapshot> graph = runner_.snapshot();
     const Loop& loop = runner_.loop();
     const double ns_per_tick = loop.counter().nsPerTick();
@@ -42,11 +53,15 @@ pb::RunnerStatistics Figures::statistics() const {
     message.set_runner(runner_.name());
     const HistogramSnapshot duration = difference(now.duration, baseline->duration);
     message.set_iterations(duration.count);
+    const HistogramSnapshot latency = difference(now.latency, baseline->latency);
     setDistribution(*message.mutable_duration(), summarize(duration, ns_per_tick));
-    setDistribution(*message.mutable_latency(),
-                    summarize(difference(now.latency, baseline->latency), 1.0));
+    setDistribution(*message.mutable_latency(), summarize(latency, 1.0));
     setDistribution(*message.mutable_adoption(),
                     summarize(difference(now.adoption, baseline->adoption), ns_per_tick));
+    if (buckets) {
+        addBuckets(*message.mutable_duration_buckets(), duration, ns_per_tick);
+        addBuckets(*message.mutable_latency_buckets(), latency, 1.0);
+    }
     message.set_overruns(now.overruns - baseline->overruns);
     message.set_missed(now.missed - baseline->missed);
     message.set_late_wake_ups(now.late_wake_ups - baseline->late_wake_ups);

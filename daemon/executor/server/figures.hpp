@@ -23,7 +23,8 @@ class Figures {
 
     /// Those of a status.
     void addTo(::rtcf::v1::RunnerStatus& status, const GraphSnapshot& graph) const;
-    ::rtcf::v1::RunnerStatistics statistics() const;
+    /// @param buckets with how often the loop took how long
+    ::rtcf::v1::RunnerStatistics statistics(bool buckets) const;
 
     /// Counts from now on. @return whether it could: not while a cycle is being counted; cycles
     /// after it are not, until it can

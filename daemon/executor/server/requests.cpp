@@ -96,7 +96,8 @@ bool Server::answerQuery(std::uint64_t connection, const v1::Request& request) {
             *response.mutable_connections() = connectionsTo(*graph);
             break;
         case v1::Request::kGetStatistics:
-            *response.mutable_statistics() = figures_->statistics();
+            *response.mutable_statistics() =
+                figures_->statistics(request.get_statistics().buckets());
             break;
         case v1::Request::kResetStatistics:
             resetStatistics(connection, request.id());

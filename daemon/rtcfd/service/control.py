@@ -364,7 +364,7 @@ class Control(control_pb2_grpc.ControlServicer):
     @answering
     async def GetStatistics(self, request: control_pb2.GetStatisticsRequest) -> Any:
         """The figures."""
-        statistics = await self._statistics(request.runner)
+        statistics = await self._statistics(request.runner, request.buckets)
         return control_pb2.GetStatisticsResponse(statistics=statistics)
 
     async def WatchStatistics(
@@ -420,9 +420,9 @@ class Control(control_pb2_grpc.ControlServicer):
             )
         return self._runners.get(name)
 
-    async def _statistics(self, name: str) -> runner_pb2.RunnerStatistics:
+    async def _statistics(self, name: str, buckets: bool = False) -> runner_pb2.RunnerStatistics:
         runner = self._runners.get(name)
-        query = wire.Request(get_statistics=wire.GetStatistics())
+        query = wire.Request(get_statistics=wire.GetStatistics(buckets=buckets))
         statistics: runner_pb2.RunnerStatistics = (await runner.query(query)).statistics
         statistics.runner = runner.name
         return statistics
