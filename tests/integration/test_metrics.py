@@ -20,7 +20,7 @@ def samples(text: str) -> Samples:
     """Read what an independent reader of the format reads."""
     return {
         (sample.name, frozenset(sample.labels.items())): sample.value
-        for family in text_string_to_metric_families(text)
+        for family in text_string_to_metric_families(text)  # type: ignore[no-untyped-call]
         for sample in family.samples
     }
 

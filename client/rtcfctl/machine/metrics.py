@@ -60,13 +60,13 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         raise rtcf.RtcfError(
             "nothing here knows Prometheus's format: sudo apt install python3-prometheus-client"
         ) from None
+    figures = prometheus_client.CollectorRegistry()
+    figures.register(_Figures(lambda: rtcf.Client(args.socket)))  # type: ignore[arg-type]
     if args.listen is None:
         client.get_status()  # a refusal is told in its own words
-        figures = _Figures(lambda: rtcf.Client(args.socket))
         print(prometheus_client.generate_latest(figures).decode(), end="")
         return
     address, port = _place(args.listen)
-    figures = _Figures(lambda: rtcf.Client(args.socket))
     try:
         prometheus_client.start_http_server(port, address, figures)
     except OSError as error:

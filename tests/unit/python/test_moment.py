@@ -47,6 +47,6 @@ def test_it_is_over_when_the_loop_is() -> None:
     (end,) = moment.take(_batch(10, 10, last=True))
     assert len(end) == 10 and moment.over
     # The same if the moment is in the loop's last cycles, and not before there was one.
-    moment = Moment(_At(5), pre_s=0.1, post_s=60.0)  # type: ignore[arg-type]
+    moment = Moment(_At(5), pre_s=0.1, post_s=60.0)
     assert not moment.take(_batch(0, 3, last=True)) and not moment.over
     assert moment.take(_batch(0, 10, last=True)) and moment.over
