@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 import rtcf
-from rtcf.streams.events import Lost
+from rtcf.streams.numbered import Lost
 from rtcf_shared.errors import RtcfError
 
 from rtcf_scope import catalog

@@ -47,6 +47,7 @@ _MODULES = {
     "stats": "loop.stats",
     "top": "loop.top",
     "events": "signals.events",
+    "logs": "signals.logs",
     "echo": "signals.echo",
     "get": "signals.get",
     "hz": "signals.hz",

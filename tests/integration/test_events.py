@@ -9,7 +9,8 @@ import pytest
 import rtcf
 from daemon_process import Daemon, wait_for
 from fig_1 import mimo
-from rtcf.streams.events import EventStream, Lost, Place
+from rtcf.streams.events import EventStream
+from rtcf.streams.numbered import Lost, Place
 from rtcf.v1 import control_pb2, runner_pb2
 
 Event = control_pb2.Event

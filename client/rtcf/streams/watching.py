@@ -1,4 +1,4 @@
-"""The calls of a client that follow something: figures, events, values of every cycle."""
+"""The calls of a client that follow something: figures, events, logs, values of every cycle."""
 
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
@@ -8,7 +8,9 @@ from rtcf_shared.spec import several
 
 from rtcf import failures
 from rtcf.connection import Connection
-from rtcf.streams.events import EventStream, Place
+from rtcf.streams.events import EventStream
+from rtcf.streams.logs import LogStream
+from rtcf.streams.numbered import Place
 from rtcf.v1 import control_pb2, ports_pb2, runner_pb2
 
 if TYPE_CHECKING:
@@ -47,6 +49,31 @@ class Watching(Connection):
         """
         return EventStream(
             self._stub.WatchEvents, self.socket, several("runners", runners), after, until_now
+        )
+
+    def watch_logs(
+        self,
+        runner: str = "",
+        components: Iterable[str] = (),
+        level: str = "debug",
+        after: Place | None = None,
+        *,
+        until_now: bool = False,
+    ) -> LogStream:
+        """Watch what a runner's components and its executor log, or only some components; `level`
+        is the lowest one: "debug", "info", "warn", "error" or "fatal".
+
+        `after` and `until_now` are as in watch_events; it ends with a refusal when the runner is
+        removed.  Raises ValueError on a level that there is not.
+        """
+        return LogStream(
+            self._stub.WatchLogs,
+            self.socket,
+            runner,
+            several("components", components),
+            level,
+            after,
+            until_now,
         )
 
     def watch_ports(

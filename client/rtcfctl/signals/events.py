@@ -5,7 +5,7 @@ import sys
 from typing import Any
 
 import rtcf
-from rtcf.streams.events import Lost, Place
+from rtcf.streams.numbered import Lost, Place
 from rtcf.v1 import control_pb2
 
 from rtcfctl.terminal.output import Output

@@ -30,6 +30,11 @@ def date(nanoseconds: int) -> str:
     return time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(nanoseconds / 1e9))
 
 
+def date_ms(nanoseconds: int) -> str:
+    """Likewise, with milliseconds: "2026-03-01 14:05:09.250"."""
+    return f"{date(nanoseconds)}.{nanoseconds // 1_000_000 % 1000:03}"
+
+
 def amount(unit: str) -> Callable[[str], float]:
     """Return what argparse reads a number by, with or without a unit of the kind of `unit`."""
 

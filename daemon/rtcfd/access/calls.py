@@ -60,6 +60,7 @@ CALLS = {
     "WatchStatistics": Call(Level.OBSERVE),
     "GetHistory": Call(Level.OBSERVE),
     "WatchEvents": Call(Level.OBSERVE),
+    "WatchLogs": Call(Level.OBSERVE, _LISTS),
     "WatchPorts": Call(Level.OBSERVE),
     "ListIncidents": Call(Level.OBSERVE),
     "ReadIncident": Call(Level.OBSERVE),

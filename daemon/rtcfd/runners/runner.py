@@ -12,6 +12,7 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2, runner_pb2
 
 from rtcfd.common import runner_settings
+from rtcfd.common.numbered_log import NumberedLog
 from rtcfd.common.refusals import InvalidArgument, Refusal
 from rtcfd.executor import opinion
 from rtcfd.executor.events import Events
@@ -41,6 +42,7 @@ class Runner(RunnerCore):
         super().__init__(desired, surroundings)
         self.leases = Leases(self, self.alarm)
         self.hold_outbox: Outbox | None = None  # of the holder, if it is there
+        self.logs = NumberedLog[wire.LogRecord]()  # of its components and its executor
         self.releasing = False  # its holder has ended, and cannot come back
         self._crashes = Crashes()
         self._changed_by_ros: dict[str, set[str]] = {}  # parameters, by component; not noted yet
@@ -72,6 +74,7 @@ class Runner(RunnerCore):
             await self.save()
         await self.end_executor("it is being ended")
         self.end_leases(why, f"runner {self.name}: {message}")
+        self.logs.end()
         await self.operations.drain()
 
     async def leave(self) -> None:
@@ -191,7 +194,9 @@ class Runner(RunnerCore):
         self.operations.in_background("counting late cycles", look())
 
     def take_log(self, record: wire.LogRecord) -> None:
-        """Hand a record to whom it concerns: the holder of the component, or of the runner."""
+        """Keep a record, and hand it to whom it concerns: the holder of the component, or of the
+        runner."""
+        self.logs.append(record)
         if self.hold_outbox is None and not self.desired.leased:
             return
         copy = control_pb2.LogRecord(

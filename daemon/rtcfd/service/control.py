@@ -42,7 +42,7 @@ from rtcfd.service.answers import answering, changing, holding, lasting
 from rtcfd.service.pages import page
 from rtcfd.service.ports import watch_ports
 from rtcfd.service.replay import Replay
-from rtcfd.service.watching import watch
+from rtcfd.service.watching import watch, watch_logs
 
 _WATCH_MS = 1000
 _SHORTEST_WATCH_MS = 100
@@ -387,6 +387,16 @@ class Control(control_pb2_grpc.ControlServicer):
         try:
             require_some = partial(self._runners.require_some, request.runners)
             async for response in watch(self._events, request, require_some):
+                yield response
+        except Exception as error:
+            await abort(context, error, request)
+
+    async def WatchLogs(
+        self, request: control_pb2.WatchLogsRequest, context: Any
+    ) -> AsyncIterator[control_pb2.WatchLogsResponse]:
+        """What is logged."""
+        try:
+            async for response in watch_logs(self._runners.get(request.runner), request):
                 yield response
         except Exception as error:
             await abort(context, error, request)

@@ -1,12 +1,52 @@
-"""Watching events: from a number on, or from now on, for one caller."""
+"""Watching events and log records: from a number on, or from now on, for one caller."""
 
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import AsyncGenerator, Callable, Iterable
+from dataclasses import dataclass
+from typing import Generic
 
-from rtcf.v1 import control_pb2
+from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import control_pb2, errors_pb2
+from rtcf_shared.naming import closest, listing, suggestion
 
 from rtcfd.common.event_log import EventLog
+from rtcfd.common.names import absolute
+from rtcfd.common.numbered_log import Entry, NumberedLog
+from rtcfd.common.refusals import NotFound
+from rtcfd.runners.runner import Runner
 
 _BATCH = 200
+
+
+@dataclass
+class _Piece(Generic[Entry]):
+    """What has come since the last piece."""
+
+    entries: list[Entry]
+    lost: int  # before the first of them
+    upto: int  # number of the last of them, or of the last before
+
+
+async def _follow(
+    log: NumberedLog[Entry],
+    request: control_pb2.WatchEventsRequest | control_pb2.WatchLogsRequest,
+    check: Callable[[], None],
+) -> AsyncGenerator[_Piece[Entry], None]:
+    """Yield where the caller stands, then what comes; without end unless asked for, or until
+    `check`, which is called before each wait, refuses it."""
+    number = log.last
+    if request.HasField("after"):
+        # Numbers of another log say nothing about this one.
+        number = min(request.after, log.last) if request.log_id == log.log_id else 0
+    until = log.last
+    while True:
+        entries, lost = log.after(number, _BATCH)
+        number += lost + len(entries)
+        yield _Piece(entries, lost, number)
+        if request.until_now and number >= until:
+            return
+        if number >= log.last:
+            check()
+        await log.beyond(number)
 
 
 async def watch(
@@ -16,24 +56,76 @@ async def watch(
 
     `require_some` refuses to wait when none of the runners that are watched is there.
     """
-    number = log.last
-    if request.HasField("after"):
-        # Numbers of another log say nothing about this one.
-        number = min(request.after, log.last) if request.log_id == log.log_id else 0
     runners = set(request.runners)
-    until = log.last
     first = True
-    while True:
-        events, lost = log.after(number, _BATCH)
-        number = events[-1].sequence if events else number + lost
-        told = [each for each in events if not runners or not each.runner or each.runner in runners]
-        if first or told or lost:
+    async for piece in _follow(log, request, require_some):
+        told = [
+            each for each in piece.entries
+            if not runners or not each.runner or each.runner in runners
+        ]  # fmt: skip
+        if first or told or piece.lost:
             yield control_pb2.WatchEventsResponse(
-                log_id=log.log_id, sequence=number, lost=lost, events=told
+                log_id=log.log_id, sequence=piece.upto, lost=piece.lost, events=told
             )
         first = False
-        if request.until_now and number >= until:
-            return
-        if number >= log.last:
-            require_some()
-        await log.beyond(number)
+
+
+async def watch_logs(
+    runner: Runner, request: control_pb2.WatchLogsRequest
+) -> AsyncGenerator[control_pb2.WatchLogsResponse, None]:
+    """Yield where the caller stands, then what is logged; without end unless asked for, or until
+    the runner is removed."""
+    log = runner.logs
+    components = {absolute(each) for each in request.components}
+    _check_known(runner, components)
+
+    def check() -> None:
+        if log.ended:
+            raise NotFound(
+                f"runner {runner.name} is not there any more", errors_pb2.REASON_RUNNER_NOT_FOUND
+            )
+
+    first = True
+    async for piece in _follow(log, request, check):
+        begin = piece.upto - len(piece.entries) + 1
+        told = [
+            _told(record, number)
+            for number, record in enumerate(piece.entries, begin)
+            if record.level >= request.level and (not components or record.component in components)
+        ]
+        if first or told or piece.lost:
+            yield control_pb2.WatchLogsResponse(
+                log_id=log.log_id, sequence=piece.upto, lost=piece.lost, records=told
+            )
+        first = False
+
+
+def _check_known(runner: Runner, names: Iterable[str]) -> None:
+    """Refuse components that are not there and have logged nothing."""
+    known = dict.fromkeys(runner.desired.components)
+    missing = [name for name in names if name not in known]
+    if missing:
+        kept, _ = runner.logs.after(0, runner.logs.last)
+        spoke = {each.component for each in kept}
+        for name in missing:
+            if name not in spoke:
+                raise NotFound(
+                    f"no component {name} in runner {runner.name}, and no log record of one"
+                    f"{suggestion(name, known)} (components: {listing(known)})",
+                    errors_pb2.REASON_COMPONENT_NOT_FOUND,
+                    component=name,
+                    suggestion=closest(name, known),
+                )
+
+
+def _told(record: wire.LogRecord, number: int) -> control_pb2.LogRecord:
+    return control_pb2.LogRecord(
+        level=wire.LogRecord.Level.Name(record.level),
+        time_ns=record.time_ns,
+        iteration=record.iteration,
+        component=record.component,
+        message=record.message,
+        sequence=number,
+        file=record.file,
+        line=record.line,
+    )

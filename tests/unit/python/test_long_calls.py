@@ -16,7 +16,7 @@ from strangers import open_to_strangers, root_only, stranger
 
 WATCH = """
 import sys, rtcf
-from rtcf.streams.events import Place
+from rtcf.streams.numbered import Place
 with rtcf.Client(sys.argv[1]) as client:
     try:
         for number, _ in enumerate({stream}):
@@ -50,7 +50,7 @@ def rules(default: str) -> str:
 LASTING = ["events -f", "stats --watch 0.1"]
 
 
-@pytest.mark.parametrize("command", LASTING)
+@pytest.mark.parametrize("command", [*LASTING, "logs -f"])
 def test_who_watches_a_runner_that_never_was_is_told(daemon: DaemonUnderTest, command: str) -> None:
     done = daemon.ctl("-r", "nobody", *command.split())
     assert done.returncode == 1

@@ -87,6 +87,7 @@ CALLS: dict[str, Callable[[rtcf.Client], object]] = {
     "parameters": lambda client: client.set_parameters("a", TEXT),
     "states": lambda client: client.set_state("a", TEXT),
     "runners": lambda client: client.watch_events(TEXT),
+    "components to listen to": lambda client: client.watch_logs("", TEXT),
     "selection": lambda client: client.watch_ports(TEXT),
 }
 

@@ -1,0 +1,71 @@
+"""`rtcfctl logs`: what the components of a loop and its executor log."""
+
+import argparse
+import contextlib
+import sys
+from collections import deque
+from collections.abc import Iterable
+from typing import Any
+
+import rtcf
+from rtcf.streams.logs import LEVELS
+from rtcf.streams.numbered import Lost, Place
+from rtcf.v1 import control_pb2
+
+from rtcfctl.terminal.output import Output
+from rtcfctl.terminal.plain import enumerator
+from rtcfctl.terminal.words import counted, date_ms, whole
+
+_STYLES = {
+    control_pb2.LogRecord.LEVEL_WARN: "yellow",
+    control_pb2.LogRecord.LEVEL_ERROR: "red",
+    control_pb2.LogRecord.LEVEL_FATAL: "bold red",
+}
+
+
+def register(verbs: Any, common: argparse.ArgumentParser) -> None:
+    """Add the verb."""
+    verb = verbs.add_parser(
+        "logs", parents=[common], help="what components and the executor log, with cycle numbers"
+    )
+    verb.add_argument(
+        "components", nargs="*", metavar="NAME", help="only of these components; all without"
+    )
+    verb.add_argument("-f", "--follow", action="store_true", help="go on until Ctrl-C")
+    verb.add_argument(
+        "-n", type=whole, metavar="N", help="of the past only the last N (default: all kept)"
+    )
+    verb.add_argument(
+        "--level", choices=LEVELS, default="debug", help="the lowest level (default: debug)"
+    )
+    verb.set_defaults(run=show)
+
+
+def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Print records; for machines a document each."""
+    asked = (args.runner, args.components, args.level)
+    with client.watch_logs(*asked, Place(), until_now=True) as past:
+        # What is not kept any more is news only to who wants all.
+        found: Iterable[control_pb2.LogRecord | Lost] = past
+        _print(found if args.n is None else deque(found, args.n), output)
+    if args.follow:
+        with contextlib.suppress(KeyboardInterrupt), client.watch_logs(*asked, past.place) as news:
+            _print(news, output)
+
+
+def _print(records: Iterable[control_pb2.LogRecord | Lost], output: Output) -> None:
+    for each in records:
+        if not output.for_people:
+            output.record({"lost": each.count} if isinstance(each, Lost) else each)
+        elif isinstance(each, Lost):
+            output.line(f"{counted(each.count, 'record')} of before are not kept", "yellow")
+        else:
+            output.line(_line(each), _STYLES.get(each.level, ""))
+        sys.stdout.flush()
+
+
+def _line(record: control_pb2.LogRecord) -> str:
+    who = record.component or "executor"
+    level = enumerator(record, "level")
+    message = " ".join(record.message.splitlines())
+    return f"{date_ms(record.time_ns)} {level:5} {who} #{record.iteration}: {message}"
