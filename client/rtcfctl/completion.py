@@ -124,6 +124,8 @@ class _Line:
         source = action.metavar if isinstance(action.metavar, str) else ""
         if source == "NAME" and ("runner" in self._verbs or action.dest == "runner"):
             source = "RUNNER"
+        if "host" in self._values:
+            return []  # no TAB asks for a password
         with rtcf.Client(self._values.get("socket")) as client:
             return [] if _asleep(client.socket) else list(self._live(client, source))
 

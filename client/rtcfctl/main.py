@@ -5,11 +5,13 @@ import importlib
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import rtcf
+from rtcf.connection import DEFAULT_SOCKET
 
 if TYPE_CHECKING:
     from rtcfctl.terminal.output import Output
@@ -63,8 +65,10 @@ _MODULES = {
 }
 _COMPLETION = "__complete"
 # Global options that are followed by a word of theirs.
-_WITH_VALUE = ("--socket", "-r", "--runner", "-o", "--output")
-_WITH_EQUALS = ("--socket=", "--runner=", "--output=")
+_WITH_VALUE = ("-H", "--host", "--socket", "-r", "--runner", "-o", "--output")
+_WITH_EQUALS = ("--host=", "--socket=", "--runner=", "--output=")
+# Verbs that look at the machine they run on.
+_OF_THIS_MACHINE = ("check", "doctor")
 
 
 def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None) -> int:
@@ -78,6 +82,7 @@ def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None)
         return DONE
     args = parser(verb_of(words)).parse_args(words)
     args.build_tree = build_tree
+    args.verb = verb_of(words)
     from rtcfctl.terminal.output import Output
 
     output = Output(args.output, args.verbose)
@@ -104,7 +109,10 @@ def _interrupt(number: int, _: object) -> None:
 def _run(args: argparse.Namespace, output: "Output") -> int:
     """Do what a command line says; return the exit code."""
     try:
-        with rtcf.Client(args.socket) as client:
+        with ExitStack() as ways:
+            if args.host is not None:
+                ways.enter_context(_another_machine(args))
+            client = ways.enter_context(rtcf.Client(args.socket))
             # What a verb returns is its own verdict, e.g. doctor's.
             code = args.run(client, args, output)
             sys.stdout.flush()
@@ -126,6 +134,26 @@ def _run(args: argparse.Namespace, output: "Output") -> int:
             return _fail(f"standard output: {error.strerror}", REFUSED)
         return _fail(error, REFUSED)
     return DONE
+
+
+@contextmanager
+def _another_machine(args: argparse.Namespace) -> Iterator[None]:
+    """Have the socket of another machine for ours."""
+    from rtcfctl.machine import remote
+
+    if args.verb in _OF_THIS_MACHINE:
+        raise ValueError(
+            f"{args.verb} looks at the machine it runs on: ssh {args.host} rtcfctl {args.verb}"
+        )
+    there = args.socket or DEFAULT_SOCKET
+    with remote.control_socket_of(args.host, args.socket) as here:
+        args.socket = here
+        try:
+            yield
+        except rtcf.DaemonUnreachableError as error:
+            raise rtcf.DaemonUnreachableError(
+                str(error).replace(here, f"{there} of {args.host}")
+            ) from None
 
 
 def _drop_output() -> None:
@@ -170,6 +198,13 @@ def _global_options(to: argparse.ArgumentParser, defaults: bool) -> None:
     def default(value: object) -> object:
         return value if defaults else argparse.SUPPRESS
 
+    to.add_argument(
+        "-H",
+        "--host",
+        metavar="[USER@]HOST",
+        default=default(None),
+        help="rtcfd of another machine, by way of ssh",
+    )
     to.add_argument(
         "--socket",
         metavar="PATH",
