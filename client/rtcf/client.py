@@ -1,9 +1,10 @@
 """The client of rtcfd: one method per call of `rtcf.v1.Control`."""
 
 from collections.abc import Iterable
+from typing import Any
 
 from rtcf_shared.errors import RtcfError
-from rtcf_shared.spec import several
+from rtcf_shared.spec import parse_port, several
 
 from rtcf import direct_stop
 from rtcf.connection import CHANGE_TIMEOUT_S, QUERY_TIMEOUT_S, OnProgress
@@ -294,6 +295,30 @@ class Client(Incidents):
             runner=runner, component=component, states=several("states", states)
         )
         return self._changed(self._stub.SetState, request, on_progress)
+
+    def write(
+        self,
+        port: str,
+        value: Any,
+        runner: str = "",
+        on_progress: OnProgress | None = None,
+    ) -> control_pb2.ChangeResult:
+        """Give the input "component.port" a value in the next cycle, as if it came from outside.
+
+        A number, bool, list or NumPy array, fields of a message in a dict; a str is YAML, as in
+        `rtcfctl write`.  Refused where a component or ROS feeds it; raises ValueError on a name
+        that is no port's.
+        """
+        # Few commands need it, and each import is time.
+        import json
+
+        name = parse_port(port)
+        if not isinstance(value, str):
+            value = json.dumps(value, default=lambda array: array.tolist())
+        request = control_pb2.WritePortRequest(
+            runner=runner, component=name.component, port=name.port, value=value
+        )
+        return self._changed(self._stub.WritePort, request, on_progress)
 
     def take_snapshot(self, runner: str = "") -> control_pb2.TakeSnapshotResponse:
         """Copy all that a runner's next cycle depends on, of one cycle boundary."""

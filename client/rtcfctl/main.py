@@ -55,6 +55,7 @@ _MODULES = {
     "hz": "signals.hz",
     "plot": "signals.plot",
     "wait": "signals.wait",
+    "write": "signals.write",
     "record": "signals.record",
     "convert": "signals.convert",
     "scope": "signals.scope",

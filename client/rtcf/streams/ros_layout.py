@@ -4,10 +4,11 @@ Of messages of one length: strings and arrays are as long in each as in the samp
 serialises is told in http://wiki.ros.org/msg.
 """
 
-import re
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+
+from rtcf_shared.ros_definition import Definition
 
 _NUMBERS = {
     "bool": "?", "int8": "i1", "byte": "i1", "uint8": "u1", "char": "u1", "int16": "<i2",
@@ -15,7 +16,6 @@ _NUMBERS = {
     "float32": "<f4", "float64": "<f8",
 }  # fmt: skip
 _TIMES = {"time": "<u4", "duration": "<i4"}
-_FIELD = re.compile(r"^([\w/]+)(\[(\d*)\])?\s+(\w+)\s*$")
 _LENGTH = struct.Struct("<I")
 
 
@@ -37,12 +37,7 @@ def size_of(form: str) -> int:
 
 def leaves(definition: str, sample: bytes) -> list[Leaf]:
     """Return the numbers of such a message, in order."""
-    first, *others = re.split(r"^=+$", definition, flags=re.MULTILINE)
-    types = {"": first}
-    for text in others:
-        head, _, body = text.strip().partition("\n")
-        types[head.removeprefix("MSG:").strip()] = body
-    found = list(_Walk(types, sample).message("", "", ""))
+    found = list(_Walk(Definition(definition), sample).message("", ""))
     # std_msgs wrap one thing, whose name says nothing.
     data = [leaf for leaf in found if leaf.path == "data"]
     rest = {leaf.path.partition(".")[0] for leaf in found} - {"data", "layout"}
@@ -54,23 +49,21 @@ def leaves(definition: str, sample: bytes) -> list[Leaf]:
 class _Walk:
     """One way through a sample."""
 
-    def __init__(self, types: dict[str, str], sample: bytes) -> None:
+    def __init__(self, types: Definition, sample: bytes) -> None:
         self._types = types
         self._sample = sample
         self._at = 0
         self._number = 0
 
-    def message(self, name: str, package: str, path: str) -> Iterator[Leaf]:
-        for line in self._types[name].splitlines():
-            match = _FIELD.match(line.partition("#")[0].strip())
-            if match is None:
-                continue  # a constant, or nothing
-            kind, array, length, field = match.groups()
-            full = f"{path}.{field}" if path else field
-            count = None if array is None else int(length) if length else self._length()
-            yield from self._field(kind, package, full, count)
+    def message(self, name: str, path: str) -> Iterator[Leaf]:
+        for field in self._types.fields(name):
+            full = f"{path}.{field.name}" if path else field.name
+            count = field.length
+            if field.is_array and count is None:
+                count = self._length()
+            yield from self._field(field.kind, full, count)
 
-    def _field(self, kind: str, package: str, path: str, count: int | None) -> Iterator[Leaf]:
+    def _field(self, kind: str, path: str, count: int | None) -> Iterator[Leaf]:
         if kind in _NUMBERS or kind in _TIMES:
             form, each = _NUMBERS.get(kind, ""), 1
             if kind in _TIMES:
@@ -87,17 +80,7 @@ class _Walk:
                 length = self._length()
                 self._at += length
             else:
-                name = self._resolve(kind, package)
-                yield from self.message(name, name.rpartition("/")[0], each_path)
-
-    def _resolve(self, kind: str, package: str) -> str:
-        if kind == "Header":
-            return "std_msgs/Header"
-        if "/" in kind:
-            return kind
-        if f"{package}/{kind}" in self._types:
-            return f"{package}/{kind}"
-        return next(name for name in self._types if name.endswith(f"/{kind}"))
+                yield from self.message(kind, each_path)
 
     def _length(self) -> int:
         (length,) = _LENGTH.unpack_from(self._sample, self._at)

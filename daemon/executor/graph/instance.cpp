@@ -262,6 +262,16 @@ InputBase* Instance::findInput(const std::string& port) const noexcept {
     return nullptr;
 }
 
+const InputBase& Instance::requireInput(const std::string& port) const {
+    if (const InputBase* const found = findInput(port)) return *found;
+    std::string names;
+    for (const InputBase* input : component_->inputs())
+        names += (names.empty() ? "" : ", ") + input->name();
+    throw Refusal(RefusalKind::PortNotFound,
+                  fmt::format("{} has no input {}; it has {}", fullName(), port,
+                              names.empty() ? "none" : names));
+}
+
 void Instance::restoreParameterValues(std::vector<ParameterValue> values) {
     parameter_values_ = std::move(values);
     releaseStaged();

@@ -74,6 +74,8 @@ class Instance {
     /// Frees what an adopted batch has replaced.
     void releaseStaged() noexcept;
     InputBase* findInput(const std::string& port) const noexcept;
+    /// @throws Refusal that lists what there is
+    const InputBase& requireInput(const std::string& port) const;
 
     /// The parameters' values as last staged, in the order of declaration.
     const std::vector<ParameterValue>& parameterValues() const noexcept {

@@ -46,6 +46,7 @@ struct ConnectionPlan {
     std::vector<Reader> readers;
     bool published = false;   ///< to ROS
     bool subscribed = false;  ///< from ROS
+    bool written = false;     ///< by Runner::writeInput(), as nobody else feeds it
 };
 
 struct Wiring {

@@ -178,6 +178,13 @@ v1::Snapshot snapshotTo(const ImageOutcome& outcome) {
     return message;
 }
 
+v1::InputType inputTypeTo(const WritableInput& input) {
+    v1::InputType type;
+    type.set_ros_type(input.type->ros_type);
+    type.set_ros_definition(input.type->ros_definition);
+    return type;
+}
+
 v1::LogRecord logTo(const LogEntry& entry) {
     v1::LogRecord record;
     record.set_level(static_cast<v1::LogRecord::Level>(entry.level));

@@ -19,6 +19,7 @@ void setState(v1::Response& response, const NumberedState& state);
 ::rtcf::v1::ChangeResult outcomeTo(const ChangeOutcome& outcome);
 /// @throws Refusal if it is too large for the wire
 v1::Snapshot snapshotTo(const ImageOutcome& outcome);
+v1::InputType inputTypeTo(const WritableInput& input);
 v1::LogRecord logTo(const LogEntry& entry);
 v1::ServiceCall callTo(std::uint64_t number, const OutsideCall& call);
 v1::DirectStop directStopTo(const DirectStopReport& report);

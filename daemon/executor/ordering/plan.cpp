@@ -81,7 +81,7 @@ class Builder {
                 if (connection.published != writer.output->connected())
                     adoption_.audiences.push_back({writer.output, connection.published});
             }
-        } else if (connection.subscribed) {
+        } else if (connection.subscribed || connection.written) {
             addFeed(name, connection);
         } else {
             for (const Reader& reader : connection.readers) unbind(reader.input);
@@ -272,7 +272,9 @@ void Plan::noteKept(const Adoption& adoption, const Plan& previous) {
 BridgeTable Plan::bridgeTable() const {
     BridgeTable table;
     for (const auto& [name, tap] : taps) table.outputs.push_back(tap);
-    for (const auto& [name, injector] : injectors) table.inputs.push_back(injector);
+    for (const auto& [name, injector] : injectors) {
+        if (wiring.connections.at(name).subscribed) table.inputs.push_back(injector);
+    }
     return table;
 }
 

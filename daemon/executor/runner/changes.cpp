@@ -5,7 +5,6 @@
 
 #include "refusal.hpp"
 #include "runner/runner.hpp"
-#include "state/state_value.hpp"
 
 namespace rtcf::executor {
 
@@ -85,6 +84,8 @@ std::vector<std::string> Runner::adopt(Change change, const Progress& progress) 
     requireNoReplay();
     const Graph graph = change.graph;
     Wiring wiring = wire(graph, filter(), change.loading);
+    for (auto& [name, connection] : wiring.connections)
+        connection.written = !connection.writer && written_.count(name) != 0;
     checkTaps(wiring);
     Adoption adoption;
     std::unique_ptr<Plan> plan = buildPlan(graph, std::move(wiring), *plan_, settings_.frequency_hz,
@@ -152,6 +153,10 @@ void Runner::handOver(Change& change, const Instance& previous, const Instance& 
 void Runner::adopted(const Change& change) {
     if (!change.values.empty()) {
         for (const GraphNode& node : plan_->graph.nodes()) node.instance->releaseStaged();
+    }
+    written_.clear();
+    for (const auto& [name, connection] : plan_->wiring.connections) {
+        if (connection.written) written_.insert(name);
     }
     for (const Feed& feed : plan_->schedule.feeds) feed.injector->setBacklogs(feed.backlogs);
     if (simulated_) {
@@ -330,78 +335,6 @@ ChangeOutcome Runner::setBreaks(const std::vector<std::pair<std::string, std::st
     for (const auto& [component, port] : ports) change.graph.setBreak(component, port, broken);
     adopt(std::move(change), [](const std::string&) {});
     return outcome(ports[0].first);
-}
-
-ChangeOutcome Runner::reset(const std::string& name) {
-    const Component& component = plan_->graph.get(name).instance->component();
-    if (component.states().empty()) {
-        throw Refusal(RefusalKind::NoState,
-                      fmt::format("{} declares no state (rtcf::State) that could be reset", name));
-    }
-    Change change;
-    change.graph = plan_->graph;
-    change.copies = planReset(component);
-    requireSmall(bytesOf(change.copies), "the reset");
-    adopt(std::move(change), [](const std::string&) {});
-    return outcome(name);
-}
-
-// A running loop is not disturbed from outside: what it remembers is its own.
-ChangeOutcome Runner::setStates(const std::string& name,
-                                const std::vector<std::pair<std::string, ParameterValue>>& batch) {
-    noticeEnd();
-    const auto& states = plan_->graph.get(name).instance->component().states();
-    if (loop_.joinable()) {
-        throw Refusal(
-            RefusalKind::FailedPrecondition,
-            fmt::format("the loop of {0} runs: state is set while it does not: rtcfctl -r "
-                        "{0} stop",
-                        name_));
-    }
-    std::vector<std::vector<std::byte>> values;
-    Change change;
-    for (const auto& [state_name, value] : batch) {
-        const auto found =
-            std::find_if(states.begin(), states.end(),
-                         [&](const StateDeclaration& state) { return state.name == state_name; });
-        if (found == states.end()) {
-            throw Refusal(
-                RefusalKind::NotFound,
-                fmt::format("{} declares no state {}: rtcfctl info {} lists what there is", name,
-                            state_name, name));
-        }
-        values.push_back(stateValue(name, *found, value));
-        change.copies.push_back({found->value, values.back().data(), found->size});
-    }
-    change.graph = plan_->graph;
-    adopt(std::move(change), [](const std::string&) {});
-    return outcome(name);
-}
-
-ChangeOutcome Runner::setParameters(
-    const std::string& name, const std::vector<std::pair<std::string, ParameterValue>>& batch) {
-    Instance& instance = *plan_->graph.get(name).instance;
-    const std::vector<ParameterValue> previous = instance.parameterValues();
-    noticeEnd();
-    requireNoReplay();
-    // Values alone: the schedule stays as it is.
-    Adoption adoption;
-    adoption.values = instance.stageParameters(batch);
-    try {
-        adoptAtBoundary(adoption);
-    } catch (...) {
-        instance.restoreParameterValues(previous);
-        throw;
-    }
-    // It stands, whatever goes wrong from here on.
-    instance.releaseStaged();
-    ++plan_->schedule.generation;  // which the cycle does not look at
-    guarded("making a change known", [&] {
-        publish({name});
-        if (bridge_) bridge_->setTable(bridgeTable());
-        noticeEnd();
-    });
-    return outcome(name);
 }
 
 }  // namespace rtcf::executor

@@ -65,6 +65,12 @@ struct ImageOutcome {
     std::vector<std::string> notes;
 };
 
+/// An input that nobody feeds.
+struct WritableInput {
+    std::string topic;  ///< its mapped name
+    const TypeInfo* type;
+};
+
 /// Something that happened without a request.
 struct RunnerEvent {
     enum class Kind {
@@ -159,6 +165,11 @@ class Runner final : private RunnerView {
     /// run.
     ChangeOutcome setStates(const std::string& name,
                             const std::vector<std::pair<std::string, ParameterValue>>& batch);
+    /// An input that can be written. @throws Refusal also if a component or ROS feeds it
+    WritableInput writableInput(const std::string& name, const std::string& port) const;
+    /// Gives such an input a value at the next boundary. @param message serialised, of its ROS type
+    ChangeOutcome writeInput(const std::string& name, const std::string& port,
+                             const std::string& message);
     /// All that the next cycle depends on, of one boundary.
     ImageOutcome takeImage();
     /// Makes all of it what an image says, at one boundary: parameters, declared state, the values
@@ -305,6 +316,7 @@ class Runner final : private RunnerView {
     // Graph thread only.
     RunnerSettings settings_;
     std::unique_ptr<Plan> plan_ = std::make_unique<Plan>();
+    std::set<std::string> written_;  // mapped names with inputs that writeInput() feeds
     std::size_t most_taps_ = SIZE_MAX;
     RunnerState state_ = RunnerState::Stopped;
     std::uint64_t job_stops_ = 0;  // Job::stops of the present one

@@ -79,6 +79,9 @@ ChangeOutcome change(Runner& runner, const v1::Request& request, const Runner::P
         case v1::Request::kSetState:
             return runner.setStates(fullNameOf(request.set_state().component()),
                                     parametersFrom(request.set_state().states()));
+        case v1::Request::kWriteInput:
+            return runner.writeInput(fullNameOf(request.write_input().component()),
+                                     request.write_input().port(), request.write_input().message());
         case v1::Request::kSetParameters:
             return runner.setParameters(fullNameOf(request.set_parameters().component()),
                                         parametersFrom(request.set_parameters().parameters()));

@@ -185,6 +185,10 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
             } else if (request.kind_case() == v1::Request::kReplay) {
                 *response.mutable_replay() =
                     replayTo(runner_->replay(replayFrom(request.replay()), progress));
+            } else if (request.kind_case() == v1::Request::kDescribeInput) {
+                const auto& input = request.describe_input();
+                *response.mutable_input_type() = inputTypeTo(
+                    runner_->writableInput(fullNameOf(input.component()), input.port()));
             } else if (request.kind_case() == v1::Request::kTakeSnapshot) {
                 *response.mutable_snapshot() = snapshotTo(runner_->takeImage());
             } else {

@@ -73,6 +73,7 @@ CALLS = {
     "Step": Call(Level.OPERATE),
     "Replay": Call(Level.OPERATE, _ANY),
     "SetBreaks": Call(Level.OPERATE, _LISTS),
+    "WritePort": Call(Level.OPERATE),
     "ResetState": Call(Level.OPERATE),
     "SetState": Call(Level.OPERATE, _LISTS),
     "TakeSnapshot": Call(Level.OPERATE),

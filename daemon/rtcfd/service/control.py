@@ -29,7 +29,7 @@ from rtcfd.common.names import DEFAULT_RUNNER, absolute
 from rtcfd.common.refusals import InvalidArgument
 from rtcfd.common.status_codes import abort
 from rtcfd.executor.link import Progress
-from rtcfd.operations import graph, incidents, parameters, snapshots
+from rtcfd.operations import graph, incidents, inputs, parameters, snapshots
 from rtcfd.operations.loop import stop
 from rtcfd.recovery import starting
 from rtcfd.runners.held_runners import Hold
@@ -250,6 +250,12 @@ class Control(control_pb2_grpc.ControlServicer):
         """Set values of a component's state."""
         runner = self._runners.get(request.runner)
         return lambda progress: graph.set_state(runner, request, progress)
+
+    @changing
+    def WritePort(self, request: control_pb2.WritePortRequest) -> Any:
+        """Give an input a value."""
+        runner = self._runners.get(request.runner)
+        return lambda progress: inputs.write(runner, request, progress)
 
     @answering
     async def TakeSnapshot(self, request: control_pb2.TakeSnapshotRequest) -> Any:

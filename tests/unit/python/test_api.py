@@ -27,7 +27,7 @@ UNITS = ("_ns", "_us", "_ms", "_s", "_hz", "_kb")
 # Answers of calls that tell nothing but that it is done.
 STREAMED = {"Add", "Set", "Remove", "Restart", "Start", "Stop", "Step", "Load", "Unload", "Replace",
             "Restore", "Apply", "Release", "Undo", "Reload", "Replay", "Hold", "Lease",
-            "Read", "Watch"}  # fmt: skip
+            "Read", "Watch", "Write"}  # fmt: skip
 
 
 def messages() -> Iterator[Descriptor]:

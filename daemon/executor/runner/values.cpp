@@ -1,0 +1,150 @@
+// What a runner does to change values: parameters, state, inputs that nobody else feeds.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "refusal.hpp"
+#include "runner/runner.hpp"
+#include "state/state_value.hpp"
+
+namespace rtcf::executor {
+
+ChangeOutcome Runner::reset(const std::string& name) {
+    const Component& component = plan_->graph.get(name).instance->component();
+    if (component.states().empty()) {
+        throw Refusal(RefusalKind::NoState,
+                      fmt::format("{} declares no state (rtcf::State) that could be reset", name));
+    }
+    Change change;
+    change.graph = plan_->graph;
+    change.copies = planReset(component);
+    requireSmall(bytesOf(change.copies), "the reset");
+    adopt(std::move(change), [](const std::string&) {});
+    return outcome(name);
+}
+
+// A running loop is not disturbed from outside: what it remembers is its own.
+ChangeOutcome Runner::setStates(const std::string& name,
+                                const std::vector<std::pair<std::string, ParameterValue>>& batch) {
+    noticeEnd();
+    const auto& states = plan_->graph.get(name).instance->component().states();
+    if (loop_.joinable()) {
+        throw Refusal(
+            RefusalKind::FailedPrecondition,
+            fmt::format("the loop of {0} runs: state is set while it does not: rtcfctl -r "
+                        "{0} stop",
+                        name_));
+    }
+    std::vector<std::vector<std::byte>> values;
+    Change change;
+    for (const auto& [state_name, value] : batch) {
+        const auto found =
+            std::find_if(states.begin(), states.end(),
+                         [&](const StateDeclaration& state) { return state.name == state_name; });
+        if (found == states.end()) {
+            throw Refusal(
+                RefusalKind::NotFound,
+                fmt::format("{} declares no state {}: rtcfctl info {} lists what there is", name,
+                            state_name, name));
+        }
+        values.push_back(stateValue(name, *found, value));
+        change.copies.push_back({found->value, values.back().data(), found->size});
+    }
+    change.graph = plan_->graph;
+    adopt(std::move(change), [](const std::string&) {});
+    return outcome(name);
+}
+
+ChangeOutcome Runner::setParameters(
+    const std::string& name, const std::vector<std::pair<std::string, ParameterValue>>& batch) {
+    Instance& instance = *plan_->graph.get(name).instance;
+    const std::vector<ParameterValue> previous = instance.parameterValues();
+    noticeEnd();
+    requireNoReplay();
+    // Values alone: the schedule stays as it is.
+    Adoption adoption;
+    adoption.values = instance.stageParameters(batch);
+    try {
+        adoptAtBoundary(adoption);
+    } catch (...) {
+        instance.restoreParameterValues(previous);
+        throw;
+    }
+    // It stands, whatever goes wrong from here on.
+    instance.releaseStaged();
+    ++plan_->schedule.generation;  // which the cycle does not look at
+    guarded("making a change known", [&] {
+        publish({name});
+        if (bridge_) bridge_->setTable(bridgeTable());
+        noticeEnd();
+    });
+    return outcome(name);
+}
+
+WritableInput Runner::writableInput(const std::string& name, const std::string& port) const {
+    const InputBase& input = plan_->graph.get(name).instance->requireInput(port);
+    const std::string full = fmt::format("{}.{}", name, port);
+    for (const auto& [topic, connection] : plan_->wiring.connections) {
+        const bool found =
+            std::any_of(connection.readers.begin(), connection.readers.end(),
+                        [&input](const Reader& reader) { return reader.input == &input; });
+        if (!found) continue;
+        if (connection.writer) {
+            const Writer& writer = *connection.writer;
+            throw Refusal(RefusalKind::TwoWriters,
+                          fmt::format("{} reads {}.{}: write to an input that no component feeds",
+                                      full, plan_->graph.nodes()[writer.node].instance->fullName(),
+                                      writer.output->name()));
+        }
+        const BridgeSettings& ros = settings_.bridge;
+        if (bridge_ && ros.enabled && ros.peers >= Right::Operate && connection.subscribed) {
+            throw Refusal(RefusalKind::TwoWriters,
+                          fmt::format("{0} reads the ROS topic {1}: publish there (rostopic pub "
+                                      "{1}), or keep the topic out: rtcfctl runner set --blacklist",
+                                      full, topic));
+        }
+        if (*input.type().ros_type == '\0') {
+            throw Refusal(RefusalKind::InvalidArgument,
+                          fmt::format("{} is of type {}, of which there is no text: write to one "
+                                      "of a number, bool, string, Eigen type or ROS message",
+                                      full, input.type().name));
+        }
+        return {topic, &input.type()};
+    }
+    throw Refusal(RefusalKind::PortNotFound, fmt::format("{} has no connection", full));
+}
+
+ChangeOutcome Runner::writeInput(const std::string& name, const std::string& port,
+                                 const std::string& message) {
+    noticeEnd();
+    requireNoReplay();
+    const auto [topic, type] = writableInput(name, port);
+    const auto* const bytes = reinterpret_cast<const std::uint8_t*>(message.data());
+    const auto size = static_cast<std::uint32_t>(message.size());
+    // Before anything changes.
+    if (!type->deserialize(*type->make_slot(nullptr), bytes, size)) {
+        throw Refusal(
+            RefusalKind::InvalidArgument,
+            fmt::format("{}.{} is of type {}: the value has another size", name, port, type->name));
+    }
+    if (plan_->injectors.count(topic) == 0) {
+        written_.insert(topic);
+        Change change;
+        change.graph = plan_->graph;
+        try {
+            adopt(std::move(change), [](const std::string&) {});
+        } catch (...) {
+            written_.erase(topic);
+            throw;
+        }
+    }
+    if (!plan_->injectors.at(topic)->deliver(bytes, size)) {
+        throw Refusal(RefusalKind::InvalidArgument,
+                      fmt::format("{}.{}: a value of {} bytes is too large: rtcfctl runner set "
+                                  "--largest-message",
+                                  name, port, size));
+    }
+    return outcome(name);
+}
+
+}  // namespace rtcf::executor

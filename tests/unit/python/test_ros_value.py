@@ -1,0 +1,104 @@
+"""Values as text become the messages that genpy would make of them, or a line that says why not."""
+
+import io
+from typing import Any
+
+import genpy
+import pytest
+from geometry_msgs.msg import PoseArray, PoseWithCovariance, Twist, TwistStamped, Vector3
+from rtcfd.common.ros_value import encode
+from sensor_msgs.msg import JointState
+from std_msgs.msg import (
+    Bool,
+    ColorRGBA,
+    Duration,
+    Float64,
+    Float64MultiArray,
+    Int8,
+    String,
+    Time,
+    UInt8MultiArray,
+)
+
+
+def read(kind: Any, text: str) -> Any:
+    """Return the message, as genpy reads it."""
+    data = encode(kind._full_text, text)
+    message = kind()
+    message.deserialize(data)
+    stream = io.BytesIO()
+    message.serialize(stream)
+    assert stream.getvalue() == data  # nothing was left over
+    return message
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "expected"),
+    [
+        (Float64, "-1.5", Float64(-1.5)),
+        (Float64, "1e-3", Float64(0.001)),
+        (Float64, "{data: 2}", Float64(2.0)),
+        (Float64, "-.inf", Float64(-float("inf"))),
+        (Float64, "{}", Float64(0.0)),
+        (Bool, "true", Bool(True)),
+        (Bool, "False", Bool(False)),
+        (Int8, "-0x10", Int8(-16)),
+        (String, "'yes: no'", String("yes: no")),
+        (String, "", String("")),
+        (String, "12", String("12")),
+        (String, "größer", String("größer")),
+        (Time, "1.5", Time(genpy.Time(1, 500_000_000))),
+        (Time, "{data: {secs: 7, nsecs: 8}}", Time(genpy.Time(7, 8))),
+        (Duration, "-0.25", Duration(genpy.Duration(-1, 750_000_000))),
+        (Vector3, "[1, 2, 3]", Vector3(1.0, 2.0, 3.0)),
+        (Vector3, "{y: 2}", Vector3(0.0, 2.0, 0.0)),
+        (ColorRGBA, "[1, 0, 0, 0.5]", ColorRGBA(1.0, 0.0, 0.0, 0.5)),
+        (Twist, "[[1, 2, 3], {z: 4}]", Twist(Vector3(1, 2, 3), Vector3(0, 0, 4))),
+        (Float64MultiArray, "[[1, 2], [3, 4]]", Float64MultiArray(data=[1.0, 2.0, 3.0, 4.0])),
+        (UInt8MultiArray, "[1, 255]", UInt8MultiArray(data=b"\x01\xff")),
+        (JointState, "{name: [a, b], position: [1, 2]}",
+         JointState(name=["a", "b"], position=[1.0, 2.0])),
+    ],
+)  # fmt: skip
+def test_a_text_is_a_message(kind: Any, text: str, expected: Any) -> None:
+    assert read(kind, text) == expected
+
+
+def test_messages_in_messages_are_made() -> None:
+    text = "{header: {frame_id: base, stamp: 3.5}, twist: {linear: {x: 1}}}"
+    message = read(TwistStamped, text)
+    assert (message.header.frame_id, message.header.stamp) == ("base", genpy.Time(3, 500_000_000))
+    assert message.twist.linear.x == 1.0
+    covariance = read(PoseWithCovariance, "{covariance: [" + "0.5, " * 35 + "9]}").covariance
+    assert covariance == (0.5,) * 35 + (9.0,)
+    poses = read(PoseArray, "{poses: [{position: {x: 1}}, {}]}").poses
+    assert [each.position.x for each in poses] == [1.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "said"),
+    [
+        (Float64, "much", 'data: "much" is no float64'),
+        (Float64, "", 'data: "" is no float64'),
+        (String, "yes: no", "no field yes (fields: data)"),
+        (Float64, "[1]", "data: a list is no float64"),
+        (Int8, "128", 'data: "128" is no int8'),
+        (Int8, "1.0", 'data: "1.0" is no int8'),
+        (Bool, "maybe", 'data: "maybe" is no bool'),
+        (Time, "-1", 'data: "-1" is no time'),
+        (Vector3, "[1, 2]", "a list is no message: name its fields, as in {x: …, y: …, z: …}"),
+        (Vector3, "{w: 1}", "no field w (fields: x, y, z)"),
+        (Twist, "{linear: {x: [1]}}", "linear.x: a list is no float64"),
+        (PoseWithCovariance, "{covariance: [1]}", "covariance: 1 values, 36 are needed"),
+        (JointState, "{name: a}", 'name: "a" is no list, as in [1, 2]'),
+        (JointState, "{position: [1, x]}", 'position[1]: "x" is no float64'),
+        (Float64, "{a", "no YAML: "),
+        (Float64, "[" * 5000, "no YAML: "),
+        (PoseArray, "{poses: [&a {}, *a]}", "no YAML: an alias (*)"),
+    ],
+)
+def test_what_does_not_fit_is_refused_with_its_place(kind: Any, text: str, said: str) -> None:
+    with pytest.raises(ValueError) as error:
+        encode(kind._full_text, text)
+    assert str(error.value).startswith(said)
+    assert "\n" not in str(error.value)
