@@ -63,6 +63,7 @@ _MODULES = {
     "check": "machine.check",
     "doctor": "machine.doctor",
     "metrics": "machine.metrics",
+    "new": "machine.new",
 }
 _COMPLETION = "__complete"
 # Global options that are followed by a word of theirs.
