@@ -58,6 +58,7 @@ _MODULES = {
     "write": "signals.write",
     "record": "signals.record",
     "convert": "signals.convert",
+    "trace": "signals.trace",
     "scope": "signals.scope",
     "incident": "signals.incident",
     "check": "machine.check",

@@ -1,12 +1,8 @@
 """`rtcfctl record`: values of every cycle into a file."""
 
 import argparse
-import contextlib
-import signal
 import sys
-import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +12,7 @@ from rtcf.recording.moment import Moment
 from rtcf.streams.condition import Condition
 from rtcf.streams.ports import PortBatch, PortStream
 
+from rtcfctl.signals.ending import ended_by_signals
 from rtcfctl.signals.idle_loop import say_if_ended, say_if_idle
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import amount, counted
@@ -84,7 +81,7 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
             moment.condition.check(stream.schema)
         say_if_idle(client, args.runner, output)
         runner = args.runner or "rt_runner"
-        with Files(args.file, runner, force=args.force) as files, _ended_by_signals(stream):
+        with Files(args.file, runner, force=args.force) as files, ended_by_signals(stream):
             _follow(stream, files, moment, args, output)
     _tell(files, moment, output)
 
@@ -135,33 +132,6 @@ def _tell(files: Files, moment: Moment | None, output: Output) -> None:
         f"{lost}{about}",
         "bold red" if files.lost else "",
     )
-
-
-@contextlib.contextmanager
-def _ended_by_signals(stream: PortStream) -> Iterator[None]:
-    """Let signals end the stream, and break off nothing that is being written.
-
-    The second one ends us at once: the disk may be one that takes nothing any more.
-    """
-
-    def end(number: int, _: object) -> None:
-        signal.signal(number, signal.SIG_DFL)
-        # Whatever locks we hold just now.
-        threading.Thread(target=stream.close, daemon=True).start()
-
-    before = {}
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        found = signal.getsignal(number)
-        if found is not signal.SIG_IGN:  # as by nohup
-            before[number] = found
-            signal.signal(number, end)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            # Who has had enough does not wait for the rest either.
-            if signal.getsignal(number) is end:
-                signal.signal(number, handler)
 
 
 def _follow(

@@ -1,0 +1,149 @@
+"""`rtcfctl trace`: what a loop does, cycle by cycle, for Perfetto and chrome://tracing."""
+
+import argparse
+import contextlib
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import rtcf
+from rtcf.recording.trace import Trace
+from rtcf.streams.numbered import Place
+from rtcf.streams.ports import PortStream
+from rtcf_shared.whole_file import whole_file
+
+from rtcfctl.signals.ending import ended_by_signals
+from rtcfctl.signals.idle_loop import say_if_ended, say_if_idle
+from rtcfctl.terminal.output import Output
+from rtcfctl.terminal.words import counted, whole
+
+_EVERY_S = 0.5  # of what is asked for beside the cycles
+_FAULT_S = 10.0  # from the end of the cycles until rtcfd knows of what
+_SETTLE_S = 0.3  # from a cycle until rtcfd has what was logged in it
+
+
+def register(verbs: Any, common: argparse.ArgumentParser) -> None:
+    """Add the verb."""
+    verb = verbs.add_parser(
+        "trace",
+        parents=[common],
+        help="cycles, changes and log records, into a file for Perfetto",
+        # -o is the file here; --output stays.
+        conflict_handler="resolve",
+    )
+    verb.add_argument(
+        "-o", dest="file", metavar="FILE", type=Path, required=True, help="the file, of JSON"
+    )
+    verb.add_argument(
+        "--cycles", type=whole, metavar="N", help="end after so many (default: Ctrl-C)"
+    )
+    verb.add_argument("--force", action="store_true", help="write over a file that is there")
+    verb.set_defaults(run=run)
+
+
+def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Follow the loop until Ctrl-C, or for some cycles."""
+    if args.cycles == 0:
+        raise ValueError("--cycles 0: at least 1")
+    runner = args.runner or "rt_runner"
+    (status,) = client.get_status(runner).runners
+    try:
+        with whole_file(args.file, force=args.force) as part:
+            trace = Trace(part, runner, status.settings.frequency_hz)
+            try:
+                # Refused where there is nothing to see.
+                with client.watch_ports((), runner) as stream, ended_by_signals(stream):
+                    say_if_idle(client, runner, output)
+                    error = _follow(client, stream, trace, args, output)
+                trace.close()
+            except BaseException:
+                trace.abandon()
+                raise
+    except FileExistsError:
+        raise ValueError(f"{args.file} is there already: --force writes over it") from None
+    _tell(trace, args, output)
+    if error is not None:
+        raise error
+
+
+class _Beside:
+    """What is asked for beside the cycles: events, log records, figures."""
+
+    def __init__(self, client: rtcf.Client, runner: str, trace: Trace) -> None:
+        self._client = client
+        self._runner = runner
+        self._trace = trace
+        with client.watch_events([runner]) as events, client.watch_logs(runner) as records:
+            self._events: Place = events.place
+            self._records: Place = records.place
+        trace.add_figures(client.get_statistics(runner))
+
+    def ask(self) -> None:
+        """Add what there is since the last call."""
+        client, runner = self._client, self._runner
+        with client.watch_events([runner], self._events, until_now=True) as events:
+            self._trace.add_events(events)
+        with client.watch_logs(runner, after=self._records, until_now=True) as records:
+            self._trace.add_records(records)
+        self._events, self._records = events.place, records.place
+        self._trace.add_figures(client.get_statistics(runner))
+        (status,) = client.get_status(runner).runners
+        self._trace.set_frequency(status.settings.frequency_hz)
+
+
+def _follow(
+    client: rtcf.Client,
+    stream: PortStream,
+    trace: Trace,
+    args: argparse.Namespace,
+    output: Output,
+) -> rtcf.RtcfError | None:
+    """Follow the loop; return what has ended it, of a trace that has cycles."""
+    beside = _Beside(client, args.runner or "rt_runner", trace)
+    try:
+        _follow_cycles(stream, beside, trace, args, output)
+        time.sleep(_SETTLE_S)
+        beside.ask()
+    except rtcf.RtcfError as error:
+        if not trace.cycles:
+            raise
+        # An executor has died: what it did before is what the trace is for.
+        until = time.monotonic() + _FAULT_S
+        with contextlib.suppress(rtcf.RtcfError):
+            beside.ask()
+            while not trace.faults and time.monotonic() < until:
+                time.sleep(_SETTLE_S)
+                beside.ask()
+        return error
+    return None
+
+
+def _follow_cycles(
+    stream: PortStream, beside: _Beside, trace: Trace, args: argparse.Namespace, output: Output
+) -> None:
+    due = time.monotonic() + _EVERY_S
+    for batch in stream:
+        left = None if args.cycles is None else args.cycles - trace.cycles
+        trace.add_cycles(batch if left is None or len(batch) <= left else batch.part(0, left))
+        if args.cycles is not None and trace.cycles >= args.cycles:
+            return
+        say_if_ended(batch, args.runner, output)
+        if time.monotonic() >= due:
+            beside.ask()
+            due = time.monotonic() + _EVERY_S
+
+
+def _tell(trace: Trace, args: argparse.Namespace, output: Output) -> None:
+    if not output.for_people:
+        output.data(
+            {"file": str(args.file), "cycles": trace.cycles, "late": trace.late,
+             "lost": trace.lost, "events": trace.events, "records": trace.records}
+        )  # fmt: skip
+        return
+    lost = f"{counted(trace.lost, 'cycle')} lost" if trace.lost else "none lost"
+    output.line(
+        f"{args.file}: {counted(trace.cycles, 'cycle')}, {trace.late} late, {lost}, "
+        f"{counted(trace.events, 'event')}, {counted(trace.records, 'log record')}"
+    )
+    print("open it at https://ui.perfetto.dev or chrome://tracing", file=sys.stderr)
