@@ -1,7 +1,7 @@
 #include "ros/ros_node.hpp"
 
 #include "ros/master/master_watch.hpp"
-#include "ros/roscpp/quiet_thread.hpp"
+#include "ros/threads/quiet_thread.hpp"
 
 namespace rtcf::ros1 {
 

@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "access/rights.hpp"
-#include "bridge/hook_gate.hpp"
-#include "bridge/injector.hpp"
-#include "bridge/tap.hpp"
+#include "exchange/injector.hpp"
+#include "exchange/tap.hpp"
+#include "graph/hook_gate.hpp"
 #include "rtcf/parameter.hpp"
 
 namespace rtcf::executor {

@@ -9,8 +9,8 @@
 #include <memory>
 #include <string>
 
-#include "bridge/injector.hpp"
-#include "bridge/tap.hpp"
+#include "exchange/injector.hpp"
+#include "exchange/tap.hpp"
 
 namespace rtcf::executor {
 

@@ -13,11 +13,11 @@
 
 #include "bridge/bridge.hpp"
 #include "check/undeclared_members.hpp"
+#include "common/refusal.hpp"
 #include "faults/crash_handler.hpp"
 #include "faults/flight_recorder.hpp"
 #include "graph/definition.hpp"
 #include "logging/log.hpp"
-#include "refusal.hpp"
 #include "runner/runner.hpp"
 
 namespace rtcf::executor {

@@ -2,8 +2,8 @@
 
 #include <unistd.h>
 
+#include "common/refusal.hpp"
 #include "messages/settings_messages.hpp"
-#include "refusal.hpp"
 #include "rtcf/v1/runner.pb.h"
 #include "view/settings.hpp"
 

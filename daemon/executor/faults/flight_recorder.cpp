@@ -9,7 +9,7 @@
 #include <new>
 #include <system_error>
 
-#include "refusal.hpp"
+#include "common/refusal.hpp"
 
 namespace rtcf::executor {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <set>
 
-#include "refusal.hpp"
+#include "common/refusal.hpp"
 
 namespace rtcf::executor {
 

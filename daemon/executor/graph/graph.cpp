@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "refusal.hpp"
+#include "common/refusal.hpp"
 
 namespace rtcf::executor {
 

@@ -6,7 +6,7 @@
 #include <exception>
 #include <utility>
 
-#include "refusal.hpp"
+#include "common/refusal.hpp"
 
 namespace rtcf::executor {
 

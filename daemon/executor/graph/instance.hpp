@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "bridge/hook_gate.hpp"
 #include "faults/flight_recorder.hpp"
 #include "graph/definition.hpp"
+#include "graph/hook_gate.hpp"
 #include "logging/log.hpp"
 #include "loop/schedule.hpp"
 #include "names/name_pattern.hpp"

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "loop/image_work.hpp"
 #include "rtcf/parameter.hpp"
+#include "state/image_work.hpp"
 
 namespace rtcf::executor {
 

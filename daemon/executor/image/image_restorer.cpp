@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "refusal.hpp"
+#include "common/refusal.hpp"
 
 namespace rtcf::executor {
 

@@ -12,10 +12,10 @@
 #include <mutex>
 #include <string>
 
+#include "common/spsc_ring.hpp"
 #include "logging/levels.hpp"
 #include "logging/log_limit.hpp"
 #include "rtcf/logging.hpp"
-#include "spsc_ring.hpp"
 
 namespace rtcf::executor {
 

@@ -8,14 +8,14 @@
 #include <atomic>
 #include <cstdint>
 
+#include "common/spsc_ring.hpp"
 #include "faults/flight_recorder.hpp"
 #include "frames/cycle_record.hpp"
 #include "frames/frame_ring.hpp"
 #include "loop/boundary.hpp"
-#include "loop/cycle_counter.hpp"
 #include "loop/faults.hpp"
 #include "loop/schedule.hpp"
-#include "spsc_ring.hpp"
+#include "realtime/cycle_counter.hpp"
 #include "statistics/counting.hpp"
 #include "statistics/histogram.hpp"
 

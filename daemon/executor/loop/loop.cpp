@@ -7,10 +7,10 @@
 
 #include <cstring>
 
+#include "common/refusal.hpp"
 #include "faults/crash_handler.hpp"
 #include "logging/log.hpp"
 #include "realtime/floating_point.hpp"
-#include "refusal.hpp"
 
 namespace rtcf::executor {
 

@@ -9,12 +9,12 @@
 #include <optional>
 #include <vector>
 
-#include "bridge/injector.hpp"
-#include "bridge/tap.hpp"
+#include "exchange/injector.hpp"
+#include "exchange/tap.hpp"
 #include "frames/frame_ring.hpp"
 #include "loop/faults.hpp"
-#include "loop/image_work.hpp"
 #include "rtcf/component.hpp"
+#include "state/image_work.hpp"
 #include "state/state_copy.hpp"
 #include "statistics/histogram.hpp"
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "refusal.hpp"
+#include "common/refusal.hpp"
 #include "rtcf/executor/v1/executor.pb.h"
 
 namespace rtcf::executor {

@@ -4,10 +4,10 @@
 
 #include <set>
 
+#include "common/refusal.hpp"
 #include "messages/parameter_value.hpp"
 #include "messages/settings_messages.hpp"
 #include "messages/to_wire.hpp"
-#include "refusal.hpp"
 
 namespace rtcf::executor {
 

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "common/refusal.hpp"
 #include "messages/parameter_value.hpp"
-#include "refusal.hpp"
 #include "rtcf/executor/v1/snapshot.pb.h"
 
 namespace rtcf::executor {

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "refusal.hpp"
+#include "common/refusal.hpp"
 
 namespace rtcf::executor {
 

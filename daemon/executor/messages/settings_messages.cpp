@@ -1,5 +1,5 @@
 #include "messages/settings_messages.hpp"
-#include "refusal.hpp"
+#include "common/refusal.hpp"
 
 #include <fmt/format.h>
 

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
+#include "common/refusal.hpp"
 #include "messages/image_file.hpp"
 #include "messages/parameter_value.hpp"
-#include "refusal.hpp"
 
 namespace rtcf::executor {
 
@@ -197,15 +197,6 @@ v1::LogRecord logTo(const LogEntry& entry) {
     record.set_function(entry.function);
     record.set_realtime(entry.realtime);
     return record;
-}
-
-v1::DirectStop directStopTo(const DirectStopReport& report) {
-    v1::DirectStop message;
-    message.set_count(report.count);
-    message.set_uid(report.user);
-    message.set_pid(report.pid);
-    message.set_at_ns(report.at_ns);
-    return message;
 }
 
 v1::Event eventTo(const RunnerEvent& event) {

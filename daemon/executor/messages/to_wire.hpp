@@ -7,7 +7,6 @@
 #include "logging/log.hpp"
 #include "rtcf/executor/v1/executor.pb.h"
 #include "runner/runner.hpp"
-#include "server/direct_stop.hpp"
 #include "view/snapshot.hpp"
 
 namespace rtcf::executor {
@@ -22,7 +21,6 @@ v1::Snapshot snapshotTo(const ImageOutcome& outcome);
 v1::InputType inputTypeTo(const WritableInput& input);
 v1::LogRecord logTo(const LogEntry& entry);
 v1::ServiceCall callTo(std::uint64_t number, const OutsideCall& call);
-v1::DirectStop directStopTo(const DirectStopReport& report);
 v1::Event eventTo(const RunnerEvent& event);
 ::rtcf::v1::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t position,
                                       RunnerState state);

@@ -4,8 +4,8 @@
 
 #include <cstring>
 
+#include "common/refusal.hpp"
 #include "names/names.hpp"
-#include "refusal.hpp"
 
 namespace rtcf::executor {
 

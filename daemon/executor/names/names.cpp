@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cctype>
 
-#include "refusal.hpp"
+#include "common/refusal.hpp"
 
 namespace rtcf::executor {
 

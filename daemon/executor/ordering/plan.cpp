@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <set>
 
-#include "graph/footprint.hpp"
-#include "refusal.hpp"
+#include "common/refusal.hpp"
+#include "ordering/footprint.hpp"
 
 namespace rtcf::executor {
 
@@ -57,7 +57,10 @@ class Builder {
                                       return previous_.bindings.count(rewire.input) == 0;
                                   }) -
             adoption_.rewires.begin());
-        plan_.schedule.footprint = footprint(plan_);
+        plan_.schedule.footprint = footprint(plan_.schedule, [this](const InputBase* input) {
+            const auto binding = plan_.bindings.find(input);
+            return binding == plan_.bindings.end() ? nullptr : binding->second.source;
+        });
         adoption_.schedule = &plan_.schedule;
     }
 

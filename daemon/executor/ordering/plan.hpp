@@ -11,8 +11,8 @@
 
 #include "bridge/bridge.hpp"
 #include "graph/graph.hpp"
-#include "graph/wiring.hpp"
 #include "loop/schedule.hpp"
+#include "ordering/wiring.hpp"
 
 namespace rtcf::executor {
 

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "refusal.hpp"
+#include "common/refusal.hpp"
 
 namespace rtcf::executor {
 

@@ -12,11 +12,11 @@
 #include <cstring>
 #include <filesystem>
 
+#include "common/refusal.hpp"
 #include "plugins/elf_file.hpp"
 #include "plugins/linked_files.hpp"
 #include "plugins/trusted_file.hpp"
 #include "realtime/floating_point.hpp"
-#include "refusal.hpp"
 
 namespace rtcf::executor {
 

@@ -8,9 +8,9 @@
 #include <filesystem>
 #include <vector>
 
+#include "common/refusal.hpp"
 #include "plugins/elf_file.hpp"
 #include "plugins/trusted_file.hpp"
-#include "refusal.hpp"
 
 namespace rtcf::executor {
 

@@ -13,7 +13,7 @@
 #include <system_error>
 #include <utility>
 
-#include "refusal.hpp"
+#include "common/refusal.hpp"
 
 namespace rtcf::executor {
 

@@ -5,10 +5,10 @@
 
 #include <algorithm>
 
+#include "common/refusal.hpp"
 #include "image/image_restorer.hpp"
 #include "image/image_taker.hpp"
-#include "loop/cycle_counter.hpp"
-#include "refusal.hpp"
+#include "realtime/cycle_counter.hpp"
 #include "runner/runner.hpp"
 
 namespace rtcf::executor {

@@ -1,7 +1,7 @@
 // What a runner tells of that nobody asked for: faults, overruns, messages that are lost.
 #include <fmt/format.h>
 
-#include "refusal.hpp"
+#include "common/refusal.hpp"
 #include "runner/runner.hpp"
 
 namespace rtcf::executor {

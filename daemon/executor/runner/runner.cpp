@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "common/refusal.hpp"
 #include "faults/crash_handler.hpp"
-#include "refusal.hpp"
 
 namespace rtcf::executor {
 

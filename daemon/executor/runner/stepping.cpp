@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "refusal.hpp"
+#include "common/refusal.hpp"
 #include "runner/runner.hpp"
 
 namespace rtcf::executor {

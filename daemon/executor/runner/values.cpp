@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "refusal.hpp"
+#include "common/refusal.hpp"
 #include "runner/runner.hpp"
 #include "state/state_value.hpp"
 

@@ -5,9 +5,9 @@
 #include <utility>
 #include <vector>
 
+#include "common/refusal.hpp"
 #include "messages/from_wire.hpp"
 #include "messages/image_file.hpp"
-#include "refusal.hpp"
 
 namespace rtcf::executor {
 

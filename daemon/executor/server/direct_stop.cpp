@@ -15,7 +15,7 @@
 #include <cstring>
 #include <system_error>
 
-#include "loop/cycle_counter.hpp"
+#include "realtime/cycle_counter.hpp"
 
 namespace rtcf::executor {
 
@@ -51,6 +51,15 @@ std::vector<gid_t> groupsOf(int fd, gid_t primary) {
 }
 
 }  // namespace
+
+v1::DirectStop directStopTo(const DirectStopReport& report) {
+    v1::DirectStop message;
+    message.set_count(report.count);
+    message.set_uid(report.user);
+    message.set_pid(report.pid);
+    message.set_at_ns(report.at_ns);
+    return message;
+}
 
 DirectStop::DirectStop(std::string path, std::string mark, const Access& access)
     : mark_(std::move(mark)), access_(access) {

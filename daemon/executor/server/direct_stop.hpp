@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "access/rights.hpp"
+#include "rtcf/executor/v1/executor.pb.h"
 #include "server/listen.hpp"
 
 namespace rtcf::executor {
@@ -28,6 +29,9 @@ struct DirectStopReport {
     pid_t pid = 0;
     std::int64_t at_ns = 0;  ///< CLOCK_MONOTONIC
 };
+
+/// As rtcfd is told.
+v1::DirectStop directStopTo(const DirectStopReport& report);
 
 /// What is stopped. Both are called by the socket's thread.
 struct Stoppable {

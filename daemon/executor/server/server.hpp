@@ -21,7 +21,7 @@
 #include "server/figures.hpp"
 #include "server/listen.hpp"
 #include "server/outside_calls.hpp"
-#include "server/port_streams.hpp"
+#include "streams/port_streams.hpp"
 
 namespace rtcf::executor {
 

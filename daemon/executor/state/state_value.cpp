@@ -9,7 +9,7 @@
 #include <optional>
 #include <type_traits>
 
-#include "refusal.hpp"
+#include "common/refusal.hpp"
 
 namespace rtcf::executor {
 

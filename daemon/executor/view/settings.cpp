@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/refusal.hpp"
 #include "names/name_pattern.hpp"
 #include "names/names.hpp"
 #include "realtime/cpu_claim.hpp"
-#include "refusal.hpp"
 
 namespace rtcf::executor {
 

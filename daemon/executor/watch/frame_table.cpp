@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "black_box/frame_layout.hpp"
-#include "refusal.hpp"
+#include "common/refusal.hpp"
+#include "watch/frame_layout.hpp"
 
 namespace rtcf::executor {
 
@@ -104,7 +104,7 @@ std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const FrameDe
     table->ring = std::make_shared<FrameRing>(std::move(sources), frames, demand.memory);
     if (const auto& block = table->ring->block(); block != nullptr) {
         demand.memory->announce(block, table->ring->capacity(), table->ring->wordsOfFrame(),
-                                frameLayout(*table));
+                                frameLayout(*table->ring, table->columns, table->notes));
     }
     return table;
 }

@@ -12,23 +12,10 @@
 
 #include "frames/frame_ring.hpp"
 #include "ordering/plan.hpp"
+#include "watch/frame_column.hpp"
 #include "watch/port_selection.hpp"
 
 namespace rtcf::executor {
-
-/// One output or state of a frame.
-struct FrameColumn {
-    std::string component;  ///< full name
-    std::string name;
-    std::string type;
-    std::string unit;
-    std::string mapped;                ///< of an output: the name of its connection
-    const TypeInfo* output = nullptr;  ///< null: a state
-    std::size_t size = 0;              ///< bytes in the frame
-    std::shared_ptr<const Library> library;
-
-    std::string fullName() const { return component + "." + name; }
-};
 
 /// Selections by the number of the watch that made them.
 using Watches = std::map<std::uint64_t, PortSelection>;

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "common/refusal.hpp"
 #include "names/names.hpp"
-#include "refusal.hpp"
 
 namespace rtcf::executor {
 

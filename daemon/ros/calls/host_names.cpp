@@ -9,7 +9,7 @@
 #include <map>
 #include <mutex>
 
-#include "ros/roscpp/quiet_thread.hpp"
+#include "ros/threads/quiet_thread.hpp"
 
 namespace rtcf::ros1 {
 

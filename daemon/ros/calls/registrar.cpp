@@ -4,7 +4,7 @@
 #include <chrono>
 #include <memory>
 
-#include "ros/roscpp/quiet_thread.hpp"
+#include "ros/threads/quiet_thread.hpp"
 
 namespace rtcf::ros1 {
 

@@ -6,7 +6,7 @@
 #include <chrono>
 
 #include "ros/reconfigure/reconfigure_server.hpp"
-#include "ros/roscpp/quiet_thread.hpp"
+#include "ros/threads/quiet_thread.hpp"
 
 namespace rtcf::ros1 {
 

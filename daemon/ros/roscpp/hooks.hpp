@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "bridge/hook_gate.hpp"
+#include "graph/hook_gate.hpp"
 
 namespace rtcf::ros1 {
 

@@ -15,7 +15,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "ros/roscpp/quiet_thread.hpp"
+#include "ros/threads/quiet_thread.hpp"
 #include "ros/transport/reconnection.hpp"
 
 // Exported by roscpp, and called by itself, but in none of its headers.

@@ -9,7 +9,7 @@
 
 #include "names/names.hpp"
 #include "ros/roscpp/handles.hpp"
-#include "ros/roscpp/quiet_thread.hpp"
+#include "ros/threads/quiet_thread.hpp"
 #include "view/runner_view.hpp"
 
 namespace rtcf::ros1 {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "ros/roscpp/handles.hpp"
-#include "ros/roscpp/quiet_thread.hpp"
+#include "ros/threads/quiet_thread.hpp"
 #include "runner/runner.hpp"
 #include "view/runner_view.hpp"
 

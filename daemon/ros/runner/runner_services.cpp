@@ -10,8 +10,8 @@
 #include <std_srvs/Trigger.h>
 
 #include "names/names.hpp"
-#include "ros/roscpp/quiet_thread.hpp"
 #include "ros/runner/runner_report.hpp"
+#include "ros/threads/quiet_thread.hpp"
 #include "view/runner_view.hpp"
 
 namespace rtcf::ros1 {

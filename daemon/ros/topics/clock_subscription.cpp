@@ -3,7 +3,7 @@
 #include <ros/node_handle.h>
 #include <rosgraph_msgs/Clock.h>
 
-#include "loop/cycle_counter.hpp"
+#include "realtime/cycle_counter.hpp"
 
 namespace rtcf::ros1 {
 

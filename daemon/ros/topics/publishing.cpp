@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "names/name_pattern.hpp"
-#include "ros/roscpp/quiet_thread.hpp"
+#include "ros/threads/quiet_thread.hpp"
 #include "ros/transport/idle_subscribers.hpp"
 
 namespace rtcf::ros1 {

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "bridge/bridge.hpp"
-#include "bridge/tap.hpp"
+#include "exchange/tap.hpp"
 #include "ros/roscpp/reconciled.hpp"
 #include "ros/topics/topic_publisher.hpp"
 

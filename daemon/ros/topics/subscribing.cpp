@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <set>
 
-#include "ros/roscpp/quiet_thread.hpp"
+#include "ros/threads/quiet_thread.hpp"
 #include "ros/topics/topic_subscriber.hpp"
 
 namespace rtcf::ros1 {

@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "bridge/injector.hpp"
+#include "exchange/injector.hpp"
 #include "ros/roscpp/reconciled.hpp"
 #include "ros/topics/clock_subscription.hpp"
 

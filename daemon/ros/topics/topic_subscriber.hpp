@@ -9,7 +9,7 @@
 #include <mutex>
 #include <string>
 
-#include "bridge/injector.hpp"
+#include "exchange/injector.hpp"
 #include "ros/roscpp/handles.hpp"
 
 namespace ros {

@@ -14,7 +14,7 @@
 #include <memory>
 #include <string>
 
-#include "bridge/injector.hpp"
+#include "exchange/injector.hpp"
 
 namespace rtcf::ros1 {
 

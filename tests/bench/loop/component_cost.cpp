@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "bench_graph.hpp"
-#include "loop/cycle_counter.hpp"
+#include "realtime/cycle_counter.hpp"
 
 namespace {
 

@@ -1,4 +1,4 @@
-"""Imports among the rooms of the Python code run down, and `make lint` says where they do not."""
+"""Imports and includes among rooms run down, and `make lint` says where they do not."""
 
 import subprocess
 from pathlib import Path
@@ -70,3 +70,52 @@ def test_a_circle_within_a_room_is_refused(house: Path) -> None:
 def test_a_module_without_a_room_is_refused(house: Path) -> None:
     (house / "rooms").write_text("house.attic\nhouse.cellar\n")
     assert "is in none of the rooms" in check(house / "rooms", house).stderr
+
+
+@pytest.fixture
+def hall(tmp_path: Path) -> Path:
+    """A house of C++ with two rooms, as it should be."""
+    (tmp_path / "rooms").write_text("hall.main\nhall.gallery\nhall.vault\n")
+    for room in ("gallery", "vault"):
+        (tmp_path / "src" / "hall" / room).mkdir(parents=True)
+    (tmp_path / "src" / "hall" / "CMakeLists.txt").touch()
+    for file, text in (
+        ("main.cpp", '#include "gallery/view.hpp"\n'),
+        ("gallery/view.hpp", '#include <vector>\n#include "vault/coin.hpp"\n'),
+        ("gallery/view.cpp", '#include "gallery/view.hpp"\n'),
+        ("vault/coin.hpp", '#include "another/library.hpp"\n'),
+    ):
+        (tmp_path / "src" / "hall" / file).write_text(text)
+    return tmp_path
+
+
+def test_includes_that_run_down_are_in_order(hall: Path) -> None:
+    found = check(hall / "rooms", hall)
+    assert (found.returncode, found.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("file", ["coin.hpp", "coin.cpp"])
+@pytest.mark.parametrize(
+    "text", ['#include "gallery/view.hpp"', '# include "hall/gallery/view.hpp"']
+)
+def test_an_include_that_runs_up_is_refused(hall: Path, file: str, text: str) -> None:
+    (hall / "src" / "hall" / "vault" / file).write_text(f"#pragma once\n{text}\n")
+    found = check(hall / "rooms", hall)
+    assert found.returncode == 1
+    assert f"vault/{file}:2: hall.vault must not import hall.gallery" in found.stderr
+
+
+def test_includes_in_a_circle_are_refused_in_a_room_too(hall: Path) -> None:
+    vault = hall / "src" / "hall" / "vault"
+    (vault / "coin.hpp").write_text('#include "vault/bar.hpp"\n')
+    (vault / "bar.hpp").touch()
+    (vault / "bar.cpp").write_text('#include "vault/bar.hpp"\n#include "vault/coin.hpp"\n')
+    found = check(hall / "rooms", hall)
+    assert found.returncode == 1
+    assert "in a circle" in found.stderr
+
+
+def test_a_folder_without_a_room_is_refused(hall: Path) -> None:
+    (hall / "src" / "hall" / "attic").mkdir()
+    (hall / "src" / "hall" / "attic" / "box.hpp").touch()
+    assert "attic/box.hpp: is in none of the rooms" in check(hall / "rooms", hall).stderr

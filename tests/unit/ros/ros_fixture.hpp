@@ -15,9 +15,9 @@
 #include <string>
 #include <vector>
 
-#include "bridge/injector.hpp"
-#include "bridge/tap.hpp"
 #include "child_process.hpp"
+#include "exchange/injector.hpp"
+#include "exchange/tap.hpp"
 #include "ros/logging/rosout.hpp"
 #include "ros/ros_node.hpp"
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "bridge/injector.hpp"
+#include "exchange/injector.hpp"
 #include "loop/simulated_clock.hpp"
 #include "rtcf/component.hpp"
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <deque>
 
-#include "loop/cycle_counter.hpp"
+#include "realtime/cycle_counter.hpp"
 
 namespace rtcf::test {
 namespace {

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <memory>
 
-#include "refusal.hpp"
+#include "common/refusal.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace rtcf::test {

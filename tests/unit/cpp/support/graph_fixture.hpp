@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "common/refusal.hpp"
 #include "faults/flight_recorder.hpp"
 #include "graph/graph.hpp"
-#include "graph/wiring.hpp"
 #include "logging/log.hpp"
+#include "ordering/wiring.hpp"
 #include "plugins/library.hpp"
-#include "refusal.hpp"
 
 namespace rtcf::test {
 

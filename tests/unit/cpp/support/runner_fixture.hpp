@@ -16,10 +16,10 @@
 #include <utility>
 #include <vector>
 
+#include "common/refusal.hpp"
 #include "components/journal.hpp"
 #include "faults/flight_recorder.hpp"
 #include "logging/log.hpp"
-#include "refusal.hpp"
 #include "runner/runner.hpp"
 #include "support/bridge_keeper.hpp"
 #include "support/eventually.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "refusal.hpp"
+#include "common/refusal.hpp"
 
 namespace rtcf::test {
 namespace {

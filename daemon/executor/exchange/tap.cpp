@@ -1,0 +1,71 @@
+#include "exchange/tap.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace rtcf::executor {
+
+Tap::Tap(std::string topic, const TypeInfo& type, std::shared_ptr<const SlotHeader> source,
+         std::size_t capacity, std::size_t largest)
+    : topic_(std::move(topic)),
+      type_(type),
+      source_(std::move(source)),
+      passed_over_(UINT32_MAX - 1),  // the first value is taken
+      largest_(type.fixed_size ? SIZE_MAX : largest) {
+    ring_.resize(ringBytes(type, capacity));
+    mask_ = ring_.size() - 1;
+}
+
+std::size_t Tap::ringBytes(const TypeInfo& type, std::size_t capacity) {
+    // Of a value of its own: the loop may be writing the source's.
+    const std::size_t one = kHead + padded(type.length(*type.make_slot(nullptr)));
+    // A power of two, so that a place in the ring is found without a division.
+    std::size_t size = kHead;
+    while (size < std::max(capacity, 2 * one)) size *= 2;
+    return size;
+}
+
+std::uint32_t Tap::lengthAt(std::size_t offset) const noexcept {
+    std::uint32_t length = 0;
+    std::memcpy(&length, ring_.data() + offset, sizeof length);
+    return length;
+}
+
+std::int64_t Tap::stampAt(std::size_t offset) const noexcept {
+    std::int64_t stamp_ns = 0;
+    std::memcpy(&stamp_ns, ring_.data() + offset + kAlign, sizeof stamp_ns);
+    return stamp_ns;
+}
+
+void Tap::push(std::int64_t stamp_ns) noexcept RTCF_NONBLOCKING {
+    if (source_->sequence == last_sequence_) return;
+    last_sequence_ = source_->sequence;
+    if (++passed_over_ < decimation_.load(std::memory_order_relaxed)) return;
+    passed_over_ = 0;
+    const std::uint32_t length = type_.length(*source_);
+    if (length > largest_) {
+        too_large_.store(too_large_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+        return;
+    }
+    const std::size_t record = kHead + padded(length);
+    std::size_t head = head_.load(std::memory_order_relaxed);
+    const std::size_t free = mask_ + 1 - (head - tail_.load(std::memory_order_acquire));
+    std::size_t offset = head & mask_;
+    const std::size_t to_end = mask_ + 1 - offset;
+    const std::size_t skipped = record > to_end ? to_end : 0;
+    if (record + skipped > free) {
+        dropped_.store(dropped_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+        return;
+    }
+    if (skipped != 0) {
+        std::memcpy(ring_.data() + offset, &kSkip, sizeof kSkip);
+        head += skipped;
+        offset = 0;
+    }
+    std::memcpy(ring_.data() + offset, &length, sizeof length);
+    std::memcpy(ring_.data() + offset + kAlign, &stamp_ns, sizeof stamp_ns);
+    type_.serialize(*source_, ring_.data() + offset + kHead, length);
+    head_.store(head + record, std::memory_order_release);
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,244 @@
+#include "ordering/wiring.hpp"
+
+#include <fmt/format.h>
+
+#include "common/refusal.hpp"
+#include "ordering/order.hpp"
+#include "ordering/rates.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+std::string portName(const Graph& graph, std::size_t node, const std::string& port) {
+    return graph.nodes()[node].instance->fullName() + "." + port;
+}
+
+// A component as rtcfctl takes it: without the root namespace's slash.
+std::string shortName(const std::string& full_name) {
+    return full_name.rfind('/') == 0 ? full_name.substr(1) : full_name;
+}
+
+// Types, for a message: the md5 is told only where the name does not tell them apart.
+std::string describe(const TypeInfo& type, const TypeInfo& other) {
+    if (std::string_view(type.name) != other.name) return type.name;
+    return fmt::format("{} (md5 {}, {} bytes)", type.name, type.md5, type.size);
+}
+
+[[noreturn]] void refuseTypes(const std::string& name, const std::string& present,
+                              const TypeInfo& present_type, const std::string& added,
+                              const TypeInfo& added_type) {
+    throw Refusal(
+        RefusalKind::TypesDiffer,
+        fmt::format("types differ on {}: {} is {}, {} is {}; remap one of them to another name",
+                    name, present, describe(present_type, added_type), added,
+                    describe(added_type, present_type)));
+}
+
+class Collector {
+   public:
+    Collector(const Graph& graph, std::map<std::string, ConnectionPlan>& connections)
+        : graph_(graph), connections_(connections) {}
+
+    void addNode(std::size_t index) {
+        const GraphNode& node = graph_.nodes()[index];
+        const Instance& instance = *node.instance;
+        const auto& outputs = instance.component().outputs();
+        for (std::size_t i = 0; i < outputs.size(); ++i)
+            addOutput(index, i, outputs[i], instance.outputNames()[i]);
+        const auto& inputs = instance.component().inputs();
+        for (std::size_t i = 0; i < inputs.size(); ++i)
+            addInput(index, node, inputs[i], instance.inputNames()[i]);
+    }
+
+   private:
+    ConnectionPlan& planFor(const std::string& name, std::size_t index, const std::string& port,
+                            const TypeInfo& type) {
+        ConnectionPlan& plan = connections_[name];
+        if (plan.type == nullptr) {
+            plan.type = &type;
+        } else if (!sameType(*plan.type, type)) {
+            const std::string present =
+                plan.writer ? portName(graph_, plan.writer->node, plan.writer->output->name())
+                            : portName(graph_, plan.readers[0].node, plan.readers[0].input->name());
+            refuseTypes(name, present, *plan.type, portName(graph_, index, port), type);
+        }
+        return plan;
+    }
+
+    void addOutput(std::size_t index, std::size_t port, OutputBase* output,
+                   const std::string& name) {
+        ConnectionPlan& plan = planFor(name, index, output->name(), output->type());
+        if (plan.writer) {
+            plan.others.push_back({index, port, output});
+        } else {
+            plan.writer = Writer{index, port, output};
+        }
+    }
+
+    void addInput(std::size_t index, const GraphNode& node, InputBase* input,
+                  const std::string& name) {
+        const Instance& instance = *node.instance;
+        ConnectionPlan& plan = planFor(name, index, input->name(), input->type());
+        const bool broken = instance.definition().first || node.breaks.count(input->name()) != 0 ||
+                            instance.ignore().matches(name);
+        plan.readers.push_back({index, input, broken});
+    }
+
+    const Graph& graph_;
+    std::map<std::string, ConnectionPlan>& connections_;
+};
+
+std::string breakCommand(const Graph& graph, const std::vector<Edge>& cut,
+                         const std::string& loading) {
+    std::string command;
+    std::string options;
+    for (const Edge& edge : cut) {
+        const std::string& component = graph.nodes()[edge.to].instance->fullName();
+        if (component == loading) {
+            options += " --break " + edge.to_port;
+        } else {
+            command += fmt::format(" {}.{}", shortName(component), edge.to_port);
+        }
+    }
+    std::string advice;
+    if (!command.empty()) advice = fmt::format("`rtcfctl break{}`", command);
+    if (!options.empty()) {
+        advice += fmt::format("{}loading {} with `{}`", advice.empty() ? "" : " and ",
+                              shortName(loading), options.substr(1));
+    }
+    return advice;
+}
+
+[[noreturn]] void refuseLoop(const Graph& graph, const OrderResult& result,
+                             const std::string& loading) {
+    // Of a loop that nobody could read, both ends.
+    constexpr std::size_t kListedAtEachEnd = 10;
+    constexpr std::size_t kListedCuts = 5;
+    const std::size_t length = result.loop.size();
+    std::string loop;
+    for (std::size_t i = 0; i < length; ++i) {
+        if (length > 2 * kListedAtEachEnd && i == kListedAtEachEnd) {
+            i = length - kListedAtEachEnd;
+            loop += fmt::format(" → … {} more connections …", length - 2 * kListedAtEachEnd);
+        }
+        const Edge& edge = result.loop[i];
+        loop += fmt::format("{}{} → {}", loop.empty() ? "" : " → ",
+                            portName(graph, edge.from, edge.from_port),
+                            portName(graph, edge.to, edge.to_port));
+    }
+    std::string advice;
+    for (std::size_t i = 0; i < result.cuts.size() && i < kListedCuts; ++i) {
+        advice += (advice.empty() ? "" : ", or ") + breakCommand(graph, result.cuts[i], loading);
+    }
+    if (result.cuts.size() > kListedCuts) advice += ", or elsewhere in the loop";
+    throw Refusal(
+        RefusalKind::ConnectionsFormLoop,
+        fmt::format("the connections form a loop: {}; let one input read the previous cycle: {}",
+                    loop, advice));
+}
+
+OrderProblem orderProblem(const Graph& graph, const Wiring& wiring) {
+    OrderProblem problem;
+    for (const GraphNode& node : graph.nodes()) {
+        problem.names.push_back(node.instance->fullName());
+        problem.first.push_back(node.instance->definition().first);
+    }
+    for (const auto& [name, plan] : wiring.connections) {
+        if (!plan.writer) continue;
+        for (const Reader& reader : plan.readers) {
+            if (!reader.broken) {
+                problem.edges.push_back({plan.writer->node, reader.node,
+                                         plan.writer->output->name(), reader.input->name()});
+            }
+        }
+    }
+    return problem;
+}
+
+// Of whom would an input read? Where there is none, several may write, as several nodes may
+// publish.
+void requireOneWriter(const Graph& graph, const std::string& name, const ConnectionPlan& plan) {
+    if (!plan.writer || plan.others.empty() || plan.readers.empty()) return;
+    const Writer& other = plan.others.front();
+    const std::string& port = other.output->name();
+    throw Refusal(
+        RefusalKind::TwoWriters,
+        fmt::format("{} has two writers and a reader: {} and {} write what {} reads; remap one of "
+                    "them, e.g. --remap {}:=~{}",
+                    name, portName(graph, plan.writer->node, plan.writer->output->name()),
+                    portName(graph, other.node, port),
+                    portName(graph, plan.readers[0].node, plan.readers[0].input->name()), port,
+                    port));
+}
+
+// A type of a component's own that is given no message stays inside the runner.
+bool onRos(const TypeInfo& type) { return *type.ros_type != '\0'; }
+
+// Two devices cannot both say when a cycle begins.
+void requireOneSource(const Graph& graph) {
+    const Instance* present = nullptr;
+    for (const GraphNode& node : graph.nodes()) {
+        if (node.instance->source() == nullptr) continue;
+        if (present != nullptr) {
+            throw Refusal(
+                RefusalKind::TwoPacers,
+                fmt::format("{} and {} both pace the loop: put one of them into another runner",
+                            present->fullName(), node.instance->fullName()));
+        }
+        present = node.instance.get();
+    }
+}
+
+}  // namespace
+
+Wiring wire(const Graph& graph, const MappingFilter& filter, const std::string& loading) {
+    Wiring wiring;
+    requireOneSource(graph);
+    assignPhases(graph, loading);
+    Collector collector(graph, wiring.connections);
+    for (std::size_t index = 0; index < graph.nodes().size(); ++index) collector.addNode(index);
+    for (auto& [name, plan] : wiring.connections) {
+        const bool mapped = onRos(*plan.type) && filter.matches(name);
+        plan.published = mapped && plan.writer.has_value();
+        // An input that a component feeds takes nothing from ROS: no side channel past the loop.
+        plan.subscribed = mapped && !plan.writer.has_value();
+    }
+    for (const auto& [name, plan] : wiring.connections) requireOneWriter(graph, name, plan);
+    OrderResult result = findOrder(orderProblem(graph, wiring));
+    if (!result.orderable()) refuseLoop(graph, result, loading);
+    wiring.order = std::move(result.order);
+    return wiring;
+}
+
+std::vector<std::string> remarks(const Graph& graph, const Wiring& wiring,
+                                 const MappingFilter& filter,
+                                 const std::set<std::string>& components) {
+    std::vector<bool> ours;
+    for (const GraphNode& node : graph.nodes())
+        ours.push_back(components.count(node.instance->fullName()) != 0);
+    const auto is_ours = [&](const auto& port) { return ours[port.node]; };
+    std::vector<std::string> lines;
+    for (const auto& [name, plan] : wiring.connections) {
+        std::vector<Writer> writers = plan.others;
+        if (plan.writer) writers.insert(writers.begin(), *plan.writer);
+        const bool written = std::any_of(writers.begin(), writers.end(), is_ours);
+        const bool read = std::any_of(plan.readers.begin(), plan.readers.end(), is_ours);
+        if (written && plan.published && writers.size() > 1) {
+            std::string names;
+            for (const Writer& writer : writers) {
+                names += (names.empty() ? "" : ", ") +
+                         portName(graph, writer.node, writer.output->name());
+            }
+            lines.push_back(fmt::format("topic {} has {} writers in this runner: {}", name,
+                                        writers.size(), names));
+        }
+        if ((written || read) && !onRos(*plan.type) && filter.matches(name)) {
+            lines.push_back(fmt::format("{} is not on ROS: there is no ROS message for its type {}",
+                                        name, plan.type->name));
+        }
+    }
+    return lines;
+}
+
+}  // namespace rtcf::executor

@@ -1,0 +1,55 @@
+#include "state/image_work.hpp"
+
+#include <cstring>
+
+namespace rtcf::executor {
+
+namespace {
+
+constexpr std::size_t kLine = 64;
+
+std::size_t lines(std::size_t bytes) { return (bytes + kLine - 1) / kLine * kLine; }
+
+}  // namespace
+
+bool Capture::Value::take() noexcept {
+    header = *from;
+    length = type->fixed_size ? static_cast<std::uint32_t>(type->size) : type->length(*from);
+    if (length > bytes.size()) return false;
+    if (type->fixed_size) {
+        std::memcpy(bytes.data(), valueOf(*type, *from), length);
+    } else {
+        type->serialize(*from, bytes.data(), length);
+    }
+    return true;
+}
+
+void Restoration::Value::put() const noexcept {
+    if (type->fixed_size) {
+        type->copy(*to, *from);
+        return;
+    }
+    type->exchange(*to, *from);
+    *to = *from;
+}
+
+std::size_t Capture::bytes() const {
+    std::size_t bytes = (inputs.size() + turns.size()) * kLine;
+    for (const StateCopy& state : states) bytes += lines(state.size);
+    for (const Value& value : values) bytes += lines(sizeof(SlotHeader) + value.bytes.size());
+    for (const Topic& topic : topics) bytes += lines(sizeof(SlotHeader) + topic.value.bytes.size());
+    return bytes;
+}
+
+std::size_t Restoration::bytes() const {
+    std::size_t bytes = (inputs.size() + turns.size() + topics.size()) * kLine;
+    for (const StateCopy& state : states) bytes += lines(state.size);
+    for (const Value& value : values) {
+        const bool fixed = value.type->fixed_size;
+        bytes += lines(sizeof(SlotHeader) +
+                       (fixed ? value.type->size : value.type->length(*value.from)));
+    }
+    return bytes;
+}
+
+}  // namespace rtcf::executor

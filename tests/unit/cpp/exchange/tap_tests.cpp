@@ -1,0 +1,212 @@
+#include "exchange/tap.hpp"
+
+#include <gtest/gtest.h>
+#include <std_msgs/String.h>
+
+#include <atomic>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "rtcf/component.hpp"
+
+namespace rtcf::test {
+namespace {
+
+using executor::Tap;
+
+template <typename T>
+void write(const std::shared_ptr<Slot<T>>& slot, const T& value) {
+    slot->value = value;
+    ++slot->sequence;
+}
+
+std::vector<double> takeAll(Tap& tap) {
+    std::vector<double> values;
+    while (tap.pop([&](const std::uint8_t* bytes, std::uint32_t size, std::int64_t) {
+        ASSERT_EQ(size, sizeof(double));
+        double value = 0.0;
+        std::memcpy(&value, bytes, size);
+        values.push_back(value);
+    })) {
+    }
+    return values;
+}
+
+TEST(Tap, PassesEachWrittenValueOnce) {
+    const auto slot = std::make_shared<Slot<double>>();
+    Tap tap("/x", typeInfo<double>(), slot, 1024);
+    tap.push(0);
+    EXPECT_TRUE(takeAll(tap).empty()) << "nothing was written yet";
+    write(slot, 1.0);
+    tap.push(0);
+    tap.push(0);
+    write(slot, 2.0);
+    tap.push(0);
+    EXPECT_EQ(takeAll(tap), (std::vector<double>{1.0, 2.0}));
+    EXPECT_FALSE(tap.pop([](const std::uint8_t*, std::uint32_t, std::int64_t) {}));
+}
+
+TEST(Tap, TellsTheStampOfTheCycleThatWroteAValue) {
+    const auto slot = std::make_shared<Slot<double>>();
+    Tap tap("/x", typeInfo<double>(), slot, 64);
+    for (std::int64_t stamp = 1'700'000'000'000'000'000; stamp < 1'700'000'000'000'000'020;
+         ++stamp) {
+        write(slot, 1.0);
+        tap.push(stamp);
+        std::int64_t told = 0;
+        ASSERT_TRUE(tap.pop(
+            [&](const std::uint8_t*, std::uint32_t, std::int64_t stamp_ns) { told = stamp_ns; }));
+        ASSERT_EQ(told, stamp);
+    }
+}
+
+// A topic that is closed and opened again: the old reader has not gone yet.
+TEST(Tap, OfTwoReadersAtOnceOneFindsNothing) {
+    const auto slot = std::make_shared<Slot<double>>();
+    Tap tap("/x", typeInfo<double>(), slot, 1024);
+    for (const double value : {1.0, 2.0}) {
+        write(slot, value);
+        tap.push(0);
+    }
+    EXPECT_TRUE(tap.pop([&](const std::uint8_t*, std::uint32_t, std::int64_t) {
+        std::thread other([&] {
+            EXPECT_FALSE(tap.pop([](const std::uint8_t*, std::uint32_t, std::int64_t) {}));
+        });
+        other.join();
+    }));
+    EXPECT_EQ(takeAll(tap), std::vector<double>{2.0});
+}
+
+TEST(Tap, TakesTheFirstValueAndThenEachNth) {
+    const auto slot = std::make_shared<Slot<double>>();
+    Tap tap("/x", typeInfo<double>(), slot, 1024);
+    tap.setDecimation(3);
+    for (int i = 1; i <= 8; ++i) {
+        write(slot, static_cast<double>(i));
+        tap.push(0);
+    }
+    EXPECT_EQ(takeAll(tap), (std::vector<double>{1.0, 4.0, 7.0}));
+    tap.setDecimation(1);
+    write(slot, 9.0);
+    tap.push(0);
+    EXPECT_EQ(takeAll(tap), (std::vector<double>{9.0}));
+    EXPECT_EQ(tap.dropped(), 0U);
+}
+
+TEST(Tap, CountsWhatIsLargerThanAllowed) {
+    const auto slot = std::make_shared<Slot<std_msgs::String>>();
+    Tap tap("/x", typeInfo<std_msgs::String>(), slot, 1024, 104);
+    std_msgs::String text;
+    text.data.assign(100, 'x');  // and its length, 4 bytes
+    write(slot, text);
+    tap.push(0);
+    EXPECT_EQ(tap.tooLarge(), 0U);
+    text.data.assign(101, 'x');
+    write(slot, text);
+    tap.push(0);
+    EXPECT_EQ(tap.tooLarge(), 1U);
+    EXPECT_EQ(tap.dropped(), 0U);
+    EXPECT_TRUE(tap.pop(
+        [](const std::uint8_t*, std::uint32_t size, std::int64_t) { EXPECT_EQ(size, 104U); }));
+    EXPECT_FALSE(tap.pop([](const std::uint8_t*, std::uint32_t, std::int64_t) {}));
+}
+
+TEST(Tap, GoesOnWhereItsRingEnds) {
+    for (const std::size_t capacity : {32, 40, 48, 56, 104}) {
+        const auto slot = std::make_shared<Slot<double>>();
+        Tap tap("/x", typeInfo<double>(), slot, capacity);
+        for (int i = 1; i < 100; ++i) {
+            write(slot, static_cast<double>(i));
+            tap.push(0);
+            ASSERT_EQ(takeAll(tap), std::vector<double>{static_cast<double>(i)})
+                << "ring of " << capacity;
+        }
+        EXPECT_EQ(tap.dropped(), 0U);
+    }
+}
+
+TEST(Tap, FullRingDropsTheNewestAndCounts) {
+    const auto slot = std::make_shared<Slot<double>>();
+    Tap tap("/x", typeInfo<double>(), slot, 128);  // five records of 16 + 8 bytes
+    for (int i = 1; i <= 7; ++i) {
+        write(slot, static_cast<double>(i));
+        tap.push(0);
+    }
+    EXPECT_EQ(tap.dropped(), 2U);
+    EXPECT_EQ(takeAll(tap), (std::vector<double>{1.0, 2.0, 3.0, 4.0, 5.0}));
+    write(slot, 8.0);
+    tap.push(0);
+    EXPECT_EQ(takeAll(tap), std::vector<double>{8.0});
+}
+
+TEST(Tap, RingTooSmallForAValueIsMadeLargeEnough) {
+    const auto slot = std::make_shared<Slot<double>>();
+    Tap tap("/x", typeInfo<double>(), slot, 1);
+    write(slot, 1.0);
+    tap.push(0);
+    EXPECT_EQ(takeAll(tap).size(), 1U);
+}
+
+TEST(Tap, ValueLargerThanTheRingIsDroppedAndCounted) {
+    const auto slot = std::make_shared<Slot<std_msgs::String>>();
+    Tap tap("/x", typeInfo<std_msgs::String>(), slot, 128);
+    std_msgs::String text;
+    text.data.assign(200, 'x');
+    write(slot, text);
+    tap.push(0);
+    EXPECT_EQ(tap.dropped(), 1U);
+    text.data = "small";
+    write(slot, text);
+    tap.push(0);
+    EXPECT_TRUE(tap.pop(
+        [](const std::uint8_t*, std::uint32_t size, std::int64_t) { EXPECT_EQ(size, 9U); }));
+}
+
+TEST(Tap, ValuesOfAllLengthsComeOutAsTheyWentIn) {
+    const auto slot = std::make_shared<Slot<std_msgs::String>>();
+    Tap tap("/x", typeInfo<std_msgs::String>(), slot, 256);
+    for (std::size_t length = 0; length < 500; ++length) {
+        std_msgs::String text;
+        text.data.assign(length % 90, static_cast<char>('a' + length % 26));
+        write(slot, text);
+        tap.push(0);
+        std::string bytes;
+        ASSERT_TRUE(tap.pop([&](const std::uint8_t* data, std::uint32_t size, std::int64_t) {
+            bytes.assign(reinterpret_cast<const char*>(data), size);
+        }));
+        ASSERT_EQ(bytes.substr(4), text.data);
+    }
+    EXPECT_EQ(tap.dropped(), 0U);
+}
+
+TEST(Tap, ConsumerInAnotherThreadGetsAllThatWasNotDropped) {
+    constexpr int kCount = 100'000;
+    const auto slot = std::make_shared<Slot<double>>();
+    Tap tap("/x", typeInfo<double>(), slot, 1000);
+    std::atomic<bool> done{false};
+    std::thread producer([&] {
+        for (int i = 1; i <= kCount; ++i) {
+            write(slot, static_cast<double>(i));
+            tap.push(0);
+        }
+        done = true;
+    });
+    std::uint64_t taken = 0;
+    double last = 0.0;
+    for (bool over = false; !over;) {
+        over = done;
+        for (const double value : takeAll(tap)) {
+            ASSERT_GT(value, last);
+            last = value;
+            ++taken;
+        }
+    }
+    producer.join();
+    EXPECT_EQ(taken + tap.dropped(), static_cast<std::uint64_t>(kCount));
+}
+
+}  // namespace
+}  // namespace rtcf::test
