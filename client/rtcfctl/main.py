@@ -25,6 +25,7 @@ _MODULES = {
     "start": "loop.running",
     "stop": "loop.running",
     "step": "loop.running",
+    "run": "graph.run",
     "replay": "loop.replay",
     "load": "graph.component",
     "unload": "graph.component",
@@ -70,8 +71,8 @@ _COMPLETION = "__complete"
 # Global options that are followed by a word of theirs.
 _WITH_VALUE = ("-H", "--host", "--socket", "-r", "--runner", "-o", "--output")
 _WITH_EQUALS = ("--host=", "--socket=", "--runner=", "--output=")
-# Verbs that look at the machine they run on.
-_OF_THIS_MACHINE = ("check", "doctor")
+# Verbs that are about the machine they run on.
+_OF_THIS_MACHINE = ("check", "doctor", "run")
 
 
 def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None) -> int:
@@ -146,7 +147,7 @@ def _another_machine(args: argparse.Namespace) -> Iterator[None]:
 
     if args.verb in _OF_THIS_MACHINE:
         raise ValueError(
-            f"{args.verb} looks at the machine it runs on: ssh {args.host} rtcfctl {args.verb}"
+            f"{args.verb} is about the machine it runs on: ssh {args.host} rtcfctl {args.verb}"
         )
     there = args.socket or DEFAULT_SOCKET
     with remote.control_socket_of(args.host, args.socket) as here:

@@ -38,17 +38,19 @@ def type_(line: str, folder: Path, environment: dict[str, str]) -> Done:
 
 @contextmanager
 def running(line: str, folder: Path, environment: dict[str, str]) -> Iterator[None]:
-    """Type the line of a daemon, which is ended by Ctrl-C."""
+    """Type a line that goes on until Ctrl-C."""
     said = folder / "said"
     with (
         said.open("wb") as to,
         subprocess.Popen(
-            ["bash", "-c", f"exec {line}"], cwd=folder, env=environment, stderr=to,
+            ["bash", "-c", f"exec {line}"], cwd=folder, env=environment, stdout=to, stderr=to,
             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
         ) as process,
     ):  # fmt: skip
         try:
-            wait_for(lambda: "ready;" in said.read_text() or process.poll() is not None, line)
+            wait_for(
+                lambda: "Ctrl-C ends it" in said.read_text() or process.poll() is not None, line
+            )
             assert process.poll() is None, said.read_text()
             yield
         finally:
@@ -67,12 +69,12 @@ def test_its_lines_build_test_and_run_it(
         for line in made.stdout.splitlines()
         if line.startswith("  ")
     ]
-    change, build, test, daemon, *others = lines
+    change, build, test, run, *others = lines
     done = type_(f"set -e\n{change}\n{build}\n{test}", tmp_path, environment)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "100% tests passed, 0 tests failed out of 1" in done.stdout
     folder = tmp_path / "my_arm"
-    with running(daemon, folder, environment):
+    with running(run, folder, environment):
         for line in others:
             done = type_(line, folder, environment)
             assert done.returncode == 0, done.stderr

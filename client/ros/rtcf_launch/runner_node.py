@@ -15,6 +15,7 @@ from typing import Any
 
 import rtcf
 from rtcf.connection import DEFAULT_SOCKET
+from rtcf.private_daemon import PrivateDaemon, program
 from rtcf.v1 import control_pb2, runner_pb2
 from rtcf_shared.enums import word
 
@@ -23,7 +24,6 @@ from rtcf_launch.codes import Code, Ending
 from rtcf_launch.daemon_choice import choose
 from rtcf_launch.inbox import Asked, Inbox, Lost
 from rtcf_launch.master import Master, MasterSilent
-from rtcf_launch.private_daemon import PrivateDaemon
 from rtcf_launch.ros_node import RosNode, wait_until_gone
 from rtcf_launch.screen import Screen
 
@@ -156,8 +156,13 @@ class RunnerNode:
             wanted, why = ("system" if choice.system else "private"), choice.why
         if wanted == "private":
             log_file = self._given.log_file or f"{_log_folder()}/{self._runner}.log"
-            self._daemon = PrivateDaemon(self._build_tree, log_file)
-            self._daemon.start(self._inbox.pause)
+            log = Path(log_file.removesuffix(".log") + ".rtcfd.log")
+            self._daemon = PrivateDaemon(program(self._build_tree), log)
+            try:
+                if not self._daemon.start(self._inbox.pause):
+                    raise Ending(Code.DONE)
+            except rtcf.RtcfError as error:
+                raise Ending(Code.REFUSED, str(error)) from None
             socket = str(self._daemon.socket)
             self._screen.info(f"private daemon at {socket}, log in {self._daemon.log_file} ({why})")
         else:

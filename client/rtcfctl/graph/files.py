@@ -38,7 +38,7 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 
 def apply(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Apply a graph file; of several runners none is changed if one is refused."""
-    graphs = _chosen(rtcf.read_graphs(*_read(args.file)), args)
+    graphs = _chosen(rtcf.read_graphs(*read(args.file)), args)
     if args.dry_run or len(graphs) > 1:
         dry = [_apply(client, graph, True, args.rebuilt, output) for graph in graphs]
     if args.dry_run:
@@ -119,8 +119,8 @@ def _print(
         output.notes(result)
 
 
-def _read(file: str) -> tuple[str, str]:
-    """Return the text of a file, and its name for messages."""
+def read(file: str) -> tuple[str, str]:
+    """Return the text of a file, and its name for messages.  Raises GraphFileError."""
     name = "standard input" if file == "-" else file
     try:
         return bounded_file.read(file).decode(), name

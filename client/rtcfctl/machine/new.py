@@ -57,10 +57,9 @@ def run(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     output.line(f"  cd {folder}")
     output.line("  cmake -S . -B build && cmake --build build")
     output.line("  ctest --test-dir build")
-    output.line("run it in a daemon of your own, and from another terminal in that folder:")
-    output.line('  rtcfd --foreground --socket /tmp/rtcf.sock --path "$PWD/build/lib/rtcf"')
-    output.line("  rtcfctl --socket /tmp/rtcf.sock apply graph.yaml")
-    output.line("  rtcfctl --socket /tmp/rtcf.sock start")
+    output.line("run it until Ctrl-C, with what is rebuilt meanwhile, and look from elsewhere:")
+    output.line("  rtcfctl --socket /tmp/rtcf.sock run graph.yaml")
+    output.line("  rtcfctl --socket /tmp/rtcf.sock status")
 
 
 def _name_of(component: str) -> str:

@@ -1,7 +1,7 @@
-"""A rtcfd of an rt_runner's own: for the life of a launch, on a plain user's account.
+"""A rtcfd of one's own: for the life of a launch or of a command, on a plain user's account.
 
 It lives in a folder that only its user may enter, loads components from that
-user's folders, keeps no state, and ends with rt_runner, however that ends.
+user's folders, keeps no state, and ends with who started it, however that ends.
 """
 
 import contextlib
@@ -11,11 +11,11 @@ import socket
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import BinaryIO
+from typing import IO
 
-from rtcf_launch.codes import Code, Ending
+from rtcf.errors import RtcfError
 
 _START_S = 30.0
 _END_S = 3.5
@@ -24,37 +24,49 @@ _TAIL = 5  # lines
 
 
 def program(build_tree: Path | None) -> Path:
-    """Return the rtcfd that belongs to this rt_runner."""
+    """Return the rtcfd of the build tree, or the one that is installed."""
     return Path("/usr/bin/rtcfd") if build_tree is None else build_tree / "bin" / "rtcfd"
+
+
+def _sleep(seconds: float) -> bool:
+    time.sleep(seconds)
+    return False
 
 
 class PrivateDaemon:
     """The process and its folder."""
 
-    def __init__(self, build_tree: Path | None, log_file: str) -> None:
-        self._program = program(build_tree)
+    def __init__(
+        self,
+        program: Path,
+        log_file: Path | None = None,
+        options: Sequence[str] = (),
+        socket: Path | None = None,
+    ) -> None:
+        """Make the folder.  Without `log_file` it logs to our standard error; `socket`: elsewhere
+        than in the folder."""
+        self._program = program
+        self._options = options
         # Of XDG_RUNTIME_DIR it is certain that no other user enters it; mkdtemp sees to the rest.
         runtime = os.environ.get("XDG_RUNTIME_DIR")
         parent = runtime if runtime and os.access(runtime, os.W_OK) else None
         self._folder = Path(tempfile.mkdtemp(prefix="rtcf-", dir=parent))
-        self.socket = self._folder / "control.sock"
-        self.log_file = Path(log_file.removesuffix(".log") + ".rtcfd.log")
+        self.socket = socket or self._folder / "control.sock"
+        self.log_file = log_file
         self._process: subprocess.Popen[bytes] | None = None
 
-    def start(self, pause: Callable[[float], bool]) -> None:
-        """Start it and wait until it serves.
+    def start(self, pause: Callable[[float], bool] = _sleep) -> bool:
+        """Start it and wait until it serves; return whether it does.
 
-        `pause` waits for some seconds, and returns true if we are asked to end.
+        `pause` waits for some seconds, and returns true if we are asked to end.  Raises RtcfError.
         """
         if not os.access(self._program, os.X_OK):
-            raise Ending(
-                Code.REFUSED, f"no rtcfd at {self._program}: install it (apt install rtcfd)"
-            )
+            raise RtcfError(f"no rtcfd at {self._program}: install it (apt install rtcfd)")
         with self._open_log() as log:
             self._process = subprocess.Popen(
                 [
                     *(str(self._program), "--foreground", "--end-with-stdin"),
-                    *("--no-default-runner", "--socket", str(self.socket)),
+                    *("--no-default-runner", "--socket", str(self.socket), *self._options),
                 ],
                 # It ends when this pipe does: with us.
                 stdin=subprocess.PIPE,
@@ -66,11 +78,12 @@ class PrivateDaemon:
         deadline = time.monotonic() + _START_S
         while not self._listens():
             if self.ended:
-                raise Ending(Code.REFUSED, f"rtcfd did not start: {self.last_words()}")
+                raise RtcfError(f"rtcfd did not start: {self.last_words()}")
             if time.monotonic() > deadline:
-                raise Ending(Code.REFUSED, f"rtcfd does not serve {self.socket}")
+                raise RtcfError(f"rtcfd does not serve {self.socket}")
             if pause(_POLL_S):
-                raise Ending(Code.DONE)
+                return False
+        return True
 
     def _listens(self) -> bool:
         # The file is there a moment before anybody listens.
@@ -79,14 +92,14 @@ class PrivateDaemon:
             return True
         return False
 
-    def _open_log(self) -> BinaryIO:
+    def _open_log(self) -> IO[bytes]:
+        if self.log_file is None:
+            return os.fdopen(os.dup(2), "wb")
         try:
             self.log_file.parent.mkdir(parents=True, exist_ok=True)
             return self.log_file.open("wb")
         except OSError as error:
-            raise Ending(
-                Code.REFUSED, f"cannot write rtcfd's log {self.log_file}: {error.strerror}"
-            ) from None
+            raise RtcfError(f"cannot write rtcfd's log {self.log_file}: {error.strerror}") from None
 
     @property
     def ended(self) -> bool:
@@ -95,6 +108,8 @@ class PrivateDaemon:
 
     def last_words(self) -> str:
         """Return the end of its log."""
+        if self.log_file is None:
+            return "its log says why"
         with contextlib.suppress(OSError):
             lines = self.log_file.read_text(errors="replace").splitlines()
             return "; ".join(lines[-_TAIL:])

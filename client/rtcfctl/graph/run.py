@@ -1,0 +1,157 @@
+"""`rtcfctl run`: a loop in a daemon of one's own, until Ctrl-C.
+
+What is saved or rebuilt meanwhile is swapped in; the daemon logs to our standard error.
+"""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import rtcf
+from rtcf.client import DEFAULT_RUNNER
+from rtcf.private_daemon import PrivateDaemon, program
+from rtcf.v1 import graph_pb2
+
+from rtcfctl.graph import files, python_source
+from rtcfctl.terminal.output import Output
+from rtcfctl.terminal.words import counted
+
+# Where builds put libraries of components, seen from the folder of a package or a workspace.
+_BUILT = ("build/lib/rtcf", "devel/lib/rtcf-components", "lib/rtcf")
+_LOOK_S = 0.5
+
+
+def register(verbs: Any, common: argparse.ArgumentParser) -> None:
+    """Add the verb."""
+    run = verbs.add_parser(
+        "run", parents=[common], help="a loop in a daemon of its own until Ctrl-C, for development"
+    )
+    run.add_argument("file", metavar="FILE", help="a graph file, or a component in Python")
+    run.add_argument("type", metavar="CLASS", nargs="?", help="of FILE.py")
+    run.add_argument(
+        "--path", action="append", default=[], metavar="FOLDER", type=Path,
+        help=f"where libraries are (default: {', '.join(_BUILT)} here, those that there are)",
+    )  # fmt: skip
+    run.add_argument("--no-start", action="store_true", help="leave the loop stopped")
+    run.set_defaults(run=show)
+
+
+def show(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Run it."""
+    if python_source.is_one(args.file) != bool(args.type):
+        raise ValueError("run: a graph file, or FILE.py and its CLASS")
+    work = _Work(args, output)
+    work.read()  # a file with a mistake is told before anything begins
+    daemon = PrivateDaemon(
+        program(args.build_tree),
+        options=[word for path in _paths(args.path) for word in ("--path", str(path))],
+        socket=Path(args.socket) if args.socket else None,
+    )
+    try:
+        daemon.start()
+        with rtcf.Client(daemon.socket) as client:
+            runners = work.apply(client)
+            for runner in [] if args.no_start else runners:
+                client.start(runner, output.progress)
+            _say(f"{'stopped' if args.no_start else 'running'}; Ctrl-C ends it")
+            _say(f"from another terminal: rtcfctl --socket {daemon.socket} status")
+            while not daemon.ended:
+                time.sleep(_LOOK_S)
+                work.look(client)
+        raise rtcf.RtcfError("rtcfd has ended: see above")
+    except KeyboardInterrupt:
+        return
+    finally:
+        daemon.end()
+
+
+def _say(line: str) -> None:
+    print(line, flush=True)
+
+
+def _paths(given: list[Path]) -> list[Path]:
+    for path in given:
+        if not path.is_dir():
+            raise ValueError(f"--path {path}: no such folder")
+    found = given or [Path(each) for each in _BUILT if Path(each).is_dir()]
+    return [path.absolute() for path in found]
+
+
+class _Work:
+    """What is run, and whether it is another by now."""
+
+    def __init__(self, args: argparse.Namespace, output: Output) -> None:
+        self._args = args
+        self._output = output
+        self._last = self._content()
+        self._refused = ""
+
+    def read(self) -> list[rtcf.Graph]:
+        """Return what the file says now; raises RtcfError."""
+        file = self._args.file
+        if self._args.type:
+            package = python_source.compiled(file, self._args.build_tree, self._output.progress)
+            spec = rtcf.component(package, self._args.type)
+            return [rtcf.Graph(self._args.runner or DEFAULT_RUNNER, components=[spec])]
+        graphs = rtcf.read_graphs(*files.read(file))
+        for graph in graphs:
+            graph.runner = graph.runner or self._args.runner or DEFAULT_RUNNER
+        return graphs
+
+    def apply(self, client: rtcf.Client) -> list[str]:
+        """Make the graph what the file says, with libraries as they are now; return the runners."""
+        known = {str(each.runner) for each in client.get_status().runners}
+        names = []
+        for graph in self.read():
+            if graph.runner not in known:
+                client.add_runner(graph.runner)
+            result = client.apply(
+                graph.components, graph.runner, graph.settings,
+                on_progress=self._output.progress, rebuilt=True,
+            )  # fmt: skip
+            self._output.notes(result)
+            names.append(graph.runner)
+        return names
+
+    def look(self, client: rtcf.Client) -> None:
+        """Swap in what was saved or rebuilt; a refusal is said once, and what runs goes on."""
+        content = self._content()
+        try:
+            rebuilt = [
+                (str(status.runner), str(each.full_name))
+                for status in client.get_status().runners
+                for each in client.list_components(status.runner)
+                if each.library_changed
+            ]
+            if content != self._last:
+                self.apply(client)
+            elif rebuilt:
+                # One by one: what was tuned since the file was applied stays.
+                for runner, name in rebuilt:
+                    client.replace(name, graph_pb2.ComponentSpec(), runner, self._output.progress)
+            else:
+                return
+        except (rtcf.RefusedError, rtcf.GraphFileError, python_source.NotCompiledError) as error:
+            # A library or a file that is just being written may be whole at the next look.
+            said = f"{content!r} {error}"
+            if said == self._refused:
+                self._last = content
+                print(f"rtcfctl: {error}", file=sys.stderr)
+            self._refused = said
+            return
+        self._refused = ""
+        what = f"{counted(len(rebuilt), 'component')} of a rebuilt library"
+        _say(f"swapped in: {what if content == self._last else self._args.file}")
+        self._last = content
+
+    def _content(self) -> object:
+        """Return what tells another content of the file."""
+        if self._args.type:
+            return python_source.fingerprint(Path(self._args.file).resolve())
+        try:
+            status = Path(self._args.file).stat()
+        except OSError:
+            return None
+        return (status.st_ino, status.st_size, status.st_mtime_ns)

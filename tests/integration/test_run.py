@@ -1,0 +1,193 @@
+"""`rtcfctl run`: a loop in a daemon of its own, with what was saved or rebuilt since."""
+
+import os
+import shutil
+import signal
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import rtcf
+from daemon_process import BUILD_TREE, clean_environment, wait_for
+
+_DEADLINE_S = 120.0  # of a compiler on a busy machine
+GRAPH = """\
+runner: rt_runner
+settings:
+  ros: {{enabled: false}}
+components:
+  - name: wave
+    package: rtcf_examples
+    type: Wave
+    parameters: {{amplitude: {amplitude}}}
+"""
+COUNTS = """\
+from rtcf.component import Component, Output, State
+
+
+class Counts(Component):
+    out: Output[int]
+    count: State[int]
+
+    def update(self):
+        self.count += {step}
+        self.out.write(self.count)
+"""
+
+
+class Running:
+    """One under way, and what it has said."""
+
+    def __init__(self, process: "subprocess.Popen[bytes]", out: Path, socket: Path) -> None:
+        self.process = process
+        self._out = out
+        self.socket = socket
+
+    @property
+    def said(self) -> str:
+        return self._out.read_text()
+
+    def wait_for(self, text: str) -> None:
+        wait_for(lambda: text in self.said or self.process.poll() is not None, text, _DEADLINE_S)
+        assert text in self.said, self.said
+
+
+@contextmanager
+def running(folder: Path, *words: str) -> Iterator[Running]:
+    """Type it in a folder; it is ended by Ctrl-C."""
+    out, socket = folder / "said", folder / "s"
+    environment = clean_environment() | {
+        "PATH": f"{BUILD_TREE / 'bin'}:{os.environ['PATH']}",
+        "XDG_CACHE_HOME": str(folder / "cache"),
+    }
+    with (
+        out.open("wb") as to,
+        subprocess.Popen(
+            ["rtcfctl", "--socket", str(socket), "run", *words],
+            cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=to, stderr=to,
+            start_new_session=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        ) as process,
+    ):  # fmt: skip
+        found = Running(process, out, socket)
+        try:
+            yield found
+        finally:
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+
+
+def amplitude(client: rtcf.Client) -> float:
+    (found,) = (p for p in client.get_component("wave").parameters if p.name == "amplitude")
+    return float(found.value.double_value)
+
+
+def test_a_graph_file_runs_until_ctrl_c_and_is_applied_again_when_it_is_saved(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "graph.yaml"
+    file.write_text(GRAPH.format(amplitude=1.5))
+    with running(tmp_path, "graph.yaml") as loop:
+        loop.wait_for("running; Ctrl-C ends it")
+        assert f"from another terminal: rtcfctl --socket {loop.socket} status" in loop.said
+        with rtcf.Client(loop.socket) as client:
+            assert amplitude(client) == 1.5
+            file.write_text(GRAPH.format(amplitude=2.5))
+            loop.wait_for("swapped in: graph.yaml")
+            assert amplitude(client) == 2.5
+            file.write_text(GRAPH.format(amplitude="[much"))
+            loop.wait_for("rtcfctl: graph.yaml:")
+            assert amplitude(client) == 2.5, "what runs goes on"
+            (status,) = client.get_status().runners
+        executor = status.pid
+        loop.process.send_signal(signal.SIGINT)
+        assert loop.process.wait() == 0
+    assert not loop.socket.exists()
+    assert not Path(f"/proc/{executor}").exists()
+    assert loop.said.count("rtcfctl: graph.yaml:") == 1, "said once"
+
+
+def test_a_rebuilt_library_is_swapped_in(tmp_path: Path) -> None:
+    # Of a package that is nowhere else.
+    library = tmp_path / "build" / "lib" / "rtcf" / "my_waves" / "my_waves.so"
+    library.parent.mkdir(parents=True)
+    shutil.copy(BUILD_TREE / "lib" / "rtcf" / "rtcf_examples" / "rtcf_examples.so", library)
+    graph = GRAPH.format(amplitude=1.5).replace("rtcf_examples", "my_waves")
+    (tmp_path / "graph.yaml").write_text(graph)
+    with running(tmp_path, "graph.yaml") as loop:
+        loop.wait_for("running; Ctrl-C ends it")
+        with rtcf.Client(loop.socket) as client:
+            client.set_parameters("wave", [rtcf.parse_parameter("rate:=3.0")])
+            begun = library.with_suffix(".part")
+            shutil.copy(library, begun)
+            begun.rename(library)
+            loop.wait_for("swapped in: 1 component of a rebuilt library")
+            (status,) = client.get_status().runners
+            assert status.overruns < status.iteration
+            (wave,) = client.list_components()
+            assert not wave.library_changed
+            (rate,) = (p for p in wave.parameters if p.name == "rate")
+            assert rate.value.double_value == 3.0, "what was tuned stays"
+            library.write_bytes(b"half of a library")
+            loop.wait_for("rtcfctl: ")
+            (wave,) = client.list_components()
+            assert wave.library_changed, "the one that was there still runs"
+
+
+def test_a_python_source_is_compiled_and_swapped_in_when_it_is_saved(tmp_path: Path) -> None:
+    source = tmp_path / "counts.py"
+    source.write_text(COUNTS.format(step=1))
+    with running(tmp_path, "counts.py", "Counts") as loop:
+        loop.wait_for("running; Ctrl-C ends it")
+        with rtcf.Client(loop.socket) as client:
+            source.write_text(COUNTS.format(step="[]"))
+            loop.wait_for("rtcfctl: ")
+            source.write_text(COUNTS.format(step=-1))
+            loop.wait_for("swapped in: counts.py")
+            with client.watch_ports(["/Counts.out"]) as stream:
+                values = next(iter(stream))["/Counts.out"]
+    assert (values[1:] < values[:-1]).all()
+
+
+def test_a_loop_may_be_left_stopped(tmp_path: Path) -> None:
+    (tmp_path / "graph.yaml").write_text(GRAPH.format(amplitude=1.5))
+    with running(tmp_path, "graph.yaml", "--no-start") as loop:
+        loop.wait_for("stopped; Ctrl-C ends it")
+        with rtcf.Client(loop.socket) as client:
+            (status,) = client.get_status().runners
+            assert status.iteration == 0
+
+
+def test_the_end_of_its_daemon_is_said(tmp_path: Path) -> None:
+    (tmp_path / "graph.yaml").write_text(GRAPH.format(amplitude=1.5))
+    with running(tmp_path, "graph.yaml") as loop:
+        loop.wait_for("running; Ctrl-C ends it")
+        (daemon,) = Path(f"/proc/{loop.process.pid}/task/{loop.process.pid}/children").read_text(
+        ).split()  # fmt: skip
+        os.kill(int(daemon), signal.SIGKILL)
+        assert loop.process.wait() in (1, 3)
+    assert "rtcfctl: " in loop.said.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("none.yaml",), 1, "none.yaml: No such file or directory"),
+        (("none.py", "Counts"), 1, "none.py: no such file"),
+        (("graph.yaml", "Counts"), 2, "run: a graph file, or FILE.py and its CLASS"),
+        (("counts.py",), 2, "run: a graph file, or FILE.py and its CLASS"),
+        (("graph.yaml", "--path", "nowhere"), 2, "--path nowhere: no such folder"),
+        (("wrong.yaml",), 1, 'no package "none"'),
+    ],
+)
+def test_refused_in_a_line(tmp_path: Path, words: tuple[str, ...], code: int, said: str) -> None:
+    (tmp_path / "graph.yaml").write_text(GRAPH.format(amplitude=1.5))
+    wrong = GRAPH.format(amplitude=1.5).replace("rtcf_examples", "none")
+    (tmp_path / "wrong.yaml").write_text(wrong)
+    with running(tmp_path, *words) as loop:
+        assert loop.process.wait() == code, loop.said
+    line = next(each for each in loop.said.splitlines() if each.startswith("rtcfctl: "))
+    assert said in line
+    assert not loop.socket.exists()
