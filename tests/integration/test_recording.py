@@ -331,7 +331,11 @@ def test_a_signal_breaks_off_nothing_that_is_being_written(
         [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "record", "-o", disk,
          "--force"],
         env=clean_environment(),
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        # Where tests run in the background, or by nohup, these are ignored.
+        preexec_fn=lambda: (
+            signal.signal(signal.SIGINT, signal.default_int_handler),
+            signal.signal(signal.SIGHUP, signal.SIG_DFL),
+        ),
     )  # fmt: skip
     writer = os.open(disk, os.O_WRONLY)
     wait_for(lambda: not select.select([], [writer], [], 0)[1], "a disk that takes nothing more")
