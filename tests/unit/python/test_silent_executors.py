@@ -13,9 +13,10 @@ from rtcfd.state.desired import Desired, HoldTerms
 from rtcfd_in_process import Rtcfd, until
 
 
-def test_the_runner_of_a_launch_goes_when_its_silent_executor_dies(
-    rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def looks(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Have no executor answer two looks, and none be there at the third; note whose was looked
+    for."""
     looks: list[str] = []
 
     async def adopt(runner: str, *_: Any) -> None:
@@ -25,7 +26,12 @@ def test_the_runner_of_a_launch_goes_when_its_silent_executor_dies(
 
     monkeypatch.setattr(Executor, "adopt", adopt)
     monkeypatch.setattr(runners, "_LOOK_AGAIN_S", 0.01)
+    return looks
 
+
+def test_the_runner_of_a_launch_goes_when_its_silent_executor_dies(
+    rtcfd: Callable[[], Rtcfd], looks: list[str]
+) -> None:
     async def play() -> None:
         daemon = rtcfd()
         desired = Desired("arm")
@@ -41,18 +47,8 @@ def test_the_runner_of_a_launch_goes_when_its_silent_executor_dies(
 
 
 def test_the_silent_executor_of_an_unknown_runner_is_looked_for_until_it_dies(
-    rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch
+    rtcfd: Callable[[], Rtcfd], looks: list[str]
 ) -> None:
-    looks: list[str] = []
-
-    async def adopt(runner: str, *_: Any) -> None:
-        looks.append(runner)
-        if len(looks) < 3:
-            raise Silent("it does not answer", errors_pb2.REASON_EXECUTOR_SILENT)
-
-    monkeypatch.setattr(Executor, "adopt", adopt)
-    monkeypatch.setattr(runners, "_LOOK_AGAIN_S", 0.01)
-
     async def play() -> None:
         daemon = rtcfd()
         await daemon.runners.bring_up(["stranger"])
