@@ -43,7 +43,7 @@ def show(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     if python_source.is_one(args.file) != bool(args.type):
         raise ValueError("run: a graph file, or FILE.py and its CLASS")
     work = _Work(args, output)
-    work.read()  # a file with a mistake is told before anything begins
+    graphs = work.read()  # a file with a mistake is told before anything begins
     daemon = PrivateDaemon(
         program(args.build_tree),
         options=[word for path in _paths(args.path) for word in ("--path", str(path))],
@@ -52,7 +52,7 @@ def show(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     try:
         daemon.start()
         with rtcf.Client(daemon.socket) as client:
-            runners = work.apply(client)
+            runners = work.apply(client, graphs)
             for runner in [] if args.no_start else runners:
                 client.start(runner, output.progress)
             _say(f"{'stopped' if args.no_start else 'running'}; Ctrl-C ends it")
@@ -100,11 +100,11 @@ class _Work:
             graph.runner = graph.runner or self._args.runner or DEFAULT_RUNNER
         return graphs
 
-    def apply(self, client: rtcf.Client) -> list[str]:
-        """Make the graph what the file says, with libraries as they are now; return the runners."""
+    def apply(self, client: rtcf.Client, graphs: list[rtcf.Graph]) -> list[str]:
+        """Make the graphs so, with libraries as they are now; return the runners."""
         known = {str(each.runner) for each in client.get_status().runners}
         names = []
-        for graph in self.read():
+        for graph in graphs:
             if graph.runner not in known:
                 client.add_runner(graph.runner)
             result = client.apply(
@@ -126,7 +126,7 @@ class _Work:
                 if each.library_changed
             ]
             if content != self._last:
-                self.apply(client)
+                self.apply(client, self.read())
             elif rebuilt:
                 # One by one: what was tuned since the file was applied stays.
                 for runner, name in rebuilt:
