@@ -12,6 +12,7 @@ class Lines {
     bool full() const { return lines_.size() >= kLargestFootprint; }
 
     void add(const void* begin, std::size_t bytes) {
+        if (begin == nullptr) return;
         const auto* byte = static_cast<const char*>(begin);
         const char* end = byte + bytes;
         byte -= reinterpret_cast<std::uintptr_t>(byte) % kCacheLine;
@@ -40,11 +41,11 @@ std::vector<const void*> footprint(
         lines.add(step.component, sizeof *step.component);
         for (const InputBase* input : step.component->inputs()) {
             lines.add(input, sizeof *input);
-            if (const SlotHeader* slot = source(input); slot != nullptr) lines.addSlot(slot);
+            lines.addSlot(source(input));
         }
         for (const OutputBase* output : step.component->outputs()) {
             lines.add(output, sizeof *output);
-            if (output->slot() != nullptr) lines.addSlot(output->slot().get());
+            lines.addSlot(output->slot().get());
         }
     }
     return lines.take();
