@@ -1,11 +1,12 @@
 """The picture of `rtcfctl stats --plot`: two histograms, as Fig. 2 of the paper shows them."""
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
 import rtcf
 from rtcf.v1 import runner_pb2
-from rtcf_shared.whole_file import whole_file
+from rtcf_shared import durable
 
 _FORMATS = (".svg", ".png", ".pdf")
 
@@ -40,10 +41,10 @@ def draw(found: runner_pb2.RunnerStatistics, file: Path) -> None:
         axis.set_xlabel(label)
         axis.set_ylabel("cycles")
         axis.legend()
+    picture = io.BytesIO()
+    figure.savefig(picture, dpi=150, format=file.suffix.removeprefix("."))
+    pyplot.close(figure)
     try:
-        with whole_file(file, force=True) as part:
-            figure.savefig(part, dpi=150, format=file.suffix.removeprefix("."))
+        durable.write_named(file, picture.getvalue())
     except OSError as error:
         raise rtcf.RtcfError(f"{file}: {error.strerror or error}") from None
-    finally:
-        pyplot.close(figure)
