@@ -1,8 +1,5 @@
 #include "frames/frame_ring.hpp"
 
-#include <algorithm>
-#include <cstring>
-
 namespace rtcf::executor {
 
 namespace {
@@ -11,73 +8,33 @@ constexpr std::size_t kWord = sizeof(std::uint64_t);
 
 std::int64_t signedOf(std::uint64_t word) { return static_cast<std::int64_t>(word); }
 
-std::size_t wordsOf(const FrameRing::Source& source) { return (source.size + kWord - 1) / kWord; }
+// A power of two, so that a place in the ring is found without a division.
+std::size_t capacityOf(std::size_t words_of_frame, std::size_t frames) {
+    std::size_t capacity = FrameRing::kFewestFrames;
+    while (capacity < frames && 2 * capacity * words_of_frame * kWord <= FrameRing::kLargestRing)
+        capacity *= 2;
+    return capacity;
+}
 
 }  // namespace
 
 FrameRing::FrameRing(std::vector<Source> sources, std::size_t frames, FrameMemory* memory)
-    : sources_(std::move(sources)) {
-    mask_ = capacityFor(sources_, frames) - 1;
-    for (const Source& source : sources_) {
-        offsets_.push_back((stride_ - kHeadWords) * kWord);
-        stride_ += wordsOf(source);
-    }
+    : copy_(std::move(sources)),
+      stride_(kHeadWords + copy_.words()),
+      mask_(capacityOf(stride_, frames) - 1) {
     const std::size_t words = capacity() * stride_;
     if (memory != nullptr) block_ = memory->take(words * kWord);
-    if (block_ != nullptr) {
-        words_ = block_->words();
-        return;
+    if (block_ == nullptr) {
+        // Written here for the first time, not in the loop.
+        own_ = std::make_unique<Word[]>(words);  // NOLINT(modernize-avoid-c-arrays)
+        for (std::size_t i = 0; i < words; ++i) own_[i].store(0, std::memory_order_relaxed);
     }
-    // Written here for the first time, not in the loop.
-    own_ = std::make_unique<Word[]>(words);  // NOLINT(modernize-avoid-c-arrays)
-    words_ = own_.get();
-    for (std::size_t i = 0; i < words; ++i) words_[i].store(0, std::memory_order_relaxed);
+    words_ = block_ != nullptr ? block_->words() : own_.get();
+    writing_ = words_;
 }
 
-// A power of two, so that a place in the ring is found without a division.
-std::size_t FrameRing::capacityFor(const std::vector<Source>& sources,
-                                   std::size_t frames) noexcept {
-    std::size_t words = kHeadWords;
-    for (const Source& source : sources) words += wordsOf(source);
-    std::size_t capacity = kFewestFrames;
-    while (capacity < frames && 2 * capacity * words * kWord <= kLargestRing) capacity *= 2;
-    return capacity;
-}
-
-// A reader that has seen any of the words stored here sees the mark before them, too.
-void FrameRing::take() noexcept RTCF_NONBLOCKING {
-    Word* word = at(next_);
-    word[kMark].store(2 * next_ + 1, std::memory_order_relaxed);
-    word += kHeadWords;
-    for (const Source& source : sources_) {
-        const auto* from = static_cast<const std::uint8_t*>(source.from);
-        std::size_t left = source.size;
-        std::uint64_t value = 0;
-        for (; left >= kWord; left -= kWord, from += kWord, ++word) {
-            std::memcpy(&value, from, kWord);
-            word->store(value, std::memory_order_release);
-        }
-        if (left == 0) continue;
-        value = 0;
-        std::memcpy(&value, from, left);
-        word->store(value, std::memory_order_release);
-        ++word;
-    }
-}
-
-void FrameRing::commit(const CycleRecord& cycle, bool last_of_loop) noexcept RTCF_NONBLOCKING {
-    Word* const word = at(next_);
-    const auto put = [word](Head place, std::uint64_t value) {
-        word[place].store(value, std::memory_order_release);
-    };
-    put(kIteration, cycle.iteration);
-    put(kStamp, static_cast<std::uint64_t>(cycle.stamp_ns));
-    put(kLatency, static_cast<std::uint64_t>(cycle.latency_ns));
-    put(kDuration, static_cast<std::uint64_t>(cycle.duration_ns));
-    put(kLast, last_of_loop ? 1 : 0);
-    put(kMark, 2 * next_ + 2);
-    ++next_;
-    end_.store(next_, std::memory_order_release);
+std::size_t FrameRing::capacityFor(const std::vector<Source>& sources, std::size_t frames) {
+    return capacityOf(kHeadWords + FrameCopy(sources).words(), frames);
 }
 
 bool FrameRing::read(std::uint64_t number, Frame& frame) const {

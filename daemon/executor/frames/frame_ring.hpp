@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "frames/cycle_record.hpp"
+#include "frames/frame_copy.hpp"
 #include "frames/frame_memory.hpp"
 #include "rtcf/realtime.hpp"
 
@@ -37,14 +38,7 @@ class Frame {
 
 class FrameRing {
    public:
-    /// A value to copy, of a size that stays.
-    struct Source {
-        const void* from;
-        std::size_t size;  ///< bytes
-        friend bool operator==(const Source& a, const Source& b) noexcept {
-            return a.from == b.from && a.size == b.size;
-        }
-    };
+    using Source = FrameCopy::Source;
 
     /// @param frames how many the ring is to hold; fewer where they would take more than
     ///               kLargestRing
@@ -60,21 +54,40 @@ class FrameRing {
     /// @name Whoever runs cycles; real-time safe
     /// @{
     /// Copies the values into the next frame, which no reader has before commit().
-    void take() noexcept RTCF_NONBLOCKING;
-    void commit(const CycleRecord& cycle, bool last_of_loop) noexcept RTCF_NONBLOCKING;
+    void take() noexcept RTCF_NONBLOCKING {
+        Word* const frame = writing_;
+        frame[kMark].store(2 * end_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+        copy_.copy(frame + kHeadWords);
+    }
+    void commit(const CycleRecord& cycle, bool last_of_loop) noexcept RTCF_NONBLOCKING {
+        const auto put = [frame = writing_](Head place, std::uint64_t value) {
+            frame[place].store(value, std::memory_order_release);
+        };
+        put(kIteration, cycle.iteration);
+        put(kStamp, static_cast<std::uint64_t>(cycle.stamp_ns));
+        put(kLatency, static_cast<std::uint64_t>(cycle.latency_ns));
+        put(kDuration, static_cast<std::uint64_t>(cycle.duration_ns));
+        put(kLast, last_of_loop ? 1 : 0);
+        const std::uint64_t next = end_.load(std::memory_order_relaxed) + 1;
+        put(kMark, 2 * next);
+        writing_ = (next & mask_) != 0 ? writing_ + stride_ : words_;
+        end_.store(next, std::memory_order_release);
+    }
     /// @}
 
     /// @name Any thread
     /// @{
-    const std::vector<Source>& sources() const noexcept { return sources_; }
+    const std::vector<Source>& sources() const noexcept { return copy_.sources(); }
     /// Where a source's value lies in a frame, bytes.
-    std::size_t offset(std::size_t source) const noexcept { return offsets_[source]; }
+    std::size_t offset(std::size_t source) const noexcept { return copy_.offset(source); }
     std::size_t capacity() const noexcept { return mask_ + 1; }
-    /// Words of a frame, and the block that they lie in; null = it goes with the process.
+    /// Words of a frame, those of its values, which are its last, and the block that frames lie
+    /// in; null = it goes with the process.
     std::size_t wordsOfFrame() const noexcept { return stride_; }
+    std::size_t wordsOfValues() const noexcept { return copy_.words(); }
     const std::shared_ptr<FrameBlock>& block() const noexcept { return block_; }
     /// How many frames a ring of such sources holds.
-    static std::size_t capacityFor(const std::vector<Source>& sources, std::size_t frames) noexcept;
+    static std::size_t capacityFor(const std::vector<Source>& sources, std::size_t frames);
     /// Number of the next frame: those from 0 up to it have been committed.
     std::uint64_t end() const noexcept { return end_.load(std::memory_order_acquire); }
     /// Copies a committed frame. @return false if it is not there any more
@@ -96,14 +109,13 @@ class FrameRing {
 
     Word* at(std::uint64_t number) const noexcept { return words_ + (number & mask_) * stride_; }
 
-    std::vector<Source> sources_;
-    std::vector<std::size_t> offsets_;
-    std::size_t stride_ = kHeadWords;  // words of a frame
-    std::size_t mask_ = 0;             // frames minus 1
+    FrameCopy copy_;
+    std::size_t stride_;  // words of a frame
+    std::size_t mask_;    // frames minus 1
     std::shared_ptr<FrameBlock> block_;
     std::unique_ptr<Word[]> own_;  // NOLINT(modernize-avoid-c-arrays): without a block
     Word* words_ = nullptr;
-    std::uint64_t next_ = 0;  // of the writer
+    Word* writing_;  // the writer's: its next frame
     std::atomic<std::uint64_t> end_{0};
     std::atomic<std::uint64_t> taken_{UINT64_MAX};
 };

@@ -69,22 +69,11 @@ void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles) {
 
 void Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NONBLOCKING {
     const std::int64_t begin = readCycleCounter();
-    const bool worked = boundary_.waiting();
-    if (worked) boundary_.perform(*this);
-    const Schedule& schedule = *schedule_;
-    clock_.time_ns = time_ns;
-    clock_.stamp_ns = time_ns + stamp_offset_ns_.load(std::memory_order_relaxed);
-    const std::uint64_t iteration = clock_.iteration;
     std::int64_t before = begin;
-    if (exchanges_) {
-        feed();
-        for (const Latch& latch : schedule.latches) latch.copy();
-    }
-    if (exchanges_ || worked) {
-        before = readCycleCounter();  // that was the work of no component
-        exchanged_ticks_ = before - begin;
-        exchanged_at_ = iteration;
-    }
+    if (exchanges_ || boundary_.waiting()) before = exchange(begin, time_ns);
+    const Schedule& schedule = *schedule_;
+    setTimes(time_ns);
+    const std::uint64_t iteration = clock_.iteration;
     notes_.setIteration(iteration);
     if (schedule.selective) total_elapsed_ns_ += clock_.elapsed_ns;
     counted_ = iteration >= warmup_cycles_ && figures_.counting.counts();
@@ -120,6 +109,20 @@ void Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     figures_.iteration.store(iteration + 1, std::memory_order_relaxed);
 }
 
+// What comes before the components' turns: a change, values from outside, those of the previous
+// cycle. @return ticks when it has ended
+[[gnu::noinline]] std::int64_t Cycle::exchange(std::int64_t begin_ticks,
+                                               std::int64_t time_ns) noexcept {
+    atBoundary();
+    setTimes(time_ns);
+    feed();
+    for (const Latch& latch : schedule_->latches) latch.copy();
+    const std::int64_t end = readCycleCounter();  // that was the work of no component
+    exchanged_ticks_ = end - begin_ticks;
+    exchanged_at_ = clock_.iteration;
+    return end;
+}
+
 // The one frame that catches: a component may throw, the loop may not. `Plain` leaves out what
 // most components do not have, so that it costs them nothing.
 // @param before ticks when they begin @return ticks when the last has ended, or kAbandoned
@@ -141,10 +144,9 @@ template <bool Plain>
                 }
                 if (!Plain) commit(*next->component, *next->figures, OnBadOutput::End);
                 const std::int64_t after = readCycleCounter();
-                const std::int64_t duration = after - before;
-                before = after;
                 next->ended_ticks = after;
-                if (Plain || counted_) next->figures->duration.add(duration);
+                if (Plain || counted_) next->figures->duration.add(after - before);
+                before = after;
             }
             return before;
         } catch (const std::exception& error) {
@@ -232,8 +234,7 @@ void Cycle::makeSafe(Component& component, ComponentFigures& figures, OnBadOutpu
 // In schedule order, so that a driver's safe() reads what the controller's has written.
 void Cycle::makeSafe(std::int64_t time_ns) noexcept {
     if (!active_) return;
-    clock_.time_ns = time_ns;
-    clock_.stamp_ns = time_ns + stamp_offset_ns_.load(std::memory_order_relaxed);
+    setTimes(time_ns);
     notes_.setIteration(clock_.iteration);
     feed();
     for (const Latch& latch : schedule_->latches) latch.copy();

@@ -107,6 +107,11 @@ class Cycle {
     /// @}
 
    private:
+    void setTimes(std::int64_t time_ns) noexcept RTCF_NONBLOCKING {
+        clock_.time_ns = time_ns;
+        clock_.stamp_ns = time_ns + stamp_offset_ns_.load(std::memory_order_relaxed);
+    }
+    std::int64_t exchange(std::int64_t begin_ticks, std::int64_t time_ns) noexcept;
     template <bool Plain>
     std::int64_t update(const Step* next, const Step* end, std::int64_t before) noexcept;
     std::int64_t updateSelected(const Step* next, const Step* end, std::int64_t before) noexcept;

@@ -63,6 +63,34 @@ TEST(FrameRing, HasEachValueOfEachCycle) {
     EXPECT_FALSE(ring.read(10, frame)) << "it has not been";
 }
 
+// Each size has its way: words are gathered, what is larger or odd is not.
+TEST(FrameRing, HasValuesOfAllSizes) {
+    constexpr std::size_t kMost = 70;  // bytes
+    std::vector<std::vector<std::uint8_t>> values;
+    std::vector<FrameRing::Source> sources;
+    for (std::size_t size = 0; size <= kMost; ++size) values.emplace_back(size);
+    for (const auto& value : values) sources.push_back({value.data(), value.size()});
+    FrameRing ring(sources, 16);
+    std::uint8_t next = 0;
+    for (auto& value : values) {
+        for (std::uint8_t& byte : value) byte = ++next;
+    }
+    fill(ring, 0);
+    Frame frame;
+    ASSERT_TRUE(ring.read(0, frame));
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        EXPECT_EQ(ring.offset(i) % sizeof(std::uint64_t), 0);
+        EXPECT_EQ(std::memcmp(frame.values() + ring.offset(i), values[i].data(), values[i].size()),
+                  0)
+            << "of " << values[i].size() << " bytes";
+        for (std::size_t other = 0; other < i; ++other) {
+            EXPECT_TRUE(ring.offset(other) + values[other].size() <= ring.offset(i) ||
+                        ring.offset(i) + values[i].size() <= ring.offset(other))
+                << other << " and " << i << " bytes lie in each other's place";
+        }
+    }
+}
+
 TEST(FrameRing, KnowsWhichFramesHaveGone) {
     double number = 0.0;
     FrameRing ring({{&number, sizeof number}}, 16);

@@ -1,0 +1,83 @@
+/// @file
+/// The values of a frame, and how the real-time thread copies them: most are
+/// numbers of a word or a few, which are gathered several at a time; what is
+/// larger, or no whole words, is copied one by one.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+#include "rtcf/realtime.hpp"
+
+namespace rtcf::executor {
+
+class FrameCopy {
+   public:
+    using Word = std::atomic<std::uint64_t>;
+
+    /// A value to copy, of a size that stays.
+    struct Source {
+        const void* from;
+        std::size_t size;  ///< bytes
+        friend bool operator==(const Source& a, const Source& b) noexcept {
+            return a.from == b.from && a.size == b.size;
+        }
+    };
+
+    explicit FrameCopy(std::vector<Source> sources);
+
+    const std::vector<Source>& sources() const noexcept { return sources_; }
+    /// Where a source's value goes, bytes from the first; each begins at a word.
+    std::size_t offset(std::size_t source) const noexcept { return offsets_[source]; }
+    /// Of all values.
+    std::size_t words() const noexcept { return words_; }
+    /// Copies them. A reader that has seen any of the words sees, by acquire, what was stored
+    /// before them, too. Real-time safe.
+    void copy(Word* to) const noexcept RTCF_NONBLOCKING {
+        const void* const* from = gathered_.data();
+        const void* const* const end = from + gathered_.size();
+        Word* next = to;
+        for (; from != end; from += kAtOnce, next += kAtOnce) {
+            static_assert(kAtOnce == 4, "as many as stand here");
+            put(next[0], load<std::uint64_t>(from[0]));
+            put(next[1], load<std::uint64_t>(from[1]));
+            put(next[2], load<std::uint64_t>(from[2]));
+            put(next[3], load<std::uint64_t>(from[3]));
+        }
+        if (!blocks_.empty()) copyBlocks(to);
+    }
+
+   private:
+    static constexpr std::size_t kAtOnce = 4;  // words that are gathered
+
+    template <typename T>
+    static std::uint64_t load(const void* from) noexcept RTCF_NONBLOCKING {
+        T value;
+        std::memcpy(&value, from, sizeof value);
+        return value;
+    }
+    static std::uint64_t loadRest(const std::uint8_t* from, std::size_t size) noexcept
+        RTCF_NONBLOCKING;
+    static void put(Word& word, std::uint64_t value) noexcept RTCF_NONBLOCKING {
+        word.store(value, std::memory_order_release);
+    }
+    void copyBlocks(Word* to) const noexcept RTCF_NONBLOCKING;
+
+    /// What is not gathered.
+    struct Block {
+        const std::uint8_t* from;
+        std::size_t words;  ///< whole ones
+        std::size_t rest;   ///< bytes after them
+    };
+
+    std::vector<Source> sources_;
+    std::vector<std::size_t> offsets_;
+    std::size_t words_ = 0;
+    std::vector<const void*> gathered_;  // the first words; as many as are gathered at a time
+    std::vector<Block> blocks_;          // after them
+};
+
+}  // namespace rtcf::executor
