@@ -27,6 +27,32 @@ def test_a_reinstallation_leaves_the_loop_alone(service: Service) -> None:
     runs_on(service, before, daemon)
 
 
+def test_changes_go_on_while_all_packages_are_installed_anew(service: Service) -> None:
+    before, daemon = service.load_and_start(), service.pid
+    # A change after the other, by a client that has begun before.
+    script = (
+        "import pathlib, rtcf\n"
+        "done = 0\n"
+        "with rtcf.Client() as client:\n"
+        "    while not pathlib.Path('/var/tmp/enough').exists():\n"
+        "        client.load(rtcf.component('rtcf_examples', 'Identity', name='again'))\n"
+        "        client.unload(['again'])\n"
+        "        done += 1\n"
+        "print(done)\n"
+    )
+    changes = service.machine.start("python3", "-c", script)
+    try:
+        service.machine.shell("apt-get install --yes --quiet --reinstall /debs/*.deb")
+    finally:
+        service.machine.shell("touch /var/tmp/enough")
+        said, errors = changes.communicate(timeout=60)
+        service.machine.shell("rm /var/tmp/enough")
+    assert changes.returncode == 0, errors
+    assert int(said) > 0
+    assert not [each for each in service.ctl("list").stdout.split() if "again" in each]
+    runs_on(service, before, daemon)
+
+
 @pytest.mark.parametrize("distance", [-2, 2])
 def test_a_rtcfd_too_old_or_too_new_leaves_the_loop_running_and_says_so(
     service: Service, distance: int
