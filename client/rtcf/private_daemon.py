@@ -17,6 +17,8 @@ from typing import IO
 
 from rtcf.errors import RtcfError
 
+# Where builds put libraries of components, seen from the folder of a package or a workspace.
+BUILT = ("build/lib/rtcf", "devel/lib/rtcf-components", "lib/rtcf")
 _START_S = 30.0
 _END_S = 3.5
 _POLL_S = 0.02
@@ -26,6 +28,16 @@ _TAIL = 5  # lines
 def program(build_tree: Path | None) -> Path:
     """Return the rtcfd of the build tree, or the one that is installed."""
     return Path("/usr/bin/rtcfd") if build_tree is None else build_tree / "bin" / "rtcfd"
+
+
+def component_folders(given: Sequence[Path] = ()) -> list[Path]:
+    """Return the folders given, or those that a build has made here.  ValueError: there is none
+    of that name."""
+    for path in given:
+        if not path.is_dir():
+            raise ValueError(f"{path}: no such folder")
+    candidates = given or [Path(each) for each in BUILT]
+    return [path.absolute() for path in candidates if path.is_dir()]
 
 
 def _sleep(seconds: float) -> bool:

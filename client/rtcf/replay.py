@@ -111,18 +111,10 @@ class _Session:
 
     def run(self, writer: "_Writer", end: bool = False) -> None:
         """Run all cycles up to the last message's time."""
-        more = True
-        while more:
-            response = self._call.run(
-                control_pb2.ReplayRequest(
-                    messages=self._waiting, until_ns=self.summary.end_ns, end=end
-                )
-            )
-            del self._waiting[: response.consumed]
+        for response in self._call.cycles(self._waiting, self.summary.end_ns, end):
             self.summary.cycles = response.cycles
             self.summary.outputs += len(response.outputs)
             writer.write(response.outputs)
-            more = response.more
         self._bytes = sum(len(each.data) for each in self._waiting)
 
 

@@ -1,5 +1,6 @@
 """A replay that is under way: one request, one answer, for as long as the call lasts."""
 
+from collections.abc import Iterator
 from queue import SimpleQueue
 from typing import Any
 
@@ -28,6 +29,22 @@ class ReplayCall(Closing):
             return next(self._call)  # type: ignore[no-any-return]
         except grpc.RpcError as error:
             raise failures.from_grpc(error, self._socket) from None
+
+    def cycles(
+        self, messages: list[control_pb2.RecordedMessage], until_ns: int, end: bool = False
+    ) -> Iterator[control_pb2.ReplayResponse]:
+        """Run all cycles up to a time; yield the answers, of which there may be several.
+
+        `messages`, none after that time, are taken out as they are consumed.
+        """
+        more = True
+        while more:
+            response = self.run(
+                control_pb2.ReplayRequest(messages=messages, until_ns=until_ns, end=end)
+            )
+            del messages[: response.consumed]
+            yield response
+            more = response.more
 
     def close(self) -> None:
         """End the call; one that was not ended by `end` is ended by rtcfd."""

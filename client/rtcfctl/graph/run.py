@@ -11,15 +11,13 @@ from typing import Any
 
 import rtcf
 from rtcf.client import DEFAULT_RUNNER
-from rtcf.private_daemon import PrivateDaemon, program
+from rtcf.private_daemon import BUILT, PrivateDaemon, component_folders, program
 from rtcf.v1 import graph_pb2
 
 from rtcfctl.graph import files, python_source
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import counted
 
-# Where builds put libraries of components, seen from the folder of a package or a workspace.
-_BUILT = ("build/lib/rtcf", "devel/lib/rtcf-components", "lib/rtcf")
 _LOOK_S = 0.5
 
 
@@ -32,7 +30,7 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     run.add_argument("type", metavar="CLASS", nargs="?", help="of FILE.py")
     run.add_argument(
         "--path", action="append", default=[], metavar="FOLDER", type=Path,
-        help=f"where libraries are (default: {', '.join(_BUILT)} here, those that there are)",
+        help=f"where libraries are (default: {', '.join(BUILT)} here, those that there are)",
     )  # fmt: skip
     run.add_argument("--no-start", action="store_true", help="leave the loop stopped")
     run.set_defaults(run=show)
@@ -44,9 +42,13 @@ def show(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         raise ValueError("run: a graph file, or FILE.py and its CLASS")
     work = _Work(args, output)
     graphs = work.read()  # a file with a mistake is told before anything begins
+    try:
+        folders = component_folders(args.path)
+    except ValueError as error:
+        raise ValueError(f"--path {error}") from None
     daemon = PrivateDaemon(
         program(args.build_tree),
-        options=[word for path in _paths(args.path) for word in ("--path", str(path))],
+        options=[word for path in folders for word in ("--path", str(path))],
         socket=Path(args.socket) if args.socket else None,
     )
     try:
@@ -69,14 +71,6 @@ def show(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 def _say(line: str) -> None:
     print(line, flush=True)
-
-
-def _paths(given: list[Path]) -> list[Path]:
-    for path in given:
-        if not path.is_dir():
-            raise ValueError(f"--path {path}: no such folder")
-    found = given or [Path(each) for each in _BUILT if Path(each).is_dir()]
-    return [path.absolute() for path in found]
 
 
 class _Work:

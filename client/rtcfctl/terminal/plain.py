@@ -24,7 +24,7 @@ def plain(message: Any) -> Any:
     result = {field.name: _field(message, field) for field in message.DESCRIPTOR.fields}
     for name in _TEXTS.get(message.DESCRIPTOR.full_name, ()):
         if result[name]:
-            from rtcfctl.terminal.value_text import parse
+            from rtcf_shared.value_text import parse
 
             result[name] = parse(result[name])
         else:
