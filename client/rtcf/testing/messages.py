@@ -1,0 +1,96 @@
+"""Serialised ROS messages of one length as columns of NumPy, and columns as such messages."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+from rtcf_shared.naming import listing, suggestion
+from rtcf_shared.ros_definition import Definition, Field
+
+from rtcf.streams import ros_layout
+
+_LENGTH = struct.Struct("<I")
+_SIZES = {"string": 0, "bool": 1, "byte": 1, "char": 1, "time": 8, "duration": 8} | {
+    f"{kind}{bits}": bits // 8
+    for kind, all_bits in (("int", (8, 16, 32, 64)), ("uint", (8, 16, 32, 64)), ("float", (32, 64)))
+    for bits in all_bits
+}
+
+
+def pack(definition: str, columns: Mapping[str, npt.NDArray[np.generic]]) -> list[bytes]:
+    """Return the messages, one for each row of the columns; what no column names is zero.
+
+    Columns are by the path of a field, "" for what a message of one field wraps; an array's have
+    its values in the axes after the first one.  Raises ValueError: one line.
+    """
+    steps = max(len(each) for each in columns.values())
+    sample = _Zero(Definition(definition), columns).message("", "")
+    leaves = {each.path: each for each in ros_layout.leaves(definition, sample)}
+    rows = np.tile(np.frombuffer(sample, "u1"), (steps, 1))
+    for path, column in columns.items():
+        leaf = leaves.get(path)
+        if leaf is None:
+            names = [each or "(the value itself)" for each in leaves]
+            raise ValueError(
+                f"no field {path or '(the value itself)'}{suggestion(path, names)} "
+                f"(fields: {listing(names)})"
+            )
+        values = column.reshape(steps, -1)
+        count = 1 if leaf.count is None else leaf.count
+        if values.shape[1] != count:
+            raise ValueError(
+                f"{path + ': ' if path else ''}{values.shape[1]} values a cycle, {count} are needed"
+            )
+        size = count * ros_layout.size_of(leaf.format)
+        with np.errstate(invalid="ignore"):  # what is no integer is found below
+            exact = np.ascontiguousarray(values.astype(leaf.format, casting="unsafe"))
+        if exact.dtype.kind in "iub" and not np.array_equal(exact.astype(float), values):
+            raise ValueError(f"{path + ': ' if path else ''}not every value is a {exact.dtype}")
+        rows[:, leaf.offset : leaf.offset + size] = exact.view("u1").reshape(steps, size)
+    return [row.tobytes() for row in rows]
+
+
+def unpack(definition: str, messages: Sequence[bytes]) -> dict[str, npt.NDArray[np.generic]]:
+    """Return the columns of messages, by path as for pack().  ValueError: they differ in length."""
+    if len({len(each) for each in messages}) > 1:
+        raise ValueError("the messages are not of one length")
+    rows = np.frombuffer(b"".join(messages), "u1").reshape(len(messages), -1)
+    columns = {}
+    for leaf in ros_layout.leaves(definition, messages[0]):
+        count = 1 if leaf.count is None else leaf.count
+        end = leaf.offset + count * ros_layout.size_of(leaf.format)
+        values = np.ascontiguousarray(rows[:, leaf.offset : end]).view(leaf.format)
+        columns[leaf.path] = values[:, 0] if leaf.count is None else values
+    return columns
+
+
+class _Zero:
+    """A message of zeros, whose arrays are as long as the columns for them are wide."""
+
+    def __init__(self, types: Definition, columns: Mapping[str, npt.NDArray[np.generic]]) -> None:
+        self._types = types
+        self._columns = columns
+
+    def message(self, name: str, path: str) -> bytes:
+        return b"".join(
+            self._field(each, f"{path}.{each.name}" if path else each.name)
+            for each in self._types.fields(name)
+        )
+
+    def _field(self, field: Field, path: str) -> bytes:
+        if not field.is_array:
+            return self._single(field.kind, path)
+        count, head = field.length, b""
+        if count is None:
+            column = self._columns.get(path, self._columns.get("") if path == "data" else None)
+            count = 0 if column is None else int(np.prod(column.shape[1:], dtype=int))
+            head = _LENGTH.pack(count)
+        return head + b"".join(self._single(field.kind, f"{path}[{i}]") for i in range(count))
+
+    def _single(self, kind: str, path: str) -> bytes:
+        if kind == "string":
+            return _LENGTH.pack(0)
+        return bytes(_SIZES[kind]) if kind in _SIZES else self.message(kind, path)

@@ -1,0 +1,55 @@
+"""What a graph under test has written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import numpy.typing as npt
+from rtcf_shared.naming import listing, suggestion
+
+
+class Response(Mapping[str, npt.NDArray[np.generic]]):
+    """The values of outputs, by name: a row for each cycle, the value that a reader has after it.
+
+    `time` is that of the cycles, s from 0; `written` tells by output in which cycles it was
+    written.  Before its first value a number is NaN, an integer 0.
+    """
+
+    def __init__(
+        self,
+        time: npt.NDArray[np.float64],
+        written: dict[str, npt.NDArray[np.bool_]],
+        columns: dict[str, npt.NDArray[np.generic]],
+    ) -> None:
+        self.time = time
+        self.written = written
+        self._columns = columns
+
+    def __getitem__(self, name: str) -> npt.NDArray[np.generic]:
+        if name not in self._columns:
+            names = list(self._columns)
+            raise KeyError(
+                f"no output {name} was written{suggestion(name, names)} "
+                f"(written: {listing(names) or 'none'})"
+            )
+        return self._columns[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
+
+
+def held(
+    values: npt.NDArray[np.generic], cycles: npt.NDArray[np.int64], steps: int
+) -> npt.NDArray[np.generic]:
+    """Return values, written in some cycles, for each cycle: held until the next one."""
+    result = np.zeros((steps, *values.shape[1:]), values.dtype)
+    if values.dtype.kind == "f":
+        result[:] = np.nan
+    newest = np.searchsorted(cycles, np.arange(steps), side="right") - 1
+    there = newest >= 0
+    result[there] = values[newest[there]]
+    return result
