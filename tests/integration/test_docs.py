@@ -61,6 +61,8 @@ PREPARE: dict[str, Callable[[Daemon, rtcf.Client], None]] = {
     "security.md": _wave_that_was_tuned,
     "signals.md": _nothing,
     "simulation.md": _loop_with_a_bag,
+    "troubleshooting.md": _nothing,
+    "tuning.md": _nothing,
 }
 BY_THEMSELVES = {
     "README.md",  # test_readme.py
