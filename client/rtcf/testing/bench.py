@@ -7,6 +7,7 @@ loop's start on. The same inputs give the same outputs, bit by bit.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -58,21 +59,20 @@ class Bench(Closing):
         if frequency_hz is not None:
             graph.settings.frequency_hz = frequency_hz
         folders = component_folders([Path(each) for each in path])
-        self._daemon = PrivateDaemon(
+        daemon = PrivateDaemon(
             program(_build_tree()),
             options=[word for each in folders for word in ("--path", str(each))],
         )
-        try:
-            self._daemon.start()
-            self._client = Client(self._daemon.socket)
+        with ExitStack() as opening:
+            opening.callback(daemon.end)
+            daemon.start()
+            self._client = opening.enter_context(Client(daemon.socket))
             self._begin(graph)
-        except BaseException:
-            self.close()
-            raise
+            self._open = opening.pop_all()
 
     def close(self) -> None:
         """End the executor."""
-        self._daemon.end()
+        self._open.close()
 
     @property
     def client(self) -> Client:
