@@ -4,6 +4,7 @@ Everything here asks rtcfd and waits for it: not to be called in the event loop.
 """
 
 import math
+import time
 from typing import Any
 
 import rtcf
@@ -88,6 +89,30 @@ def event(found: control_pb2.Event) -> dict[str, Any]:
         "component": found.component,
         "user": found.user,
         "message": found.message,
+    }
+
+
+def record(found: control_pb2.LogRecord) -> dict[str, Any]:
+    """Return a log record."""
+    return {
+        "kind": "record",
+        "what": word(control_pb2.LogRecord.Level.DESCRIPTOR, found.level),
+        "time_ns": str(found.time_ns),
+        "iteration": found.iteration,
+        "component": found.component,
+        "message": found.message,
+    }
+
+
+def lost(count: int, what: str) -> dict[str, Any]:
+    """Return, as a record, that some are not told."""
+    return {
+        "kind": "record",
+        "what": "warn",
+        "time_ns": str(time.time_ns()),
+        "iteration": 0,
+        "component": "",
+        "message": f"{count} {what} before this were left out",
     }
 
 

@@ -1,10 +1,12 @@
-"""What happens to a runner, for its tabs: its state every second, events as they come.
+"""What happens to a runner, for its tabs: its state every second, events and log records as they
+come.
 
 One thread of each, while there are tabs.
 """
 
 import asyncio
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -16,10 +18,11 @@ from rtcf_scope import catalog
 from rtcf_scope.hub import Listener
 
 _EVERY_S = 1.0
+_MOST_RECORDS = 100  # in _EVERY_S: more than that nobody reads
 
 
 class News:
-    """The state and the events of one runner."""
+    """The state, the events and the log records of one runner."""
 
     def __init__(self, client: rtcf.Client, runner: str) -> None:
         self._client = client
@@ -33,7 +36,7 @@ class News:
         self._tabs.add(tab)
         if self._ended is None:
             self._ended = threading.Event()
-            for follow in (self._follow_state, self._follow_events):
+            for follow in (self._follow_state, self._follow_events, self._follow_logs):
                 words = (follow, self._ended, asyncio.get_running_loop())
                 threading.Thread(target=self._run, args=words, daemon=True).start()
 
@@ -90,6 +93,25 @@ class News:
                 return
             for found in stream:
                 if isinstance(found, Lost):
-                    tell({"kind": "lost_events", "count": found.count})
+                    tell(catalog.lost(found.count, "events"))
                 else:
                     tell(catalog.event(found))
+
+    def _follow_logs(self, ended: threading.Event, tell: Callable[[dict[str, Any]], None]) -> None:
+        with self._client.watch_logs(self._runner, level="info") as stream:
+            self._streams.append(stream)
+            if ended.is_set():
+                return
+            begin, told, left_out = time.monotonic(), 0, 0
+            for found in stream:
+                if time.monotonic() - begin > _EVERY_S:
+                    if left_out:
+                        tell(catalog.lost(left_out, "log records"))
+                    begin, told, left_out = time.monotonic(), 0, 0
+                if isinstance(found, Lost):
+                    left_out += found.count
+                elif told < _MOST_RECORDS:
+                    told += 1
+                    tell(catalog.record(found))
+                else:
+                    left_out += 1

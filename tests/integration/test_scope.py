@@ -250,6 +250,31 @@ def test_tabs_share_one_stream_and_miss_no_cycle_when_another_comes(scope: Scope
     asyncio.run(look())
 
 
+def test_what_happens_and_what_is_logged_is_told(looping: Daemon, scope: ScopeProcess) -> None:
+    def tune(amplitude: str) -> None:
+        with rtcf.Client(looping.socket) as client:
+            client.set_parameters("wave", [rtcf.parse_parameter(f"amplitude:={amplitude}")])
+
+    async def visit() -> list[dict[str, Any]]:
+        async with _Visit(scope) as page:
+            await page.text("state")
+            await asyncio.to_thread(tune, "9.5")
+            await page.text("event")
+            while not any(each.get("what") == "warn" for each in page.texts):
+                await page.text("record")
+            return page.texts
+
+    try:
+        texts = asyncio.run(visit())
+    finally:
+        tune("1.0")
+    (event,) = (each for each in texts if each["kind"] == "event")
+    assert (event["what"], event["component"]) == ("parameters", "/wave")
+    (record,) = (each for each in texts if each["kind"] == "record" and each["what"] == "warn")
+    assert (record["component"], record["message"]) == ("/wave", "amplitude 9.5 is large")
+    assert record["iteration"] > 0
+
+
 def test_a_trigger_shows_the_cycle_that_it_waits_for_and_its_neighbours(
     scope: ScopeProcess,
 ) -> None:

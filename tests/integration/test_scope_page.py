@@ -147,6 +147,29 @@ def test_a_slider_sets_the_parameter_of_the_running_component(
     assert page.errors == []
 
 
+def test_what_is_logged_is_a_mark_at_its_cycle(
+    visit: Opener, scope: ScopeProcess, loop: Daemon
+) -> None:
+    page = visit(scope, '{"panes":[{"traces":["/w7.wave"]}]}')
+    page.wait("scope.rate && !scope.live.empty")
+    _press(page, "footer [data-drawer=events]")
+    with rtcf.Client(loop.socket) as client:
+        client.set_parameters("w7", [spec.parse_parameter("amplitude:=9.5")])
+        page.wait(
+            "document.querySelector('.drawer[data-drawer=events]').textContent"
+            ".includes('/w7: amplitude 9.5 is large')"
+        )
+        client.set_parameters("w7", [spec.parse_parameter("amplitude:=1.0")])
+    # Within the second that the values come from.
+    assert page.ask(
+        """(() => {
+          const mark = scope.marks().find((each) => each.event.what === "warn");
+          return mark && Math.abs(mark.time - scope.live.lastTime) < 60;
+        })()"""
+    )
+    assert page.errors == []
+
+
 def test_figures_and_spectra_of_known_values_are_right(visit: Opener, scope: ScopeProcess) -> None:
     page = visit(scope)
     page.wait("scope.rate")

@@ -89,7 +89,7 @@ function hear(message) {
   else if (message.kind === "watching") rebase(BigInt(message.base_ns));
   else if (message.kind === "trigger") { scope.trigger.state = message.state; triggering.tell(); }
   else if (message.kind === "state") state(message);
-  else if (message.kind === "event") {
+  else if (message.kind === "event" || message.kind === "record") {
     scope.events.push(message);
     if (scope.events.length > 1000) scope.events.shift();
     if (message.what === "parameters") renew(false);

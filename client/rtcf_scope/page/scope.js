@@ -139,13 +139,13 @@ export class Scope {
     this.changed();
   }
 
-  // Events at the times of the axis that is shown.
+  // Events, warnings and errors at the times of the axis that is shown.
   marks() {
     if (this.mode === "recording") return [];
     const shift = this.mode === "trigger" ? this.shot?.hitTime ?? 0 : 0;
-    return this.events.map((event) => ({
+    return this.events.filter((event) => event.what !== "info").map((event) => ({
       time: Number(BigInt(event.time_ns) - this.baseNs) / 1e9 - shift,
-      ink: /fault|overruns|degraded/.test(event.what) ? "bad" : "change", event,
+      ink: isBad(event) ? "bad" : "change", event,
     }));
   }
 
@@ -160,6 +160,10 @@ export class Scope {
     for (const pane of this.panes) pane.draw();
     return true;
   }
+}
+
+export function isBad(event) {
+  return /fault|overruns|degraded|error|fatal/.test(event.what);
 }
 
 const EMPTY = new Store(1);

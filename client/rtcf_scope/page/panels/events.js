@@ -1,4 +1,7 @@
-// What has happened: faults, changes, overruns; each is a mark in the panes, too.
+// What has happened: faults, changes, overruns, each a mark in the panes, too; and what components
+// log, warnings and errors as marks.
+import { isBad } from "../scope.js";
+
 export class Events {
   constructor(scope, box) { this.scope = scope; this.box = box; }
 
@@ -20,9 +23,11 @@ export class Events {
       button.onclick = () => this.#go(event);
       const what = document.createElement("b");
       what.textContent = event.what.replaceAll("_", " ");
-      what.className = /fault|overruns|degraded/.test(event.what) ? "bad" : "";
+      what.className = isBad(event) ? "bad" : "";
       const text = document.createElement("span");
-      text.textContent = [event.message, event.user && `by ${event.user}`].filter(Boolean).join(", ");
+      const who = event.kind === "record" && event.component ? `${event.component}: ` : "";
+      text.textContent = who + [event.message, event.user && `by ${event.user}`].filter(Boolean).join(", ");
+      text.title = `cycle ${event.iteration}`;
       item.append(button, what, text);
       return item;
     }));
