@@ -12,7 +12,7 @@ import { Recordings } from "./panels/recordings.js";
 import { Spectrum } from "./panels/spectrum.js";
 import { Tree } from "./panels/tree.js";
 import { TriggerPanel } from "./panels/trigger.js";
-import { Scope } from "./scope.js";
+import { isForInformation, Scope } from "./scope.js";
 import { Stream, ask, query } from "./server.js";
 import { DURATION, LATENCY } from "./data/store.js";
 
@@ -91,7 +91,8 @@ function hear(message) {
   else if (message.kind === "state") state(message);
   else if (message.kind === "event" || message.kind === "record") {
     scope.events.push(message);
-    if (scope.events.length > 1000) scope.events.shift();
+    // What was told for information goes first.
+    if (scope.events.length > 1000) scope.events.splice(Math.max(0, scope.events.findIndex(isForInformation)), 1);
     if (message.what === "parameters") renew(false);
     if (drawer === "events") events.show();
     scope.changed();

@@ -143,7 +143,7 @@ export class Scope {
   marks() {
     if (this.mode === "recording") return [];
     const shift = this.mode === "trigger" ? this.shot?.hitTime ?? 0 : 0;
-    return this.events.filter((event) => event.what !== "info").map((event) => ({
+    return this.events.filter((event) => !isForInformation(event)).map((event) => ({
       time: Number(BigInt(event.time_ns) - this.baseNs) / 1e9 - shift,
       ink: isBad(event) ? "bad" : "change", event,
     }));
@@ -164,6 +164,10 @@ export class Scope {
 
 export function isBad(event) {
   return /fault|overruns|degraded|error|fatal/.test(event.what);
+}
+
+export function isForInformation(event) {
+  return event.what === "info";
 }
 
 const EMPTY = new Store(1);

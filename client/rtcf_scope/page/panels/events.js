@@ -1,6 +1,6 @@
 // What has happened: faults, changes, overruns, each a mark in the panes, too; and what components
 // log, warnings and errors as marks.
-import { isBad } from "../scope.js";
+import { isBad, isForInformation } from "../scope.js";
 
 export class Events {
   constructor(scope, box) { this.scope = scope; this.box = box; }
@@ -15,15 +15,16 @@ export class Events {
       return;
     }
     const list = document.createElement("ol");
-    list.append(...events.slice(-200).reverse().map((event) => {
+    const shown = new Set([...events.filter((each) => !isForInformation(each)).slice(-150), ...events.filter(isForInformation).slice(-50)]);
+    list.append(...events.filter((each) => shown.has(each)).reverse().map((event) => {
       const item = document.createElement("li");
       const button = document.createElement("button");
       button.textContent = new Date(Number(BigInt(event.time_ns) / 1000000n)).toLocaleTimeString();
       button.title = "show this moment";
       button.onclick = () => this.#go(event);
-      const what = document.createElement("b");
+      const what = document.createElement(isForInformation(event) ? "span" : "b");
       what.textContent = event.what.replaceAll("_", " ");
-      what.className = isBad(event) ? "bad" : "";
+      what.className = isBad(event) ? "what bad" : "what";
       const text = document.createElement("span");
       const who = event.kind === "record" && event.component ? `${event.component}: ` : "";
       text.textContent = who + [event.message, event.user && `by ${event.user}`].filter(Boolean).join(", ");
