@@ -123,8 +123,9 @@ void PortStreams::chooseColumns(Stream& stream) {
         if (stream.selection.matches(table.columns[i].fullName())) stream.columns.push_back(i);
     }
     stream.told = false;
-    stream.windows.reset();
-    if (stream.min_max) stream.windows.emplace(table, stream.columns, stream.every);
+    stream.windows = stream.min_max
+                         ? std::make_unique<PortWindows>(table, stream.columns, stream.every)
+                         : nullptr;
 }
 
 void PortStreams::serve(Stream& stream, const Send& send) {

@@ -8,7 +8,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -58,13 +57,13 @@ class PortStreams {
         PortSelection selection;
         std::uint32_t every;
         bool min_max;
-        std::deque<Table> tables;            // the first one is being read
-        std::vector<std::size_t> columns;    // of it
-        std::optional<PortWindows> windows;  // of minima and maxima
-        bool begun = false;                  // the first one has come
-        bool told = false;                   // its schema
-        std::uint64_t next = 0;              // frame of it
-        std::uint64_t lost = 0;              // cycles, since the last batch
+        std::deque<Table> tables;              // the first one is being read
+        std::vector<std::size_t> columns;      // of it
+        std::unique_ptr<PortWindows> windows;  // of minima and maxima; null = of each cycle
+        bool begun = false;                    // the first one has come
+        bool told = false;                     // its schema
+        std::uint64_t next = 0;                // frame of it
+        std::uint64_t lost = 0;                // cycles, since the last batch
 
         // Of so many cycles one is told, or would be: lost ones are counted like this.
         std::uint32_t step() const noexcept { return min_max ? 1 : every; }
