@@ -29,6 +29,7 @@ _MAX_STDERR_LINE = 300
 _LONGEST_ANSWER = 4 * 1024 * 1024
 _LONGEST_COMPLAINT = 64 * 1024
 _CHUNK = 64 * 1024
+_OOM_SCORE = "500"  # proc(5): where memory runs out, what nobody has loaded goes before a loop
 
 _File = tuple[str, int | None]  # path, and whose libraries are trusted
 _Identity = tuple[int, ...]  # inode, time of change, size; and whose it is and who may write it
@@ -147,6 +148,8 @@ class Describer:
             )
         except OSError as error:
             raise _Failed(f"cannot run {self.binary}: {error.strerror}") from None
+        with contextlib.suppress(OSError):  # it has ended already
+            Path(f"/proc/{process.pid}/oom_score_adj").write_text(_OOM_SCORE)
         reading = asyncio.gather(
             _until_end(process, process.stdout, _LONGEST_ANSWER),
             _until_end(process, process.stderr, _LONGEST_COMPLAINT),

@@ -161,6 +161,16 @@ def test_a_library_that_writes_without_end_is_ended(
     assert asyncio.run(work()) == "the process that loaded it wrote without end"
 
 
+def test_where_memory_runs_out_what_describes_goes_first(library: Path, tmp_path: Path) -> None:
+    binary = tmp_path / "executor"
+    binary.write_text(
+        '#!/bin/sh\nuntil [ "$(cat /proc/$$/oom_score_adj)" = 500 ]; do sleep 0.05; done\n'
+        'echo "as is due" >&2\nexit 1\n'
+    )
+    binary.chmod(0o755)
+    assert "as is due" in asyncio.run(Describer(binary).describe(library, "pkg")).problem
+
+
 def test_what_a_library_has_started_ends_with_its_process(library: Path, tmp_path: Path) -> None:
     binary = tmp_path / "executor"
     child = tmp_path / "child"
