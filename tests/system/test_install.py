@@ -108,8 +108,4 @@ def test_the_limits_of_the_unit_are_what_a_loop_needs(service: Service) -> None:
     assert service.unit_property("LimitRTPRIO") == "99"
     assert service.unit_property("AmbientCapabilities") == "cap_ipc_lock cap_sys_nice"
     assert service.unit_property("CPUSchedulingPolicy") == "0"
-
-
-def test_a_machine_without_memory_ends_others_before_a_loop(service: Service) -> None:
-    for pid in (service.pid, service.load_and_start()["pid"]):
-        assert service.machine.shell(f"cat /proc/{pid}/oom_score_adj").stdout.strip() == "-900"
+    assert service.unit_property("OOMScoreAdjust") == "-900"
