@@ -5,6 +5,8 @@ BUILD := build
 # Compilers are called by way of ccache where it is installed.
 export CMAKE_CXX_COMPILER_LAUNCHER = $(wildcard /usr/bin/ccache)
 export CMAKE_BUILD_PARALLEL_LEVEL ?= $(shell nproc)
+# Progress: share of the steps done, seconds since the start.
+export NINJA_STATUS ?= [%p, %e s] 
 
 tasks := all build demo checker test test-long bench bench-rt deb lint
 elsewhere := $(filter-out $(shell tools/release codename),$(RELEASE))
@@ -34,7 +36,7 @@ demo: dependencies ## run Fig. 1 of the paper at 2 kHz for 10 s, with ROS nodes 
 
 checker: dependencies ## build the executor that `build/bin/rtcfctl check` runs components in
 	@cmake -S . -B $(BUILD)-rtsan -G Ninja -DRTCF_SANITIZE=realtime \
-	  -DCMAKE_CXX_COMPILER=clang++-22
+	  -DCMAKE_CXX_COMPILER=clang++-22 -DRTCF_UNITY=OFF
 	@cmake --build $(BUILD)-rtsan --target rtcf-executor
 
 test: all ## all checks: lint, unit, sanitizers, integration, packages

@@ -6,12 +6,11 @@ namespace rtcf::executor {
 
 namespace {
 
-constexpr std::size_t kWord = sizeof(std::uint64_t);
 constexpr std::size_t kMostGathered = 4;  // words of one value
 constexpr std::uint64_t kNothing = 0;     // fills up what is gathered last
 
 bool isGathered(const FrameCopy::Source& source) {
-    return source.size % kWord == 0 && source.size / kWord <= kMostGathered;
+    return source.size % FrameCopy::kWord == 0 && source.size / FrameCopy::kWord <= kMostGathered;
 }
 
 }  // namespace
@@ -30,8 +29,8 @@ FrameCopy::FrameCopy(std::vector<Source> sources) : sources_(std::move(sources))
         const Source& source = sources_[i];
         if (isGathered(source)) continue;
         offsets_[i] = words_ * kWord;
-        blocks_.push_back({static_cast<const std::uint8_t*>(source.from), source.size / kWord,
-                           source.size % kWord});
+        blocks_.push_back({static_cast<const std::uint8_t*>(source.from),
+                           source.size / FrameCopy::kWord, source.size % FrameCopy::kWord});
         words_ += (source.size + kWord - 1) / kWord;
     }
 }

@@ -17,6 +17,7 @@ namespace rtcf::executor {
 class FrameCopy {
    public:
     using Word = std::atomic<std::uint64_t>;
+    static constexpr std::size_t kWord = sizeof(std::uint64_t);  ///< bytes
 
     /// A value to copy, of a size that stays.
     struct Source {

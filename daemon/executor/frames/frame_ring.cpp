@@ -4,14 +4,13 @@ namespace rtcf::executor {
 
 namespace {
 
-constexpr std::size_t kWord = sizeof(std::uint64_t);
-
 std::int64_t signedOf(std::uint64_t word) { return static_cast<std::int64_t>(word); }
 
 // A power of two, so that a place in the ring is found without a division.
 std::size_t capacityOf(std::size_t words_of_frame, std::size_t frames) {
     std::size_t capacity = FrameRing::kFewestFrames;
-    while (capacity < frames && 2 * capacity * words_of_frame * kWord <= FrameRing::kLargestRing)
+    while (capacity < frames &&
+           2 * capacity * words_of_frame * FrameCopy::kWord <= FrameRing::kLargestRing)
         capacity *= 2;
     return capacity;
 }
@@ -23,7 +22,7 @@ FrameRing::FrameRing(std::vector<Source> sources, std::size_t frames, FrameMemor
       stride_(kHeadWords + copy_.words()),
       mask_(capacityOf(stride_, frames) - 1) {
     const std::size_t words = capacity() * stride_;
-    if (memory != nullptr) block_ = memory->take(words * kWord);
+    if (memory != nullptr) block_ = memory->take(words * FrameCopy::kWord);
     if (block_ == nullptr) {
         // Written here for the first time, not in the loop.
         own_ = std::make_unique<Word[]>(words);  // NOLINT(modernize-avoid-c-arrays)

@@ -1,12 +1,10 @@
 #include "logging/log_limit.hpp"
 
+#include "common/time_units.hpp"
+
 namespace rtcf::executor {
 
-namespace {
-
-constexpr std::int64_t kSecond = 1'000'000'000;
-
-}  // namespace
+namespace {}  // namespace
 
 bool LogLimit::admit(const LogOrigin& origin, std::int64_t time_ns) {
     if (limit_ == 0) return true;

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "common/time_units.hpp"
 #include "logging/log.hpp"
 #include "loop/loop.hpp"
 #include "loop/simulated_clock.hpp"
@@ -16,7 +17,6 @@ namespace rtcf::executor {
 
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::uint64_t kBucketLeak = 1000;   // cycles on time that make good one overrun
 constexpr std::uint32_t kMostCaughtUp = 100;  // cycles in a row; after a freeze there are many
 

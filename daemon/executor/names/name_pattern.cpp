@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cstring>
+#include <regex>
 
 #include "common/refusal.hpp"
 #include "names/names.hpp"
@@ -46,11 +47,16 @@ const char* reason(std::regex_constants::error_type code, const std::string& exp
 
 }  // namespace
 
+struct NamePattern::Expression {
+    std::regex regex;
+};
+
 NamePattern::NamePattern(const std::string& what, const std::string& expression) {
     if (expression.empty()) return;
     requireLength(what.c_str(), expression, kLongestPattern);
     try {
-        regex_.emplace(expression, kSyntax);
+        expression_ =
+            std::make_shared<const Expression>(Expression{std::regex(expression, kSyntax)});
     } catch (const std::regex_error& error) {
         throw Refusal(RefusalKind::ExpressionInvalid,
                       fmt::format("{}: bad regular expression '{}': {}", what, expression,
@@ -60,7 +66,7 @@ NamePattern::NamePattern(const std::string& what, const std::string& expression)
 
 bool NamePattern::matches(const std::string& name) const {
     try {
-        return regex_ && std::regex_match(name, *regex_);
+        return expression_ != nullptr && std::regex_match(name, expression_->regex);
     } catch (const std::regex_error& error) {
         throw Refusal(RefusalKind::ExpressionInvalid,
                       fmt::format("a regular expression takes too long on '{}': {}", name,

@@ -3,8 +3,7 @@
 /// match a whole name. Not real-time.
 #pragma once
 
-#include <optional>
-#include <regex>
+#include <memory>
 #include <string>
 
 namespace rtcf::executor {
@@ -21,7 +20,8 @@ class NamePattern {
     bool matches(const std::string& name) const;
 
    private:
-    std::optional<std::regex> regex_;
+    struct Expression;
+    std::shared_ptr<const Expression> expression_;  // immutable, shared by copies
 };
 
 }  // namespace rtcf::executor

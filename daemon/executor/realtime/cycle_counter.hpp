@@ -5,9 +5,6 @@
 #pragma once
 
 #include <cstdint>
-#if defined(__x86_64__)
-#include <x86intrin.h>
-#endif
 #include <ctime>
 
 #include "rtcf/realtime.hpp"
@@ -38,7 +35,7 @@ std::int64_t realtimeOffset(ClockReading monotonic = monotonicNow,
 /// Ticks of the time stamp counter, or of the generic timer on arm64. Real-time safe.
 inline std::int64_t readCycleCounter() noexcept RTCF_NONBLOCKING {
 #if defined(__x86_64__)
-    return static_cast<std::int64_t>(__rdtsc());
+    return static_cast<std::int64_t>(__builtin_ia32_rdtsc());
 #elif defined(__aarch64__)
     std::int64_t ticks = 0;
     asm volatile("mrs %0, cntvct_el0" : "=r"(ticks));

@@ -4,15 +4,12 @@
 #include <algorithm>
 
 #include "common/refusal.hpp"
+#include "common/time_units.hpp"
 #include "runner/runner.hpp"
 
 namespace rtcf::executor {
 
-namespace {
-
-constexpr std::int64_t kSecond = 1'000'000'000;
-
-}  // namespace
+namespace {}  // namespace
 
 MappingFilter Runner::filter() const {
     return {NamePattern("whitelist", settings_.whitelist),

@@ -2,15 +2,12 @@
 #include <fmt/format.h>
 
 #include "common/refusal.hpp"
+#include "common/time_units.hpp"
 #include "runner/runner.hpp"
 
 namespace rtcf::executor {
 
-namespace {
-
-constexpr std::int64_t kSecond = 1'000'000'000;
-
-}  // namespace
+namespace {}  // namespace
 
 const GraphNode* Runner::nodeOf(const Component* component) const noexcept {
     for (const GraphNode& node : plan_->graph.nodes()) {

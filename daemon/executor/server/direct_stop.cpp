@@ -15,14 +15,14 @@
 #include <cstring>
 #include <system_error>
 
+#include "common/time_units.hpp"
 #include "realtime/cycle_counter.hpp"
 
 namespace rtcf::executor {
 
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::int64_t kAskTimeout = kSecond;         // from the connection to the line
+constexpr std::int64_t kLineTimeout = kSecond;        // from the connection to the line
 constexpr std::int64_t kAnswerTimeout = 2 * kSecond;  // from the line to the end of the loop
 constexpr int kLookMs = 2;                            // between looks at a loop that is to end
 constexpr std::size_t kMostClients = 32;              // with the right; others are never kept
@@ -147,7 +147,7 @@ void DirectStop::accept() {
         ::close(fd);
         return;
     }
-    clients_.push_back({fd, peer.uid, peer.pid, false, monotonicNow() + kAskTimeout, {}});
+    clients_.push_back({fd, peer.uid, peer.pid, false, monotonicNow() + kLineTimeout, {}});
 }
 
 bool DirectStop::attend(Client& client, bool readable) {

@@ -12,11 +12,11 @@
 #include <system_error>
 #include <utility>
 
+#include "common/time_units.hpp"
+
 namespace rtcf::executor {
 
 namespace {
-
-constexpr std::int64_t kSecond = 1'000'000'000;
 
 int spare() noexcept { return ::open("/dev/null", O_RDONLY | O_CLOEXEC); }
 

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <utility>
 
+#include "common/time_units.hpp"
 #include "messages/errors.hpp"
 #include "messages/from_wire.hpp"
 #include "messages/settings_messages.hpp"
@@ -23,7 +24,6 @@ namespace {
 // Of rtcfd and executor the newer asks for nothing that the older does not know:
 // see link.py of rtcfd. Hello, stop and exit stay as they are for good.
 constexpr std::uint32_t kProtocol = 4;
-constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kHookTimeout = 10 * kSecond;
 constexpr std::int64_t kProbeTimeout = kSecond / 2;
 

@@ -15,7 +15,7 @@ namespace rtcf::ros1 {
 
 namespace {
 
-constexpr auto kAgain = std::chrono::seconds(10);  // after one that failed, or is in doubt
+constexpr auto kRetryAfter = std::chrono::seconds(10);  // after one that failed, or is in doubt
 
 std::string lookUpHost(const std::string& host) {
     addrinfo hints{};
@@ -74,7 +74,7 @@ void HostNames::doubt(const std::string& host) {
         const bool is_new = shared_->hosts.count(host) == 0;
         Shared::Host& known = shared_->hosts[host];
         const auto now = std::chrono::steady_clock::now();
-        if (isNumeric(host) || known.looking || (!is_new && now < known.last + kAgain)) return;
+        if (isNumeric(host) || known.looking || (!is_new && now < known.last + kRetryAfter)) return;
         known.looking = true;
         known.last = now;
     }

@@ -34,6 +34,9 @@ struct MasterAnswer {
     std::string text();
 };
 
+/// For one answer of a master.
+inline constexpr std::chrono::milliseconds kMasterAnswerTimeout{1000};
+
 /// A method and an array of arguments.
 struct MasterCall {
     std::string method;

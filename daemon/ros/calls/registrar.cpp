@@ -8,11 +8,7 @@
 
 namespace rtcf::ros1 {
 
-namespace {
-
-constexpr auto kEach = std::chrono::milliseconds(1000);  // for one answer
-
-}  // namespace
+namespace {}  // namespace
 
 Registrar::Registrar(Connect connect)
     : connect_(std::move(connect)), thread_(quietThread("ros-register", [this] { run(); })) {}
@@ -193,7 +189,7 @@ void Registrar::run() {
         const Clock::time_point deadline = deadline_;
         telling_ = true;
         lock.unlock();
-        std::vector<MasterAnswer> answers = master->run(calls, kEach, deadline);
+        std::vector<MasterAnswer> answers = master->run(calls, kMasterAnswerTimeout, deadline);
         std::vector<std::pair<std::string, XmlRpc::XmlRpcValue>> connections;
         lock.lock();
         telling_ = false;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint32_t kQueue = 1000;
 
-rosgraph_msgs::Log::_level_type levelTo(LogLevel level) {
+rosgraph_msgs::Log::_level_type rosLevelTo(LogLevel level) {
     switch (level) {
         case LogLevel::Debug:
             return rosgraph_msgs::Log::DEBUG;
@@ -38,7 +38,7 @@ ros::Time timeOf(const executor::LogEntry& entry) {
 
 void Rosout::publish(const executor::LogEntry& entry) {
     rosgraph_msgs::Log message;
-    message.level = levelTo(entry.level);
+    message.level = rosLevelTo(entry.level);
     message.msg = entry.message;
     message.file = entry.file;
     message.function = entry.function;

@@ -6,8 +6,7 @@ namespace rtcf::ros1 {
 
 namespace {
 
-constexpr auto kEach = std::chrono::milliseconds(1000);  // for one answer
-constexpr auto kAgain = std::chrono::seconds(10);
+constexpr auto kCheckPeriod = std::chrono::seconds(10);
 
 // The nodes that have this topic or service.
 std::vector<std::string> holders(XmlRpc::XmlRpcValue& state, int kind, const std::string& name) {
@@ -37,14 +36,14 @@ const std::string& Claim::of(MasterLink& link, const std::string& wanted) {
     }
     if (wanted == wanted_ && now < next_) return used_;
     ParallelCalls master = link.calls();
-    std::vector<MasterAnswer> answers =
-        master.run({{"getSystemState", texts({own})}}, kEach, now + kEach);
+    std::vector<MasterAnswer> answers = master.run(
+        {{"getSystemState", texts({own})}}, kMasterAnswerTimeout, now + kMasterAnswerTimeout);
     if (!answers[0]) {
         if (used_.empty()) used_ = own;
         return used_;
     }
     // Soon again at first: two that begin together may both have found it free.
-    next_ = now + (wanted == wanted_ ? kAgain : kEach);
+    next_ = now + (wanted == wanted_ ? kCheckPeriod : kMasterAnswerTimeout);
     wanted_ = wanted;
     used_ = wanted;
     problem_.clear();

@@ -73,10 +73,11 @@ bool canBeSent(const ParameterValue& value) {
     return following == 0;
 }
 
-constexpr auto kEach = std::chrono::milliseconds(1000);  // for one answer
-constexpr std::size_t kMost = 400;                       // calls in one turn
+constexpr std::size_t kMost = 400;  // calls in one turn
 
-std::chrono::steady_clock::time_point soon() { return std::chrono::steady_clock::now() + kEach; }
+std::chrono::steady_clock::time_point soon() {
+    return std::chrono::steady_clock::now() + kMasterAnswerTimeout;
+}
 
 }  // namespace
 
@@ -172,7 +173,7 @@ bool ParameterMirror::read(ParallelCalls& master, const Caller& caller,
                          : MasterCall{"subscribeParam", texts({caller.name, caller.uri, name})});
         }
     }
-    std::vector<MasterAnswer> answers = master.run(calls, kEach, soon());
+    std::vector<MasterAnswer> answers = master.run(calls, kMasterAnswerTimeout, soon());
     for (std::size_t i = 0; i < answers.size(); ++i) {
         const std::string& name = looked_at[i]->set->full_name;
         if (answers[i].silent()) {
@@ -271,7 +272,7 @@ bool ParameterMirror::write(ParallelCalls& master, const Caller& caller,
         const std::lock_guard lock(pending_->mutex);
         pending_->problem = problem;
     }
-    const std::vector<MasterAnswer> answers = master.run(calls, kEach, soon());
+    const std::vector<MasterAnswer> answers = master.run(calls, kMasterAnswerTimeout, soon());
     for (std::size_t i = 0; i < answers.size(); ++i) {
         if (answers[i].silent()) {
             result = Reconciled::Later;
@@ -314,7 +315,7 @@ void ParameterMirror::leave(ParallelCalls& master, const Caller& caller,
         of.insert(of.end(), owed.size(), component);
         calls.insert(calls.end(), owed.begin(), owed.end());
     }
-    const std::vector<MasterAnswer> answers = master.run(calls, kEach, deadline);
+    const std::vector<MasterAnswer> answers = master.run(calls, kMasterAnswerTimeout, deadline);
     for (std::size_t i = 0; i < answers.size(); ++i) {
         if (answers[i].silent()) owed_[of[i]].push_back(std::move(calls[i]));
     }

@@ -13,7 +13,7 @@ namespace rtcf::ros1 {
 namespace {
 
 // For what components that have left take back.
-constexpr auto kLeaving = std::chrono::milliseconds(1000);
+constexpr auto kLeaveTimeout = std::chrono::milliseconds(1000);
 
 bool sameChoices(const std::vector<Choice>& one, const std::vector<Choice>& other) {
     return std::equal(
@@ -92,7 +92,7 @@ Reconciled Reconfiguring::reconcile(ros::NodeHandle& handle, ParallelCalls& mast
         server->close();
         left.insert(component);
     }
-    mirror_.leave(master, caller, left, std::chrono::steady_clock::now() + kLeaving);
+    mirror_.leave(master, caller, left, std::chrono::steady_clock::now() + kLeaveTimeout);
     Reconciled result = Reconciled::Done;
     for (const auto& [component, server] : wanted) {
         if (!server->isDue()) continue;

@@ -123,27 +123,27 @@ TEST_F(ParameterTest, FloatTakesNoDoubleBeyondItsRange) {
     EXPECT_EQ(gain.value(), 1e38F);
 }
 
-enum class Mode { Off = 3, Slow = 7, Fast = 1 };
+enum class Drive { Off = 3, Slow = 7, Fast = 1 };
 
 TEST_F(ParameterTest, EnumeratorTravelsByName) {
-    Parameter<Mode> mode{&component,
+    Parameter<Drive> mode{&component,
                          "mode",
-                         Mode::Slow,
-                         Choice("off", Mode::Off),
-                         Choice("slow", Mode::Slow),
-                         Choice("fast", Mode::Fast)};
+                         Drive::Slow,
+                         Choice("off", Drive::Off),
+                         Choice("slow", Drive::Slow),
+                         Choice("fast", Drive::Fast)};
     EXPECT_EQ(mode.declaration().type, "enum");
     EXPECT_EQ(std::get<std::string>(mode.declaration().default_value), "slow");
     EXPECT_EQ(set(mode, std::string("fast")), "");
-    EXPECT_EQ(mode.value(), Mode::Fast);
+    EXPECT_EQ(mode.value(), Drive::Fast);
     EXPECT_EQ(set(mode, std::string("warp")), "parameter mode = warp is none of off, slow, fast");
     EXPECT_EQ(set(mode, Int{1}), "parameter mode takes a name, not an int");
-    EXPECT_EQ(mode.value(), Mode::Fast);
+    EXPECT_EQ(mode.value(), Drive::Fast);
 }
 
 TEST_F(ParameterTest, EnumDefaultWithoutAChoiceIsRefused) {
     const auto declare = [this] {
-        const Parameter<Mode> mode{&component, "mode", Mode::Off, Choice("fast", Mode::Fast)};
+        const Parameter<Drive> mode{&component, "mode", Drive::Off, Choice("fast", Drive::Fast)};
     };
     EXPECT_THROW(declare(), std::logic_error);
 }
