@@ -127,11 +127,11 @@ enum class Drive { Off = 3, Slow = 7, Fast = 1 };
 
 TEST_F(ParameterTest, EnumeratorTravelsByName) {
     Parameter<Drive> mode{&component,
-                         "mode",
-                         Drive::Slow,
-                         Choice("off", Drive::Off),
-                         Choice("slow", Drive::Slow),
-                         Choice("fast", Drive::Fast)};
+                          "mode",
+                          Drive::Slow,
+                          Choice("off", Drive::Off),
+                          Choice("slow", Drive::Slow),
+                          Choice("fast", Drive::Fast)};
     EXPECT_EQ(mode.declaration().type, "enum");
     EXPECT_EQ(std::get<std::string>(mode.declaration().default_value), "slow");
     EXPECT_EQ(set(mode, std::string("fast")), "");
