@@ -105,9 +105,8 @@ _CMAKE_PYTHON = (
 rtcf_add_python_components($package PACKAGE $package SOURCES src/$name.py)
 
 include(CTest)
-if(BUILD_TESTING)  # python3-pytest
-  add_test(NAME $name COMMAND /usr/bin/python3 -m pytest $${CMAKE_CURRENT_SOURCE_DIR}
-           WORKING_DIRECTORY $${CMAKE_CURRENT_SOURCE_DIR})
+if(BUILD_TESTING)
+  rtcf_add_python_test($name)  # python3-pytest
 endif()
 """
 )

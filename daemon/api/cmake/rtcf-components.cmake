@@ -111,3 +111,19 @@ function(rtcf_add_python_components target)
   add_custom_target(${target} ALL DEPENDS ${library})
   install(FILES ${library} DESTINATION ${destination} COMPONENT ${arg_PACKAGE})
 endfunction()
+
+# rtcf_add_python_test(<name>)
+#
+# Adds a test that runs pytest (python3-pytest) in the current source folder. It imports the Python
+# modules of the same rtcf as find_package(rtcf) has found: those of a build tree, or installed ones.
+function(rtcf_add_python_test name)
+  add_test(
+    NAME ${name}
+    COMMAND /usr/bin/python3 -m pytest ${CMAKE_CURRENT_SOURCE_DIR}
+    WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
+  if(rtcf_PYTHON_DIR)
+    set_tests_properties(
+      ${name} PROPERTIES ENVIRONMENT_MODIFICATION
+                         "PYTHONPATH=path_list_prepend:${rtcf_PYTHON_DIR}")
+  endif()
+endfunction()
