@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import rtcf
 from daemon_process import BUILD_TREE, Daemon, clean_environment
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from pages import TREE
@@ -40,7 +40,7 @@ def mimo() -> Iterator[Bench]:
         yield bench
 
 
-@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=20)
 @given(
     values=arrays.arrays(float, 50, elements=st.floats(-1e6, 1e6)),
     sent=arrays.arrays(bool, 50, elements=st.booleans()),

@@ -77,7 +77,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[rtcf.Client]:
 
 @hypothesis.seed(SEED)
 @hypothesis.settings(
-    max_examples=40, deadline=None, database=None, derandomize=False,
+    max_examples=40, derandomize=False,
     suppress_health_check=list(hypothesis.HealthCheck),
 )  # fmt: skip
 @hypothesis.given(

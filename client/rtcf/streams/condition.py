@@ -57,15 +57,18 @@ class Condition:
         except (SyntaxError, RecursionError, MemoryError):
             raise ConditionError(_no_condition(text)) from None
         if _depth(tree) > _DEEPEST:
-            raise ConditionError(f'"{text[:40]}…" has too many parentheses')
+            raise ConditionError(f'"{_line(text[:40])}…" has too many parentheses')
         for node in ast.walk(tree):
             if not isinstance(node, _NODES):
                 raise ConditionError(_no_condition(text))
         self._tree = tree.body
         if not self.signals:
-            raise ConditionError(f'"{text}" names no signal: write one as in `wave.phase > 0.5`')
+            raise ConditionError(
+                f'"{_line(text)}" names no signal: write one as in `wave.phase > 0.5`'
+            )
         if not _is_truth(self._tree):
-            raise ConditionError(f'"{text}" is a number: compare it, as in `{text} > 0`')
+            line = _line(text)
+            raise ConditionError(f'"{line}" is a number: compare it, as in `{line} > 0`')
 
     @property
     def columns(self) -> list[str]:
@@ -108,20 +111,24 @@ class Condition:
                 at, last = word.end(), _WORDS.get(word[0], word[0])
                 if word[0] not in _WORDS and word[0] not in _FUNCTIONS:
                     raise ConditionError(
-                        f'"{word[0]}" in "{self.text}" is no signal: these are COMPONENT.PORT, '
-                        "COMPONENT.STATE or COMPONENT.PORT.FIELD"
+                        f'"{word[0]}" in "{_line(self.text)}" is no signal: these are '
+                        "COMPONENT.PORT, COMPONENT.STATE or COMPONENT.PORT.FIELD"
                     )
             elif sign := _SIGN.match(self.text, at):
                 at, last = sign.end(), _WORDS.get(sign[0], sign[0])
             else:
-                raise ConditionError(
-                    f'"{self.text[at : at + 10]}" in "{self.text}" is not understood'
-                )
+                part, line = _line(self.text[at : at + 10]), _line(self.text)
+                raise ConditionError(f'"{part}" in "{line}" is not understood')
             yield last
 
 
 def _no_condition(text: str) -> str:
-    return f'"{text}" is no condition: write one as in `wave.phase > 0.5`'
+    return f'"{_line(text)}" is no condition: write one as in `wave.phase > 0.5`'
+
+
+def _line(text: str) -> str:
+    """Return it for a message of one line: line ends and control characters as escapes."""
+    return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
 
 
 def _matched(pattern: re.Pattern[str], text: str, at: int) -> re.Match[str]:

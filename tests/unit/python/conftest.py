@@ -7,14 +7,7 @@ from pathlib import Path
 import pytest
 import rtcf
 from daemon_under_test import DaemonUnderTest
-from hypothesis import HealthCheck, settings
 from rtcfd_in_process import Machine, Rtcfd
-
-# How fast this machine draws and tries is no property of what is tested.
-settings.register_profile(
-    "any pace", deadline=None, database=None, suppress_health_check=[HealthCheck.too_slow]
-)
-settings.load_profile("any pace")
 
 
 @pytest.fixture

@@ -3,7 +3,8 @@
 After an answered stop no cycle runs until somebody asks for a start; nothing is
 held by the dead; and the disk says what was answered.  A few dozen sequences are
 drawn by each run; `--long` draws 10 000, or as many as RTCF_SEQUENCES says.
-Sequences depend on the seed alone: RTCF_SEED, 1 if there is none.
+Sequences depend on the seed alone (RTCF_SEED, 1 if there is none), besides those that failed before
+and are kept.
 """
 
 import asyncio
@@ -226,7 +227,7 @@ def drawn(number: int) -> Any:
         test = settings(
             max_examples=number,
             suppress_health_check=health,
-            phases=[Phase.explicit, Phase.generate, Phase.shrink],
+            phases=[Phase.explicit, Phase.reuse, Phase.generate, Phase.shrink],
         )(test)
         return seed(SEED)(test)
 
