@@ -4,9 +4,7 @@ A counterexample is kept in build/hypothesis/, from which the next run tries it 
 noted in build/test/counterexamples: tests/run does not repeat such a test, as other draws may pass.
 """
 
-from collections.abc import Generator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, errors, settings
@@ -19,23 +17,21 @@ _NOTED = _BUILD / "test" / "counterexamples"
 settings.register_profile(
     "any pace",
     deadline=None,
-    database=DirectoryBasedExampleDatabase(str(_BUILD / "hypothesis")),  # type: ignore[no-untyped-call]
+    database=DirectoryBasedExampleDatabase(str(_BUILD / "hypothesis")),
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("any pace")
 
 
-@pytest.hookimpl(hookwrapper=True)
-def pytest_runtest_makereport(
-    item: pytest.Item, call: pytest.CallInfo[None]
-) -> Generator[None, Any, None]:
+def pytest_exception_interact(
+    node: pytest.Item, call: pytest.CallInfo[None], report: pytest.TestReport
+) -> None:
     """Note a property test that has found a counterexample."""
-    report: pytest.TestReport = (yield).get_result()
-    if report.when != "call" or not report.failed or call.excinfo is None:
-        return
     # Hypothesis repeats a failure; Flaky says that it did not come back.
     by_chance = (errors.Flaky, errors.FailedHealthCheck)
-    if item.get_closest_marker("hypothesis") and not isinstance(call.excinfo.value, by_chance):
+    if report.when != "call" or call.excinfo is None or isinstance(call.excinfo.value, by_chance):
+        return
+    if node.get_closest_marker("hypothesis"):
         _NOTED.parent.mkdir(parents=True, exist_ok=True)
         with _NOTED.open("a") as noted:
-            noted.write(f"{item.nodeid}\n")
+            noted.write(f"{node.nodeid}\n")
