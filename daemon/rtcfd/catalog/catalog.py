@@ -2,6 +2,8 @@
 
 A package is a folder of libraries, `<folder>/<package>/*.so`, in one of the
 folders of the search path; of two types with one name the first found wins.
+A library that does not load hides its package in later folders: other code than
+the first folder's is never taken unasked.
 """
 
 import asyncio
@@ -67,6 +69,8 @@ class _Contents:
 
     types: dict[str, graph_pb2.ComponentType] = field(default_factory=dict)
     others: dict[str, list[str]] = field(default_factory=dict)  # libraries with a type again
+    hidden: dict[str, Path] = field(default_factory=dict)  # by type, its library in a later folder
+    broken: Path | None = None  # the first library that does not load
     problems: list[str] = field(default_factory=list)
 
 
@@ -103,6 +107,16 @@ class Catalog:
                 str(found.library),
                 self._owner(Path(found.library)),
                 tuple(contents.others.get(type_name, ())),
+            )
+        if type_name in contents.hidden:
+            later = contents.hidden[type_name]
+            raise FailedPrecondition(
+                f"{package}/{type_name}: {contents.broken} does not load, and {later} of a later "
+                f"folder is not taken in its place: mend {contents.broken}, or remove it: "
+                + "; ".join(contents.problems),
+                errors_pb2.REASON_LIBRARY_REFUSED,
+                package=package,
+                type=type_name,
             )
         if contents.problems:
             raise FailedPrecondition(
@@ -151,7 +165,12 @@ class Catalog:
         for library, description in zip(libraries, descriptions, strict=True):
             if description.problem:
                 contents.problems.append(_one_problem(library, description.problem))
+                contents.broken = contents.broken or library
+            hidden = contents.broken is not None and contents.broken.parent != library.parent
             for described in description.types:
+                if hidden and described.type not in contents.types:
+                    contents.hidden.setdefault(described.type, library)
+                    continue
                 offered = graph_pb2.ComponentType()
                 offered.CopyFrom(described)
                 offered.package = package

@@ -46,6 +46,8 @@ class Incidents:
         self._folder = folder
         self._limits = limits
         self._threads = ThreadPoolExecutor(1, "rtcfd-incidents")
+        # Of its own: a file may take _WRITE_TIMEOUT_S, for which nobody who lists or removes waits.
+        self._writers = ThreadPoolExecutor(1, "rtcfd-incident-file")
         # Of its own: frames are written anew while they wait for the file of another incident.
         self._copier = ThreadPoolExecutor(1, "rtcfd-frames")
         self._kept: dict[str, float] = {}  # when, by runner
@@ -74,7 +76,7 @@ class Incidents:
                 stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime(facts["time_ns"] / 1e9))
                 name = await self._aside(_free_name, folder, f"{stamp}-{facts['runner']}")
                 file = folder / (name + _SUFFIX)
-                await self._aside(_write, frozen, file, facts)
+                await self._aside(_write, frozen, file, facts, threads=self._writers)
                 await self._aside(_tidy, folder, self._limits().incidents_mb * 1_000_000, file)
         finally:
             os.close(frozen)

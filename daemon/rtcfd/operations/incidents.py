@@ -30,7 +30,10 @@ def keep(
     facts = _facts(runner, executor, reason, component, iteration)
     # Our own: the executor's is closed soon.
     descriptor = os.dup(executor.frames)
-    runner.operations.in_background("keeping an incident", _keep(runner, descriptor, facts))
+    # Not the runner's: its removal does not wait for a file.
+    runner.shared.keeping.in_background(
+        f"an incident of {runner.name}", _keep(runner, descriptor, facts)
+    )
 
 
 async def take(runner: RunnerCore, reason: str) -> incidents_pb2.Incident:
@@ -47,8 +50,8 @@ async def take(runner: RunnerCore, reason: str) -> incidents_pb2.Incident:
     facts = _facts(runner, executor, reason, "", 0)
     descriptor = os.dup(executor.frames)
     # To its end, also if the caller leaves: threads have what is open then.
-    return await runner.operations.begin(
-        "keeping an incident", lambda: _keep(runner, descriptor, facts)
+    return await runner.shared.keeping.begin(
+        f"an incident of {runner.name}", lambda: _keep(runner, descriptor, facts)
     )
 
 

@@ -6,6 +6,7 @@ here and nowhere else.
 
 import asyncio
 import contextlib
+import logging
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -59,6 +60,9 @@ class Surroundings:
     events: EventLog = field(default_factory=EventLog)
     limits: Limits = field(default_factory=Limits)
     incidents: Incidents = field(default_factory=lambda: Incidents(None, Limits))
+    keeping: Operations = field(  # incidents under way
+        default_factory=lambda: Operations("incidents", logging.getLogger("rtcfd.incidents"))
+    )
     rules: wire.AccessRules = field(default_factory=wire.AccessRules)  # for executors
     name_of: Callable[[int], Awaitable[str]] = _number  # of a user, for people
     # Threads of their own: a stop must get to disk whatever else hangs.

@@ -276,11 +276,15 @@ class Runners:
         await asyncio.gather(
             *(each.shut_down(cause, "rtcfd is being ended", in_order) for each in runners)
         )
-        await self.operations.drain()
+        await self._drain()
 
     async def leave(self) -> None:
         """Let go of all executors, whose loops go on: the next rtcfd adopts them."""
         self.closing.set()
         await asyncio.gather(*(runner.leave() for runner in self._runners.values()))
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self.operations.drain(), LEAVE_TIMEOUT_S)
+            await asyncio.wait_for(self._drain(), LEAVE_TIMEOUT_S)
+
+    async def _drain(self) -> None:
+        await self.operations.drain()
+        await self._shared.keeping.drain()

@@ -26,10 +26,12 @@ from rtcfd.catalog.catalog import Catalog, Folder
 from rtcfd.catalog.describe import Describer
 from rtcfd.common import runner_settings
 from rtcfd.common.event_log import EventLog
+from rtcfd.common.limits import Limits
 from rtcfd.executor import executor, left_over
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.link import Link
 from rtcfd.executor.process import End
+from rtcfd.incidents.incidents import Incidents
 from rtcfd.operations.runner_core import Surroundings
 from rtcfd.runners.held_runners import await_holder
 from rtcfd.runners.runners import Runners
@@ -159,6 +161,7 @@ class Rtcfd:
                 defaults=defaults,
                 on_change=lambda: None,
                 serve_ros=no_ros,
+                incidents=Incidents(folder / "incidents", Limits),
             )
         )
         self.control = Control(self.runners, catalog, self, EventLog())

@@ -5,14 +5,18 @@ import os
 import struct
 import threading
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from daemon_under_test import DEADLINE_S
+from rtcf.v1 import control_pb2
 from rtcfd.common.limits import Limits
 from rtcfd.incidents import copying, frame_file, frame_layout, incidents
 from rtcfd.incidents.incidents import Incidents
-from rtcfd_in_process import until
+from rtcfd.operations.incidents import keep
+from rtcfd_in_process import Rtcfd, until
 
 
 def _frames(data: bytes) -> int:
@@ -64,6 +68,77 @@ def test_frames_are_copied_while_the_file_of_another_incident_is_written(
     asyncio.run(play())
     os.close(frames)
     assert written == [b"other", b"before"]
+
+
+@pytest.fixture
+def held_writing(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[threading.Event, Any]]:
+    """Let no file be written before an event; the other one says that one has been begun."""
+    begun, may_write = threading.Event(), threading.Event()
+
+    def held(_: int, file: Path, __: Any) -> None:
+        begun.set()
+        may_write.wait()
+        file.write_bytes(b"")
+
+    monkeypatch.setattr(incidents, "_write", held)
+    yield begun, may_write
+    may_write.set()
+
+
+def test_incidents_are_listed_and_removed_while_another_is_written(
+    tmp_path: Path, held_writing: tuple[threading.Event, Any]
+) -> None:
+    begun, may_write = held_writing
+    folder = tmp_path / "incidents"
+    folder.mkdir()
+    (folder / "old.mcap").write_bytes(b"")
+
+    async def play() -> None:
+        kept = Incidents(folder, Limits)
+        facts = {"runner": "one", "time_ns": time.time_ns()}
+        keeping = asyncio.create_task(kept.keep(_frames(b""), facts))
+        await until(begun.is_set, "the file of the new one")
+        try:
+            async with asyncio.timeout(DEADLINE_S):
+                assert [each.name for each in await kept.all()] == ["old"]
+                assert (await kept.get("old")).name == "old"
+                assert [each.name for each in await kept.remove(["old"])] == ["old"]
+            assert not keeping.done()
+        finally:
+            may_write.set()
+        name = (await keeping).name
+        assert [each.name for each in await kept.all()] == [name]
+
+    asyncio.run(play())
+
+
+def test_a_runner_is_removed_while_its_incident_is_written(
+    rtcfd: Callable[[], Rtcfd], held_writing: tuple[threading.Event, Any]
+) -> None:
+    begun, may_write = held_writing
+
+    async def play() -> None:
+        daemon = rtcfd()
+        await daemon.start()
+        kept = daemon.runners.incidents
+        await daemon.call("AddRunner", control_pb2.AddRunnerRequest(runner="arm"))
+        runner = daemon.runners.get("arm")
+        executor = runner.alive()
+        executor.frames = _frames(b"")
+        keep(runner, executor, "a crash")
+        await until(begun.is_set, "the incident's file")
+        try:
+            async with asyncio.timeout(DEADLINE_S):
+                await daemon.call("RemoveRunner", control_pb2.RemoveRunnerRequest(runner="arm"))
+            assert not await kept.all()
+        finally:
+            may_write.set()
+        # rtcfd ends with the file whole.
+        await daemon.runners.close(in_order=True)
+        (incident,) = await kept.all()
+        assert incident.file.endswith("-arm.mcap")
+
+    asyncio.run(play())
 
 
 def _memory(rings: int, frames: int) -> int:
