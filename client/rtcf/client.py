@@ -306,8 +306,8 @@ class Client(Incidents):
         """Give the input "component.port" a value in the next cycle, as if it came from outside.
 
         A number, bool, list or NumPy array, fields of a message in a dict; a str is YAML, as in
-        `rtcfctl write`.  Refused where a component or ROS feeds it; raises ValueError on a name
-        that is no port's.
+        `rtcfctl write`.  Refused where a component feeds it or a ROS node publishes its topic;
+        raises ValueError on a name that is no port's.
         """
         # Few commands need it, and each import is time.
         import json

@@ -35,6 +35,8 @@ void RosNode::setClock(std::shared_ptr<executor::SimulatedClock> clock) {
 
 executor::BridgeStatus RosNode::status() const { return watch_->status(); }
 
+bool RosNode::feeds(const executor::Injector& injector) const { return watch_->feeds(injector); }
+
 void RosNode::serveParameters(executor::ParameterRequest request) {
     watch_->serveParameters(std::move(request));
 }

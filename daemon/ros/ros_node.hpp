@@ -44,6 +44,7 @@ class RosNode final : public executor::Bridge {
     void setTable(std::shared_ptr<const executor::BridgeTable> table) override;
     void setClock(std::shared_ptr<executor::SimulatedClock> clock) override;
     executor::BridgeStatus status() const override;
+    bool feeds(const executor::Injector& injector) const override;
     executor::HookGate* hooks() noexcept override;
     void serveParameters(executor::ParameterRequest request) override;
 

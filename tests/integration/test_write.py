@@ -126,21 +126,76 @@ def test_a_name_that_is_no_ports_is_a_mistake_of_use(daemon: Daemon) -> None:
     assert (done.returncode, done.stderr) == (2, 'rtcfctl: "pid": a port is COMPONENT.PORT\n')
 
 
-def test_an_input_that_ros_feeds_is_refused(tmp_path: Path, master: Master) -> None:
-    daemon = Daemon(tmp_path, with_ros(master.uri, "/fed/.*"))
+@pytest.fixture
+def on_ros(tmp_path: Path, master: Master) -> Iterator[Daemon]:
+    """Give a daemon whose loops subscribe all inputs that no component feeds."""
+    daemon = Daemon(tmp_path, with_ros(master.uri, ".*"))
     daemon.start()
-    with rtcf.Client(daemon.socket) as client:
-        for ns in ("/fed", "/free"):
-            client.load(rtcf.component("rtcf_examples", "Identity", name="a", ns=ns))
+    yield daemon
+    daemon.end()
+
+
+def subscribed(master: Master, *topics: str) -> None:
+    """Wait until topics are subscribed at the master."""
+    wait_for(lambda: set(topics) <= master.topics()[1], f"subscriptions of {topics}")
+
+
+def test_an_input_whose_topic_nobody_publishes_is_written(on_ros: Daemon, master: Master) -> None:
+    with rtcf.Client(on_ros.socket) as client:
+        client.load(rtcf.component("rtcf_examples", "Identity", name="a"))
+        client.load(rtcf.component("rtcf_test", "Chaos", name="chaos", ns="/c"))
+        client.load(rtcf.component("rtcf_test", "Mixer", name="mixer", ns="/m"))
+        client.load(rtcf.component("rtcf_test_ros", "Text", name="text", ns="/t"))
         client.start()
+        topics = ("/in", "/c/frame", "/c/list", "/m/in1", "/t/heard")
+        subscribed(master, *topics)
+        for name, value, shown in (
+            ("a.in", 1.5, "1.5"),
+            ("c/chaos.list", [2.5, 3.0], "2.5"),
+            # Types of C++ that go as a message.
+            ("c/chaos.frame", {"position": {"x": 0.25}, "orientation": {"w": 1.0}}, "0.25"),
+            ("m/mixer.in1", -7, "-7"),
+            ("t/text.heard", "five words of no number", "five words"),
+        ):
+            client.write(name, value)
+            reads(client, name, shown)
+        assert set(topics) <= master.topics()[1]
+
+
+def test_an_input_that_a_node_publishes_is_refused(on_ros: Daemon, master: Master) -> None:
+    with rtcf.Client(on_ros.socket) as client:
+        client.load(rtcf.component("rtcf_examples", "Identity", name="a", ns="/fed"))
+        client.start()
+        client.write("fed/a.in", 1.0)
+        reads(client, "fed/a.out", "1")
+        node = master.node("latch", "/fed/in", "2.5")
+        node.wait_until_connected()
+        reads(client, "fed/a.out", "2.5")
         with pytest.raises(rtcf.RefusedError, match=r"^/fed/a\.in reads the ROS topic /fed/in: "):
-            client.write("fed/a.in", 1.0)
-        client.write("free/a.in", 2.5)
-        reads(client, "free/a.out", "2.5")
+            client.write("fed/a.in", 3.5)
         # Peers that may only look feed nothing.
-        client.set_runner(
-            runner_pb2.RunnerSettings(ros=runner_pb2.RosSettings(peers=runner_pb2.RIGHT_OBSERVE))
-        )
+        observe = runner_pb2.RosSettings(peers=runner_pb2.RIGHT_OBSERVE)
+        client.set_runner(runner_pb2.RunnerSettings(ros=observe))
+        wait_for(lambda: "/fed/in" not in master.topics()[1], "the end of the subscription")
         client.write("fed/a.in", 4.5)
         reads(client, "fed/a.out", "4.5")
-    daemon.end()
+        node.end()
+
+
+def test_an_input_is_free_when_its_publisher_has_left(on_ros: Daemon, master: Master) -> None:
+    with rtcf.Client(on_ros.socket) as client:
+        client.load(rtcf.component("rtcf_examples", "Identity", name="a"))
+        client.start()
+        node = master.node("latch", "/in", "2.5")
+        reads(client, "a.out", "2.5")
+        node.end()
+
+        def written() -> bool:
+            try:
+                client.write("a.in", 3.5)
+            except rtcf.RefusedError:
+                return False
+            return True
+
+        wait_for(written, "the end of the publisher's connection")
+        reads(client, "a.out", "3.5")

@@ -107,6 +107,10 @@ class Bridge {
 
     virtual BridgeStatus status() const = 0;
 
+    /// Whether somebody outside feeds an injector now: a peer that publishes its topic is
+    /// connected.
+    virtual bool feeds(const Injector& /*injector*/) const { return false; }
+
     /// How parameters are to be changed. Called once, before all else.
     // NOLINTNEXTLINE(performance-unnecessary-value-param): to be kept
     virtual void serveParameters(ParameterRequest /*request*/) {}

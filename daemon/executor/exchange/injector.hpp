@@ -1,5 +1,5 @@
 /// @file
-/// An injector brings values into the loop: one thread deserialises a message
+/// An injector brings values into the loop: a thread deserialises a message
 /// into the free slot of a triple buffer, the real-time thread takes the newest
 /// at the next cycle boundary. Neither ever waits; only the newest value counts, but for
 /// queues, which get every one.
@@ -34,7 +34,7 @@ class Injector {
     const std::string& topic() const noexcept { return topic_; }
     const TypeInfo& type() const noexcept { return type_; }
 
-    /// Takes one serialised message. One thread at a time; not real-time safe.
+    /// Takes one serialised message. Any thread; not real-time safe.
     /// @return false if the bytes are not a message of this type or too many; nothing has changed
     /// then
     /// @param arrived_ns when it came, CLOCK_MONOTONIC; never before the last one

@@ -96,8 +96,8 @@ WritableInput Runner::writableInput(const std::string& name, const std::string& 
                                       full, plan_->graph.nodes()[writer.node].instance->fullName(),
                                       writer.output->name()));
         }
-        const BridgeSettings& ros = settings_.bridge;
-        if (bridge_ && ros.enabled && ros.peers >= Right::Operate && connection.subscribed) {
+        const auto injector = plan_->injectors.find(topic);
+        if (bridge_ && injector != plan_->injectors.end() && bridge_->feeds(*injector->second)) {
             throw Refusal(RefusalKind::TwoWriters,
                           fmt::format("{0} reads the ROS topic {1}: publish there (rostopic pub "
                                       "{1}), or keep the topic out: rtcfctl runner set --blacklist",

@@ -36,6 +36,7 @@ class MasterWatch {
     void setTable(const executor::BridgeTable& table);
     void setClock(std::shared_ptr<executor::SimulatedClock> clock);
     executor::BridgeStatus status() const;
+    bool feeds(const executor::Injector& injector) const { return subjects_.feeds(injector); }
     void serveParameters(executor::ParameterRequest request);
     /// Lets run() end, soon whatever the master does.
     void stop();

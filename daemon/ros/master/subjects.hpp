@@ -41,6 +41,7 @@ class Subjects {
     void noteParameterWritten(const std::string& key);
     /// Fills in what it knows.
     void show(executor::BridgeStatus& status) const;
+    bool feeds(const executor::Injector& injector) const { return subscribing_.feeds(injector); }
     /// Calls that wait for the loop end now.
     void end() { reconfiguring_.end(); }
     /// @}

@@ -96,6 +96,13 @@ void Subscribing::closeAll() {
     clock_.close();
 }
 
+bool Subscribing::feeds(const executor::Injector& injector) const {
+    const std::lock_guard lock(mutex_);
+    return std::any_of(subscribers_.begin(), subscribers_.end(), [&](const auto& each) {
+        return each.first.get() == &injector && each.second->hasPeers();
+    });
+}
+
 std::uint32_t Subscribing::open() const {
     const std::lock_guard lock(mutex_);
     std::uint32_t count = 0;

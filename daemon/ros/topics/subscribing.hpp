@@ -57,6 +57,8 @@ class Subscribing {
     /// Unsubscribes all; reconcile() subscribes them again. Watch thread.
     void closeAll();
 
+    /// Whether a peer that publishes the injector's topic is connected. Any thread.
+    bool feeds(const executor::Injector& injector) const;
     /// Topics that are subscribed. Any thread.
     std::uint32_t open() const;
     /// Why a topic could not be subscribed; empty if all could. Any thread.

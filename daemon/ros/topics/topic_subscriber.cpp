@@ -55,6 +55,11 @@ bool TopicSubscriber::isOpen() const {
     return subscriber_ != nullptr;
 }
 
+bool TopicSubscriber::hasPeers() const {
+    const std::lock_guard lock(mutex_);
+    return subscriber_ != nullptr && subscriber_.getNumPublishers() > 0;
+}
+
 std::string TopicSubscriber::problem() const {
     const std::lock_guard lock(mutex_);
     return problem_;

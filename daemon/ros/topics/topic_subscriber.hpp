@@ -33,6 +33,8 @@ class TopicSubscriber {
     void close();
 
     bool isOpen() const;
+    /// Peers that publish the topic are connected. Any thread.
+    bool hasPeers() const;
     /// It is to be opened: it is not yet, and has not failed just now. Watch thread.
     bool isDue() const;
     /// Why it could not be opened, one line; empty if it could.
