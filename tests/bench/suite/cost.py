@@ -53,9 +53,26 @@ def _cpu_ms(servers: list[int]) -> float:
     called = resource.getrusage(resource.RUSAGE_CHILDREN)
     total += (called.ru_utime + called.ru_stime) * 1e3
     for pid in servers:
+        total += _process_cpu_ms(pid)
+        # The loop computes anyway.  Other threads may end at any time: their time is the process'.
         for thread in Path(f"/proc/{pid}/task").iterdir():
-            if (thread / "comm").read_text().strip() == _LOOP:
-                continue  # it computes anyway
-            # sched_debug(5) of the kernel's documentation: ns on the CPU, ns waiting, time slices.
-            total += int((thread / "schedstat").read_text().split()[0]) / 1e6
+            total -= _loop_cpu_ms(thread)
     return total
+
+
+def _process_cpu_ms(pid: int) -> float:
+    """Return the CPU time of a process with that of threads that have ended."""
+    # clock_getcpuclockid(3), which Python has not.
+    clock = (~pid << 3) | 2
+    return time.clock_gettime_ns(clock) / 1e6
+
+
+def _loop_cpu_ms(thread: Path) -> float:
+    """Return the CPU time of a thread if it is a loop's that runs, else 0."""
+    try:
+        if (thread / "comm").read_text().strip() != _LOOP:
+            return 0.0
+        # sched_debug(5) of the kernel's documentation: ns on the CPU, ns waiting, time slices.
+        return int((thread / "schedstat").read_text().split()[0]) / 1e6
+    except (FileNotFoundError, ProcessLookupError):
+        return 0.0  # it has ended
