@@ -8,6 +8,7 @@ import contextlib
 import os
 import shutil
 import socket
+import struct
 import subprocess
 import tempfile
 import time
@@ -23,6 +24,7 @@ _START_S = 30.0
 _END_S = 3.5
 _POLL_S = 0.02
 _TAIL = 5  # lines
+_CREDENTIALS = struct.Struct("3i")  # struct ucred: pid, uid, gid
 
 
 def program(build_tree: Path | None) -> Path:
@@ -70,10 +72,12 @@ class PrivateDaemon:
     def start(self, pause: Callable[[float], bool] = _sleep) -> bool:
         """Start it and wait until it serves; return whether it does.
 
-        `pause` waits for some seconds, and returns true if we are asked to end.  Raises RtcfError.
+        `pause` waits for some seconds, and returns true if we are asked to end.  Raises RtcfError,
+        also where another daemon serves the socket, which is left alone.
         """
         if not os.access(self._program, os.X_OK):
             raise RtcfError(f"no rtcfd at {self._program}: install it (apt install rtcfd)")
+        self._check_owner()
         with self._open_log() as log:
             self._process = subprocess.Popen(
                 [
@@ -97,11 +101,26 @@ class PrivateDaemon:
                 return False
         return True
 
+    def _check_owner(self) -> None:
+        """Refuse the socket of another user, without connecting to it."""
+        try:
+            owner = self.socket.lstat().st_uid
+        except OSError:
+            return  # there is none, or rtcfd says why it cannot be made
+        if owner != os.geteuid():
+            raise RtcfError(
+                f"{self.socket} belongs to another user (uid {owner}): choose another --socket"
+            )
+
     def _listens(self) -> bool:
+        """Tell whether the process that we started listens.  Another daemon at its socket is asked
+        nothing: ours ends because of it, and says so."""
         # The file is there a moment before anybody listens.
         with socket.socket(socket.AF_UNIX) as probe, contextlib.suppress(OSError):
             probe.connect(str(self.socket))
-            return True
+            found = probe.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+            listener, _, _ = _CREDENTIALS.unpack(found)  # of who called listen(2), see unix(7)
+            return self._process is not None and listener == self._process.pid
         return False
 
     def _open_log(self) -> IO[bytes]:

@@ -3,6 +3,7 @@
 import os
 import shutil
 import signal
+import socket
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,8 +11,10 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_process import BUILD_TREE, clean_environment, wait_for
+from daemon_process import BUILD_TREE, NO_ROS, Daemon, clean_environment, wait_for
+from rtcf.v1 import runner_pb2
 
+_STRANGER = 54321  # a uid that no user has
 _DEADLINE_S = 120.0  # of a compiler on a busy machine
 GRAPH = """\
 runner: rt_runner
@@ -55,9 +58,9 @@ class Running:
 
 
 @contextmanager
-def running(folder: Path, *words: str) -> Iterator[Running]:
-    """Type it in a folder; it is ended by Ctrl-C."""
-    out, socket = folder / "said", folder / "s"
+def running(folder: Path, *words: str, at: Path | None = None) -> Iterator[Running]:
+    """Type it in a folder; it is ended by Ctrl-C.  `at`: its socket."""
+    out, socket = folder / "said", at or folder / "s"
     environment = clean_environment() | {
         "PATH": f"{BUILD_TREE / 'bin'}:{os.environ['PATH']}",
         "XDG_CACHE_HOME": str(folder / "cache"),
@@ -169,6 +172,43 @@ def test_the_end_of_its_daemon_is_said(tmp_path: Path) -> None:
         os.kill(int(daemon), signal.SIGKILL)
         assert loop.process.wait() in (1, 3)
     assert "rtcfctl: " in loop.said.splitlines()[-1]
+
+
+def test_the_daemon_that_serves_its_socket_already_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "graph.yaml").write_text(GRAPH.format(amplitude=1.5))
+    (tmp_path / "other").mkdir()
+    other = Daemon(tmp_path / "other", NO_ROS)
+    other.start()
+    try:
+        with rtcf.Client(other.socket) as client:
+            client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
+            with running(tmp_path, "graph.yaml", at=other.socket) as loop:
+                assert loop.process.wait() == 1
+            assert f"a daemon answers at {other.socket} already" in loop.said
+            assert client.get_order() == ["/steady"]
+            (status,) = client.get_status().runners
+            assert status.state == runner_pb2.RUNNER_STATE_STOPPED
+    finally:
+        other.end()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="takes on another user")
+def test_nothing_is_asked_at_a_socket_of_another_user(tmp_path: Path) -> None:
+    (tmp_path / "graph.yaml").write_text(GRAPH.format(amplitude=1.5))
+    path = tmp_path / "theirs"
+    with socket.socket(socket.AF_UNIX) as theirs:
+        theirs.bind(str(path))
+        os.chown(path, _STRANGER, _STRANGER)
+        theirs.listen()
+        theirs.setblocking(False)
+        with running(tmp_path, "graph.yaml", at=path) as loop:
+            assert loop.process.wait() == 1
+        assert loop.said == (
+            f"rtcfctl: {path} belongs to another user (uid {_STRANGER}): choose another --socket\n"
+        )
+        with pytest.raises(BlockingIOError):
+            theirs.accept()
+    assert path.exists(), "it is theirs"
 
 
 @pytest.mark.parametrize(
