@@ -46,8 +46,12 @@ def test_removal_ends_everything_and_keeps_settings_and_state(machine: Machine) 
     service = Service(machine)
     service.reset()
     service.ctl("load", "rtcf_examples", "Mimo", "--name", "M")
+    others = ("rtcf-scope.service", "rtcf-metrics.service")
+    service.systemctl("start", *others)
     machine.run("apt-get", "remove", "--yes", "--quiet", *PACKAGES)
     assert machine.run("pgrep", "-u", "rtcf", check=False).stdout == ""
+    states = service.systemctl("is-active", *others, check=False).stdout.split()
+    assert states == ["inactive", "inactive"]
     assert machine.run("ls", "/run/rtcfd", check=False).returncode != 0
     assert machine.path("/etc/rtcfd/rtcfd.toml").is_file()
     assert machine.path("/var/lib/rtcfd/rt_runner.json").is_file()

@@ -53,6 +53,26 @@ def test_changes_go_on_while_all_packages_are_installed_anew(service: Service) -
     runs_on(service, before, daemon)
 
 
+def test_services_beside_rtcfd_go_on_in_what_was_installed(service: Service) -> None:
+    units = ("rtcf-scope.service", "rtcf-metrics.service")
+
+    def processes() -> list[int]:
+        return [int(service.unit_property("MainPID", unit)) for unit in units]
+
+    reinstall = "apt-get install --yes --quiet --reinstall /debs/rtcf-scope_*.deb /debs/rtcfctl_*.deb"
+    service.machine.shell(reinstall)
+    assert processes() == [0, 0], "what nobody has started stays off"
+    service.systemctl("start", *units)
+    try:
+        before = processes()
+        service.machine.shell(reinstall)
+        after = processes()
+        assert all(after)
+        assert not set(before) & set(after), "the old code has gone"
+    finally:
+        service.systemctl("stop", *units)
+
+
 @pytest.mark.parametrize("distance", [-2, 2])
 def test_a_rtcfd_too_old_or_too_new_leaves_the_loop_running_and_says_so(
     service: Service, distance: int
