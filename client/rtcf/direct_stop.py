@@ -9,6 +9,7 @@ import os
 import socket as sockets
 import struct
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -22,6 +23,8 @@ from rtcf.v1 import control_pb2
 
 PATIENCE_S = 0.5  # with rtcfd, until a loop's executor is asked instead
 TIMEOUT_S = 5.0  # above the executor's own for a component that does not return
+_VERDICT_S = 3.0  # for rtcfd to say of what an executor died
+_CREDENTIALS = struct.Struct("3i")  # struct ucred: pid, uid, gid
 
 
 @dataclass(frozen=True)
@@ -38,8 +41,8 @@ def folders(socket: str) -> list[Path]:
     return [path.with_name(path.name + ".d") / "stop", path.parent / "stop"]
 
 
-def stop(runner: str, socket: str) -> None:
-    """Stop one loop; return when it has ended.
+def stop(runner: str, socket: str) -> bool:
+    """Stop one loop; return when it has ended: whether in order, or with its executor's death.
 
     Raises RefusedError, also if a component does not return from its cycle,
     and DaemonUnreachableError if there is no executor of that name, or the
@@ -48,8 +51,7 @@ def stop(runner: str, socket: str) -> None:
     problem: OSError | None = None
     for folder in folders(socket):
         try:
-            _ask(folder / runner, runner)
-            return
+            return _ask(folder / runner, runner)
         except (FileNotFoundError, NotADirectoryError, ConnectionRefusedError) as error:
             problem = problem or error
         except OSError as error:
@@ -92,9 +94,14 @@ def where_rtcfd_does_not(
                 raise
             problem = str(error)
     try:
-        stop(runner, socket)
+        in_order = stop(runner, socket)
     except DaemonUnreachableError:
         return asked.result()  # what rtcfd says in the end
+    if not in_order:
+        # An executor that has died says no more; rtcfd knows of what, if it answers at all.
+        with contextlib.suppress(TimeoutError):
+            return asked.result(_VERDICT_S)
+        return control_pb2.ChangeResult(notes=["the loop has ended with its executor, which died"])
     return control_pb2.ChangeResult(notes=[f"the loop was stopped at its executor, as {problem}"])
 
 
@@ -144,28 +151,38 @@ def _stopped(runner: str, socket: str) -> Stopped:
     return Stopped(runner)
 
 
-def _ask(path: Path, runner: str) -> None:
-    """Say `stop` and take the answer; raises OSError or RefusedError."""
+def _ask(path: Path, runner: str) -> bool:
+    """Say `stop` and take the answer: whether the loop ended in order, or with its executor's
+    death; raises OSError or RefusedError."""
     with sockets.socket(sockets.AF_UNIX, sockets.SOCK_STREAM) as connection:
         # Not settimeout(): one that blocks in the kernel has its turn in a queue that is full.
         limit = struct.pack("ll", int(TIMEOUT_S), 0)
         for option in (sockets.SO_SNDTIMEO, sockets.SO_RCVTIMEO):
             connection.setsockopt(sockets.SOL_SOCKET, option, limit)
         connection.connect(str(path))
+        found = connection.getsockopt(
+            sockets.SOL_SOCKET, sockets.SO_PEERCRED, _CREDENTIALS.size
+        )
+        pid, _, _ = _CREDENTIALS.unpack(found)  # of the executor; 0: seen from a container
         # Whoever may not is told so, and hung up on, before anything is read.
         with contextlib.suppress(BrokenPipeError, ConnectionResetError):
             connection.sendall(b"stop\n")
         answer = b""
+        hung_up = False
         try:
-            while not answer.endswith(b"\n") and (more := connection.recv(4096)):
+            while not answer.endswith(b"\n") and not hung_up:
+                more = connection.recv(4096)
                 answer += more
+                hung_up = not more
         except BlockingIOError:
             pass
         except ConnectionResetError:
-            pass
+            hung_up = True
     word, _, reason = answer.decode(errors="replace").strip().partition(": ")
     if word == "stopped":
-        return
+        return True
+    if hung_up and not answer and _wait_for_end(pid):
+        return False
     about = {"runner": runner}
     if word == "refused":
         raise refused(f"runner {runner}: {reason}", "PERMISSION_DENIED", "RIGHT_MISSING", about)
@@ -173,10 +190,33 @@ def _ask(path: Path, runner: str) -> None:
         raise refused(
             f"runner {runner} is asked to stop, and {reason}", "UNAVAILABLE", "LOOP_STUCK", about
         )
-    raise refused(
-        f"the executor of runner {runner} does not answer within {TIMEOUT_S:g} s: "
-        "is it stopped by a debugger?",
-        "UNAVAILABLE",
-        "EXECUTOR_SILENT",
-        about,
-    )
+    if not hung_up and _state(pid) in ("T", "t"):
+        problem = (
+            f"the executor of runner {runner} (pid {pid}) is frozen, by a signal or a debugger: "
+            f"its loop stands still now, and goes on if somebody lets it; `rtcfctl runner restart "
+            f"{runner}` ends it, or `kill -KILL {pid}` where rtcfd does not answer"
+        )
+    elif hung_up:
+        problem = f"the executor of runner {runner} (pid {pid}) hung up, and lives on"
+    else:
+        problem = f"the executor of runner {runner} (pid {pid}) does not answer within {TIMEOUT_S:g} s"
+    raise refused(problem, "UNAVAILABLE", "EXECUTOR_SILENT", about)
+
+
+def _wait_for_end(pid: int) -> bool:
+    """Wait for the end of a process that has closed its sockets; tell whether it came."""
+    until = time.monotonic() + TIMEOUT_S
+    while _state(pid) not in ("", "Z", "X"):
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def _state(pid: int) -> str:
+    """Return the letter of a process's state, see proc(5); empty: there is none to be seen."""
+    try:
+        text = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return ""
+    return text.rpartition(")")[2].split()[0]

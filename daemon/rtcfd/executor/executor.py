@@ -66,6 +66,7 @@ class Executor:
         self.expected = False  # its end was asked for
         self.ended = asyncio.Event()  # set after on_end
         self.verdict = ""  # on its end, or why it was asked for
+        self.safe = True  # it did not die in a hook that makes things safe or stops them
         self.version = ""  # of rtcf
         self.foreign = ""  # why nothing but stop and its end can be asked of it
         self._protocol = 0
@@ -168,6 +169,16 @@ class Executor:
         """Tell whether the link stands."""
         return self._link is not None and not self._link.ended.is_set()
 
+    @property
+    def frozen(self) -> str:
+        """Say that a signal or a debugger has stopped it, and what ends it; empty: none has."""
+        if not self._process.frozen:
+            return ""
+        return (
+            f"{self._peer} is frozen, by a signal or a debugger: `rtcfctl runner restart "
+            f"{self._runner}` ends it, `kill -CONT {self.pid}` lets its loop go on"
+        )
+
     def note(self) -> Note | None:
         """Return what the flight recorder says; None if there is none."""
         return None if self._recorder is None else self._recorder.read()
@@ -229,11 +240,15 @@ class Executor:
         """Stop the loop in order, then end the process, by force if it must be."""
         self.expected = True
         try:
+            if self.frozen:
+                raise Unavailable(self.frozen, errors_pb2.REASON_EXECUTOR_SILENT)
             await self.request(wire.Request(stop=wire.Stop()), STOP_TIMEOUT_S)
             await self.request(wire.Request(exit=wire.Exit()), EXIT_TIMEOUT_S)
         except Refusal as refusal:
             log.warning("%s: no orderly end: %s", self._peer, refusal)
             self._process.signal(signal.SIGTERM)
+            # One that was frozen finds the other when it wakes up, and ends in order.
+            self._process.signal(signal.SIGCONT)
         await _end(self._process, self._peer)
         if self._watching is not None:
             await self._watching

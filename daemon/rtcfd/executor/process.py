@@ -10,6 +10,7 @@ import os
 import signal
 import subprocess
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,17 @@ class Process:
     def end(self) -> End | None:
         """How it ended; None while it runs."""
         return self._end
+
+    @property
+    def frozen(self) -> bool:
+        """Tell whether a signal or a debugger has stopped it: it does nothing, and answers nobody."""
+        if self._end is not None:
+            return False
+        try:
+            text = Path(f"/proc/{self.pid}/stat").read_text(encoding="ascii", errors="replace")
+        except OSError:
+            return False
+        return text.rpartition(")")[2].split()[0] in ("T", "t")
 
     async def wait(self) -> End:
         """Wait until it has ended."""

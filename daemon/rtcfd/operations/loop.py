@@ -11,11 +11,13 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2
 
 from rtcfd.access import caller
-from rtcfd.common.refusals import FailedPrecondition, Refusal
+from rtcfd.common.refusals import FailedPrecondition, Refusal, Unavailable
+from rtcfd.executor.executor import Executor
 from rtcfd.executor.link import Progress
 from rtcfd.operations.runner_core import RunnerCore
 
 STOP_TIMEOUT_S = 30.0
+_FROZEN_S = 1.0
 
 
 def asked_now(runner: RunnerCore) -> int:
@@ -70,7 +72,7 @@ async def stop(runner: RunnerCore, progress: Progress) -> control_pb2.ChangeResu
                 await runner.settle()  # it may be adopted just now
                 runner.require_ours()
             if runner.up:
-                result = await _ask_to_stop(runner, progress)
+                result = await _stop_at(runner, runner.alive(), progress)
                 runner.log.info("loop stopped")
             else:
                 result = control_pb2.ChangeResult(notes=[f"no loop to stop: {runner.trouble}"])
@@ -91,9 +93,26 @@ async def stop_quietly(runner: RunnerCore) -> None:
         runner.log.error("%s", refusal)
 
 
-async def _ask_to_stop(runner: RunnerCore, progress: Progress | None) -> control_pb2.ChangeResult:
+async def _stop_at(
+    runner: RunnerCore, executor: Executor, progress: Progress
+) -> control_pb2.ChangeResult:
+    """Have an executor stop its loop.  Its death ends the loop too, unless it kept something from
+    becoming safe."""
+    try:
+        # One that is frozen takes it when it goes on.
+        patience_s = _FROZEN_S if executor.frozen else STOP_TIMEOUT_S
+        return await _ask_to_stop(runner, progress, patience_s)
+    except Unavailable as refusal:
+        if executor.frozen:
+            raise Unavailable(executor.frozen, errors_pb2.REASON_EXECUTOR_SILENT) from None
+        if not executor.ended.is_set() or not executor.safe:
+            raise
+        return control_pb2.ChangeResult(notes=[f"the loop has ended with its executor: {refusal}"])
+
+
+async def _ask_to_stop(
+    runner: RunnerCore, progress: Progress | None, timeout_s: float = STOP_TIMEOUT_S
+) -> control_pb2.ChangeResult:
     request = wire.Request(stop=wire.Stop())
-    response = await runner.ask(
-        request, progress, lambda _: runner.loop.told(False), STOP_TIMEOUT_S
-    )
+    response = await runner.ask(request, progress, lambda _: runner.loop.told(False), timeout_s)
     return response.change

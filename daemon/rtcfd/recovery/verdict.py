@@ -7,7 +7,7 @@ It is quarantined only if the thread that died was executing it.
 import signal
 import time
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rtcfd.executor.flight_recorder import Note, Thread
 from rtcfd.executor.process import End, describe_signal
@@ -34,6 +34,7 @@ class Verdict:
     running: str  # "while /H1.update was running in cycle 7"
     culprit: str = ""  # full name of the component to quarantine; empty = none
     orderly: bool = False  # somebody asked the executor itself to end, e.g. by SIGTERM
+    safe: bool = True  # it died in no hook that makes things safe or stops them
 
     def __str__(self) -> str:
         return f"{self.how} {self.running}"
@@ -43,6 +44,11 @@ def judge(end: End, note: Note | None) -> Verdict:
     """Return the verdict on a death that nobody asked for."""
     if note is None:
         return Verdict(str(end), "(there is no flight recorder)")
+    safe = not (note.updating and note.cycle_hook == "safe") and not (note.hooking and note.hook)
+    return replace(_judge(end, note), safe=safe)
+
+
+def _judge(end: End, note: Note) -> Verdict:
     update = f"{note.updating}.{note.cycle_hook}" if note.updating else ""
     hook = f"{note.hooking}.{note.hook}" if note.hooking else ""
     cycle = f"in cycle {note.iteration}"

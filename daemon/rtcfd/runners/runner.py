@@ -137,9 +137,11 @@ class Runner(RunnerCore):
 
     def executor_ended(self, executor: Executor, end: End, ours: bool) -> None:
         """See to what follows from the death of an executor."""
-        was_running = self.loop.running
+        # One that somebody has stopped meanwhile is not to go on in the next executor.
+        was_running = self.loop.running and self.loop.wanted
         self.loop.gone()
         verdict = judge(end, executor.note())
+        executor.safe = verdict.safe
         keep(self, executor, f"executor {verdict}", verdict.culprit)
         died = f"its executor (pid {executor.pid}) {verdict} at {time.strftime('%H:%M:%S')}"
         self.trouble = executor.verdict = died

@@ -78,7 +78,7 @@ async def status_of(runner: RunnerCore) -> runner_pb2.RunnerStatus:
         except Refusal as refusal:
             if executor is runner.executor:
                 status.state = runner_pb2.RUNNER_STATE_STUCK
-                lines.append(str(refusal))
+                lines.append(executor.frozen or str(refusal))
             else:
                 lines.append(runner.trouble)  # it has just died
         status.runner = runner.name

@@ -1,0 +1,99 @@
+"""Stopping loops whose executors die of it, or are frozen: the answer says what has happened."""
+
+import contextlib
+import re
+from pathlib import Path
+
+import pytest
+import rtcf
+from daemon_process import Daemon, stopped, wait_for
+from rtcf.v1 import runner_pb2
+from values import iteration, state
+
+SETTINGS = (
+    "[runner]\nstall_timeout_ms = 1500\non_crash = 'resume'\n[runner.ros]\nenabled = false\n"
+)
+
+
+@pytest.fixture
+def settings() -> str:
+    """Let an executor whose component hangs end while somebody waits for its stop."""
+    return SETTINGS
+
+
+def hang(client: rtcf.Client) -> int:
+    """Run a loop until its component hangs; return the executor."""
+    client.load(
+        rtcf.component(
+            "rtcf_faults", "NeverReturns", name="bad", optional=True, parameters=["after:=20"]
+        )
+    )
+    client.start()
+    pid = int(state(client).pid)
+    wait_for(lambda: iteration(client) >= 20, "the hang")
+    return pid
+
+
+def ended(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
+    except OSError:
+        return True
+
+
+def test_an_update_that_hangs_ends_with_its_executor_and_that_is_a_stop(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    executor = hang(client)
+    done = daemon.ctl("stop")
+    assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
+    assert "the loop has ended with its executor" in done.stderr
+    assert "while /bad.update was running" in done.stderr
+    assert ended(executor)
+    wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
+    # Though a loop goes on by itself after a crash of an optional component.
+    assert state(client).state != runner_pb2.RUNNER_STATE_RUNNING
+
+
+def test_an_update_that_hangs_is_stopped_without_rtcfd_too(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    executor = hang(client)
+    with stopped(daemon.pid):
+        done = daemon.ctl("stop")
+        assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
+        assert "the loop has ended with its executor" in done.stderr
+        assert ended(executor)
+
+
+def test_a_frozen_executor_is_named_with_what_ends_it(daemon: Daemon, client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_test", "Witness", name="steady"))
+    client.start()
+    wait_for(lambda: iteration(client) > 10, "cycles")
+    executor = int(state(client).pid)
+    with contextlib.ExitStack() as freezing, contextlib.suppress(ProcessLookupError):
+        freezing.enter_context(stopped(executor))
+        done = daemon.ctl("stop")
+        assert (done.returncode, done.stdout) == (1, ""), done.stderr
+        (line,) = done.stderr.splitlines()
+        assert f"(pid {executor}) is frozen" in line
+        assert "`rtcfctl runner restart rt_runner` ends it" in line
+        assert "is frozen" in state(client).status
+        restart = daemon.ctl("runner", "restart", "rt_runner")
+        assert restart.returncode == 0, restart.stderr
+        assert ended(executor)
+    # In order: it woke up to end.
+    assert daemon.log().count("hook safe") == 1
+    assert state(client).state == runner_pb2.RUNNER_STATE_STOPPED
+
+
+def test_a_frozen_executor_that_goes_on_stops_first(daemon: Daemon, client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
+    client.start()
+    wait_for(lambda: iteration(client) > 10, "cycles")
+    executor = int(state(client).pid)
+    with stopped(executor):
+        found = daemon.ctl("stop", "--all")
+        assert found.returncode == 1
+        assert re.search(r"\(pid \d+\) is frozen", found.stderr), found.stderr
+    wait_for(lambda: state(client).state == runner_pb2.RUNNER_STATE_STOPPED, "the stop")
