@@ -76,10 +76,22 @@ class Client(Incidents):
         return self._change(self._stub.RestartRunner, request, on_progress).runner  # type: ignore[no-any-return]
 
     def start(
-        self, runner: str = "", on_progress: OnProgress | None = None
+        self,
+        runner: str = "",
+        on_progress: OnProgress | None = None,
+        *,
+        without: Iterable[str] = (),
+        partial: bool = False,
     ) -> control_pb2.ChangeResult:
-        """Start the loop; one that runs is left alone."""
-        return self._changed(self._stub.Start, control_pb2.StartRequest(runner=runner), on_progress)
+        """Start the loop; one that runs is left alone.
+
+        Refused where components are left out of it that are not optional, unless they are
+        named in `without`, or `partial` says that it may be any.
+        """
+        request = control_pb2.StartRequest(
+            runner=runner, without=several("without", without), partial=partial
+        )
+        return self._changed(self._stub.Start, request, on_progress)
 
     def stop(
         self, runner: str = "", on_progress: OnProgress | None = None
@@ -228,7 +240,7 @@ class Client(Incidents):
         runner: str = "",
         on_progress: OnProgress | None = None,
     ) -> control_pb2.ChangeResult:
-        """Load components again that were left out of the loop after a fault."""
+        """Load components anew that are left out of the loop, or that a fault has marked."""
         request = control_pb2.ReleaseRequest(
             runner=runner, components=several("components", components)
         )

@@ -182,6 +182,10 @@ class ExecutorForeignError(RefusedError):
     """The executor is of a version that this rtcfd does not work with."""
 
 
+class ComponentLeftOutError(RefusedError):
+    """The loop would run without it, and the request does not say that it may."""
+
+
 class ComponentRefusedError(RefusedError):
     """For another reason, which the line tells."""
 
@@ -300,6 +304,7 @@ BY_REASON: dict[str, type[RefusedError]] = {
     "NOTHING_TO_UNDO": NothingToUndoError,
     "EXECUTOR_FAILED": ExecutorFailedError,
     "EXECUTOR_FOREIGN": ExecutorForeignError,
+    "COMPONENT_LEFT_OUT": ComponentLeftOutError,
     "COMPONENT_REFUSED": ComponentRefusedError,
     "LIST_CHANGED": ListChangedError,
     "EXECUTOR_DOWN": ExecutorDownError,

@@ -11,8 +11,9 @@ import pytest
 import rtcf
 from bystander import Bystander
 from daemon_process import Daemon, wait_for
+from rtcf import refusals
 from rtcf.v1 import graph_pb2, runner_pb2
-from values import state
+from values import port_value, state
 
 SETTINGS = "[runner]\nstall_timeout_ms = 300\n[runner.ros]\nenabled = false\n"
 
@@ -68,8 +69,10 @@ def test_what_crashes_the_process_is_named_and_taken_out(
     assert status.state == runner_pb2.RUNNER_STATE_FAULTED
     assert client.get_order() == ["/a", "/z"]
     assert client.get_component("bad").state == graph_pb2.COMPONENT_STATE_LEFT_OUT
-    # And it runs without the culprit.
-    client.start()
+    # And it runs without the culprit, by the word of somebody who knows.
+    with pytest.raises(refusals.ComponentLeftOutError, match=r"left out of its loop: /bad \("):
+        client.start()
+    client.start(without=["bad"])
     wait_for(lambda: state(client).iteration > 100, "100 cycles")
 
 
@@ -225,6 +228,93 @@ def test_an_exception_of_an_optional_component_takes_it_out(
     before = state(client)
     assert before.state == runner_pb2.RUNNER_STATE_RUNNING
     wait_for(lambda: state(client).iteration > before.iteration + 100, "100 cycles")
+
+
+def test_what_was_taken_out_is_released_with_its_parameters(client: rtcf.Client) -> None:
+    load(client, faulty("Throws", optional=True))
+    client.start()
+    wait_for(lambda: client.get_component("bad").fault, "the fault")
+    client.set_parameters("bad", [rtcf.parse_parameter("after:=1000000")])
+    before = state(client)
+    client.release(["bad"])
+    found = client.get_component("bad")
+    assert (found.state, found.fault) == (graph_pb2.COMPONENT_STATE_RUNNING, "")
+    (after,) = (each for each in found.parameters if each.name == "after")
+    assert after.value.int_value == 1000000
+    wait_for(lambda: state(client).iteration > before.iteration + 100, "100 cycles")
+    assert port_value(client, "bad", "out") > 0, "it is updated again"
+    assert state(client).pid == before.pid
+    with pytest.raises(refusals.ComponentNotLeftOutError, match="it is in the loop"):
+        client.release(["bad"])
+
+
+def test_what_is_left_out_is_released_beside_what_was_taken_out(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    load(client, faulty("NullDereference"))
+    client.start()
+    wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
+    client.load(
+        rtcf.component(
+            "rtcf_faults", "Throws", name="loose", optional=True, parameters=["after:=0"]
+        )
+    )
+    client.start(partial=True)
+    wait_for(lambda: client.get_component("loose").fault, "the fault")
+    for name in ("bad", "loose"):
+        client.set_parameters(name, [rtcf.parse_parameter("after:=1000000")])
+    client.release(["bad", "loose"])
+    assert not [each.full_name for each in client.list_components() if each.fault]
+    assert set(client.get_order()) == {"/a", "/bad", "/loose", "/z"}
+
+
+def test_a_parameter_of_what_is_left_out_is_mended(daemon: Daemon, client: rtcf.Client) -> None:
+    load(client, faulty("NullDereference"))
+    client.start()
+    wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
+    result = client.set_parameters("bad", [rtcf.parse_parameter("after:=1000000")])
+    assert "/bad is left out of the loop" in result.notes[0]
+    for wrong, what in (
+        ("after:=-1", "is below its minimum 0"),
+        ("after:=text", "takes an int, not a string"),
+        ("befor:=1", "has no parameter befor"),
+    ):
+        with pytest.raises(rtcf.RefusedError, match=what):
+            client.set_parameters("bad", [rtcf.parse_parameter(wrong)])
+    assert [each.value.int_value for each in client.get_history("bad", "after")] == [20, 1000000]
+    client.set_parameters("bad", [rtcf.parse_parameter("after:=3")])
+    assert client.undo_parameters("bad").notes[-1].startswith("after = 1000000")
+    client.release(["bad"])
+    client.start()
+    wait_for(lambda: state(client).iteration > 100, "100 cycles")
+    assert client.get_component("bad").state == graph_pb2.COMPONENT_STATE_RUNNING
+
+
+def test_a_start_names_what_is_left_out(daemon: Daemon, client: rtcf.Client) -> None:
+    load(client, faulty("NullDereference"))
+    client.start()
+    wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
+    done = daemon.ctl("start")
+    assert done.returncode == 1
+    assert re.search(r"left out of its loop: /bad \(.* start --without /bad`", done.stderr)
+    assert len(done.stderr.splitlines()) == 1
+    done = daemon.ctl("start", "--without", "good")
+    assert done.returncode == 1
+    assert "/good is not left out of runner rt_runner (left out: /bad)" in done.stderr
+    done = daemon.ctl("start", "--without", "bad")
+    assert (done.returncode, done.stdout) == (0, "started\n"), done.stderr
+    assert "rtcfctl: note: without /bad: was killed by SIGSEGV" in done.stderr
+    # One that runs is left alone, whatever it lacks.
+    assert daemon.ctl("start").returncode == 0
+    client.stop()
+    assert daemon.ctl("start", "--partial").returncode == 0
+
+
+def test_what_is_optional_holds_up_no_start(daemon: Daemon, client: rtcf.Client) -> None:
+    load(client, faulty("NullDereference", optional=True))
+    client.start()
+    wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
+    assert client.start().notes[-1].startswith("without /bad: was killed by SIGSEGV")
 
 
 def test_a_value_that_is_not_finite_is_held_back(daemon: Daemon, client: rtcf.Client) -> None:

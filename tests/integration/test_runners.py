@@ -127,3 +127,19 @@ def _mixer(name: str) -> graph_pb2.ComponentSpec:
     return rtcf.component(
         "rtcf_test", "Mixer", name=name, remaps=[f"{port}:=~{port}" for port in ports]
     )
+
+
+def test_a_bare_stop_names_the_loops_that_run_on(daemon: Daemon, client: rtcf.Client) -> None:
+    client.add_runner("second")
+    client.add_runner("third")
+    for runner in ("rt_runner", "second"):
+        client.load(rtcf.component("rtcf_test", "Counter"), runner)
+        client.start(runner)
+    done = daemon.ctl("stop")
+    assert (done.returncode, done.stdout) == (0, "stopped\n")
+    assert done.stderr == "rtcfctl: note: runs on: second; `rtcfctl stop --all` ends all loops\n"
+    client.start()
+    # Who names a runner means that one.
+    done = daemon.ctl("-r", "second", "stop")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "stopped\n", "")
+    assert daemon.ctl("stop").stderr == ""

@@ -15,6 +15,16 @@ _MOST_CYCLES = 10**18
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verbs."""
     begin = verbs.add_parser("start", parents=[common], help="start the loop")
+    begin.add_argument(
+        "--without",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="start though this component, which is not optional, is left out",
+    )
+    begin.add_argument(
+        "--partial", action="store_true", help="start whichever components are left out"
+    )
     begin.set_defaults(run=start)
     end = verbs.add_parser("stop", parents=[common], help="end the loop at the next cycle")
     end.add_argument(
@@ -32,7 +42,9 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 
 def start(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Start the loop."""
-    result = client.start(args.runner, output.progress)
+    result = client.start(
+        args.runner, output.progress, without=args.without, partial=args.partial
+    )
     if output.for_people:
         output.alarm(args.runner or "rt_runner", result.degraded, sys.stderr)
     output.changed("started", result)

@@ -48,6 +48,7 @@ class Found:
     path: str
     owner: int | None
     others: tuple[str, ...] = ()  # libraries that offer it too, and are not taken
+    parameters: tuple[graph_pb2.ParameterInfo, ...] = ()  # as the type declares them
 
     def note(self, spec: graph_pb2.ComponentSpec) -> str:
         """Say that the type is in several places; empty = it is not."""
@@ -107,6 +108,7 @@ class Catalog:
                 str(found.library),
                 self._owner(Path(found.library)),
                 tuple(contents.others.get(type_name, ())),
+                tuple(found.parameters),
             )
         if type_name in contents.hidden:
             later = contents.hidden[type_name]

@@ -160,7 +160,7 @@ async def replace(
 async def release(
     runner: RunnerCore, names: list[str], progress: Progress
 ) -> control_pb2.ChangeResult:
-    """Load components again that were left out of the loop."""
+    """Load components anew that are left out of the loop, or that a fault has marked there."""
     if not names:
         raise InvalidArgument(
             "no component named to release", errors_pb2.REASON_NAME_MISSING, field="components"
@@ -170,21 +170,20 @@ async def release(
 
     async def work() -> control_pb2.ChangeResult:
         _check_known(runner, full_names)
-        for name in full_names:
-            if name not in runner.left_out:
-                raise NotFound(
-                    f"{name} is not left out of runner {runner.name}: it is in the loop",
-                    errors_pb2.REASON_COMPONENT_NOT_LEFT_OUT,
-                    component=name,
-                )
+        marked = [name for name in full_names if name not in runner.left_out]
+        if marked:
+            await _require_faulted(runner, marked)
         specs = [runner.desired.components[name] for name in full_names]
-        if len(specs) == 1:
+        if len(specs) == 1 and not marked:
             (load,) = await loads(runner.catalog, specs)
             request = wire.Request(load=load)
         else:
             every = [spec for name, spec in runner.desired.components.items()
                      if name not in runner.left_out or name in full_names]  # fmt: skip
-            request = wire.Request(apply=wire.Apply(components=await loads(runner.catalog, every)))
+            apply = wire.Apply(components=await loads(runner.catalog, every))
+            for load in apply.components:
+                load.anew = full_name(load.component) in marked
+            request = wire.Request(apply=apply)
         result = (await runner.ask(request, progress)).change
         for name in full_names:
             runner.left_out.pop(name, None)
@@ -196,6 +195,23 @@ async def release(
     result = await runner.change(f"the release of {what}", work)
     runner.log.info("%s released", what)
     return result
+
+
+async def _require_faulted(runner: RunnerCore, names: list[str]) -> None:
+    """Refuse to release what is in the loop and sound."""
+    listed = await runner.ask(wire.Request(list_components=wire.ListComponents()))
+    faulted = {
+        str(each.full_name)
+        for each in listed.components.components
+        if each.state == graph_pb2.COMPONENT_STATE_FAULTED
+    }
+    for name in names:
+        if name not in faulted:
+            raise NotFound(
+                f"{name} is not left out of runner {runner.name}: it is in the loop",
+                errors_pb2.REASON_COMPONENT_NOT_LEFT_OUT,
+                component=name,
+            )
 
 
 async def apply(

@@ -14,6 +14,7 @@ from rtcf_shared.graph_writer import same_value
 from rtcfd.access import caller
 from rtcfd.access.caller import Caller
 from rtcfd.access.tuning import require_pace
+from rtcfd.common import declared_values
 from rtcfd.common.names import absolute
 from rtcfd.common.refusals import FailedPrecondition, NotFound
 from rtcfd.executor.link import Progress
@@ -166,10 +167,35 @@ async def _set(
     before = await _values(runner, name)
     if acting is not None and acting.tuning is not None:
         _require_tuning(runner, name, settings, before, acting)
+    if name in runner.left_out:
+        return await _set_left_out(runner, name, settings, before, acting, takes_back)
     request = control_pb2.SetParametersRequest(component=name, parameters=settings)
     result = (await runner.ask(wire.Request(set_parameters=request), progress)).change
     runner.desired.set_parameters(name, settings)
     note(runner, name, settings, before, acting, "undo" if takes_back else "set", "", takes_back)
+    result.notes.extend(await runner.save())
+    return result
+
+
+async def _set_left_out(
+    runner: RunnerCore,
+    name: str,
+    settings: list[graph_pb2.ParameterSetting],
+    before: Mapping[str, graph_pb2.ParameterValue],
+    acting: Caller | None,
+    takes_back: int,
+) -> control_pb2.ChangeResult:
+    """Change parameters that a component begins with when it is loaded again."""
+    declared = {each.name: each for each in await _declared(runner, name)}
+    for each in settings:
+        declared_values.check(name, each, declared)
+    runner.desired.set_parameters(name, settings)
+    note(runner, name, settings, before, acting, "undo" if takes_back else "set", "", takes_back)
+    result = control_pb2.ChangeResult(component=name)
+    result.notes.append(
+        f"{name} is left out of the loop: `rtcfctl -r {runner.name} release {name}` loads it with "
+        "this"
+    )
     result.notes.extend(await runner.save())
     return result
 
@@ -230,7 +256,17 @@ async def _component(runner: RunnerCore, name: str) -> graph_pb2.ComponentInfo:
     return found
 
 
+async def _declared(runner: RunnerCore, name: str) -> list[graph_pb2.ParameterInfo]:
+    """Return the parameters of a component that is left out, as its type declares them."""
+    spec = runner.desired.components[name]
+    return list((await runner.catalog.find(spec.package, spec.type)).parameters)
+
+
 async def _values(runner: RunnerCore, name: str) -> dict[str, graph_pb2.ParameterValue]:
+    if name in runner.left_out:
+        values = {each.name: each.default_value for each in await _declared(runner, name)}
+        given = runner.desired.components[name].parameters
+        return values | {each.name: each.value for each in given}
     found = await _component(runner, name)
     return {each.name: each.value for each in found.parameters}
 

@@ -7,23 +7,33 @@ Functions on a RunnerCore.  All that waits here is withdrawn by a stop.
 from collections.abc import Callable
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import control_pb2
+from rtcf.v1 import control_pb2, errors_pb2
+from rtcf_shared.naming import listing
 
+from rtcfd.common.names import absolute
+from rtcfd.common.refusals import FailedPrecondition, NotFound
 from rtcfd.executor.link import Progress
 from rtcfd.operations.loop import asked_now, require_no_stop, start_in_turn
 from rtcfd.operations.runner_core import RunnerCore
 from rtcfd.recovery.bring_up import bring_up
 
 
-async def start(runner: RunnerCore, progress: Progress) -> control_pb2.ChangeResult:
-    """Start the loop."""
+async def start(
+    runner: RunnerCore, request: control_pb2.StartRequest, progress: Progress
+) -> control_pb2.ChangeResult:
+    """Start the loop; without components that are left out only where these are optional, or the
+    request names them."""
     asked = asked_now(runner)
 
     async def work() -> control_pb2.ChangeResult:
         require_no_stop(runner, asked)
         await _need_executor(runner, progress)
+        if not runner.loop.running:
+            _require_whole(runner, request)
         result = await start_in_turn(runner, asked, progress)
         runner.log.info("loop started")
+        for name, reason in sorted(runner.left_out.items()):
+            result.notes.append(f"without {name}: {reason}")
         return result
 
     return await runner.change("the start", work, runs_cycles=True)
@@ -64,6 +74,36 @@ async def replay(
         return response
 
     return await runner.change("a replay", work, timeout_s=None, runs_cycles=True)
+
+
+def _require_whole(runner: RunnerCore, request: control_pb2.StartRequest) -> None:
+    """Refuse to run cycles without a component whose absence nobody has agreed to."""
+    without = {absolute(name) for name in request.without}
+    if unknown := sorted(without - runner.left_out.keys()):
+        raise NotFound(
+            f"{unknown[0]} is not left out of runner {runner.name} "
+            f"(left out: {listing(runner.left_out)}): `rtcfctl -r {runner.name} unload` takes a "
+            "component out",
+            errors_pb2.REASON_COMPONENT_NOT_LEFT_OUT,
+            component=unknown[0],
+        )
+    components = runner.desired.components
+    missing = [
+        name
+        for name in sorted(runner.left_out)
+        if name not in without and name in components and not components[name].optional
+    ]
+    if not missing or request.partial:
+        return
+    first = missing[0]
+    words = " ".join(f"--without {name}" for name in missing)
+    raise FailedPrecondition(
+        f"runner {runner.name}: left out of its loop: {listing(missing)} ({first}: "
+        f"{runner.left_out[first]}): `rtcfctl -r {runner.name} release {first}` loads it again, "
+        f"`rtcfctl -r {runner.name} start {words}` goes on without",
+        errors_pb2.REASON_COMPONENT_LEFT_OUT,
+        component=first,
+    )
 
 
 async def _need_executor(runner: RunnerCore, progress: Progress) -> None:

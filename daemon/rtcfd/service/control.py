@@ -95,13 +95,23 @@ class Control(Looking):
     def Start(self, request: control_pb2.StartRequest) -> Any:
         """Start the loop."""
         runner = self._runners.get(request.runner)
-        return lambda progress: starting.start(runner, progress)
+        return lambda progress: starting.start(runner, request, progress)
 
     @changing
     def Stop(self, request: control_pb2.StopRequest) -> Any:
-        """Stop the loop."""
+        """Stop the loop; who names none hears of others that run on."""
         runner = self._runners.get(request.runner)
-        return lambda progress: stop(runner, progress)
+
+        async def work(progress: Progress) -> control_pb2.ChangeResult:
+            result = await stop(runner, progress)
+            others = [each.name for each in self._runners.all() if each.loop.running]
+            if not request.runner and others:
+                result.notes.append(
+                    f"runs on: {', '.join(others)}; `rtcfctl stop --all` ends all loops"
+                )
+            return result
+
+        return work
 
     @changing
     def Step(self, request: control_pb2.StepRequest) -> Any:

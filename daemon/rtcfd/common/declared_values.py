@@ -1,0 +1,71 @@
+"""Checks values against the declarations of parameters, where no executor has the component.
+
+As ParameterBase::check() of the component API does; what prepare() says to them is known when the
+component is loaded.
+"""
+
+import math
+from collections.abc import Mapping
+
+from rtcf.v1 import errors_pb2, graph_pb2
+from rtcf_shared.graph_writer import same_value
+from rtcf_shared.naming import closest, listing, suggestion
+
+from rtcfd.common.refusals import InvalidArgument, NotFound
+
+_KINDS = {
+    "bool_value": "a bool",
+    "int_value": "an int",
+    "double_value": "a double",
+    "string_value": "a string",
+}
+
+
+def check(
+    component: str,
+    setting: graph_pb2.ParameterSetting,
+    declared: Mapping[str, graph_pb2.ParameterInfo],
+) -> None:
+    """Refuse a value that a component would refuse; an int for a double becomes one in place.
+
+    Raises NotFound or InvalidArgument.
+    """
+    found = declared.get(setting.name)
+    if found is None:
+        raise NotFound(
+            f"{component} has no parameter {setting.name}{suggestion(setting.name, declared)}; it "
+            f"has {listing(declared)}",
+            errors_pb2.REASON_PARAMETER_NOT_FOUND,
+            component=component,
+            parameter=setting.name,
+            suggestion=closest(setting.name, declared),
+        )
+    if found.type == "double" and setting.value.WhichOneof("kind") == "int_value":
+        setting.value.double_value = float(setting.value.int_value)
+    if why := _problem(setting.value, found):
+        raise InvalidArgument(
+            f"{component}: parameter {setting.name} {why}",
+            errors_pb2.REASON_VALUE_INVALID,
+            component=component,
+            parameter=setting.name,
+        )
+
+
+def _problem(value: graph_pb2.ParameterValue, declared: graph_pb2.ParameterInfo) -> str:
+    """Return what is wrong with a value; empty: nothing."""
+    kind, wanted = value.WhichOneof("kind"), declared.default_value.WhichOneof("kind")
+    if kind != wanted:
+        given = "nothing" if kind is None else _KINDS[kind]
+        return f"takes {'a name' if declared.type == 'enum' else _KINDS[str(wanted)]}, not {given}"
+    plain = getattr(value, str(kind))
+    if kind in ("int_value", "double_value"):
+        if not math.isfinite(plain):
+            # No values to set, but for who takes back what it was declared with.
+            return "" if same_value(value, declared.default_value) else "must be finite"
+        if declared.HasField("minimum") and plain < declared.minimum:
+            return f"= {plain:g} is below its minimum {declared.minimum:g} {declared.unit}".rstrip()
+        if declared.HasField("maximum") and plain > declared.maximum:
+            return f"= {plain:g} is above its maximum {declared.maximum:g} {declared.unit}".rstrip()
+    if declared.choices and plain not in declared.choices:
+        return f"= {plain} is none of {', '.join(declared.choices)}"
+    return ""
