@@ -7,7 +7,8 @@ it.  All reads go through a Host, whose root a test may choose.
 import enum
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,21 +76,19 @@ def cpus(text: str) -> set[int]:
     return found
 
 
-def cpu_of_next_loop(host: Host, pid: int) -> int | None:
+def cpu_of_next_loop(host: Host, pid: int, taken: Iterable[int] = ()) -> int | None:
     """Return the CPU that a loop gets which may choose among those of a process: of those with
-    the fewest loops an isolated one, else the last.  As executors do (cpu_claim.cpp)."""
+    the fewest loops an isolated one, else the last.  As executors do (cpu_claim.cpp).
+
+    `taken`: the CPU of each loop of the daemon.
+    """
     match = re.search(r"^Cpus_allowed_list:\s*(\S+)", host.read(f"/proc/{pid}/status") or "", re.M)
     if not match or not (allowed := cpus(match[1])):
         return None
     isolated = cpus(host.read("/sys/devices/system/cpu/isolated") or "")
     best_first = sorted(allowed, key=lambda cpu: (cpu not in isolated, -cpu))
-    # Each loop in real time has the first name of its CPU that no other one has.
-    names = re.findall(r"@rtcf-loop-cpu-(\S+)$", host.read("/proc/net/unix") or "", re.M)
-    for place in range(len(names) + 1):
-        for cpu in best_first:
-            if (f"{cpu}-{place}" if place else str(cpu)) not in names:
-                return cpu
-    return None
+    loops = Counter(taken)
+    return min(best_first, key=lambda cpu: loops[cpu])
 
 
 def _kernel(host: Host, _: Loop) -> Iterator[Finding]:

@@ -28,9 +28,10 @@ class RefusedError(RtcfError):
 class DaemonUnreachableError(RtcfError):
     """rtcfd does not run, does not answer, or may not be asked.
 
-    `what` is the message without how to mend it.
+    `what` is the message without how to mend it; `denied`: its socket is not ours to use.
     """
 
-    def __init__(self, what: str, remedy: str = "") -> None:
+    def __init__(self, what: str, remedy: str = "", *, denied: bool = False) -> None:
         super().__init__(f"{what}: {remedy}" if remedy else what)
         self.what = what
+        self.denied = denied

@@ -88,7 +88,9 @@ def _unreachable(socket: str, text: str) -> DaemonUnreachableError:
             probe.settimeout(_PROBE_TIMEOUT_S)
             probe.connect(socket)
     except PermissionError:
-        return DaemonUnreachableError(f"permission denied on {socket}", _who_may(socket))
+        return DaemonUnreachableError(
+            f"permission denied on {socket}", _who_may(socket), denied=True
+        )
     except (FileNotFoundError, ConnectionRefusedError):
         return DaemonUnreachableError(
             f"rtcfd is not running at {socket}",

@@ -41,6 +41,7 @@ struct Options {
     std::string socket;
     std::string stop_socket;
     std::string resume_mark;
+    std::string cpu_claims;
     std::string describe;
     std::string package;
     std::vector<uid_t> trusted;
@@ -50,7 +51,7 @@ struct Options {
 
 constexpr const char* kUsage =
     "usage: rtcf-executor --runner NAME --socket PATH [--daemon NAME] [--stop-socket PATH]\n"
-    "                     [--resume-mark FILE]\n"
+    "                     [--resume-mark FILE] [--cpu-claims FOLDER]\n"
     "       rtcf-executor --describe LIBRARY --package PACKAGE [--trust UID]...\n"
     "       rtcf-executor --check LIBRARY --package PACKAGE --type TYPE [--cycles N] [--param "
     "NAME:=VALUE]...\n"
@@ -67,6 +68,7 @@ int parse(int argc, char** argv, Options& options) {
         kSocket,
         kStopSocket,
         kResumeMark,
+        kCpuClaims,
         kDaemon,
         kDescribe,
         kPackage,
@@ -83,6 +85,7 @@ int parse(int argc, char** argv, Options& options) {
                             {"socket", required_argument, nullptr, kSocket},
                             {"stop-socket", required_argument, nullptr, kStopSocket},
                             {"resume-mark", required_argument, nullptr, kResumeMark},
+                            {"cpu-claims", required_argument, nullptr, kCpuClaims},
                             {"daemon", required_argument, nullptr, kDaemon},
                             {"describe", required_argument, nullptr, kDescribe},
                             {"package", required_argument, nullptr, kPackage},
@@ -109,6 +112,9 @@ int parse(int argc, char** argv, Options& options) {
                 break;
             case kResumeMark:
                 options.resume_mark = optarg;
+                break;
+            case kCpuClaims:
+                options.cpu_claims = optarg;
                 break;
             case kDaemon:
                 options.daemon = optarg;
@@ -234,7 +240,7 @@ int run(const Options& options) {
                           [&server](const OutsideCall& call, const std::atomic<bool>& cancel) {
                               return server.ask(call, cancel);
                           }),
-                      recorder);
+                      recorder, options.cpu_claims);
         // After the runner, which it stops to the last.
         DirectStop direct_stop(options.stop_socket, options.resume_mark, access);
         direct_stop.serve({[&](const DirectStopReport& report) {

@@ -26,7 +26,7 @@ from rtcfd.common.names import DEFAULT_RUNNER
 from rtcfd.common.refusals import FailedPrecondition, Refusal, Unavailable
 from rtcfd.configuration import options
 from rtcfd.executor import frames, left_over
-from rtcfd.executor.command import ExecutorCommand
+from rtcfd.executor.command import ExecutorCommand, claims_folder_of_user
 from rtcfd.incidents.incidents import Incidents
 from rtcfd.notify import Notify, machine_goes_down
 from rtcfd.operations.runner_core import Surroundings
@@ -68,6 +68,10 @@ class Daemon:
             0o700 if given.foreground else 0o750,
             self._store.mark,
             private=given.foreground,
+            # Of the system's loops, where only their user writes.
+            claims_folder=claims_folder_of_user(given.runtime_dir / "cpus")
+            if given.foreground
+            else given.runtime_dir / "cpus",
         )
         self._endpoint = Endpoint(given.socket, private=given.foreground)
         folder = self._command.folder

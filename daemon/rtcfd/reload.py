@@ -64,6 +64,7 @@ class Reloads:
         self._graphs = BootGraphs(given.graphs_dir, {}, self._opinion)
         self._late: list[Given] = []  # for runners that are adopted first
         self._graph_problems: list[str] = []
+        self._refused = ""  # why the last reload changed nothing
         self._files = (Path(__file__), given.executor)
         self._identities = [_identity(file) for file in self._files]
 
@@ -113,7 +114,7 @@ class Reloads:
 
     def notes(self) -> list[str]:
         """Return what is to be said about rtcfd itself."""
-        lines = [self._given.settings.problem] if self._given.settings.problem else []
+        lines = [each for each in (self._given.settings.problem, self._refused) if each]
         lines += [f"not applied: {problem}" for problem in self._graph_problems]
         lines += self._store.problems
         if [_identity(file) for file in self._files] != self._identities:
@@ -135,6 +136,16 @@ class Reloads:
         return await self._runners.operations.take_turn("a reload", self._reload, None)
 
     async def _reload(self) -> list[str]:
+        self._shared.command.close_folders()
+        try:
+            lines = await self._read_again()
+        except Refusal as refusal:
+            self._refused = f"settings not read again: {refusal}"
+            raise
+        self._refused = ""
+        return lines
+
+    async def _read_again(self) -> list[str]:
         new = await self._aside.run(self._read_options, _FILES_TIMEOUT_S)
         new.settings.keep()
         lines = [
@@ -162,7 +173,11 @@ class Reloads:
         lines += self._graph_problems
         lines += await self._apply([given for given in graphs if given.changed])
         self._leave_note()
-        log.info("settings and graphs read again: %s", "; ".join(lines) or "nothing has changed")
+        log.log(
+            logging.ERROR if self._graph_problems else logging.INFO,
+            "settings and graphs read again: %s",
+            "; ".join(lines) or "nothing has changed",
+        )
         self._shared.events.add(
             control_pb2.Event.KIND_DAEMON, "; ".join(["settings read again", *lines])
         )

@@ -44,11 +44,13 @@ def replace(
     *,
     sync: bool = True,
     like: os.stat_result | None = None,
+    mode: int = 0o666,
 ) -> None:
     """Make `data` what a file holds, or leave it as it is; raises OSError.  Blocks.
 
     After a power cut it may still hold what it held, until sync_folder(); without
-    `sync` it may hold nothing.  `like`: whose mode it gets, and its owner where that is allowed.
+    `sync` it may hold nothing.  `like`: whose mode it gets, and its owner where that is allowed;
+    else it gets `mode`, but for what the umask takes away.
     """
     folder, name = os.path.split(file)
     new = os.path.join(folder, f".{name}.new")
@@ -56,7 +58,7 @@ def replace(
         # What is there, of a power cut or of somebody, is not opened: it may be a named pipe.
         with contextlib.suppress(FileNotFoundError):
             os.unlink(new)
-        with open(new, "xb") as out:
+        with open(new, "xb", opener=lambda path, flags: os.open(path, flags, mode)) as out:
             if like is not None:
                 with contextlib.suppress(PermissionError):
                     os.fchown(out.fileno(), like.st_uid, like.st_gid)

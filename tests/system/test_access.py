@@ -207,3 +207,48 @@ def test_limits_are_refused_with_what_to_do(service: Service) -> None:
     for each in watching:
         each.communicate()
     wait_for(lambda: service.ctl("status", check=False).returncode == 0, "room for a client")
+
+
+def test_a_reload_opens_no_folder_to_members(service: Service) -> None:
+    folders = [f"/run/rtcfd/{each}" for each in ("executors", "stop", "cpus")]
+    ask = ("stat", "-c", "%a %U:%G", *folders)
+    closed = ["700 rtcf:rtcf", "750 rtcf:rtcf", "700 rtcf:rtcf"]
+    service.load_and_start()
+    assert service.machine.run(*ask).stdout.splitlines() == closed
+    service.systemctl("reload", "rtcfd.service")
+    assert service.machine.run(*ask).stdout.splitlines() == closed
+    note = "/run/rtcfd/executors/handover.json"
+    assert service.machine.run("cat", note, user="alice", check=False).returncode != 0
+    modes = service.machine.shell("stat -c %a /run/rtcfd/executors/*.json").stdout.split()
+    assert modes == ["600"]
+
+
+def test_nobody_else_moves_a_loop_to_another_cpu(service: Service) -> None:
+    before = service.load_and_start()
+    service.ctl("stop")
+    # Names that claims had once, and the files that they are: for a member, who may enter nothing.
+    take = (
+        "import os, socket, time\n"
+        "kept = []\n"
+        "for cpu in range(64):\n"
+        "    kept.append(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))\n"
+        "    kept[-1].bind(f'\\0rtcf-loop-cpu-{cpu}')\n"
+        "    try:\n"
+        "        os.open(f'/run/rtcfd/cpus/cpu-{cpu}', os.O_RDWR | os.O_CREAT)\n"
+        "        print('taken', flush=True)\n"
+        "    except PermissionError:\n"
+        "        pass\n"
+        "print('ready', flush=True)\n"
+        "time.sleep(1000)\n"
+    )
+    holder = service.machine.start("/usr/bin/python3", "-c", take, user="alice")
+    try:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == "ready\n"
+        service.ctl("start")
+        after = service.status()
+        assert after.get("loop_cpu") == before.get("loop_cpu")
+        assert not any("has another loop" in line for line in after.get("degraded", []))
+    finally:
+        holder.kill()
+        holder.communicate()

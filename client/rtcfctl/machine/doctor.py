@@ -5,6 +5,7 @@ import os
 import re
 import time
 import uuid
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,41 +46,74 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> int:
     if not 0.0 <= args.seconds <= 3600.0:
         raise ValueError(f"--seconds {args.seconds:g}: use 0 to 3600")
     host = Host()
-    status, trouble = _status(client, args.runner)
-    loop = _loop(host, status)
-    findings = [*_of_rtcfd(status, trouble), *diagnose(host, loop)]
+    found = _ask(client, args.runner)
+    status = found.runner
+    loop = _loop(host, found)
+    findings = [*_of_rtcfd(found), *diagnose(host, loop)]
     latency = _Latency(why_not="rtcfd does not answer" if args.seconds else "--seconds 0")
     if args.seconds and status is not None:
-        latency = _measure(client, host, status, loop.cpu, args.seconds, output)
+        latency = _measure(client, host, found, loop.cpu, args.seconds, output)
     findings.append(_judge(latency))
     return report(findings, latency.figures, output)
 
 
-def _status(client: rtcf.Client, runner: str) -> tuple[runner_pb2.RunnerStatus | None, str]:
+@dataclass(frozen=True)
+class _Answer:
+    """What rtcfd says, or why it says nothing."""
+
+    runner: runner_pb2.RunnerStatus | None = None  # the one that is meant
+    every: Sequence[runner_pb2.RunnerStatus] = ()
+    notes: Sequence[str] = ()  # on rtcfd itself
+    trouble: rtcf.RtcfError | None = None
+
+
+def _ask(client: rtcf.Client, name: str) -> _Answer:
     try:
-        return client.get_status(runner or "rt_runner").runners[0], ""
+        (runner,) = client.get_status(name or "rt_runner").runners
+        response = client.get_status()
     except rtcf.RtcfError as error:
-        return None, str(error)
+        if isinstance(error, rtcf.RefusedError) and error.code == "NOT_FOUND":
+            raise  # there is no such runner
+        return _Answer(trouble=error)
+    return _Answer(runner, list(response.runners), list(response.notes))
 
 
-def _loop(host: Host, status: runner_pb2.RunnerStatus | None) -> Loop:
+def _loop(host: Host, found: _Answer) -> Loop:
+    status = found.runner
     if status is None:
         return Loop(max(os.sched_getaffinity(0)), 80)
     return Loop(
-        _cpu_of(host, status), status.settings.priority, status.pid, status.settings.lock_memory
+        _cpu_of(host, status, found.every),
+        status.settings.priority,
+        status.pid,
+        status.settings.lock_memory,
     )
 
 
-def _of_rtcfd(status: runner_pb2.RunnerStatus | None, trouble: str) -> list[Finding]:
+def _of_rtcfd(found: _Answer) -> list[Finding]:
     """Say what rtcfd itself says."""
-    if status is None:
-        return [Finding("rtcfd", Grade.BAD, trouble, "it serves", "systemctl start rtcfd")]
-    lines = [str(line) for line in status.degraded]
-    if lines:
+    if found.trouble is not None:
+        return [_silent(found.trouble)]
+    assert found.runner is not None
+    status, topic = found.runner, f"runner {found.runner.runner}"
+    findings = [Finding("rtcfd", Grade.WARNING, note, "nothing to say") for note in found.notes]
+    if lines := [str(line) for line in status.degraded]:
         text = "; ".join(lines)
-        return [Finding(f"runner {status.runner}", Grade.WARNING, f"degraded: {text}", "real time")]
-    found = f"serves; its loop is {runner_pb2.RunnerState.Name(status.state)[13:].lower()}"
-    return [Finding(f"runner {status.runner}", Grade.GOOD, found)]
+        findings.append(Finding(topic, Grade.WARNING, f"degraded: {text}", "real time"))
+    if status.status:
+        findings.append(Finding(topic, Grade.WARNING, status.status, "nothing to say"))
+    if not status.degraded and not status.status:
+        text = f"serves; its loop is {runner_pb2.RunnerState.Name(status.state)[13:].lower()}"
+        findings.append(Finding(topic, Grade.GOOD, text))
+    return findings
+
+
+def _silent(trouble: rtcf.RtcfError) -> Finding:
+    """Say why rtcfd tells us nothing, with the way out of just that."""
+    if isinstance(trouble, rtcf.DaemonUnreachableError) and not trouble.denied:
+        return Finding("rtcfd", Grade.BAD, str(trouble), "it serves", "systemctl start rtcfd")
+    # It may serve well: the line says what is missing to see that.
+    return Finding("rtcfd", Grade.UNKNOWN, str(trouble), "the right to observe")
 
 
 @dataclass(frozen=True)
@@ -94,7 +128,7 @@ class _Latency:
 def _measure(
     client: rtcf.Client,
     host: Host,
-    status: runner_pb2.RunnerStatus,
+    found: _Answer,
     cpu: int,
     seconds: float,
     output: Output,
@@ -103,12 +137,14 @@ def _measure(
 
     No second loop is put beside one that runs: the two would make each other late.
     """
+    status = found.runner
+    assert status is not None
     try:
         if _runs(status):
             latency = client.get_statistics(status.runner).latency
             return _Latency(latency, f"of the loop that runs, {latency.count} cycles")
-        for other in client.get_status().runners:
-            if _runs(other) and _cpu_of(host, other) == cpu:
+        for other in found.every:
+            if _runs(other) and _cpu_of(host, other, found.every) == cpu:
                 return _Latency(why_not=f"the loop of {other.runner} runs on CPU {cpu}")
         return _Latency(
             _of_an_empty_loop(client, status, cpu, seconds, output),
@@ -160,15 +196,19 @@ def _runs(status: runner_pb2.RunnerStatus) -> bool:
     return bool(status.state == runner_pb2.RUNNER_STATE_RUNNING)
 
 
-def _cpu_of(host: Host, status: runner_pb2.RunnerStatus) -> int:
-    """Return the CPU of a runner's real-time thread, or the one it would get."""
+def _cpu_of(
+    host: Host, status: runner_pb2.RunnerStatus, every: Sequence[runner_pb2.RunnerStatus]
+) -> int:
+    """Return the CPU of a runner's real-time thread, or the one it would get beside the loops of
+    `every` runner."""
     thread = f"/proc/{status.pid}/task/{status.realtime_tid}/status"
     found = re.search(r"^Cpus_allowed_list:\s*(\d+)$", host.read(thread) or "", re.MULTILINE)
     if status.realtime_tid and found:
         return int(found[1])
     if status.settings.cpu >= 0:
         return int(status.settings.cpu)
-    known = (cpu_of_next_loop(host, pid) for pid in (status.pid, os.getpid()))
+    taken = [each.loop_cpu for each in every if each.HasField("loop_cpu")]
+    known = (cpu_of_next_loop(host, pid, taken) for pid in (status.pid, os.getpid()))
     return next((cpu for cpu in known if cpu is not None), 0)
 
 

@@ -52,7 +52,8 @@ class ProbeWork final : public BoundaryWork {
 
 }  // namespace
 
-Loop::Loop(Log& log, FlightRecorder& recorder) : cycle_(recorder), log_(log), recorder_(recorder) {
+Loop::Loop(Log& log, FlightRecorder& recorder, std::string cpu_claims)
+    : cycle_(recorder), log_(log), recorder_(recorder), cpu_claims_(std::move(cpu_claims)) {
     log_.setIteration(&cycle_.figures().iteration);
 }
 
@@ -187,7 +188,7 @@ RealtimeSettings Loop::placed(RealtimeSettings settings, RealtimeProblems& probl
     const bool stays = cpu_claim_ != nullptr && (settings.cpu < 0 || settings.cpu == cpu());
     if (!stays) {
         cpu_claim_.reset();
-        cpu_claim_ = std::make_unique<CpuClaim>(settings.cpu);
+        cpu_claim_ = std::make_unique<CpuClaim>(settings.cpu, cpu_claims_);
         cpu_.store(cpu_claim_->cpu(), std::memory_order_relaxed);
         keepThreadsOff(cpu(), threadId());
     }

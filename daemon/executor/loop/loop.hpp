@@ -45,7 +45,8 @@ class Loop {
    public:
     /// @param log the thread marks itself there; outlives the loop
     /// @param recorder what runs is noted there; outlives the loop
-    Loop(Log& log, FlightRecorder& recorder);
+    /// @param cpu_claims folder where loops that are to know of each other claim CPUs, see CpuClaim
+    Loop(Log& log, FlightRecorder& recorder, std::string cpu_claims);
     /// Ends the loop in order.
     ~Loop();
     Loop(const Loop&) = delete;
@@ -175,6 +176,7 @@ class Loop {
     Cycle cycle_;
     Log& log_;
     FlightRecorder& recorder_;
+    const std::string cpu_claims_;
     pthread_t thread_{};
     std::unique_ptr<IdleStateGuard> idle_guard_;
     std::unique_ptr<CpuClaim> cpu_claim_;  // while it runs in real time

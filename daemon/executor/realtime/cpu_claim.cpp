@@ -1,11 +1,11 @@
 #include "realtime/cpu_claim.hpp"
 
-#include <sys/socket.h>
-#include <sys/un.h>
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstddef>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -60,7 +60,7 @@ std::vector<int> byPreference(const std::vector<int>& cpus, const std::string& i
     return found;
 }
 
-CpuClaim::CpuClaim(int wanted, std::string names) : names_(std::move(names)) {
+CpuClaim::CpuClaim(int wanted, std::string folder) : folder_(std::move(folder)) {
     constexpr int kMost = 100;  // loops of one CPU that are counted
     std::vector<int> cpus{wanted};
     if (wanted < 0) {
@@ -68,35 +68,46 @@ CpuClaim::CpuClaim(int wanted, std::string names) : names_(std::move(names)) {
         std::getline(std::ifstream("/sys/devices/system/cpu/isolated"), isolated);
         cpus = byPreference(processCpus(), isolated);
     }
-    for (int place = 0; place < kMost; ++place) {
+    if (!cpus.empty()) cpu_ = cpus.front();
+    for (int place = 0; place < kMost && !folder_.empty(); ++place) {
         if (std::any_of(cpus.begin(), cpus.end(), [&](int cpu) { return take(cpu, place); }))
             return;
     }
-    if (!cpus.empty()) cpu_ = cpus.front();
 }
 
 CpuClaim::~CpuClaim() {
-    if (fd_ >= 0) ::close(fd_);
+    if (fd_ < 0) return;
+    // While it is locked: nobody else has it for theirs.
+    ::unlink(file_.c_str());
+    ::close(fd_);
 }
 
 bool CpuClaim::take(int cpu, int place) {
-    std::string name = names_ + "-" + std::to_string(cpu);
-    if (place > 0) name += "-" + std::to_string(place);
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    // A zero, then the name: it stands in no folder.
-    std::copy(name.begin(), name.end(), address.sun_path + 1);
-    const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
-    const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    if (fd < 0) return false;
-    if (::bind(fd, reinterpret_cast<const sockaddr*>(&address), size) != 0) {
+    constexpr int kMostTries = 100;  // for a file that goes as soon as it is there
+    std::string file = folder_ + "/cpu-" + std::to_string(cpu);
+    if (place > 0) file += "-" + std::to_string(place);
+    for (int i = 0; i < kMostTries; ++i) {
+        // For nobody else to read: who reads a file can lock it.
+        const int fd = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
+        if (fd < 0) return false;
+        struct stat locked {};
+        struct stat named {};
+        if (::flock(fd, LOCK_EX | LOCK_NB) != 0 || ::fstat(fd, &locked) != 0) {
+            ::close(fd);
+            return false;
+        }
+        // Who had it may have removed it between the two.
+        if (::stat(file.c_str(), &named) == 0 && named.st_ino == locked.st_ino &&
+            named.st_dev == locked.st_dev) {
+            fd_ = fd;
+            file_ = std::move(file);
+            cpu_ = cpu;
+            place_ = place;
+            return true;
+        }
         ::close(fd);
-        return false;
     }
-    fd_ = fd;
-    cpu_ = cpu;
-    place_ = place;
-    return true;
+    return false;
 }
 
 }  // namespace rtcf::executor

@@ -1,7 +1,9 @@
 /// @file
 /// The CPU of a real-time loop. Loops on one CPU wait for each other: one that may choose takes a
-/// CPU that no other loop of this machine has, or else one of those that the fewest have, and knows
-/// whether it was alone there when it came. Not real-time; graph thread.
+/// CPU that no other loop with the same folder of claims has, or else one of those that the fewest
+/// have, and knows whether it was alone there when it came. A claim is a locked file in a folder
+/// where only the executors' user writes, so that nobody else moves a loop; the kernel unlocks it
+/// however a process ends. Not real-time; graph thread.
 #pragma once
 
 #include <sched.h>
@@ -26,21 +28,22 @@ void keepThreadsOff(int cpu, int except);
 class CpuClaim {
    public:
     /// @param wanted -1 = of all CPUs of this process the best of those with the fewest loops
-    /// @param names in the abstract namespace of sockets, which the kernel clears when a process
-    /// ends, however it does
-    explicit CpuClaim(int wanted, std::string names = "rtcf-loop-cpu");
+    /// @param folder of the claims; empty, or one that cannot be written to: other loops are not
+    /// known of
+    CpuClaim(int wanted, std::string folder);
     ~CpuClaim();
     CpuClaim(const CpuClaim&) = delete;
     CpuClaim& operator=(const CpuClaim&) = delete;
 
     int cpu() const noexcept { return cpu_; }
-    /// No other loop had this CPU before.
-    bool alone() const noexcept { return place_ == 0; }
+    /// No other loop is known to have had this CPU before.
+    bool alone() const noexcept { return place_ <= 0; }
 
    private:
     bool take(int cpu, int place);
 
-    std::string names_;
+    std::string folder_;
+    std::string file_;  // that is locked
     int cpu_ = -1;
     int place_ = -1;  // among the loops of that CPU; -1 = nobody knows
     int fd_ = -1;

@@ -15,7 +15,7 @@ constexpr std::int64_t kProbeTimeout = 100'000'000;
 }  // namespace
 
 Runner::Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr<Bridge> bridge,
-               FlightRecorder& recorder)
+               FlightRecorder& recorder, std::string cpu_claims)
     : name_(std::move(name)),
       log_(log),
       events_([this, events = std::move(events)](RunnerEvent event) {
@@ -23,7 +23,7 @@ Runner::Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr
           events(std::move(event));
       }),
       recorder_(recorder),
-      loop_(log, recorder),
+      loop_(log, recorder, std::move(cpu_claims)),
       stall_monitor_(loop_),
       bridge_(std::move(bridge)),
       size_watch_(name_,

@@ -113,8 +113,9 @@ class Runner final : private RunnerView {
     /// @param events called from the graph thread
     /// @param bridge the link to the outside; null = none
     /// @param recorder outlives the runner
+    /// @param cpu_claims folder of the claims of CPUs, see CpuClaim; empty = none
     Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr<Bridge> bridge,
-           FlightRecorder& recorder);
+           FlightRecorder& recorder, std::string cpu_claims = {});
     /// Stops the loop and lets all components go, in order.
     ~Runner();
     Runner(const Runner&) = delete;

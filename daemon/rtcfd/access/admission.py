@@ -81,11 +81,13 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
                 if isinstance(request, AsyncIterator):
                     request = self._formed(method, request, peer)
                 watches = needed(method) <= Level.OBSERVE
-                with self._noted(method, request, context, peer):
+                with self._noted(method, request, context, peer) as but:
                     async with contextlib.aclosing(inner(request, context)) as responses:
                         async for response in responses:
                             if watches:
                                 await self._check_again(method, request, context, peer)
+                            else:
+                                but[:] = _refused(response)
                             yield response
 
         return call
@@ -134,19 +136,24 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
         await abort(context, refusal, request)
 
     @contextlib.contextmanager
-    def _noted(self, method: str, request: Any, context: Any, peer: Peer) -> Iterator[None]:
-        """Log what came of a change."""
+    def _noted(self, method: str, request: Any, context: Any, peer: Peer) -> Iterator[list[str]]:
+        """Log what came of a change, with what of it was refused: that goes into the list."""
+        but: list[str] = []
         if needed(method) <= Level.OBSERVE:
-            yield
+            yield but
             return
         runner = _runner(request)
         what = f"{method} by {peer}"
         try:
-            yield
+            yield but
         except BaseException:
             reason = context.details() or "its caller left"
             self._log(logging.WARNING, f"{what}: not done: {reason}", peer, request)
             raise
+        if but:
+            text = f"{what}: not all of it done: {bounded('; '.join(but))}"
+            self._log(logging.WARNING, text, peer, request)
+            return
         log.info("%s: done", what, extra={"runner": runner, "peer": peer})
 
     def _log(self, level: int, text: str, peer: Peer, request: Any) -> None:
@@ -155,6 +162,12 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
         if lost := self._budget.take_lost():
             text += f" ({lost} more were refused since the last such line)"
         log.log(level, "%s", text, extra={"runner": _runner(request), "peer": peer})
+
+
+def _refused(response: Any) -> list[str]:
+    """Return what of a change the answer says was refused, a line each."""
+    result = getattr(response, "result", None)
+    return [str(line) for line in getattr(result, "refused", ())]
 
 
 def _asked_ns(context: Any) -> int:

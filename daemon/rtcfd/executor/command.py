@@ -3,6 +3,8 @@
 import contextlib
 import hashlib
 import os
+import stat
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,24 +33,32 @@ class ExecutorCommand:
     stop_mode: int = 0o700
     mark: Callable[[str], Path | None] = lambda runner: None  # see Store.mark
     private: bool = False  # not the system's daemon
+    claims_folder: Path | None = None  # where loops claim their CPUs
 
     def prepare(self) -> None:
-        """Make the socket folders, of which only our user may enter the first, and check the
-        binary."""
+        """Make the folders and check the binary."""
         if not os.access(self.binary, os.X_OK):
             raise FailedPrecondition(
                 f"no executor at {self.binary}: install it, or name one with --executor",
                 errors_pb2.REASON_DAEMON_FAILED,
             )
+        self.close_folders()
+
+    def close_folders(self) -> None:
+        """Let others than our user enter the folder of direct stops alone.  systemd opens all of
+        them with each command of the unit that it runs."""
         _make(self.folder, 0o700)
         if self.stop_folder is not None:
             _make(self.stop_folder, self.stop_mode)
+        if self.claims_folder is not None:
+            _make(self.claims_folder, 0o700)
 
     def remove_folders(self) -> None:
-        """Remove the socket folders, if nothing is left in them."""
-        for folder in (self.folder, self.stop_folder):
-            with contextlib.suppress(OSError):
-                if folder is not None:
+        """Remove our folders, if nothing is left in them."""
+        for folder in (self.folder, self.stop_folder, self.claims_folder):
+            # That of the claims may be of several daemons.
+            if folder is not None and folder.parent == self.folder.parent:
+                with contextlib.suppress(OSError):
                     folder.rmdir()
 
     def socket(self, runner: str) -> Path:
@@ -69,6 +79,8 @@ class ExecutorCommand:
             line += ["--stop-socket", str(_checked(self.stop_folder / runner))]
         if mark := self.mark(runner):
             line += ["--resume-mark", str(mark)]
+        if self.claims_folder is not None:
+            line += ["--cpu-claims", str(self.claims_folder)]
         return line
 
     def daemon_name(self) -> str:
@@ -83,6 +95,24 @@ class ExecutorCommand:
     def environment() -> dict[str, str]:
         """Return ours (ROS_MASTER_URI, ROS_IP, ROS_HOSTNAME …) without what is rtcfd's alone."""
         return {name: value for name, value in os.environ.items() if name not in _OWN_VARIABLES}
+
+
+def claims_folder_of_user(fallback: Path) -> Path:
+    """Return where the loops of all private daemons of our user claim CPUs; `fallback`: of a
+    daemon that is alone with it, where somebody else has the name."""
+    runtime = os.environ.get("XDG_RUNTIME_DIR")
+    if runtime and os.access(runtime, os.W_OK):
+        return Path(runtime) / "rtcf-cpus"
+    folder = Path(tempfile.gettempdir()) / f"rtcf-cpus-{os.geteuid()}"
+    try:
+        folder.mkdir(mode=0o700)
+    except FileExistsError:
+        found = folder.lstat()
+        if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid():
+            return fallback
+    except OSError:
+        return fallback
+    return folder
 
 
 def _make(folder: Path, mode: int) -> None:

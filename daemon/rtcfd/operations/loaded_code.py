@@ -100,7 +100,7 @@ class LoadedCode:
     def store(self, file: Path) -> None:
         """Leave it to the next rtcfd, that adopts the executor."""
         with contextlib.suppress(OSError):  # then that one does not know
-            durable.replace(file, json.dumps(self._files).encode(), sync=False)
+            durable.replace(file, json.dumps(self._files).encode(), sync=False, mode=0o600)
 
     def restore(self, file: Path) -> None:
         """Take what the rtcfd before this one left."""

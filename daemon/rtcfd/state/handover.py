@@ -54,7 +54,7 @@ def write(folder: Path, handover: Handover) -> None:
         "graphs": handover.graphs,
     }
     try:
-        durable.replace(folder / _NAME, json.dumps(document).encode(), sync=False)
+        durable.replace(folder / _NAME, json.dumps(document).encode(), sync=False, mode=0o600)
     except OSError as error:
         log.warning("cannot write %s: %s", folder / _NAME, error.strerror)
 

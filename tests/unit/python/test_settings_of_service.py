@@ -217,6 +217,48 @@ def test_a_reload_fails_when_a_graph_is_refused(stopped_daemon: DaemonUnderTest)
     assert done.stderr.startswith(f"rtcfd: not applied: {refused}: ")
     assert 'no type "Nothing"' in done.stderr
     assert str(refused) not in done.stdout
+    # Nor does the journal end in another word.
+    ends = [line for line in daemon.log().splitlines() if "Reload by" in line]
+    assert [line.endswith(": done") for line in ends] == [True, False]
+    assert f"not all of it done: {refused}: " in ends[1]
+
+
+def test_a_reload_that_was_refused_is_told_until_one_is_not(
+    stopped_daemon: DaemonUnderTest,
+) -> None:
+    daemon = stopped_daemon
+    daemon.settings.write_text(GOOD)
+    daemon.start_service()
+    daemon.settings.write_text(BAD)
+    assert rtcfd(daemon, "--reload").returncode == 1
+    said = f"settings not read again: {daemon.settings}:2: runner.frequency_hz must be a number"
+    with daemon.client() as client:
+        (note,) = client.get_status().notes
+        assert note.startswith(said)
+    assert f"rtcfd: {said}" in daemon.ctl("status").stdout
+    doctor = daemon.ctl("doctor", "--seconds", "0").stdout
+    assert said in " ".join(doctor.split())
+    daemon.settings.write_text(GOOD)
+    assert rtcfd(daemon, "--reload").returncode == 0
+    with daemon.client() as client:
+        assert not client.get_status().notes
+
+
+def test_a_reload_closes_the_folders_that_systemd_has_opened(
+    stopped_daemon: DaemonUnderTest,
+) -> None:
+    daemon = stopped_daemon.start_service()
+    folders = {name: daemon.folder / "run" / name for name in ("executors", "stop", "cpus")}
+    modes = {name: folder.stat().st_mode & 0o777 for name, folder in folders.items()}
+    assert modes == {"executors": 0o700, "stop": 0o750, "cpus": 0o700}
+    for folder in folders.values():
+        folder.chmod(0o750)  # as RuntimeDirectoryMode= says, with each command that it runs
+    # What is in them is nobody else's in the moment before that, either.
+    files = [each for each in folders["executors"].iterdir() if each.is_file()]
+    assert "handover.json" in [each.name for each in files]
+    assert {each.stat().st_mode & 0o777 for each in files} == {0o600}
+    assert rtcfd(daemon, "--reload").returncode == 0
+    assert {n: f.stat().st_mode & 0o777 for n, f in folders.items()} == modes
 
 
 def test_settings_and_graphs_are_checked_without_a_daemon(stopped_daemon: DaemonUnderTest) -> None:

@@ -1,22 +1,42 @@
 #include "realtime/cpu_claim.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
+#include <csignal>
+#include <filesystem>
 #include <future>
 #include <set>
 #include <string>
 #include <thread>
+
+#include "support/temporary_folder.hpp"
 
 namespace rtcf::test {
 namespace {
 
 using namespace executor;
 
-// Of this test alone: other loops run on the machine.
-std::string names() { return "rtcf-test-cpu-" + std::to_string(::getpid()); }
+class CpuClaimTest : public ::testing::Test {
+   protected:
+    void SetUp() override { ASSERT_TRUE(std::filesystem::create_directory(names())); }
+    std::string names() const { return folder_.path("claims"); }
+    std::set<std::string> files() const {
+        std::set<std::string> found;
+        for (const auto& file : std::filesystem::directory_iterator(names()))
+            found.insert(file.path().filename());
+        return found;
+    }
 
-TEST(CpuClaim, SpreadsLoopsOverTheCpus) {
+   private:
+    TemporaryFolder folder_;
+};
+
+TEST_F(CpuClaimTest, SpreadsLoopsOverTheCpus) {
     std::vector<std::unique_ptr<CpuClaim>> loops;
     std::set<int> taken;
     for (std::size_t i = 0; i < processCpus().size(); ++i) {
@@ -40,7 +60,7 @@ TEST(CpuClaim, SpreadsLoopsOverTheCpus) {
     EXPECT_EQ(CpuClaim(-1, names()).cpu(), left);
 }
 
-TEST(CpuClaim, PrefersCpusThatAreIsolatedAndThenTheLast) {
+TEST_F(CpuClaimTest, PrefersCpusThatAreIsolatedAndThenTheLast) {
     const std::vector<int> cpus{0, 1, 2, 3, 5, 12};
     using Order = std::vector<int>;
     EXPECT_EQ(byPreference(cpus, ""), (Order{12, 5, 3, 2, 1, 0}));
@@ -51,7 +71,7 @@ TEST(CpuClaim, PrefersCpusThatAreIsolatedAndThenTheLast) {
     EXPECT_TRUE(byPreference({}, "1").empty());
 }
 
-TEST(CpuClaim, ThatEndsIsFreeAgain) {
+TEST_F(CpuClaimTest, ThatEndsIsFreeAgain) {
     const int last = processCpus().back();
     {
         const CpuClaim loop(-1, names());
@@ -64,7 +84,86 @@ TEST(CpuClaim, ThatEndsIsFreeAgain) {
     EXPECT_FALSE(chosen.alone()) << "it is where it was told to be, and knows of the other";
 }
 
-TEST(CpuClaim, ThreadsKeepOffTheLoopsCpuWhereThereIsAnother) {
+TEST_F(CpuClaimTest, LeavesNoFileBehind) {
+    const int last = processCpus().back();
+    {
+        const CpuClaim first(last, names());
+        const CpuClaim second(last, names());
+        const std::string name = "cpu-" + std::to_string(last);
+        EXPECT_EQ(files(), (std::set<std::string>{name, name + "-1"}));
+    }
+    EXPECT_TRUE(files().empty());
+}
+
+TEST_F(CpuClaimTest, OfAProcessThatWasKilledIsFreeAgain) {
+    const int last = processCpus().back();
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+        const CpuClaim loop(last, names());
+        ::raise(SIGKILL);
+    }
+    ASSERT_EQ(::waitpid(child, nullptr, 0), child);
+    EXPECT_EQ(files().size(), 1U) << "its file is there";
+    EXPECT_TRUE(CpuClaim(last, names()).alone());
+}
+
+TEST_F(CpuClaimTest, IsForNobodyElseToHold) {
+    const CpuClaim loop(-1, names());
+    const auto file = *std::filesystem::directory_iterator(names());
+    struct stat found {};
+    ASSERT_EQ(::stat(file.path().c_str(), &found), 0);
+    EXPECT_EQ(found.st_mode & 0777U, 0600U);
+    // Nor by what is there in its place.
+    const int last = processCpus().back();
+    const std::string other = names() + "/cpu-" + std::to_string(last) + "-1";
+    ASSERT_EQ(::symlink(file.path().c_str(), other.c_str()), 0);
+    EXPECT_EQ(CpuClaim(last, names()).cpu(), last);
+    EXPECT_EQ(files().count("cpu-" + std::to_string(last) + "-2"), 0U) << "it is free again";
+}
+
+TEST_F(CpuClaimTest, WithoutAFolderKnowsOfNobody) {
+    for (const std::string& folder : {std::string(), names() + "/none"}) {
+        const CpuClaim first(-1, folder);
+        const CpuClaim second(-1, folder);
+        EXPECT_EQ(first.cpu(), processCpus().back());
+        EXPECT_EQ(second.cpu(), first.cpu());
+        EXPECT_TRUE(second.alone());
+    }
+}
+
+TEST_F(CpuClaimTest, OfManyProcessesThatComeAndGoIsOneAtATime) {
+    constexpr int kProcesses = 4;
+    constexpr int kClaims = 500;
+    const int last = processCpus().back();
+    // Who is alone makes a file that must not be there.
+    const std::string mark = names() + "/alone";
+    std::array<pid_t, kProcesses> children{};
+    for (pid_t& child : children) {
+        child = ::fork();
+        ASSERT_GE(child, 0);
+        if (child != 0) continue;
+        int alone = 0;
+        for (int i = 0; i < kClaims; ++i) {
+            const CpuClaim claim(last, names());
+            if (!claim.alone()) continue;
+            ++alone;
+            const int fd = ::open(mark.c_str(), O_CREAT | O_EXCL | O_RDWR, 0600);
+            if (fd < 0) ::_exit(1);
+            ::close(fd);
+            ::unlink(mark.c_str());
+        }
+        ::_exit(alone > 0 ? 0 : 2);
+    }
+    for (const pid_t child : children) {
+        int status = 0;
+        ASSERT_EQ(::waitpid(child, &status, 0), child);
+        EXPECT_EQ(status, 0);
+    }
+    EXPECT_TRUE(files().empty());
+}
+
+TEST_F(CpuClaimTest, ThreadsKeepOffTheLoopsCpuWhereThereIsAnother) {
     if (processCpus().size() < 2) GTEST_SKIP() << "one CPU";
     const auto mayUse = [](int cpu) {
         cpu_set_t allowed;
