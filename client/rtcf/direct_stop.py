@@ -160,9 +160,7 @@ def _ask(path: Path, runner: str) -> bool:
         for option in (sockets.SO_SNDTIMEO, sockets.SO_RCVTIMEO):
             connection.setsockopt(sockets.SOL_SOCKET, option, limit)
         connection.connect(str(path))
-        found = connection.getsockopt(
-            sockets.SOL_SOCKET, sockets.SO_PEERCRED, _CREDENTIALS.size
-        )
+        found = connection.getsockopt(sockets.SOL_SOCKET, sockets.SO_PEERCRED, _CREDENTIALS.size)
         pid, _, _ = _CREDENTIALS.unpack(found)  # of the executor; 0: seen from a container
         # Whoever may not is told so, and hung up on, before anything is read.
         with contextlib.suppress(BrokenPipeError, ConnectionResetError):
@@ -199,7 +197,9 @@ def _ask(path: Path, runner: str) -> bool:
     elif hung_up:
         problem = f"the executor of runner {runner} (pid {pid}) hung up, and lives on"
     else:
-        problem = f"the executor of runner {runner} (pid {pid}) does not answer within {TIMEOUT_S:g} s"
+        problem = (
+            f"the executor of runner {runner} (pid {pid}) does not answer within {TIMEOUT_S:g} s"
+        )
     raise refused(problem, "UNAVAILABLE", "EXECUTOR_SILENT", about)
 
 

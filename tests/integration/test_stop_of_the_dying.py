@@ -10,9 +10,7 @@ from daemon_process import Daemon, stopped, wait_for
 from rtcf.v1 import runner_pb2
 from values import iteration, state
 
-SETTINGS = (
-    "[runner]\nstall_timeout_ms = 1500\non_crash = 'resume'\n[runner.ros]\nenabled = false\n"
-)
+SETTINGS = "[runner]\nstall_timeout_ms = 1500\non_crash = 'resume'\n[runner.ros]\nenabled = false\n"
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from machine import Machine
+from rtcf_service import Service
 
 TESTS = Path(__file__).parents[2] / "debian" / "tests"
 
@@ -28,3 +29,16 @@ def test_all_of_them_are_run_here() -> None:
     control = (TESTS / "control").read_text()
     names = [line.split()[1] for line in control.splitlines() if line.startswith("Tests:")]
     assert sorted(names) == ["build-component", "run-time"]
+
+
+@pytest.mark.parametrize("language", [(), ("--python",)], ids=["C++", "Python"])
+def test_a_new_package_builds_and_tests_by_the_lines_that_are_printed(
+    service: Service, language: tuple[str, ...]
+) -> None:
+    machine = service.machine
+    folder = machine.run("mktemp", "-d", user="alice").stdout.strip()
+    new = " ".join(["rtcfctl new my_arm Gain", *language])
+    lines = machine.shell(f"cd {folder} && {new}", user="alice").stdout.splitlines()
+    change, build, test, *_ = [line for line in lines if line.startswith("  ")]
+    done = machine.shell(f"cd {folder} && set -e\n{change}\n{build}\n{test}", user="alice")
+    assert "100% tests passed, 0 tests failed out of 1" in done.stdout

@@ -59,7 +59,8 @@ def test_services_beside_rtcfd_go_on_in_what_was_installed(service: Service) -> 
     def processes() -> list[int]:
         return [int(service.unit_property("MainPID", unit)) for unit in units]
 
-    reinstall = "apt-get install --yes --quiet --reinstall /debs/rtcf-scope_*.deb /debs/rtcfctl_*.deb"
+    packages = "/debs/rtcf-scope_*.deb /debs/rtcfctl_*.deb"
+    reinstall = f"apt-get install --yes --quiet --reinstall {packages}"
     service.machine.shell(reinstall)
     assert processes() == [0, 0], "what nobody has started stays off"
     service.systemctl("start", *units)

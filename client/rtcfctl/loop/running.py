@@ -42,9 +42,7 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 
 def start(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Start the loop."""
-    result = client.start(
-        args.runner, output.progress, without=args.without, partial=args.partial
-    )
+    result = client.start(args.runner, output.progress, without=args.without, partial=args.partial)
     if output.for_people:
         output.alarm(args.runner or "rt_runner", result.degraded, sys.stderr)
     output.changed("started", result)

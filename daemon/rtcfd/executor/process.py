@@ -45,7 +45,7 @@ class Process:
 
     @property
     def frozen(self) -> bool:
-        """Tell whether a signal or a debugger has stopped it: it does nothing, and answers nobody."""
+        """Tell whether a signal or a debugger has stopped it: it does nothing."""
         if self._end is not None:
             return False
         try:

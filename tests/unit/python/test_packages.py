@@ -1,8 +1,11 @@
 """What our packages depend on: what they run, and nothing of the size of a compiler besides."""
 
 import re
+import subprocess
+from pathlib import Path
 
 import pytest
+from daemon_under_test import BUILD_TREE
 from pages import TREE
 
 # With what is run of each.
@@ -58,3 +61,23 @@ def test_the_checker_needs_no_more_than_an_executor_and_a_symbolizer() -> None:
 def test_nothing_is_named_twice(paragraph: dict[str, str], field: str) -> None:
     names = [each for each in _names(paragraph.get(field, "")) if not each.startswith("$")]
     assert len(names) == len(set(names)), sorted(names)
+
+
+@pytest.mark.parametrize(
+    ("language", "needed"),
+    [
+        ((), ["librtcf-dev", "libgtest-dev"]),
+        (("--python",), ["rtcf-python", "python3-pytest"]),
+    ],
+)
+def test_a_new_package_builds_and_tests_with_what_comes_along(
+    tmp_path: Path, language: tuple[str, ...], needed: list[str]
+) -> None:
+    done = subprocess.run(
+        [BUILD_TREE / "bin" / "rtcfctl", "new", "my_arm", "Gain", *language],
+        cwd=tmp_path, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert f"(apt install {' '.join(needed)})" in done.stdout
+    first, *others = needed
+    (package,) = (each for each in BINARIES if each["Package"].strip() == first)
+    assert set(others) <= {*_names(package["Depends"]), *_names(package["Recommends"])}
