@@ -11,6 +11,7 @@ import pytest
 import rtcf
 from bystander import Bystander
 from daemon_process import Daemon, wait_for
+from pages import TREE
 from rtcf import refusals
 from rtcf.v1 import graph_pb2, runner_pb2
 from values import port_value, state
@@ -74,6 +75,42 @@ def test_what_crashes_the_process_is_named_and_taken_out(
         client.start()
     client.start(without=["bad"])
     wait_for(lambda: state(client).iteration > 100, "100 cycles")
+
+
+# With what stands in the line that crashes.
+PLACES = {
+    "NullDereference": ("NullDereference::fault", "*nowhere = 1;"),
+    "DivisionByZero": ("DivisionByZero::fault", "zero = 7 / zero;"),
+    "CallsAbort": ("CallsAbort::fault", "std::abort();"),
+    "StackOverflow": ("StackOverflow::deeper", None),
+}
+
+
+@pytest.mark.parametrize("type_name", PLACES)
+def test_a_crash_is_named_with_its_source_line(
+    daemon: Daemon, client: rtcf.Client, type_name: str
+) -> None:
+    function, code = PLACES[type_name]
+    load(client, faulty(type_name))
+    client.start()
+    wait_for(lambda: "it crashed in" in daemon.log(), "the place")
+    (line,) = [each for each in daemon.log().splitlines() if "it crashed in" in each]
+    found = re.search(r"it crashed in .*?([^: ]+::[^: ]+)\(.*?\) at (\S+):(\d+) \(innermost", line)
+    assert found, line
+    assert (found[1], found[2]) == (function, "crashes.cpp")
+    if code is not None:
+        source = TREE / "tests" / "components" / "faults" / "crashes.cpp"
+        assert code in source.read_text().splitlines()[int(found[3]) - 1]
+        assert re.search(r"Faulty::update\(\) at faulty\.hpp:\d+", line), "and what called it"
+    assert "rtcf-executor" not in line
+    wait_for(lambda: "crashes.cpp:" in state(client).status, "the status")
+    assert client.get_component("bad").fault.endswith(f"at crashes.cpp:{found[3]}")
+    # It outlives rtcfd with the rest of the reason.
+    wait_for(lambda: "crashes.cpp:" in saved(daemon), "the state on disk")
+
+
+def saved(daemon: Daemon) -> str:
+    return (daemon.folder / "state" / "rt_runner.json").read_text()
 
 
 def _stop_in_vain(daemon: Daemon, client: rtcf.Client, faulty: str) -> str:

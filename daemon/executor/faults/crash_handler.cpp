@@ -1,9 +1,12 @@
 #include "faults/crash_handler.hpp"
 
+#include <execinfo.h>
 #include <sched.h>
 #include <sys/syscall.h>
+#include <ucontext.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -19,12 +22,43 @@ namespace {
 std::atomic<FlightRecorder*> the_recorder{nullptr};
 thread_local ThreadRole this_thread = ThreadRole::Other;
 
-// Only what signal-safety(7) and the kernel allow: atomics and system calls.
-void handle(int signal, siginfo_t* info, void* /*context*/) {
-    const int error = errno;
-    if (FlightRecorder* recorder = the_recorder.load()) {
-        recorder->noteCrash(signal, this_thread, CrashReason::Signal, info->si_addr);
+// Where a thread was when a signal interrupted it.
+const void* placeOf(const void* context) {
+    const mcontext_t& machine = static_cast<const ucontext_t*>(context)->uc_mcontext;
+#if defined(__x86_64__)
+    return reinterpret_cast<const void*>(machine.gregs[REG_RIP]);
+#elif defined(__aarch64__)
+    return reinterpret_cast<const void*>(machine.pc);
+#else
+    static_cast<void>(machine);
+    return nullptr;
+#endif
+}
+
+// What called it, too: a look at the stack, which may be spoilt. A fault in here ends the process
+// at once, as its signal is blocked; all that is needed is noted by then.
+void noteTrace(FlightRecorder& recorder, const void* context) {
+    constexpr int kOurs = 2;  // this and the handler, above the kernel's frame
+    std::array<void*, FlightRecorder::kMostFrames + kOurs> frames{};
+    const void* place = placeOf(context);
+    const int count = ::backtrace(frames.data(), static_cast<int>(frames.size()));
+    const auto end = frames.begin() + count;
+    auto begin = std::find(frames.begin(), end, place);
+    if (begin == end) {
+        // It is not on its stack: a call of what is no function.
+        begin = frames.begin() + std::min(count, kOurs);
+        *begin = const_cast<void*>(place);  // NOLINT(cppcoreguidelines-pro-type-const-cast)
     }
+    recorder.noteTrace(&*begin, std::max<std::size_t>(static_cast<std::size_t>(end - begin), 1));
+}
+
+// Only what signal-safety(7) and the kernel allow: atomics and system calls; and backtrace(), which
+// takes no lock and no memory once it has been called.
+void handle(int signal, siginfo_t* info, void* context) {
+    const int error = errno;
+    FlightRecorder* recorder = the_recorder.load();
+    const bool first = recorder != nullptr &&
+                       recorder->noteCrash(signal, this_thread, CrashReason::Signal, info->si_addr);
     // Writing a core may take seconds, which must not be real-time seconds of the loops' CPU.
     const sched_param ordinary{};
     sched_setscheduler(0, SCHED_OTHER, &ordinary);
@@ -32,6 +66,7 @@ void handle(int signal, siginfo_t* info, void* /*context*/) {
     CPU_ZERO(&all);
     for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) CPU_SET(cpu, &all);
     sched_setaffinity(0, sizeof all, &all);
+    if (first) noteTrace(*recorder, context);
     std::signal(signal, SIG_DFL);
     // Pending until the handler returns, then the default action: the core shows this very frame.
     syscall(SYS_tgkill, getpid(), syscall(SYS_gettid), signal);
@@ -42,6 +77,9 @@ void handle(int signal, siginfo_t* info, void* /*context*/) {
 
 void installCrashHandler(FlightRecorder& recorder) {
     the_recorder.store(&recorder);
+    // Its first call loads a library.
+    std::array<void*, 1> ours{};
+    (void)::backtrace(ours.data(), 1);
     for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP}) {
         struct sigaction action{};
         action.sa_sigaction = &handle;

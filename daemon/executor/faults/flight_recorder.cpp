@@ -1,9 +1,12 @@
 #include "faults/flight_recorder.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <new>
@@ -17,6 +20,7 @@ namespace {
 
 constexpr std::uint32_t kMagic = 0x46435452;  // "RTCF"
 constexpr std::uint32_t kVersion = 1;
+constexpr off_t kLargest = 8 * 1024 * 1024;  // of the file, with the mappings of a crash
 
 }  // namespace
 
@@ -99,14 +103,41 @@ std::string FlightRecorder::realtimeActivity() const {
                        hook == Hook::None ? "update" : hookName(hook));
 }
 
-void FlightRecorder::noteCrash(int signal, ThreadRole thread, CrashReason reason,
+bool FlightRecorder::noteCrash(int signal, ThreadRole thread, CrashReason reason,
                                const void* address) noexcept {
     std::uint32_t none = 0;
     if (!page_->crash_signal.compare_exchange_strong(none, static_cast<std::uint32_t>(signal)))
-        return;
+        return false;
     page_->crash_thread.store(static_cast<std::uint32_t>(thread));
     page_->crash_reason.store(static_cast<std::uint32_t>(reason));
     page_->crash_address.store(reinterpret_cast<std::uintptr_t>(address));
+    return true;
+}
+
+// Behind the page, where nothing is until then: memory that is locked is not spent on it.
+void FlightRecorder::noteTrace(const void* const* frames, std::size_t count) noexcept {
+    constexpr off_t kFrames = sizeof(Page) + sizeof(std::uint64_t);
+    off_t at = kFrames + static_cast<off_t>(kMostFrames * sizeof(std::uint64_t));
+    const int maps = ::open("/proc/self/maps", O_RDONLY | O_CLOEXEC);
+    if (maps < 0) return;
+    std::array<char, 1024> buffer;  // NOLINT(cppcoreguidelines-pro-type-member-init): on a signal's
+                                    // stack
+    ssize_t taken = 0;
+    while (at < kLargest && (taken = ::read(maps, buffer.data(), buffer.size())) > 0) {
+        if (::pwrite(fd_, buffer.data(), static_cast<std::size_t>(taken), at) != taken) break;
+        at += taken;
+    }
+    ::close(maps);
+    count = std::min(count, kMostFrames);
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::uint64_t frame = reinterpret_cast<std::uintptr_t>(frames[i]);
+        const auto place = kFrames + static_cast<off_t>(i * sizeof frame);
+        if (::pwrite(fd_, &frame, sizeof frame, place) != sizeof frame) return;
+    }
+    // At last: what is counted is there.
+    const std::uint64_t counted = count;
+    [[maybe_unused]] const ssize_t done =
+        ::pwrite(fd_, &counted, sizeof counted, static_cast<off_t>(sizeof(Page)));
 }
 
 }  // namespace rtcf::executor

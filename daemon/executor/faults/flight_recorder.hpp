@@ -40,6 +40,7 @@ enum class CrashReason : std::uint32_t { Signal = 0, Stall = 1 };
 class FlightRecorder {
    public:
     static constexpr std::uint32_t kSlots = 10241;  ///< one per component; slot 0 means none
+    static constexpr std::size_t kMostFrames = 64;  ///< of a crash
 
     /// @throws std::system_error if there is no memory for it
     FlightRecorder();
@@ -70,8 +71,11 @@ class FlightRecorder {
         page_->graph_hook.store(static_cast<std::uint32_t>(hook), std::memory_order_relaxed);
     }
     void leaveHook() noexcept { enterHook(0, Hook::None); }
-    /// Async-signal-safe; the first note stays.
-    void noteCrash(int signal, ThreadRole thread, CrashReason reason, const void* address) noexcept;
+    /// Async-signal-safe; the first note stays. @return whether this is it
+    bool noteCrash(int signal, ThreadRole thread, CrashReason reason, const void* address) noexcept;
+    /// Keeps where a crash was, and the process's mappings, by which others find its source lines.
+    /// Async-signal-safe; once. @param frames addresses of code, innermost first
+    void noteTrace(const void* const* frames, std::size_t count) noexcept;
     /// @}
 
     /// Slot of the component that the real-time thread runs; 0 = none.

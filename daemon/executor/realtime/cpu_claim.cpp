@@ -90,8 +90,8 @@ bool CpuClaim::take(int cpu, int place) {
         // For nobody else to read: who reads a file can lock it.
         const int fd = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
         if (fd < 0) return false;
-        struct stat locked {};
-        struct stat named {};
+        struct stat locked{};
+        struct stat named{};
         if (::flock(fd, LOCK_EX | LOCK_NB) != 0 || ::fstat(fd, &locked) != 0) {
             ::close(fd);
             return false;

@@ -12,6 +12,7 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2
 
 from rtcfd.common.budget import Budget
+from rtcfd.common.growing_interval import GrowingInterval
 from rtcfd.common.limits import Limits
 
 log = logging.getLogger("rtcf-executor")
@@ -46,6 +47,9 @@ _KINDS: dict[int, "control_pb2.Event.Kind"] = {
     wire.Event.KIND_CLOCK: control_pb2.Event.KIND_CLOCK,
 }
 
+# Between lines of the journal on late cycles, of which an executor tells each 10 s.
+_LATE_S = 10.0
+_LATE_LONGEST_S = 3600.0
 _REPORT_S = 1.0  # from the first record that is dropped to the line that says how many were
 
 
@@ -86,6 +90,7 @@ class Events:
         self._limits = limits
         self._budget = Budget(limits().log_records_per_s)
         self._report: asyncio.TimerHandle | None = None  # of what was lost
+        self._late = GrowingInterval(_LATE_S, _LATE_LONGEST_S)  # between lines on late cycles
 
     def take(self, response: wire.Response) -> None:
         """Take one unasked frame."""
@@ -144,16 +149,23 @@ class Events:
         )
 
     def _event(self, event: wire.Event) -> None:
-        log.log(
-            _EVENT_LEVELS.get(event.kind, logging.WARNING),
-            "%s",
-            event.message,
-            extra={
-                "runner": self._runner,
-                "component": event.component,
-                "iteration": event.iteration,
-            },
-        )
+        text = str(event.message)
+        # A loop that is late for good, as on a kernel that is not for real time, is not to fill
+        # the journal.
+        left_out = self._late.due() if event.kind == wire.Event.KIND_OVERRUNS else 0
+        if left_out:
+            text += f" ({left_out} reports like this were left out since the last one here)"
+        if left_out is not None:
+            log.log(
+                _EVENT_LEVELS.get(event.kind, logging.WARNING),
+                "%s",
+                text,
+                extra={
+                    "runner": self._runner,
+                    "component": event.component,
+                    "iteration": event.iteration,
+                },
+            )
         if event.kind == wire.Event.KIND_LOOP_ENDED:
             self._audience.loop_ended(event.component, event.message)
         elif event.kind == wire.Event.KIND_COMPONENT_FAILED:

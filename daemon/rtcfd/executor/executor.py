@@ -23,7 +23,7 @@ from rtcfd.common.refusals import FailedPrecondition, Refusal, Silent, Unavailab
 from rtcfd.common.tasks import looked_at
 from rtcfd.executor import left_over
 from rtcfd.executor.command import ExecutorCommand
-from rtcfd.executor.flight_recorder import FlightRecorder, Note
+from rtcfd.executor.flight_recorder import FlightRecorder, Note, Trace
 from rtcfd.executor.link import (
     ACCESS_PROTOCOL,
     FIGURES_PROTOCOL,
@@ -182,6 +182,10 @@ class Executor:
     def note(self) -> Note | None:
         """Return what the flight recorder says; None if there is none."""
         return None if self._recorder is None else self._recorder.read()
+
+    def trace(self) -> Trace | None:
+        """Return where it crashed, if that is known."""
+        return None if self._recorder is None else self._recorder.trace()
 
     async def request(
         self,

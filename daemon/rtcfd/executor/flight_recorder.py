@@ -13,6 +13,9 @@ from enum import IntEnum
 _HEADER = struct.Struct("<IIQIIIIIIQIIII")
 _MAGIC = 0x46435452
 _VERSION = 1
+_MOST_FRAMES = 64
+_TRACE = struct.Struct(f"<Q{_MOST_FRAMES}Q")
+_LONGEST_MAPS = 8 * 1024 * 1024
 _NAMES = 64
 _NAME_BYTES = 128
 _HOOKS = (
@@ -46,6 +49,14 @@ class Note:
     cycle_hook: str = "update"  # the real-time thread's in the component `updating`
 
 
+@dataclass(frozen=True)
+class Trace:
+    """Where a crash was: addresses of code, innermost first, and the process's mappings then."""
+
+    frames: tuple[int, ...]
+    maps: str  # as /proc/PID/maps
+
+
 def _hook(number: int) -> str:
     return _HOOKS[number] if number < len(_HOOKS) else f"hook {number}"
 
@@ -55,14 +66,16 @@ class FlightRecorder:
 
     def __init__(self, pid: int, descriptor: int) -> None:
         """Open a recorder by its number in the executor; raises OSError or ValueError."""
-        own = os.open(f"/proc/{pid}/fd/{descriptor}", os.O_RDONLY | os.O_CLOEXEC)
+        # Kept open: what is noted of a crash comes behind what is mapped.
+        self._file = os.open(f"/proc/{pid}/fd/{descriptor}", os.O_RDONLY | os.O_CLOEXEC)
         try:
-            self._memory = mmap.mmap(own, 0, prot=mmap.PROT_READ)
-        finally:
-            os.close(own)
+            self._memory = mmap.mmap(self._file, 0, prot=mmap.PROT_READ)
+        except BaseException:
+            os.close(self._file)
+            raise
         magic, version, *_ = _HEADER.unpack_from(self._memory)
         if (magic, version) != (_MAGIC, _VERSION):
-            self._memory.close()
+            self.close()
             raise ValueError(f"it is no flight recorder of version {_VERSION}")
 
     def read(self) -> Note:
@@ -82,9 +95,23 @@ class FlightRecorder:
             cycle_hook=_hook(cycle_hook) or "update",
         )
 
+    def trace(self) -> Trace | None:
+        """Return where the process crashed; None: it did not, or nothing is known."""
+        slots = _HEADER.unpack_from(self._memory)[11]
+        begin = _NAMES + slots * _NAME_BYTES
+        data = os.pread(self._file, _TRACE.size, begin)
+        if len(data) < _TRACE.size:
+            return None
+        count, *frames = _TRACE.unpack(data)
+        if not 0 < count <= _MOST_FRAMES:
+            return None
+        maps = os.pread(self._file, _LONGEST_MAPS, begin + _TRACE.size)
+        return Trace(tuple(frames[:count]), os.fsdecode(maps))
+
     def close(self) -> None:
         """Let go of it."""
         self._memory.close()
+        os.close(self._file)
 
     def _name(self, slot: int, slots: int) -> str:
         begin = _NAMES + slot * _NAME_BYTES

@@ -22,6 +22,7 @@ from rtcfd.operations.incidents import keep
 from rtcfd.operations.parameters import follow_ros
 from rtcfd.operations.runner_core import RunnerCore, Surroundings
 from rtcfd.recovery.bring_up import bring_up, recover, resumes
+from rtcfd.recovery.crash_place import name_source
 from rtcfd.recovery.verdict import Crashes, judge
 from rtcfd.runners.leases import Leases
 from rtcfd.runners.outbox import Outbox
@@ -152,6 +153,10 @@ class Runner(RunnerCore):
             extra={"runner": self.name, "component": verdict.culprit},
         )
         self.happened(control_pb2.Event.KIND_EXECUTOR_FAULT, died, verdict.culprit)
+        if (trace := executor.trace()) is not None:
+            self.operations.in_background(
+                "finding the source lines of a crash", name_source(self, trace, verdict)
+            )
         self.shared.on_change()
         if ours and verdict.orderly:
             self.trouble += f"; `rtcfctl -r {self.name} start` brings it back with its components"

@@ -407,6 +407,7 @@ def main() -> int:
         "--daemon",
         "--stop-socket",
         "--resume-mark",
+        "--cpu-claims",
         "--package",
         "--trust",
     ):

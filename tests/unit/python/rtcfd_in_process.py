@@ -93,6 +93,7 @@ class PeerProcess:
         PeerProcess._last_pid += 1
         self.pid = PeerProcess._last_pid
         self.end: End | None = None
+        self.frozen = False
         self.peer = SlowPeer(runner, machine)
         self._machine, self._socket = machine, socket
         self._ended = asyncio.Event()

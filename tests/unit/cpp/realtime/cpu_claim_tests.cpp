@@ -111,7 +111,7 @@ TEST_F(CpuClaimTest, OfAProcessThatWasKilledIsFreeAgain) {
 TEST_F(CpuClaimTest, IsForNobodyElseToHold) {
     const CpuClaim loop(-1, names());
     const auto file = *std::filesystem::directory_iterator(names());
-    struct stat found {};
+    struct stat found{};
     ASSERT_EQ(::stat(file.path().c_str(), &found), 0);
     EXPECT_EQ(found.st_mode & 0777U, 0600U);
     // Nor by what is there in its place.

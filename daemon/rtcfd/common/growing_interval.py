@@ -1,0 +1,35 @@
+"""Says when to repeat what is said again and again: seldom, and more seldom.
+
+On rtcfd's one thread.
+"""
+
+import time
+
+
+class GrowingInterval:
+    """Of one thing to be said: at once, after `first_s`, then at intervals that double up to
+    `longest_s`; anew when there was nothing to say for two of the first."""
+
+    def __init__(self, first_s: float, longest_s: float) -> None:
+        self._first_s = first_s
+        self._longest_s = longest_s
+        self._interval_s = 0.0
+        self._asked_at = 0.0
+        self._said_at = 0.0
+        self._left_out = 0
+
+    def due(self) -> int | None:
+        """Tell whether it is to be said now: how often it was not since the last time; None: it
+        is not."""
+        now = time.monotonic()
+        if not self._interval_s or now - self._asked_at > 2 * self._first_s + 1.0:
+            self._interval_s, self._left_out = self._first_s, 0
+        elif now - self._said_at < self._interval_s:
+            self._asked_at = now
+            self._left_out += 1
+            return None
+        else:
+            self._interval_s = min(2 * self._interval_s, self._longest_s)
+        self._asked_at = self._said_at = now
+        left_out, self._left_out = self._left_out, 0
+        return left_out

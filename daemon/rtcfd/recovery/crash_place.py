@@ -1,0 +1,33 @@
+"""Says where in its source an executor crashed: in the journal, the events and the status.
+
+A function on a RunnerCore; runs beside the recovery, which it does not hold up.
+"""
+
+from rtcf.v1 import control_pb2
+
+from rtcfd.executor import source_lines
+from rtcfd.executor.flight_recorder import Trace
+from rtcfd.operations.runner_core import RunnerCore
+from rtcfd.recovery.verdict import Verdict
+
+
+async def name_source(runner: RunnerCore, trace: Trace, verdict: Verdict) -> None:
+    """Find the source lines of a crash, where there is debug information, and name them."""
+    # As they were: the next executor is about to load them anew.
+    loaded = {path for path, *_ in runner.code.files().values()}
+    changed = set((await runner.code.changed()).values())
+    program = str(runner.shared.command.binary.resolve())
+    found = await source_lines.find(trace, loaded - changed, program)
+    if not found.lines:
+        return
+    place = f"it crashed in {found.place}"
+    text = f"{place} (innermost first: {'; '.join(found.lines)})"
+    extra = {"runner": runner.name, "component": verdict.culprit}
+    runner.log.logger.error("%s", text, extra=extra)
+    runner.happened(control_pb2.Event.KIND_EXECUTOR_FAULT, text, verdict.culprit)
+    for known in (runner.left_out, runner.desired.quarantined):
+        if known.get(verdict.culprit) == str(verdict):
+            known[verdict.culprit] = f"{verdict}: {place}"
+    if not runner.closing:
+        await runner.save()
+        runner.tell()

@@ -1,0 +1,96 @@
+"""Where a crash was: by addresses and mappings, from a real library."""
+
+import asyncio
+import subprocess
+from pathlib import Path
+
+import pytest
+from rtcfd.executor import source_lines
+from rtcfd.executor.flight_recorder import Trace
+
+CODE = """\
+int inner(int value) {
+    return 7 / value;
+}
+int outer(int value) { return inner(value) + 1; }
+"""
+PROGRAM = "/nowhere/rtcf-executor"
+
+
+@pytest.fixture
+def library(tmp_path: Path) -> Path:
+    """A library with debug information."""
+    source = tmp_path / "code.cpp"
+    source.write_text(CODE)
+    made = tmp_path / "my_code.so"
+    command = ["g++", "-g", "-O0", "-shared", "-fPIC", str(source), "-o", str(made)]
+    subprocess.run(command, check=True)
+    return made
+
+
+def trace_of(library: Path, mapped: str, functions: tuple[str, ...]) -> Trace:
+    """A crash in the middle of functions, of a library that is mapped under a name."""
+    symbols = subprocess.run(["nm", "-S", str(library)], capture_output=True, text=True, check=True)
+    places = []
+    for name in functions:
+        (row,) = [each.split() for each in symbols.stdout.splitlines() if name in each]
+        places.append(int(row[0], 16) + int(row[1], 16) // 2)
+    segments = subprocess.run(
+        ["readelf", "-lW", str(library)], capture_output=True, text=True, check=True
+    )
+    base, lines = 0x7F0000000000, []
+    for words in map(str.split, segments.stdout.splitlines()):
+        if words[:1] == ["LOAD"] and "E" in words[6:-1]:
+            offset, address, size = (int(words[at], 16) for at in (1, 2, 4))
+            begin = base + address
+            lines.append(f"{begin:x}-{begin + size:x} r-xp {offset:08x} 00:01 77   {mapped}")
+    lines.append(f"{base * 2:x}-{base * 2 + 4096:x} r-xp 00000000 00:01 78   {PROGRAM}")
+    return Trace((*(base + each for each in places), base * 2 + 16), "\n".join(lines))
+
+
+def find(trace: Trace, *libraries: Path) -> source_lines.Found:
+    return asyncio.run(source_lines.find(trace, map(str, libraries), PROGRAM))
+
+
+@pytest.mark.parametrize("mapped", ["{library}", "/memfd:my_code.so (deleted)"])
+def test_frames_are_named_up_to_the_executor(library: Path, mapped: str) -> None:
+    trace = trace_of(library, mapped.format(library=library), ("inner", "outer"))
+    found = find(trace, library)
+    assert found.lines == ("inner(int) at code.cpp:2", "outer(int) at code.cpp:4")
+    assert found.place == found.lines[0]
+
+
+def test_without_debug_information_the_function_is_named(library: Path) -> None:
+    subprocess.run(["strip", "--strip-debug", str(library)], check=True)
+    found = find(trace_of(library, str(library), ("inner",)), library)
+    (line,) = found.lines
+    assert line.startswith("inner(int) in my_code.so+0x")
+
+
+def test_of_what_is_another_file_now_the_place_is_said(library: Path, tmp_path: Path) -> None:
+    # Not among those that are as they were loaded.
+    trace = trace_of(library, "/memfd:my_code.so (deleted)", ("inner",))
+    assert find(trace).place.startswith("my_code.so+0x")
+    # Nor is it known which of two it was.
+    other = tmp_path / "other" / "my_code.so"
+    other.parent.mkdir()
+    other.write_bytes(library.read_bytes())
+    assert find(trace, library, other).place.startswith("my_code.so+0x")
+
+
+@pytest.mark.parametrize("damage", [b"", b"\x7fELF", b"\x7fELF\x02\x01" + b"\xff" * 100])
+def test_a_file_that_is_no_library_names_its_place(library: Path, damage: bytes) -> None:
+    trace = trace_of(library, str(library), ("inner",))
+    library.write_bytes(damage)
+    assert find(trace, library).place.startswith("my_code.so+0x")
+
+
+def test_a_jump_to_nowhere_is_said_to_be_one(library: Path) -> None:
+    trace = trace_of(library, str(library), ("outer",))
+    found = find(Trace((0, *trace.frames), trace.maps), library)
+    assert found.lines == ("no code at 0x0", "outer(int) at code.cpp:4")
+    assert found.place == "outer(int) at code.cpp:4"
+
+
+def test_mappings_that_make_no_sense_are_passed_over() -> None:
+    assert find(Trace((1, 2, 3), "nonsense\n\n1-2 r-xp\n")).lines == ("no code at 0x1",)
