@@ -7,6 +7,7 @@ it lets lead here (the Host is another: DNS rebinding).
 import asyncio
 import hmac
 from collections.abc import Awaitable, Callable, Iterable
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -36,9 +37,16 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 class Door:
     """The rules of one server; one thread."""
 
-    def __init__(self, token: str, names: Iterable[str], most_connections: int) -> None:
+    def __init__(
+        self, token: str, names: Iterable[str], most_connections: int, token_file: Path | None
+    ) -> None:
         """`names` are those of this machine, by which it may be called beside loopback's."""
         self._token = token.encode()
+        self._where = (
+            "the one that rtcfctl scope printed"
+            if token_file is None
+            else f"http://HOST:PORT/?token=TOKEN, with the token that is in {token_file}"
+        )
         self._names = {*LOOPBACK, *(name.lower() for name in names)}
         self._most = most_connections
         self._new: set[Any] = set()
@@ -106,9 +114,7 @@ class Door:
             raise to_page
         given = request.headers.get("Authorization", "").removeprefix("Bearer ")
         if not self._is_token(request.cookies.get(cookie)) and not self._is_token(given):
-            raise web.HTTPForbidden(
-                text="the address with its token is the one that rtcfctl scope printed\n"
-            )
+            raise web.HTTPForbidden(text=f"the address with its token is {self._where}\n")
         self._known.add(request.protocol)
         return await handler(request)
 

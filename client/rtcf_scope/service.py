@@ -36,6 +36,7 @@ class Options:
     names: tuple[str, ...]  # by which the machine may be called beside loopback's
     right: str
     token: str
+    token_file: Path | None  # that holds it
     layouts: Path
     files: tuple[Path, ...]
     recordings: Path | None
@@ -87,7 +88,7 @@ def options(args: argparse.Namespace, files: Sequence[Path] = ()) -> Options:
         names += (args.address,)
     return Options(
         args.socket, args.address, args.port, names, args.right, _token(args.token_file),
-        args.layouts or Path(state) / "layouts", tuple(files), args.recordings,
+        args.token_file, args.layouts or Path(state) / "layouts", tuple(files), args.recordings,
     )  # fmt: skip
 
 
@@ -100,7 +101,7 @@ async def serve(given: Options, ready: Callable[[str], None]) -> None:
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, ended.set)
-    door = Door(given.token, given.names, MOST_CONNECTIONS)
+    door = Door(given.token, given.names, MOST_CONNECTIONS, given.token_file)
     recordings = Recordings(given.files, given.recordings)
     with rtcf.Client(given.socket) as client:
         site = Site(client, door, given.right, Layouts(given.layouts), recordings)

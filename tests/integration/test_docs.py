@@ -153,6 +153,25 @@ def test_the_component_of_the_page_is_built_and_loaded(tmp_path: Path) -> None:
     assert kp.value.double_value == 4.0
 
 
+def test_the_component_with_a_service_of_the_page_is_built_and_described(tmp_path: Path) -> None:
+    (tmp_path / "brake.cpp").write_text(_block("components.md", "cpp", "class Brake "))
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.25)\n"
+        "project(brakes LANGUAGES CXX)\n"
+        "find_package(rtcf REQUIRED)\n"
+        "rtcf_add_components(brakes PACKAGE brakes SOURCES brake.cpp LINK rtcf::ros)\n"
+    )
+    _type("cmake -S . -B build && cmake --build build", tmp_path, _environment(tmp_path))
+    daemon = Daemon(tmp_path, arguments=("--path", str(tmp_path / "build" / "lib" / "rtcf")))
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            (found,) = client.list_types("brakes").types
+    finally:
+        daemon.end()
+    assert [port.name for port in found.ports] == ["speed", "torque"]
+
+
 def test_the_component_in_python_of_the_page_is_compiled_and_loaded(tmp_path: Path) -> None:
     (tmp_path / "observer.py").write_text(_block("python-components.md", "python", "class Obs"))
     environment = _environment(tmp_path)

@@ -51,6 +51,16 @@ def test_without_the_token_nothing_is_shown(scope: ScopeProcess, path: str) -> N
     assert scope.ask(f"/?token={scope.token[:-1]}", token="")[0] == 403
 
 
+def test_who_lacks_the_token_of_a_file_is_told_of_the_file(looping: Daemon, tmp_path: Path) -> None:
+    file = tmp_path / "token"
+    with ScopeProcess(looping, "--token-file", str(file)) as scope:
+        status, text = scope.ask("/", token="")
+    assert (status, text.decode()) == (
+        403, "the address with its token is http://HOST:PORT/?token=TOKEN, "
+        f"with the token that is in {file}\n",
+    )  # fmt: skip
+
+
 def test_the_address_with_the_token_leads_to_the_page_without_it(scope: ScopeProcess) -> None:
     async def visit() -> tuple[str, str]:
         async with (

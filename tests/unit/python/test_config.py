@@ -269,7 +269,7 @@ def test_the_service_takes_systemds_folder(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_every_line_of_the_shipped_file_is_a_setting_that_is_accepted(tmp_path: Path) -> None:
     shipped = Path(__file__).parents[3] / "systemd" / "rtcfd.toml"
-    lines = [line[1:] if re.match(r"#[a-z_]+ = ", line) else line
+    lines = [line[1:] if re.match(r"#([a-z_]+ = |\[[a-z.]+\]$)", line) else line
              for line in shipped.read_text().splitlines()]  # fmt: skip
     file = written(tmp_path, "\n".join(lines))
     found = settings_file.read(file)
@@ -280,3 +280,11 @@ def test_every_line_of_the_shipped_file_is_a_setting_that_is_accepted(tmp_path: 
                                       *runner_pb2.RosSettings.DESCRIPTOR.fields]}  # fmt: skip
     named = {line.partition(" =")[0] for line in lines}
     assert known - named == {"ros", "realtime"} - named
+
+
+def test_a_block_can_be_appended_to_the_settings_as_shipped(tmp_path: Path) -> None:
+    shipped = (Path(__file__).parents[3] / "systemd" / "rtcfd.toml").read_text()
+    file = tmp_path / "rtcfd.toml"
+    file.write_text(f"{shipped}\n[access]\ndefault = 'observe'\n[runner]\nfrequency_hz = 20.0\n")
+    found = settings_file.read(file)
+    assert found.runner.frequency_hz == 20.0

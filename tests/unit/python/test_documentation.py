@@ -1,7 +1,9 @@
 """What README, docs and manual pages name is there: pages, packages, commands and their options."""
 
+import argparse
 import re
 import shlex
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -21,6 +23,52 @@ def test_links_lead_to_pages_that_are_installed_under_these_names(page: Path) ->
             assert (page.parent / link).exists(), link
     for name in re.findall(r"/usr/share/doc/rtcf/(\S+?\.md)", page.read_text()):
         assert (TREE / name).exists(), name
+
+
+def test_links_of_what_is_installed_lead_to_what_is_installed() -> None:
+    installed: dict[Path, Path] = {}  # by place there, the file here
+    for line in (TREE / "debian" / "rtcf-doc.install").read_text().splitlines():
+        pattern, folder = line.split()
+        installed |= {Path("/", folder, file.name): file for file in TREE.glob(pattern)}
+    dead = [
+        f"{file.name}: {link}"
+        for place, file in installed.items()
+        for link in re.findall(r"\]\(([^)#]+)\)", file.read_text())
+        if not link.startswith("http") and (place.parent / link).resolve() not in installed
+    ]
+    assert dead == []
+
+
+def options_of(found: argparse.ArgumentParser) -> Iterator[str]:
+    """Yield the long options of a parser and of the verbs below it."""
+    for action in found._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for below in action.choices.values():
+                yield from options_of(below)
+        else:
+            yield from (each for each in action.option_strings if each.startswith("--"))
+
+
+def test_each_option_of_rtcfctl_stands_in_its_manual_page() -> None:
+    # The scope's are told where its service is.
+    pages = [(TREE / "docs" / "man" / name).read_text() for name in ("rtcfctl.1", "rtcf-scope.8")]
+    named = set(re.findall(r"--[a-z-]*[a-z]", "".join(pages).replace("\\-", "-")))
+    assert sorted({*options_of(parser())} - named - {"--help"}) == []
+
+
+@pytest.mark.parametrize(
+    "setting", ["on_boot", "on_crash", "realtime", "overrun", "sim_time", "ros_peers"]
+)
+def test_the_words_of_an_option_stand_in_the_manual_page(setting: str) -> None:
+    (runner,) = (a for a in parser()._actions if isinstance(a, argparse._SubParsersAction))
+    (noun,) = (
+        a for a in runner.choices["runner"]._actions if isinstance(a, argparse._SubParsersAction)
+    )
+    (found,) = (a for a in noun.choices["set"]._actions if a.dest == setting)
+    manual = (TREE / "docs" / "man" / "rtcfctl.1").read_text().replace("\\-", "-")
+    head = re.search(rf"^\.BR? {found.option_strings[0]} \"? *([a-z_|]+)", manual, re.MULTILINE)
+    assert head, found.option_strings
+    assert set(head[1].split("|")) == set(found.choices or ())
 
 
 def test_each_page_is_linked_from_the_readme() -> None:
