@@ -57,7 +57,8 @@ class Loop:
 
     cpu: int
     priority: int
-    pid: int = 0  # of its executor; 0: none runs
+    pid: int = 0  # of its executor; 0: none runs, or we are not told
+    hidden: bool = False  # we are not told
     lock_memory: bool = True
 
 
@@ -159,6 +160,9 @@ def _v1_cpu_group(host: Host, pid: int) -> str:
 
 def _rights(host: Host, loop: Loop) -> Iterator[Finding]:
     topic = "capabilities and limits"
+    if loop.hidden:
+        yield Finding(topic, Grade.UNKNOWN, "rtcfd does not say which executor runs")
+        return
     if not loop.pid:
         yield Finding(topic, Grade.UNKNOWN, "no executor runs", "", "systemctl start rtcfd")
         return
@@ -194,7 +198,9 @@ def _locked(host: Host, loop: Loop) -> Iterator[Finding]:
     topic = "locked memory"
     status = host.read(f"/proc/{loop.pid}/status") if loop.pid else None
     found = re.search(r"^VmLck:\s*(\d+) kB", status or "", re.M)
-    if found is None:
+    if loop.hidden:
+        yield Finding(topic, Grade.UNKNOWN, "rtcfd does not say which executor runs")
+    elif found is None:
         yield Finding(topic, Grade.UNKNOWN, "no executor runs")
     elif int(found[1]):
         yield Finding(topic, Grade.GOOD, f"{int(found[1]) // 1024} MiB of the executor")

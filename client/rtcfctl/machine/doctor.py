@@ -66,6 +66,13 @@ class _Answer:
     notes: Sequence[str] = ()  # on rtcfd itself
     trouble: rtcf.RtcfError | None = None
 
+    @property
+    def keeps_silent(self) -> bool:
+        """Tell whether it may serve well, and only tells us nothing."""
+        if isinstance(self.trouble, rtcf.DaemonUnreachableError):
+            return self.trouble.denied
+        return self.trouble is not None
+
 
 def _ask(client: rtcf.Client, name: str) -> _Answer:
     try:
@@ -81,7 +88,7 @@ def _ask(client: rtcf.Client, name: str) -> _Answer:
 def _loop(host: Host, found: _Answer) -> Loop:
     status = found.runner
     if status is None:
-        return Loop(max(os.sched_getaffinity(0)), 80)
+        return Loop(max(os.sched_getaffinity(0)), 80, hidden=found.keeps_silent)
     return Loop(
         _cpu_of(host, status, found.every),
         status.settings.priority,
@@ -93,7 +100,10 @@ def _loop(host: Host, found: _Answer) -> Loop:
 def _of_rtcfd(found: _Answer) -> list[Finding]:
     """Say what rtcfd itself says."""
     if found.trouble is not None:
-        return [_silent(found.trouble)]
+        text = str(found.trouble)
+        if found.keeps_silent:  # the line says what is missing
+            return [Finding("rtcfd", Grade.UNKNOWN, text, "the right to observe")]
+        return [Finding("rtcfd", Grade.BAD, text, "it serves", "systemctl start rtcfd")]
     assert found.runner is not None
     status, topic = found.runner, f"runner {found.runner.runner}"
     findings = [Finding("rtcfd", Grade.WARNING, note, "nothing to say") for note in found.notes]
@@ -106,14 +116,6 @@ def _of_rtcfd(found: _Answer) -> list[Finding]:
         text = f"serves; its loop is {runner_pb2.RunnerState.Name(status.state)[13:].lower()}"
         findings.append(Finding(topic, Grade.GOOD, text))
     return findings
-
-
-def _silent(trouble: rtcf.RtcfError) -> Finding:
-    """Say why rtcfd tells us nothing, with the way out of just that."""
-    if isinstance(trouble, rtcf.DaemonUnreachableError) and not trouble.denied:
-        return Finding("rtcfd", Grade.BAD, str(trouble), "it serves", "systemctl start rtcfd")
-    # It may serve well: the line says what is missing to see that.
-    return Finding("rtcfd", Grade.UNKNOWN, str(trouble), "the right to observe")
 
 
 @dataclass(frozen=True)

@@ -225,7 +225,7 @@ def test_without_rights_it_says_what_is_missing(connects: bool) -> None:
         "from rtcfctl.main import main\n"
         "sys.exit(main(['--socket', sys.argv[1], 'doctor', '--seconds', '0']))\n"
     )
-    with open_to_strangers("") as daemon:
+    with open_to_strangers("[access]\ndefault = 'none'\n") as daemon:
         daemon.socket.chmod(0o666 if connects else 0o600)
         with stranger(program, str(daemon.socket)) as asking:
             said, _ = asking.communicate(timeout=60)
