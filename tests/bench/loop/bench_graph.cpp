@@ -42,7 +42,7 @@ std::vector<Node> paperGraph() {
 BenchGraph::BenchGraph(const std::vector<Node>& nodes, const std::string& library,
                        std::string mapped)
     : log_([](executor::LogEntry&&) {}),
-      loop_(log_, recorder_),
+      loop_(log_, recorder_, {}),
       code_(libraries_.open(library)),
       mapped_(std::move(mapped)) {
     executor::Graph graph;
