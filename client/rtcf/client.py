@@ -137,11 +137,14 @@ class Client(Incidents):
         for runner in runners:
             request = control_pb2.StopRequest(runner=runner)
             try:
-                self._changed(self._stub.Stop, request, None, timeout_s=direct_stop.TIMEOUT_S)
+                result = self._changed(
+                    self._stub.Stop, request, None, timeout_s=direct_stop.TIMEOUT_S
+                )
             except RtcfError as error:
                 stopped.setdefault(runner, direct_stop.Stopped(runner, error))
             else:
-                stopped[runner] = direct_stop.Stopped(runner)
+                notes = tuple(each for each in result.notes if direct_stop.is_unsaved(each))
+                stopped[runner] = direct_stop.Stopped(runner, notes=notes)
         return [stopped[runner] for runner in sorted(stopped)]
 
     def step(

@@ -33,6 +33,13 @@ class Stopped:
 
     runner: str
     error: RtcfError | None = None
+    notes: tuple[str, ...] = ()  # what the caller should know, a line each
+    died: bool = False  # ended with its executor, which died
+
+
+def is_unsaved(note: str) -> bool:
+    """Tell whether a note says that a stop is not on disk."""
+    return note.startswith("not saved")
 
 
 def folders(socket: str) -> list[Path]:
@@ -41,8 +48,8 @@ def folders(socket: str) -> list[Path]:
     return [path.with_name(path.name + ".d") / "stop", path.parent / "stop"]
 
 
-def stop(runner: str, socket: str) -> bool:
-    """Stop one loop; return when it has ended: whether in order, or with its executor's death.
+def stop(runner: str, socket: str) -> Stopped:
+    """Stop one loop; return when it has ended: in order, or with its executor's death.
 
     Raises RefusedError, also if a component does not return from its cycle,
     and DaemonUnreachableError if there is no executor of that name, or the
@@ -94,15 +101,16 @@ def where_rtcfd_does_not(
                 raise
             problem = str(error)
     try:
-        in_order = stop(runner, socket)
+        stopped = stop(runner, socket)
     except DaemonUnreachableError:
         return asked.result()  # what rtcfd says in the end
-    if not in_order:
+    if stopped.died:
         # An executor that has died says no more; rtcfd knows of what, if it answers at all.
         with contextlib.suppress(TimeoutError):
             return asked.result(_VERDICT_S)
         return control_pb2.ChangeResult(notes=["the loop has ended with its executor, which died"])
-    return control_pb2.ChangeResult(notes=[f"the loop was stopped at its executor, as {problem}"])
+    told = f"the loop was stopped at its executor, as {problem}"
+    return control_pb2.ChangeResult(notes=[told, *stopped.notes])
 
 
 def _is_rtcfds_trouble(error: RtcfError) -> bool:
@@ -141,19 +149,17 @@ def stop_all(socket: str) -> list[Stopped]:
 
 def _stopped(runner: str, socket: str) -> Stopped:
     try:
-        stop(runner, socket)
+        return stop(runner, socket)
     except RtcfError as error:
         # One that has ended since has no loop any more.
         gone = isinstance(error, DaemonUnreachableError) and not any(
             os.path.exists(folder / runner) for folder in folders(socket)
         )
         return Stopped(runner, None if gone else error)
-    return Stopped(runner)
 
 
-def _ask(path: Path, runner: str) -> bool:
-    """Say `stop` and take the answer: whether the loop ended in order, or with its executor's
-    death; raises OSError or RefusedError."""
+def _ask(path: Path, runner: str) -> Stopped:
+    """Say `stop` and take the answer; raises OSError or RefusedError."""
     with sockets.socket(sockets.AF_UNIX, sockets.SOCK_STREAM) as connection:
         # Not settimeout(): one that blocks in the kernel has its turn in a queue that is full.
         limit = struct.pack("ll", int(TIMEOUT_S), 0)
@@ -178,9 +184,9 @@ def _ask(path: Path, runner: str) -> bool:
             hung_up = True
     word, _, reason = answer.decode(errors="replace").strip().partition(": ")
     if word == "stopped":
-        return True
+        return Stopped(runner, notes=(reason,) if is_unsaved(reason) else ())
     if hung_up and not answer and _wait_for_end(pid):
-        return False
+        return Stopped(runner, died=True)
     about = {"runner": runner}
     if word == "refused":
         raise refused(f"runner {runner}: {reason}", "PERMISSION_DENIED", "RIGHT_MISSING", about)

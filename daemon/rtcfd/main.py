@@ -38,6 +38,7 @@ from rtcfd.service.control import Control
 from rtcfd.state import handover
 from rtcfd.state.boot_graphs import BootGraphs
 from rtcfd.state.desired import Desired
+from rtcfd.state.disk import Disk
 from rtcfd.state.store import Store
 
 log = logging.getLogger("rtcfd")
@@ -83,7 +84,7 @@ class Daemon:
         self._shared = shared = Surroundings(
             command=self._command,
             catalog=catalog,
-            store=self._store,
+            disk=Disk(self._store),
             defaults=given.defaults,
             on_change=self._tell,
             serve_ros=ros_services.serve,
@@ -157,6 +158,7 @@ class Daemon:
                 f"cannot make the state folder {self._options.state_dir}: {error.strerror}",
                 errors_pb2.REASON_DAEMON_FAILED,
             ) from None
+        self._store.lock()
         self._options.settings.keep()
         self._serve_privately()
         self._shared.rules = await self._reloads.rules()

@@ -3,6 +3,7 @@
 Owned by the daemon.
 """
 
+import contextlib
 import logging
 import os
 from collections.abc import Callable, Iterable
@@ -17,7 +18,7 @@ from rtcfd.access.clients import Clients
 from rtcfd.catalog.catalog import Catalog
 from rtcfd.common import runner_settings
 from rtcfd.common.aside import Aside
-from rtcfd.common.refusals import Refusal
+from rtcfd.common.refusals import Refusal, Unavailable
 from rtcfd.configuration.options import Options
 from rtcfd.operations.runner_core import Surroundings
 from rtcfd.runners.runners import Runners
@@ -31,6 +32,7 @@ log = logging.getLogger(__name__)
 
 _USERS_TIMEOUT_S = 5.0
 _FILES_TIMEOUT_S = 60.0
+_COPY_TIMEOUT_S = 2.0
 # Read at the start only.
 _FIXED = ("socket", "runtime_dir", "state_dir", "graphs_dir", "executor")
 
@@ -60,6 +62,7 @@ class Reloads:
         self._store = store
         self._users = Aside("user database")
         self._aside = Aside("settings and graphs")
+        self._copy = Aside("state folder")
         self._left: Handover | None = None  # by the rtcfd before this one
         self._graphs = BootGraphs(given.graphs_dir, {}, self._opinion)
         self._late: list[Given] = []  # for runners that are adopted first
@@ -147,7 +150,8 @@ class Reloads:
 
     async def _read_again(self) -> list[str]:
         new = await self._aside.run(self._read_options, _FILES_TIMEOUT_S)
-        new.settings.keep()
+        with contextlib.suppress(Unavailable):  # a disk that hangs holds up nothing else
+            await self._copy.run(new.settings.keep, _COPY_TIMEOUT_S)
         lines = [
             f"{name} changes with the next restart of rtcfd"
             for name in _FIXED

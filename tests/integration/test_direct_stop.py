@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 import rtcf
 from daemon_process import BUILD_TREE, NO_ROS, Daemon, stopped, wait_for
+from hanging_disk import HangingDisk, mounted
 from rtcf.v1 import runner_pb2
 from values import iteration
 
@@ -244,6 +245,103 @@ def test_a_disk_without_a_free_byte_holds_up_no_stop(small_disk: Path) -> None:
             assert not runs(client)
     finally:
         daemon.end()
+
+
+NOT_YET = "not saved yet: the disk of the state folder does not answer"
+
+
+@pytest.fixture
+def hanging_disk(tmp_path: Path) -> Iterator[HangingDisk]:
+    """Give a disk that can hang; `state` of the folder `d` is on it."""
+    with mounted(tmp_path / "d" / "state", tmp_path / "image") as disk:
+        yield disk
+
+
+def begun_on(disk: HangingDisk) -> Daemon:
+    """Start an rtcfd whose state is on a disk."""
+    daemon = Daemon(disk.folder.parent, RESUME)
+    daemon.start()
+    return daemon
+
+
+def test_a_disk_that_hangs_holds_up_no_stop_and_is_right_when_it_answers(
+    hanging_disk: HangingDisk,
+) -> None:
+    daemon = begun_on(hanging_disk)
+    with rtcf.Client(daemon.socket) as client:
+        begin(client)
+        with hanging_disk.hanging():
+            assert NOT_YET in client.stop().notes
+            assert not runs(client)
+            # Nor does it hold up a start, or the stop after that.
+            assert NOT_YET in client.start().notes
+            assert runs(client)
+            done = daemon.ctl("stop")
+            assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
+            assert NOT_YET in done.stderr
+            assert not runs(client)
+            assert client.get_status("rt_runner").runners[0].status == NOT_YET
+        wait_for(lambda: not client.get_status("rt_runner").runners[0].status, "the disk")
+        assert not mark(daemon).exists()
+    daemon.end(signal.SIGKILL)
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        assert not runs(client)
+    daemon.end()
+
+
+def test_an_executor_stops_again_and_again_whatever_its_disk_does(
+    hanging_disk: HangingDisk,
+) -> None:
+    daemon = begun_on(hanging_disk)
+    with rtcf.Client(daemon.socket) as client:
+        begin(client)
+        with hanging_disk.hanging():
+            for _ in range(2):
+                with stopped(daemon.pid):
+                    for _ in range(2):
+                        done = daemon.ctl("stop")
+                        assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
+                        assert NOT_YET in done.stderr
+                wait_for(lambda: not runs(client), "rtcfd to know")
+                before = iteration(client)
+                client.start()
+                wait_for(lambda: iteration(client) not in (0, before), "cycles")
+            done = daemon.ctl("stop", "--all")
+            assert (done.returncode, done.stdout) == (0, "rt_runner stopped\n"), done.stderr
+            assert f"rt_runner: {NOT_YET}" in done.stderr
+            assert not runs(client)
+        wait_for(lambda: not mark(daemon).exists(), "the disk")
+    daemon.end()
+
+
+def test_the_end_of_rtcfd_ends_loops_whatever_its_disk_does(hanging_disk: HangingDisk) -> None:
+    daemon = begun_on(hanging_disk)
+    with rtcf.Client(daemon.socket) as client:
+        begin(client)
+        executor = client.get_status("rt_runner").runners[0].pid
+    with hanging_disk.hanging():
+        os.kill(daemon.pid, signal.SIGTERM)
+        wait_for(lambda: not Path(f"/proc/{executor}").exists(), "the end of the executor")
+    wait_for(lambda: daemon.ended, "the end of rtcfd")
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        assert not runs(client)
+    daemon.end()
+
+
+def test_a_read_only_disk_is_told_of_by_the_executor_that_stops(hanging_disk: HangingDisk) -> None:
+    daemon = begun_on(hanging_disk)
+    with rtcf.Client(daemon.socket) as client:
+        begin(client)
+        remount = ["mount", "-o", "remount,ro", str(hanging_disk.folder)]
+        subprocess.run(remount, check=True, capture_output=True)
+        with stopped(daemon.pid):
+            done = daemon.ctl("stop")
+            assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
+            assert "not saved: Read-only file system" in done.stderr
+        wait_for(lambda: not runs(client), "rtcfd to know")
+    daemon.end()
 
 
 @pytest.fixture

@@ -116,7 +116,7 @@ def _print(
         )  # fmt: skip
     print(sentence if rows else nothing)
     for result in results:
-        output.notes(result)
+        output.notes(result.notes)
 
 
 def read(file: str) -> tuple[str, str]:

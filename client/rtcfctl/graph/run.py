@@ -105,7 +105,7 @@ class _Work:
                 graph.components, graph.runner, graph.settings,
                 on_progress=self._output.progress, rebuilt=True,
             )  # fmt: skip
-            self._output.notes(result)
+            self._output.notes(result.notes)
             names.append(graph.runner)
         return names
 

@@ -41,7 +41,7 @@ def take(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         )
         return
     print(f"cycle {taken.iteration} of {args.runner or 'rt_runner'} in {args.file}")
-    output.notes(taken)
+    output.notes(taken.notes)
 
 
 def restore(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:

@@ -64,8 +64,18 @@ def _stop_all(client: rtcf.Client, output: Output) -> None:
         for each in found:
             if each.error is None:
                 print(f"{each.runner} stopped")
+                output.notes(f"{each.runner}: {note}" for note in each.notes)
     else:
-        output.data([{"runner": each.runner, "stopped": each.error is None} for each in found])
+        output.data(
+            [
+                {
+                    "runner": each.runner,
+                    "stopped": each.error is None,
+                    "notes": list(each.notes),
+                }
+                for each in found
+            ]
+        )
     if failed:
         lines = "; ".join(str(each.error) for each in failed)
         if all(isinstance(each.error, rtcf.DaemonUnreachableError) for each in failed):

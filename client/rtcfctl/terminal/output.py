@@ -103,11 +103,11 @@ class Output:
             self.data(result)
             return
         print(sentence)
-        self.notes(result)
+        self.notes(result.notes)
 
-    def notes(self, result: control_pb2.ChangeResult) -> None:
+    def notes(self, lines: Iterable[str]) -> None:
         """Print what else the caller of a change should know."""
-        for note in result.notes:
+        for note in lines:
             print(f"rtcfctl: note: {note}", file=sys.stderr)
 
 

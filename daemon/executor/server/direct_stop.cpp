@@ -1,6 +1,5 @@
 #include "server/direct_stop.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
 #include <pthread.h>
@@ -22,10 +21,11 @@ namespace rtcf::executor {
 
 namespace {
 
-constexpr std::int64_t kLineTimeout = kSecond;        // from the connection to the line
-constexpr std::int64_t kAnswerTimeout = 2 * kSecond;  // from the line to the end of the loop
-constexpr int kLookMs = 2;                            // between looks at a loop that is to end
-constexpr std::size_t kMostClients = 32;              // with the right; others are never kept
+constexpr std::int64_t kLineTimeout = kSecond;           // from the connection to the line
+constexpr std::int64_t kAnswerTimeout = 2 * kSecond;     // from the line to the end of the loop
+constexpr std::int64_t kDiskTimeout = 3 * kSecond / 10;  // from the line, for the disk
+constexpr int kLookMs = 2;                               // between looks at a loop that is to end
+constexpr std::size_t kMostClients = 32;                 // with the right; others are never kept
 constexpr std::size_t kLongestLine = 64;
 constexpr mode_t kSocketMode = 0660;  // who has no right is told so; the folder keeps others out
 
@@ -113,16 +113,6 @@ void DirectStop::threadMain() {
         }
         if ((polled[1].revents & POLLIN) != 0) accept();
         listener_->renew(monotonicNow());
-        if (unsynced_ && clients_.empty()) {
-            // After the answers: a busy disk is no reason to say "stopped" late.
-            unsynced_ = false;
-            const std::string folder = mark_.substr(0, mark_.rfind('/') + 1);
-            const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-            if (fd >= 0) {
-                ::fsync(fd);
-                ::close(fd);
-            }
-        }
     }
     for (const Client& client : clients_) {
         if (client.asked) answer(client.fd, "stopped: the executor ends");
@@ -147,15 +137,12 @@ void DirectStop::accept() {
         ::close(fd);
         return;
     }
-    clients_.push_back({fd, peer.uid, peer.pid, false, monotonicNow() + kLineTimeout, {}});
+    clients_.push_back({fd, peer.uid, peer.pid, false, monotonicNow() + kLineTimeout, 0, {}});
 }
 
 bool DirectStop::attend(Client& client, bool readable) {
     if (client.asked) {
-        if (!what_.running()) {
-            answer(client.fd, "stopped");
-            return false;
-        }
+        if (!what_.running()) return !answerStopped(client);
         if (monotonicNow() < client.until_ns) return true;
         answer(client.fd,
                "late: a component does not return from its update(): its loop ends when that does, "
@@ -176,6 +163,20 @@ bool DirectStop::attend(Client& client, bool readable) {
     stop(client);
     client.asked = true;
     client.until_ns = monotonicNow() + kAnswerTimeout;
+    client.saved_until_ns = monotonicNow() + kDiskTimeout;
+    return true;
+}
+
+bool DirectStop::answerStopped(const Client& client) const {
+    const auto [done, problem] = mark_.last();
+    if (!done && monotonicNow() < client.saved_until_ns) return false;
+    if (!done) {
+        answer(client.fd, "stopped: not saved yet: the disk of the state folder does not answer");
+    } else if (!problem.empty()) {
+        answer(client.fd, "stopped: not saved: " + problem);
+    } else {
+        answer(client.fd, "stopped");
+    }
     return true;
 }
 
@@ -187,8 +188,7 @@ void DirectStop::stop(const Client& client) {
         report = last_;
     }
     what_.stop(report);
-    // Whoever starts this loop again by itself looks for it. Removing works on a full disk too.
-    if (!mark_.empty() && ::unlink(mark_.c_str()) == 0) unsynced_ = true;
+    mark_.remove();
 }
 
 }  // namespace rtcf::executor

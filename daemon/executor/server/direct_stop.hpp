@@ -19,6 +19,7 @@
 #include "access/rights.hpp"
 #include "rtcf/executor/v1/executor.pb.h"
 #include "server/listen.hpp"
+#include "server/resume_mark.hpp"
 
 namespace rtcf::executor {
 
@@ -64,6 +65,7 @@ class DirectStop {
         pid_t pid;
         bool asked;
         std::int64_t until_ns;
+        std::int64_t saved_until_ns;  // for the disk
         std::string text;
     };
 
@@ -71,15 +73,16 @@ class DirectStop {
     void accept();
     /// @return false if the client is to be let go
     bool attend(Client& client, bool readable);
+    /// Answers a client whose loop has ended, if there is an answer yet.
+    bool answerStopped(const Client& client) const;
     void stop(const Client& client);
 
-    const std::string mark_;
+    ResumeMark mark_;
     const Access& access_;
     Stoppable what_;
     std::optional<Listener> listener_;  // none without a path
     int wake_ = -1;
     std::atomic<bool> ending_{false};
-    bool unsynced_ = false;  // the mark was removed, and its folder is not on disk yet
     std::vector<Client> clients_;
     mutable std::mutex mutex_;
     DirectStopReport last_;

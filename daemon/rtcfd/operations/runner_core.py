@@ -9,7 +9,6 @@ import contextlib
 import logging
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Awaitable, Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -34,7 +33,8 @@ from rtcfd.operations.loaded_code import LoadedCode
 from rtcfd.operations.loop_state import LoopState
 from rtcfd.operations.operations import Operations
 from rtcfd.state.desired import Desired
-from rtcfd.state.store import Store
+from rtcfd.state.disk import Disk
+from rtcfd.state.saver import Saver
 
 CHANGE_TIMEOUT_S = 60.0  # for one change, waiting for those before it included
 _LAST_WORDS_S = 2.0  # from the loss of a link to the end of its executor
@@ -52,7 +52,7 @@ class Surroundings:
 
     command: ExecutorCommand
     catalog: Catalog
-    store: Store
+    disk: Disk
     defaults: runner_pb2.RunnerSettings  # complete
     on_change: Callable[[], None]  # what summary() says may have changed
     # Answers what ROS peers ask of a runner.
@@ -67,7 +67,6 @@ class Surroundings:
     name_of: Callable[[int], Awaitable[str]] = _number  # of a user, for people
     # Threads of their own: a stop must get to disk whatever else hangs.
     folders: Aside = field(default_factory=lambda: Aside("folders of components"))
-    disk: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(4, "rtcfd-store"))
 
 
 class RunnerCore(ABC):
@@ -81,10 +80,10 @@ class RunnerCore(ABC):
         self.operations = Operations(f"runner {self.name}", self.log)
         self.shared = surroundings
         self.trouble = "its executor is not started"  # why there is none
-        self.unsaved = ""  # why the desired state is not on disk
         self.tuned: dict[str, float] = {}  # when parameters were set whose pace is bound
         self.closing = False
         self.leaving = False  # it ends for this rtcfd only
+        self.saver = Saver(desired, surroundings.disk, self.log)
         self.code = LoadedCode(surroundings.folders)
         self.figures = Figures()
         self.incident = ""  # the name of the newest
@@ -92,8 +91,6 @@ class RunnerCore(ABC):
         self._executor: Executor | None = None
         self._changing_executor = asyncio.Lock()
         self._settled = asyncio.Event()  # not set while an executor is being started
-        self._saving = asyncio.Lock()
-        self._forgotten = False
         self._told = (self.state, "")  # state and holder, as those who watch know them
 
     # -- what a runner adds ---------------------------------------------------
@@ -374,34 +371,5 @@ class RunnerCore(ABC):
         return await self.operations.take_turn(what, told, timeout_s, runs_cycles)
 
     async def save(self) -> list[str]:
-        """Save the desired state; return a note if that failed: the change stands."""
-        try:
-            async with self._saving:
-                if self._forgotten:
-                    return []
-                store = self.shared.store
-                text, running = store.text(self.desired), self.desired.running
-                changes, anew = self.desired.history.to_write()
-                # Not here: fsync may take long.
-                await self._on_disk(store.save, self.name, text, running)
-                await self._on_disk(store.save_history, self.name, changes, anew)
-        except OSError as error:
-            self.desired.history.not_written()
-            self.unsaved = f"not saved: {error.strerror}"
-            self.log.error("its state is %s", self.unsaved)
-            return [self.unsaved]
-        self.unsaved = ""
-        return []
-
-    async def forget(self) -> None:
-        """Take it off the disk, for good."""
-        try:
-            async with self._saving:
-                self._forgotten = True
-                await self._on_disk(self.shared.store.remove, self.name)
-        except OSError as error:
-            self.log.error("its state stays on disk: %s", error.strerror)
-
-    async def _on_disk(self, work: Callable[..., None], *arguments: object) -> None:
-        """Do work of the store beside the event loop."""
-        await asyncio.get_running_loop().run_in_executor(self.shared.disk, work, *arguments)
+        """Save the desired state; see Saver.save()."""
+        return await self.saver.save()

@@ -72,11 +72,12 @@ class Runner(RunnerCore):
         self.operations.withdraw(message, errors_pb2.REASON_RUNNER_ENDING)
         if in_order and self.loop.wanted:
             self.loop.stop()
-            await self.save()
+            self.saver.begin()
         await self.end_executor("it is being ended")
         self.end_leases(why, f"runner {self.name}: {message}")
         self.logs.end()
         await self.operations.drain()
+        await self.saver.finish(LEAVE_TIMEOUT_S)
 
     async def leave(self) -> None:
         """Let go of the executor, whose loop goes on until the next rtcfd adopts it.
@@ -90,6 +91,7 @@ class Runner(RunnerCore):
             await asyncio.wait_for(self.operations.drain(), LEAVE_TIMEOUT_S)
         self.operations.withdraw("rtcfd is being restarted", errors_pb2.REASON_DAEMON_ENDING)
         await self.leave_executor()
+        await self.saver.finish(LEAVE_TIMEOUT_S)
 
     async def restart(self) -> None:
         """Begin anew with a fresh executor, whatever the one of now is stuck in; what is desired

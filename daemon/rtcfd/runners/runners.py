@@ -256,7 +256,7 @@ class Runners:
         self._leaving.add(runner)
         try:
             await runner.shut_down()
-            await runner.forget()
+            await runner.saver.forget()
         finally:
             self._leaving.discard(runner)
         # Not before: its executor must be gone when another takes the name.

@@ -29,6 +29,7 @@ from rtcfd.common.refusals import Refusal
 from rtcfd.state import history
 from rtcfd.state.desired import Desired, HoldTerms, LeaseTerms, this_boot
 from rtcfd.state.history import Change
+from rtcfd.state.lock import lock
 
 log = logging.getLogger(__name__)
 
@@ -79,6 +80,11 @@ class Store:
         """Make the folder; raises OSError."""
         if self._folder is not None:
             self._folder.mkdir(mode=0o750, parents=True, exist_ok=True)
+
+    def lock(self) -> None:
+        """Refuse a folder that another rtcfd uses, and keep others off."""
+        if self._folder is not None:
+            lock(self._folder)
 
     def mark(self, runner: str) -> Path | None:
         """Return the file without which a loop is not resumed, whatever the state says.
@@ -187,7 +193,7 @@ class Store:
                 # At once: the rest may find no room, and the state before says that it runs.
                 durable.sync_folder(self._folder)
             except OSError:
-                self._note_stop(runner)
+                self.note_stop(runner)
                 raise
         file = self._folder / f"{runner}{_SUFFIX}"
         self._require_known(file)
@@ -238,7 +244,9 @@ class Store:
     def _note(self, runner: str) -> Path | None:
         return None if self._boot_folder is None else self._boot_folder / f"{runner}{_STOPPED}"
 
-    def _note_stop(self, runner: str) -> None:
+    def note_stop(self, runner: str) -> None:
+        """Note outside the state folder, where that is known, that a loop is not to run, until
+        save() has it in the folder.  May run on any thread."""
         note = self._note(runner)
         if note is not None:
             with contextlib.suppress(OSError):

@@ -37,6 +37,7 @@ from rtcfd.runners.held_runners import await_holder
 from rtcfd.runners.runners import Runners
 from rtcfd.service.control import Control
 from rtcfd.state.desired import Desired
+from rtcfd.state.disk import Disk
 from rtcfd.state.store import Store
 
 
@@ -158,7 +159,7 @@ class Rtcfd:
             Surroundings(
                 command=ExecutorCommand(Path("/nowhere"), sockets),
                 catalog=catalog,
-                store=self.store,
+                disk=Disk(self.store),
                 defaults=defaults,
                 on_change=lambda: None,
                 serve_ros=no_ros,

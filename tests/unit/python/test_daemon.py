@@ -100,6 +100,32 @@ def test_a_refused_start_leaves_the_folder_of_the_daemon_that_serves(
     assert daemon.executor_pid("other")
 
 
+def test_a_second_rtcfd_with_the_same_state_is_refused_and_overwrites_nothing(
+    daemon: DaemonUnderTest, client: rtcf.Client, tmp_path: Path
+) -> None:
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=123.0))
+    folder = tmp_path / "second"
+    folder.mkdir()
+    second = DaemonUnderTest(folder)
+    second.state = daemon.state
+    second.start()
+    assert daemon.process is not None
+    assert second.process is not None
+    assert second.process.wait() == 1
+    assert second.log() == (
+        f"rtcfd: state folder {daemon.state} is in use by another rtcfd (pid "
+        f"{daemon.process.pid}): end that, or choose another --state-dir\n"
+    )
+    assert daemon.saved()["settings"]["frequency_hz"] == 123.0
+    # Not by a rtcfd that is no more, however it ended.
+    executor = daemon.executor_pid()
+    daemon.end(signal.SIGKILL)
+    second.start()
+    assert "ready;" in second.log()
+    assert second.end() == 0
+    os.kill(executor, signal.SIGKILL)
+
+
 def test_an_executor_that_ends_at_once_shows_in_the_status(
     stopped_daemon: DaemonUnderTest,
 ) -> None:

@@ -1,0 +1,95 @@
+"""Brings the desired state of one runner to disk; owned by its RunnerCore.
+
+On rtcfd's one thread; the disk is written by others.  Whoever saves waits PATIENCE_S at most: a
+disk that hangs is told of, and written once it answers.  Several saves that wait become one.
+"""
+
+import asyncio
+import logging
+
+from rtcfd.state.desired import Desired
+from rtcfd.state.disk import Disk
+
+PATIENCE_S = 0.3  # with a disk, until the answer says that the state is not saved yet
+_NOT_YET = "not saved yet: the disk of the state folder does not answer"
+
+Log = logging.Logger | logging.LoggerAdapter[logging.Logger]
+
+
+class Saver:
+    """Saves `desired`, the newest state last."""
+
+    def __init__(self, desired: Desired, disk: Disk, log: Log) -> None:
+        self.problem = ""  # why what is on disk is not what is desired
+        self._desired = desired
+        self._disk = disk
+        self._log = log
+        self._next: asyncio.Task[str] | None = None  # has not taken the state yet
+        self._last: asyncio.Task[str] | None = None
+        self._noting: asyncio.Task[None] | None = None
+        self._forgotten = False
+
+    def begin(self) -> "asyncio.Task[str]":
+        """Save what is desired, without waiting; the task returns what went wrong, if anything."""
+        if self._next is None:
+            self._next = self._last = self._disk.in_turn(self._desired.runner, self._write)
+        return self._next
+
+    async def save(self) -> list[str]:
+        """Save; return a note if it is not on disk, or not yet: the change stands."""
+        saving = self.begin()
+        if not await self._in_time(saving, PATIENCE_S):
+            self.problem = _NOT_YET
+            self._log.error("its state is %s", self.problem)
+            return [self.problem]
+        return [problem] if (problem := saving.result()) else []
+
+    async def forget(self) -> None:
+        """Take it off the disk, for good; what is saved after that is not."""
+        self._forgotten = True
+        self._last = self._disk.in_turn(self._desired.runner, self._remove)
+        if not await self._in_time(self._last, PATIENCE_S):
+            self._log.error("its state stays on disk until that answers")
+
+    async def finish(self, timeout_s: float) -> None:
+        """Wait until nothing is left to write, but not for ever."""
+        if self._last is not None and not await self._in_time(self._last, timeout_s):
+            self._log.error("its state is %s", _NOT_YET)
+
+    async def _in_time(self, task: "asyncio.Task[str]", timeout_s: float) -> bool:
+        done, _ = await asyncio.wait({task}, timeout=timeout_s)
+        if not done and (self._forgotten or not self._desired.running):
+            # Whoever starts loops after the next start of rtcfd is to know of it.
+            self._noting = asyncio.create_task(self._disk.note_stop(self._desired.runner))
+            await asyncio.wait({self._noting}, timeout=PATIENCE_S)
+        return bool(done)
+
+    async def _write(self) -> str:
+        self._next = None
+        if self._forgotten:
+            return ""
+        if self._noting is not None:
+            # Else it might be written after the start that it is to be forgotten for.
+            await asyncio.wait({self._noting})
+        store, runner = self._disk.store, self._desired.runner
+        text, running = store.text(self._desired), self._desired.running
+        changes, anew = self._desired.history.to_write()
+        try:
+            await self._disk.do(store.save, runner, text, running)
+            await self._disk.do(store.save_history, runner, changes, anew)
+        except OSError as error:
+            self._desired.history.not_written()
+            self.problem = f"not saved: {error.strerror}"
+            self._log.error("its state is %s", self.problem)
+            return self.problem
+        if self._next is None:
+            self.problem = ""
+        return ""
+
+    async def _remove(self) -> str:
+        try:
+            await self._disk.do(self._disk.store.remove, self._desired.runner)
+        except OSError as error:
+            self._log.error("its state stays on disk: %s", error.strerror)
+            return f"not removed: {error.strerror}"
+        return ""

@@ -1,0 +1,168 @@
+"""Saving on a disk that does not answer."""
+
+import asyncio
+import contextlib
+import json
+import logging
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from daemon_under_test import DEADLINE_S
+from rtcfd.state.desired import Desired
+from rtcfd.state.disk import Disk
+from rtcfd.state.saver import Saver
+from rtcfd.state.store import Store
+
+log = logging.getLogger("test")
+NOT_YET = ["not saved yet: the disk of the state folder does not answer"]
+
+
+class HangingStore(Store):
+    """A store whose folder is on a disk that may hang; where stops are noted does not."""
+
+    def __init__(self, folder: Path) -> None:
+        self.state, self.boot = folder / "state", folder / "boot"
+        self.boot.mkdir(exist_ok=True)
+        super().__init__(self.state, self.boot)
+        self.prepare()
+        self.saves: list[bool] = []
+        self._answers = threading.Event()
+        self._answers.set()
+
+    @contextlib.contextmanager
+    def hanging(self) -> Iterator[None]:
+        self._answers.clear()
+        try:
+            yield
+        finally:
+            self._answers.set()
+
+    def save(self, runner: str, text: bytes, running: bool) -> None:
+        assert self._answers.wait(DEADLINE_S)
+        super().save(runner, text, running)
+        self.saves.append(running)
+
+    def remove(self, runner: str) -> None:
+        assert self._answers.wait(DEADLINE_S)
+        super().remove(runner)
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> HangingStore:
+    return HangingStore(tmp_path)
+
+
+def loaded(store: HangingStore) -> Desired:
+    """Return what the next rtcfd finds."""
+    (state,) = Store(store.state, store.boot).load()
+    return state
+
+
+def saver_of(desired: Desired, store: Store) -> Saver:
+    return Saver(desired, Disk(store), log)
+
+
+def test_whoever_saves_on_a_disk_that_hangs_is_told_so_and_does_not_wait(
+    store: HangingStore,
+) -> None:
+    async def run() -> None:
+        saver = saver_of(Desired("arm"), store)
+        with store.hanging():
+            assert await saver.save() == NOT_YET
+            assert saver.problem == NOT_YET[0]
+        await saver.finish(DEADLINE_S)
+        assert saver.problem == ""
+        assert await saver.save() == []
+
+    asyncio.run(run())
+
+
+def test_what_was_desired_last_is_on_disk_once_it_answers_however_often_it_was_saved(
+    store: HangingStore,
+) -> None:
+    async def run() -> None:
+        desired = Desired("arm")
+        saver = saver_of(desired, store)
+        with store.hanging():
+            for count in range(20):
+                desired.running = count % 2 == 0
+                saver.begin()
+                await asyncio.sleep(0)  # the first is on its way to the disk
+            desired.running = True
+            saver.begin()
+        await saver.finish(DEADLINE_S)
+
+    asyncio.run(run())
+    assert loaded(store).running
+    assert len(store.saves) == 2, "what waits is one save"
+
+
+def test_a_stop_that_a_hanging_disk_does_not_take_is_known_to_the_next_rtcfd(
+    store: HangingStore,
+) -> None:
+    async def run() -> None:
+        desired = Desired("arm")
+        saver = saver_of(desired, store)
+        desired.running = True
+        assert await saver.save() == []
+        with store.hanging():
+            desired.running = False
+            assert await saver.save() == NOT_YET
+            # What is on disk says that it runs.
+            assert json.loads((store.state / "arm.json").read_text())["running"] is True
+            assert not loaded(store).running
+            desired.running = True
+            assert await saver.save() == NOT_YET
+        await saver.finish(DEADLINE_S)
+
+    asyncio.run(run())
+    assert loaded(store).running, "the start came last"
+
+
+def test_a_runner_that_is_added_again_is_not_removed_by_what_its_disk_did_not_do_in_time(
+    store: HangingStore,
+) -> None:
+    async def run() -> None:
+        disk = Disk(store)
+        first = Saver(Desired("arm"), disk, log)
+        await first.save()
+        with store.hanging():
+            await first.forget()
+            await first.save()
+            second = Saver(Desired("arm"), disk, log)
+            assert await second.save() == NOT_YET
+        await second.finish(DEADLINE_S)
+
+    asyncio.run(run())
+    assert loaded(store).runner == "arm"
+
+
+def test_a_runner_that_a_hanging_disk_still_has_is_not_resumed(store: HangingStore) -> None:
+    async def run() -> None:
+        desired = Desired("arm")
+        desired.running = True
+        saver = saver_of(desired, store)
+        await saver.save()
+        with store.hanging():
+            await saver.forget()
+            assert not loaded(store).running
+        await saver.finish(DEADLINE_S)
+
+    asyncio.run(run())
+    assert Store(store.state, store.boot).load() == []
+
+
+def test_what_goes_wrong_is_the_note_and_stays_until_it_goes_right(store: HangingStore) -> None:
+    async def run() -> Any:
+        saver = saver_of(Desired("arm"), store)
+        store.state.rmdir()
+        assert await saver.save() == ["not saved: No such file or directory"]
+        assert saver.problem == "not saved: No such file or directory"
+        store.state.mkdir()
+        assert await saver.save() == []
+        assert saver.problem == ""
+
+    asyncio.run(run())
