@@ -3,11 +3,12 @@
 import random
 import re
 import socket
+import subprocess
 from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_process import Daemon, wait_for
+from daemon_process import BUILD_TREE, Daemon, wait_for
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import runner_pb2
 
@@ -112,3 +113,36 @@ def test_a_peer_that_never_catches_up_costs_what_it_has_not_taken(
             assert _answer(peer).id == 2
             peer.sendall(ask)
         assert _resident_bytes(pid) - before < 64 * MIB
+
+
+def test_enumerators_that_are_none_are_refused(daemon: Daemon, client: rtcf.Client) -> None:
+    requests = [
+        wire.Request(id=2, configure=runner_pb2.RunnerSettings(realtime=99)),
+        wire.Request(
+            id=2, configure=runner_pb2.RunnerSettings(ros=runner_pb2.RosSettings(peers=99))
+        ),
+        wire.Request(
+            id=2,
+            access=wire.AccessRules(users=[wire.AccessRules.Entry(id=1, right=99)]),
+        ),
+    ]
+    before = client.get_status().runners[0].settings
+    for request in requests:
+        with socket.socket(socket.AF_UNIX) as peer:
+            peer.settimeout(60)
+            peer.connect(f"{daemon.socket}.d/executors/rt_runner.sock")
+            peer.sendall(hello())
+            _answer(peer)
+            peer.sendall(frame(request.SerializeToString()))
+            error = _answer(peer).error
+            assert error.code == wire.Error.CODE_INVALID_ARGUMENT
+            assert " 99 is not known: choose of " in error.message
+    assert client.get_status().runners[0].settings == before
+    checked = subprocess.run(
+        [BUILD_TREE / "bin" / "rtcf-executor", "--check-settings"],
+        input=runner_pb2.RunnerSettings(on_crash=99).SerializeToString(),
+        capture_output=True,
+        check=False,
+    )
+    assert checked.returncode == 1
+    assert b"on_crash 99 is not known: choose of " in checked.stderr

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include "common/refusal.hpp"
+#include "messages/known_values.hpp"
 #include "messages/settings_messages.hpp"
 #include "rtcf/v1/runner.pb.h"
 #include "view/settings.hpp"
@@ -14,6 +15,7 @@ int checkSettings() {
     if (!message.ParseFromFileDescriptor(STDIN_FILENO)) {
         throw Refusal(RefusalKind::InvalidArgument, "standard input is no RunnerSettings");
     }
+    requireKnownValues(message);
     RunnerSettings settings = settingsFrom(message, {});
     validate(settings);
     return 0;

@@ -9,6 +9,7 @@
 #include "common/time_units.hpp"
 #include "messages/errors.hpp"
 #include "messages/from_wire.hpp"
+#include "messages/known_values.hpp"
 #include "messages/settings_messages.hpp"
 #include "messages/to_wire.hpp"
 #include "rtcf/version.hpp"
@@ -66,6 +67,7 @@ void Server::handle(Connection& connection, const v1::Request& request) {
         return;
     }
     try {
+        requireKnownValues(request);
         if (answerQuery(id, request)) return;
         if (request.kind_case() == v1::Request::kGetComponent) {
             submitProbe(id, request);

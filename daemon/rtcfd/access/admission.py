@@ -20,6 +20,7 @@ from rtcfd.access.calls import Level
 from rtcfd.access.clients import Client, Clients
 from rtcfd.access.peer import Peer
 from rtcfd.access.rights import Access, needed
+from rtcfd.common import known_values
 from rtcfd.common.budget import Budget
 from rtcfd.common.refusals import InvalidArgument, Refusal, ResourceExhausted
 from rtcfd.common.status_codes import abort, bounded
@@ -188,6 +189,7 @@ def _require_formed(method: str, request: Any) -> None:
         raise request.problem
     if hasattr(request, "DESCRIPTOR"):
         lengths.check(request)
+        known_values.check(request)
 
 
 def _forgiving(method: str, deserialize: Callable[[bytes], Any]) -> Callable[[bytes], Any]:

@@ -15,8 +15,9 @@ from google.protobuf import json_format
 from rtcf.v1 import runner_pb2
 from rtcf_shared import durable
 
-from rtcfd.common import regular_files
+from rtcfd.common import known_values, regular_files
 from rtcfd.common.nonsense import NONSENSE
+from rtcfd.common.refusals import Refusal
 
 log = logging.getLogger(__name__)
 
@@ -39,10 +40,11 @@ def read(folder: Path) -> Handover | None:
         defaults = json_format.ParseDict(
             document["defaults"], runner_pb2.RunnerSettings(), ignore_unknown_fields=True
         )
+        known_values.check(defaults)
         return Handover(defaults, {str(k): str(v) for k, v in document["graphs"].items()})
     except FileNotFoundError:
         return None
-    except (OSError, *NONSENSE):
+    except (OSError, *NONSENSE, Refusal):
         log.warning("%s is of no use: runners are taken as they are", file)
         return None
 

@@ -19,10 +19,10 @@ from pathlib import Path
 from typing import Any
 
 from google.protobuf import json_format
-from rtcf.v1 import graph_pb2, runner_pb2
+from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 from rtcf_shared import durable
 
-from rtcfd.common import regular_files
+from rtcfd.common import known_values, regular_files
 from rtcfd.common.names import check_base_name, full_name
 from rtcfd.common.nonsense import NONSENSE
 from rtcfd.common.refusals import Refusal
@@ -363,9 +363,15 @@ def _parse(runner: str, document: _Document) -> Desired:
     desired.ended_boot = str(document.get("ended_boot", ""))
     for name, terms in document["leased"].items():
         desired.leased[name] = LeaseTerms(**terms)
+        known_values.check_value(
+            control_pb2.OnLeaseLost.DESCRIPTOR, "on_lost", desired.leased[name].on_lost
+        )
     if hold := document["hold"]:
         desired.hold = HoldTerms(hold["token"], hold["holder"], desired.chosen, hold["added"])
         desired.chosen = json_format.ParseDict(hold["settings"], runner_pb2.RunnerSettings())
+    for message in (desired.chosen, desired.hold and desired.hold.parked):
+        if message is not None:
+            known_values.check(message)
     for name, reason in document["quarantined"].items():
         desired.quarantine(name, str(reason))
     for name, reason in document["left_out"].items():

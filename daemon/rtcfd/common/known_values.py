@@ -1,0 +1,63 @@
+"""Enumerators that are none.
+
+proto3 keeps any number in the place of an enumerator, and each reader takes it for whatever is
+left over.  So what comes from outside is looked at once, where it comes in.
+"""
+
+from functools import cache
+from typing import Any
+
+from google.protobuf.descriptor import Descriptor, EnumDescriptor, FieldDescriptor
+from google.protobuf.message import Message
+from rtcf.v1 import errors_pb2
+from rtcf_shared.enums import choices
+from rtcf_shared.naming import listing
+
+from rtcfd.common.refusals import InvalidArgument
+
+
+def check(message: Message) -> None:
+    """Refuse a message with an enumerator that is not known, at any depth."""
+    for number in _to_look_at(message.DESCRIPTOR):
+        field = message.DESCRIPTOR.fields_by_number[number]
+        value: Any = getattr(message, field.name)
+        repeated = field.label == FieldDescriptor.LABEL_REPEATED
+        if field.enum_type is not None:
+            for each in value if repeated else [value]:
+                check_value(field.enum_type, field.name, each)
+        elif repeated:
+            for each in value:
+                check(each)
+        elif message.HasField(field.name):
+            check(value)
+
+
+def check_value(enum_type: EnumDescriptor, name: str, value: object) -> None:
+    """Refuse a value that is no enumerator; `name` is what it is for."""
+    if value not in enum_type.values_by_number:
+        raise InvalidArgument(
+            f"{name} {value} is not known: choose of {listing(choices(enum_type))}",
+            errors_pb2.REASON_VALUE_INVALID,
+            setting=name,
+        )
+
+
+@cache
+def _to_look_at(message: Descriptor) -> tuple[int, ...]:
+    """Return the numbers of the fields that are enumerators, or may hold some."""
+    return tuple(
+        field.number
+        for field in message.fields
+        if field.enum_type is not None or _holds(field.message_type, frozenset())
+    )
+
+
+def _holds(message: Descriptor | None, above: frozenset[str]) -> bool:
+    """Tell whether there are enumerators in messages of a type."""
+    if message is None or message.full_name in above:
+        return False
+    within = above | {message.full_name}
+    return any(
+        field.enum_type is not None or _holds(field.message_type, within)
+        for field in message.fields
+    )
