@@ -2,13 +2,14 @@
 
 import itertools
 import re
+import signal
 import subprocess
 from pathlib import Path
 
 import fig_1
 import pytest
 import rtcf
-from daemon_process import Daemon
+from daemon_process import BUILD_TREE, Daemon, wait_for
 from rtcf.v1 import runner_pb2
 from values import iteration, number, port_value, state, wait_until_after
 
@@ -136,3 +137,44 @@ def test_a_step_that_was_stopped_says_how_far_it_came(daemon: Daemon, client: rt
         assert process.wait() == 1
     assert re.fullmatch(r"stepped [1-9]\d* of 1000000000 cycles\n", said)
     assert ended.splitlines()[-1] == "rtcfctl: step ended early: the loop was stopped"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_step_whose_caller_leaves_pauses(
+    daemon: Daemon, client: rtcf.Client, number: signal.Signals
+) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
+    with subprocess.Popen(
+        [BUILD_TREE / "bin" / "rtcfctl", "step", str(10**15)],
+        env=daemon.environment(),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    ) as caller:
+        wait_for(lambda: iteration(client) > 1000, "cycles")
+        caller.send_signal(number)
+    # A change has its turn, and no cycle runs any more.
+    client.load(rtcf.component("rtcf_test", "Counter", name="other"))
+    before = iteration(client)
+    client.unload(["other"])
+    assert iteration(client) == before
+    assert client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_STEPPING
+    client.step(5)
+    assert iteration(client) == before + 5
+
+
+def test_a_step_of_a_daemon_that_dies_pauses(daemon: Daemon, client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
+    with subprocess.Popen(
+        [BUILD_TREE / "bin" / "rtcfctl", "step", str(10**15)],
+        env=daemon.environment(),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    ):
+        wait_for(lambda: iteration(client) > 1000, "cycles")
+        daemon.end(signal.SIGKILL)
+    daemon.start()
+    with rtcf.Client(daemon.socket) as again:
+        again.load(rtcf.component("rtcf_test", "Counter", name="other"))
+        before = iteration(again)
+        again.unload(["other"])
+        assert iteration(again) == before

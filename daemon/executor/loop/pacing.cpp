@@ -28,7 +28,10 @@ void Loop::beginStepping(const LoopSettings& settings, std::uint64_t stops_known
     cycle_.setStampOffset(stamp_ns);
 }
 
-std::uint64_t Loop::step(std::uint64_t cycles) noexcept {
+std::uint64_t Loop::step(std::uint64_t cycles, const std::atomic<bool>* given_up) noexcept {
+    const auto wanted = [given_up] {
+        return given_up == nullptr || !given_up->load(std::memory_order_relaxed);
+    };
     std::uint64_t done = 0;
     if (const auto loads = ThreadLocals::loads(); loads != stepped_loads_) {
         ThreadLocals().touch();
@@ -37,7 +40,7 @@ std::uint64_t Loop::step(std::uint64_t cycles) noexcept {
     const FloatingPointDefaults floating_point;
     // Components log as in any cycle; there is no other thread that runs one.
     Log::setRealtimeThread(true);
-    for (; done < cycles && goesOn(); ++done) {
+    for (; done < cycles && goesOn() && wanted(); ++done) {
         const Counting::Turn turn(cycle_.figures().counting);
         cycle_.run(nextStep(), 0);
         cycle_.setElapsed(cycle_.clock().period_ns);  // also if a snapshot said otherwise

@@ -138,7 +138,9 @@ class Runner final : private RunnerView {
     ChangeOutcome start(const Progress& progress);
     ChangeOutcome stop(const Progress& progress);
     /// Runs cycles without real time on a simulated clock, as fast as they go; then pauses.
-    ChangeOutcome step(std::uint64_t cycles, const Progress& progress);
+    /// @param given_up set by any thread to pause at the next boundary; null = nobody does
+    ChangeOutcome step(std::uint64_t cycles, const Progress& progress,
+                       const std::atomic<bool>* given_up = nullptr);
     /// Runs a piece of a replay. With its beginning all components are made anew, and ROS sees
     /// nothing of the loop until its end.
     ReplayOutcome replay(const ReplayChunk& chunk, const Progress& progress);
@@ -284,7 +286,7 @@ class Runner final : private RunnerView {
     void renewFrames();
     std::shared_ptr<const FrameTable> framesOf(const Plan& plan);
     void publishFrames(std::shared_ptr<const FrameTable> frames);
-    std::uint64_t stepWatched(std::uint64_t cycles);
+    std::uint64_t stepWatched(std::uint64_t cycles, const std::atomic<bool>* given_up);
     void awaitReaders();
     void startAll(const Progress& progress);
     void stopAll() noexcept;

@@ -37,14 +37,15 @@ void Runner::pause(const Progress& progress) {
     publish();
 }
 
-ChangeOutcome Runner::step(std::uint64_t cycles, const Progress& progress) {
+ChangeOutcome Runner::step(std::uint64_t cycles, const Progress& progress,
+                           const std::atomic<bool>* given_up) {
     constexpr std::uint64_t kChunk = 10000;  // cycles between reports
     requireNoLoop();
     if (state_ != RunnerState::Stepping) pause(progress);
     std::uint64_t left = cycles;
     while (left > 0) {
         const std::uint64_t wanted = std::min(left, kChunk);
-        const std::uint64_t done = stepWatched(wanted);
+        const std::uint64_t done = stepWatched(wanted, given_up);
         left -= done;
         log_.drain();
         note({});  // a long run is not a hook that hangs

@@ -37,13 +37,13 @@ void Runner::onFramesWaiting(std::function<void()> tell) {
 }
 
 // Cycles that go as fast as they can wait for those who watch them.
-std::uint64_t Runner::stepWatched(std::uint64_t cycles) {
-    if (watches_.empty()) return loop_.step(cycles);
+std::uint64_t Runner::stepWatched(std::uint64_t cycles, const std::atomic<bool>* given_up) {
+    if (watches_.empty()) return loop_.step(cycles, given_up);
     const std::uint64_t most = frames_->ring->capacity() / 2;
     std::uint64_t done = 0;
     while (done < cycles) {
         const std::uint64_t wanted = std::min(cycles - done, most);
-        const std::uint64_t ran = loop_.step(wanted);
+        const std::uint64_t ran = loop_.step(wanted, given_up);
         done += ran;
         if (ran < wanted) break;
         awaitReaders();

@@ -23,7 +23,8 @@ void trustOwnerOf(Runner& runner, const Message& message) {
 
 }  // namespace
 
-ChangeOutcome change(Runner& runner, const v1::Request& request, const Runner::Progress& progress) {
+ChangeOutcome change(Runner& runner, const v1::Request& request, const Runner::Progress& progress,
+                     const std::atomic<bool>& given_up) {
     switch (request.kind_case()) {
         case v1::Request::kStart:
             return runner.start(progress);
@@ -32,7 +33,7 @@ ChangeOutcome change(Runner& runner, const v1::Request& request, const Runner::P
         case v1::Request::kStep:
             if (request.step().cycles() == 0)
                 throw Refusal(RefusalKind::InvalidArgument, "0 cycles to step: name a number");
-            return runner.step(request.step().cycles(), progress);
+            return runner.step(request.step().cycles(), progress, &given_up);
         case v1::Request::kLoad: {
             trustOwnerOf(runner, request.load());
             ComponentDefinition definition = definitionFrom(request.load().component());

@@ -124,6 +124,12 @@ bool Server::answerQuery(std::uint64_t connection, const v1::Request& request) {
             response.mutable_done();
             break;
         }
+        case v1::Request::kEndStep: {
+            const auto step = waiting_.find({connection, request.end_step().step()});
+            if (step != waiting_.end() && step->second.endless()) step->second.given_up->store(true);
+            response.mutable_done();
+            break;
+        }
         case v1::Request::kExit:
             response.mutable_done();
             exiting_ = true;
@@ -160,19 +166,21 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
     };
     waiting_[{connection, id}] = {endless ? INT64_MAX : monotonicNow() + kHookTimeout, otherwise,
                                   given_up};
-    runner_->post([this, connection, id, request, given_up] {
+    runner_->post([this, connection, id, request, given_up, endless] {
         v1::Response response;
         response.set_id(id);
         // Whoever asked has been told that it did not happen. Stop is another matter.
         const auto require_wanted = [&] {
             if (!given_up->load() || request.kind_case() == v1::Request::kStop) return;
-            throw Refusal(RefusalKind::Unavailable, "given up: a hook took too long");
+            throw Refusal(RefusalKind::Unavailable,
+                          "given up: its caller has left, or a hook took too long");
         };
         try {
             require_wanted();
             requireStopsKnown(request);
-            const auto progress = [this, connection, id, &require_wanted](const std::string& line) {
-                require_wanted();
+            const auto progress = [this, connection, id, endless,
+                                   &require_wanted](const std::string& line) {
+                if (!endless) require_wanted();  // those end by themselves
                 v1::Response step;
                 step.set_id(id);
                 step.set_progress(line);
@@ -194,7 +202,7 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
             } else if (request.kind_case() == v1::Request::kTakeSnapshot) {
                 *response.mutable_snapshot() = snapshotTo(runner_->takeImage());
             } else {
-                *response.mutable_change() = outcomeTo(change(*runner_, request, progress));
+                *response.mutable_change() = outcomeTo(change(*runner_, request, progress, *given_up));
             }
         } catch (const Refusal& refusal) {
             response = errorResponse(id, refusal.kind(), refusal.what());

@@ -226,8 +226,11 @@ void Server::drop(std::uint64_t id) {
     connections_.erase(id);
     calls_.lost(id);
     endWatches(ports_.endAll(id));
-    for (auto it = waiting_.begin(); it != waiting_.end();)
-        it = it->first.first == id ? waiting_.erase(it) : std::next(it);
+    for (auto it = waiting_.begin(); it != waiting_.end();) {
+        const bool of_it = it->first.first == id;
+        if (of_it && it->second.endless()) it->second.given_up->store(true);
+        it = of_it ? waiting_.erase(it) : std::next(it);
+    }
     // Those of others are gone on with; if there are none, the figures go on.
     const auto gone = std::remove_if(resets_.begin(), resets_.end(),
                                      [id](const Reset& each) { return each.connection == id; });

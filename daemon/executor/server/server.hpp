@@ -105,6 +105,8 @@ class Server {
         std::int64_t until_ns;
         std::function<v1::Response()> otherwise;
         std::shared_ptr<std::atomic<bool>> given_up;  // of a change, which then does not happen
+        // Cycles without real time, which end when they are given up.
+        bool endless() const { return until_ns == INT64_MAX && given_up != nullptr; }
     };
     std::map<std::pair<std::uint64_t, std::uint64_t>, Waiting> waiting_;
 

@@ -4,6 +4,8 @@ first.
 Functions on a RunnerCore.  All that waits here is withdrawn by a stop.
 """
 
+import asyncio
+import contextlib
 from collections.abc import Callable
 
 from rtcf.executor.v1 import executor_pb2 as wire
@@ -11,7 +13,7 @@ from rtcf.v1 import control_pb2, errors_pb2
 from rtcf_shared.naming import listing
 
 from rtcfd.common.names import absolute
-from rtcfd.common.refusals import FailedPrecondition, NotFound
+from rtcfd.common.refusals import FailedPrecondition, NotFound, Refusal
 from rtcfd.executor.link import Progress
 from rtcfd.operations.loop import asked_now, require_no_stop, start_in_turn
 from rtcfd.operations.runner_core import RunnerCore
@@ -40,18 +42,35 @@ async def start(
 
 
 async def step(runner: RunnerCore, cycles: int, progress: Progress) -> control_pb2.ChangeResult:
-    """Run cycles of a stopped loop on a simulated clock; takes as long as they take."""
+    """Run cycles of a stopped loop on a simulated clock; takes as long as they take, and ends at
+    a boundary if its caller leaves."""
     asked = asked_now(runner)
+    left = asyncio.Event()  # the caller has
 
     async def work() -> control_pb2.ChangeResult:
         await _need_executor(runner, progress)
         require_no_stop(runner, asked)
         request = wire.Request(step=control_pb2.StepRequest(cycles=cycles))
-        result = (await runner.ask(request, progress)).change
-        runner.log.info("%d cycles stepped", cycles)
+        ending = asyncio.create_task(_end_step(runner, request, left))
+        try:
+            result = (await runner.ask(request, progress)).change
+        finally:
+            ending.cancel()
+        runner.log.info("%d cycles stepped", result.cycles)
         return result
 
-    return await runner.change("stepping", work, timeout_s=None, runs_cycles=True)
+    try:
+        return await runner.change("stepping", work, timeout_s=None, runs_cycles=True)
+    except asyncio.CancelledError:
+        left.set()
+        raise
+
+
+async def _end_step(runner: RunnerCore, step: wire.Request, left: asyncio.Event) -> None:
+    """End a step that was asked for at the next boundary, once its caller has left."""
+    await left.wait()
+    with contextlib.suppress(Refusal):
+        await runner.ask(wire.Request(end_step=wire.EndStep(step=step.id)))
 
 
 async def replay(

@@ -153,6 +153,21 @@ TEST_F(Stepping, EndsByRequest) {
     EXPECT_EQ(state(), RunnerState::Stopped);
 }
 
+TEST_F(Stepping, PausesWhereItIsGivenUp) {
+    load(definition("Ticker", "T"));
+    std::atomic<bool> given_up{false};
+    auto endless = begin([&] {
+        return runner().step(std::uint64_t{1} << 60, [](const std::string&) {}, &given_up);
+    });
+    ASSERT_TRUE(eventually([this] { return iteration() > 100; }));
+    given_up = true;
+    EXPECT_EQ(endless.get().cycles, iteration());
+    EXPECT_EQ(state(), RunnerState::Stepping);
+    const std::uint64_t before = iteration();
+    step(5);
+    EXPECT_EQ(iteration(), before + 5) << "it goes on from there";
+}
+
 TEST_F(Stepping, EndsWithItsRunner) {
     load(definition("Ticker", "T"));
     Runner& ending = runner();
