@@ -16,8 +16,8 @@ class Incidents(Watching):
     """What of a Client looks at, keeps and removes them."""
 
     def list_incidents(self, runner: str = "") -> list[incidents_pb2.Incident]:
-        """Return the files with the last cycles before faults, from the oldest on; of all runners
-        without one."""
+        """Return the files with the last cycles before faults, in the order in which they were
+        kept; of all runners without one."""
         request = incidents_pb2.ListIncidentsRequest(runner=runner)
         return self._pages(self._stub.ListIncidents, request, "incidents")
 

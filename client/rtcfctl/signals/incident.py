@@ -119,7 +119,10 @@ def remove(client: rtcf.Client, args: argparse.Namespace, output: Output) -> Non
 def _told(incident: incidents_pb2.Incident, recording: "rtcf.Recording") -> dict[str, Any]:
     about = recording.metadata.get("incident", {})
     cycles = recording.cycles
-    last = slice(max(len(cycles) - _CYCLES, 0), None)
+    cycle = int(about.get("cycle", 0))
+    # The loop may have gone on: the faulting cycle is what is looked at.
+    end = _end(cycles, cycle)
+    last = slice(max(end - _CYCLES, 0), end)
     component = about.get("component", "")
     # Of nobody in particular: of all.
     names = [name for name in recording.signals if name.startswith(f"{component}.")]
@@ -127,15 +130,18 @@ def _told(incident: incidents_pb2.Incident, recording: "rtcf.Recording") -> dict
     values = {}
     for name in names[:_SIGNALS]:
         column = recording.read(name)
-        if len(column.values):
-            values[name] = {"cycle": int(column.cycles[-1]), "value": column.values[-1].tolist()}
+        if at := _end(column.cycles, cycle):
+            values[name] = {
+                "cycle": int(column.cycles[at - 1]),
+                "value": column.values[at - 1].tolist(),
+            }
     return {
         "incident": incident.name,
         "runner": incident.runner,
         "time": date(incident.time_ns),
         "reason": incident.reason,
         "component": component,
-        "cycle": int(about.get("cycle", 0)),
+        "cycle": cycle,
         "rtcf": about.get("rtcf", ""),
         "executor": about.get("executor", ""),
         "notes": [note for note in about.get("notes", "").split("\n") if note],
@@ -158,6 +164,12 @@ def _told(incident: incidents_pb2.Incident, recording: "rtcf.Recording") -> dict
     }
 
 
+def _end(cycles: Any, cycle: int) -> int:
+    """Return how many there are up to and with one, or in all if that one is not among them."""
+    found = (cycles == cycle).nonzero()[0]
+    return int(found[-1]) + 1 if len(found) else len(cycles)
+
+
 def _listed(recording: "rtcf.Recording", name: str) -> list[Any]:
     try:
         found = json.loads(recording.metadata.get(name, {}).get("json", "[]"))
@@ -173,7 +185,7 @@ def _print(told: dict[str, Any], output: Output) -> None:
     for note in told["notes"]:
         output.line(note, "yellow")
     cycles = told["last_cycles"]
-    print(f"\nlast of {counted(told['cycles'], 'cycle')}")
+    print(f"\nup to cycle {told['cycle']}, of {counted(told['cycles'], 'cycle')}")
     output.table(
         ("cycle", "duration µs", "wake-up µs"),
         [(each["cycle"], microseconds(each["duration_us"] * 1e3),
@@ -192,7 +204,9 @@ def _print(told: dict[str, Any], output: Output) -> None:
         print("\nparameters changed lately")
         for each in told["parameters"]:
             when = _time(int(each.get("timeNs", 0)))
-            print(f"{when}  {each.get('component')}.{each.get('parameter')} by {each.get('who')}")
+            name = f"{each.get('component')}.{each.get('parameter')}"
+            values = f"{_parameter(each.get('before'))} -> {_parameter(each.get('value'))}"
+            print(f"{when}  {name} {values} by {each.get('who')}, {each.get('how')}")
     if told["events"]:
         print("\nevents")
         for each in told["events"]:
@@ -202,6 +216,11 @@ def _print(told: dict[str, Any], output: Output) -> None:
         for line in sorted(set(told["libraries"].values())):
             print(line)
     sys.stdout.flush()
+
+
+def _parameter(value: Any) -> str:
+    """Return a parameter's value as JSON has it, by its kind."""
+    return _value(next(iter(value.values()), None)) if isinstance(value, dict) else "?"
 
 
 def _value(value: Any) -> str:

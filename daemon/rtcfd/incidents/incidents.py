@@ -5,6 +5,7 @@ written by a process of its own, which has NumPy.  The oldest files go when ther
 """
 
 import asyncio
+import contextlib
 import json
 import logging
 import os
@@ -46,8 +47,8 @@ class Incidents:
         self._folder = folder
         self._limits = limits
         self._threads = ThreadPoolExecutor(1, "rtcfd-incidents")
-        # Of its own: a file may take _WRITE_TIMEOUT_S, for which nobody who lists or removes waits.
-        self._writers = ThreadPoolExecutor(1, "rtcfd-incident-file")
+        # Of their own: who looks at what is kept does not wait for what is being written.
+        self._readers = ThreadPoolExecutor(2, "rtcfd-incident-list")
         # Of its own: frames are written anew while they wait for the file of another incident.
         self._copier = ThreadPoolExecutor(1, "rtcfd-frames")
         self._kept: dict[str, float] = {}  # when, by runner
@@ -76,17 +77,18 @@ class Incidents:
                 stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime(facts["time_ns"] / 1e9))
                 name = await self._aside(_free_name, folder, f"{stamp}-{facts['runner']}")
                 file = folder / (name + _SUFFIX)
-                await self._aside(_write, frozen, file, facts, threads=self._writers)
+                facts["sequence"] = 1 + await self._aside(_last_sequence, folder)
+                await self._aside(_write, frozen, file, facts)
                 await self._aside(_tidy, folder, self._limits().incidents_mb * 1_000_000, file)
         finally:
             os.close(frozen)
-        return await self._aside(_incident, file)  # type: ignore[no-any-return]
+        return await self._look(_incident, file)  # type: ignore[no-any-return]
 
     async def all(self, runner: str = "") -> list[incidents_pb2.Incident]:
         """Return what there is, from the oldest on."""
         if self._folder is None:
             return []
-        found = await self._aside(_all, self._folder)
+        found = await self._look(_all, self._folder)
         return [each for each in found if not runner or each.runner == runner]
 
     async def get(self, name: str) -> incidents_pb2.Incident:
@@ -99,7 +101,7 @@ class Incidents:
 
     async def read(self, incident: incidents_pb2.Incident, at: int) -> bytes:
         """Return a piece of the file; nothing at its end."""
-        return await self._aside(_piece, Path(incident.file), at)  # type: ignore[no-any-return]
+        return await self._look(_piece, Path(incident.file), at)  # type: ignore[no-any-return]
 
     async def remove(self, names: Sequence[str]) -> list[incidents_pb2.Incident]:
         """Remove files, all of them or none."""
@@ -110,7 +112,7 @@ class Incidents:
                 raise _unknown(name, found)
         gone = [known[name] for name in dict.fromkeys(names)]
         for each in gone:
-            await self._aside(_remove, Path(each.file))
+            await self._look(_remove, Path(each.file))
         return gone
 
     def _place(self) -> Path:
@@ -120,6 +122,9 @@ class Incidents:
                 errors_pb2.REASON_DAEMON_FAILED,
             )
         return self._folder
+
+    async def _look(self, work: Callable[..., Any], *arguments: Any) -> Any:
+        return await self._aside(work, *arguments, threads=self._readers)
 
     async def _aside(
         self, work: Callable[..., Any], *arguments: Any, threads: ThreadPoolExecutor | None = None
@@ -180,18 +185,28 @@ def _write(frozen: int, file: Path, facts: dict[str, Any]) -> None:
 
 def _tidy(folder: Path, most: int, newest: Path) -> None:
     """Remove the oldest ones until there is room; the newest stays."""
-    files = sorted((each.stat().st_mtime_ns, each) for each in folder.glob("*" + _SUFFIX))
     room = most
-    for _, file in reversed(files):
-        room -= file.stat().st_size
+    for each in reversed(_all(folder)):
+        file = Path(each.file)
+        room -= each.bytes
         if room < 0 and file != newest:
             file.unlink(missing_ok=True)
             log.info("incident %s removed: those kept are more than incidents_mb", file.stem)
 
 
 def _all(folder: Path) -> list[incidents_pb2.Incident]:
-    found = [_incident(each) for each in folder.glob("*" + _SUFFIX) if _NAME.match(each.stem)]
-    return sorted(found, key=lambda each: (each.time_ns, each.name))
+    """Return what there is in the order in which it was kept, whatever the clock said."""
+    found = []
+    for each in folder.glob("*" + _SUFFIX):
+        with contextlib.suppress(FileNotFoundError):  # removed since
+            if _NAME.match(each.stem):
+                found.append(_incident(each))
+    # Those of an older rtcfd have no number, and are older.
+    return sorted(found, key=lambda each: (each.sequence, each.time_ns, each.name))
+
+
+def _last_sequence(folder: Path) -> int:
+    return max((int(each.sequence) for each in _all(folder)), default=0)
 
 
 def _incident(file: Path) -> incidents_pb2.Incident:
@@ -204,6 +219,7 @@ def _incident(file: Path) -> incidents_pb2.Incident:
         bytes=status.st_size,
         file=str(file),
         reason=told.get("reason", ""),
+        sequence=int(told.get("sequence", 0)),
     )
 
 

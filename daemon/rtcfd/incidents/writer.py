@@ -49,6 +49,7 @@ def _write(descriptor: int, file: Path, facts: dict[str, Any]) -> None:
                 "reason": facts["reason"],
                 "component": facts["component"],
                 "time_ns": str(facts["time_ns"]),
+                "sequence": str(facts["sequence"]),
                 "cycle": str(facts["iteration"]),
                 "rtcf": facts["version"],
                 "executor": facts["executor_version"],

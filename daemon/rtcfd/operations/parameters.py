@@ -18,8 +18,8 @@ from rtcfd.common import declared_values
 from rtcfd.common.names import absolute
 from rtcfd.common.refusals import FailedPrecondition, NotFound
 from rtcfd.executor.link import Progress
-from rtcfd.operations.runner_core import RunnerCore
-from rtcfd.state.history import Change
+from rtcfd.operations.runner_core import Asked, RunnerCore
+from rtcfd.state.history import UNANSWERED, Change
 
 _LONGEST_WORD = 60  # of a value in a line
 _MOST_CHANGES = 500  # in one answer
@@ -115,6 +115,13 @@ async def follow_ros(runner: RunnerCore, changed: Mapping[str, set[str]]) -> Non
             note(runner, component, settings, known, None, "dynamic_reconfigure")
 
 
+def note_unanswered(runner: RunnerCore) -> None:
+    """Note what an executor was asked to set when it died: it may have died of it."""
+    asked, runner.asked_parameters = runner.asked_parameters, []
+    for each in asked:
+        note(runner, each.component, each.settings, each.before, each.acting, UNANSWERED)
+
+
 def note(
     runner: RunnerCore,
     component: str,
@@ -143,6 +150,8 @@ def note(
         return
     words = ", ".join(f"{each.name} = {_word(each.value)}" for each in settings)
     what = "taken back" if takes_back else "set"
+    if how == UNANSWERED:
+        what = "set (the executor died before its answer)"
     runner.happened(
         control_pb2.Event.KIND_PARAMETERS, f"{component}: {words} {what}", component, user=who
     )
@@ -170,7 +179,13 @@ async def _set(
     if name in runner.left_out:
         return await _set_left_out(runner, name, settings, before, acting, takes_back)
     request = control_pb2.SetParametersRequest(component=name, parameters=settings)
-    result = (await runner.ask(wire.Request(set_parameters=request), progress)).change
+    asked = Asked(name, settings, before, acting)
+    runner.asked_parameters.append(asked)
+    try:
+        result = (await runner.ask(wire.Request(set_parameters=request), progress)).change
+    finally:
+        if asked in runner.asked_parameters:
+            runner.asked_parameters.remove(asked)
     runner.desired.set_parameters(name, settings)
     note(runner, name, settings, before, acting, "undo" if takes_back else "set", "", takes_back)
     result.notes.extend(await runner.save())

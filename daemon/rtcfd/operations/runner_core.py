@@ -8,12 +8,12 @@ import asyncio
 import contextlib
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TypeVar
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import control_pb2, errors_pb2, ports_pb2, runner_pb2
+from rtcf.v1 import control_pb2, errors_pb2, graph_pb2, ports_pb2, runner_pb2
 from rtcf_shared.enums import word
 
 from rtcfd.access import caller
@@ -69,6 +69,16 @@ class Surroundings:
     folders: Aside = field(default_factory=lambda: Aside("folders of components"))
 
 
+@dataclass(eq=False)
+class Asked:
+    """Parameters that an executor was asked to set, and has not answered for yet."""
+
+    component: str  # full name
+    settings: list[graph_pb2.ParameterSetting]
+    before: Mapping[str, graph_pb2.ParameterValue]
+    acting: caller.Caller | None
+
+
 class RunnerCore(ABC):
     """A runner below what clients see of it."""
 
@@ -81,6 +91,7 @@ class RunnerCore(ABC):
         self.shared = surroundings
         self.trouble = "its executor is not started"  # why there is none
         self.tuned: dict[str, float] = {}  # when parameters were set whose pace is bound
+        self.asked_parameters: list[Asked] = []
         self.closing = False
         self.leaving = False  # it ends for this rtcfd only
         self.saver = Saver(desired, surroundings.disk, self.log)

@@ -19,7 +19,7 @@ from rtcfd.executor.events import Events
 from rtcfd.executor.executor import Executor
 from rtcfd.executor.process import End
 from rtcfd.operations.incidents import keep
-from rtcfd.operations.parameters import follow_ros
+from rtcfd.operations.parameters import follow_ros, note_unanswered
 from rtcfd.operations.runner_core import RunnerCore, Surroundings
 from rtcfd.recovery.bring_up import bring_up, recover, resumes
 from rtcfd.recovery.crash_place import name_source
@@ -145,6 +145,7 @@ class Runner(RunnerCore):
         self.loop.gone()
         verdict = judge(end, executor.note())
         executor.safe = verdict.safe
+        note_unanswered(self)
         keep(self, executor, f"executor {verdict}", verdict.culprit)
         died = f"its executor (pid {executor.pid}) {verdict} at {time.strftime('%H:%M:%S')}"
         self.trouble = executor.verdict = died

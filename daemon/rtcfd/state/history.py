@@ -23,6 +23,9 @@ MOST = 4000
 MOST_BYTES_OF_A_COMPONENT = 1024 * 1024
 MOST_BYTES = 8 * 1024 * 1024
 
+# How a value was set that an executor took and did not answer for, as it died.
+UNANSWERED = "set, unanswered"
+
 Value = graph_pb2.ParameterValue
 
 
@@ -37,7 +40,8 @@ class Change:
     before: Value | None  # None: it was not there, or is not known
     value: Value
     who: str  # for people
-    how: str  # "set", "undo", "load", "replace", "apply", "restore", "dynamic_reconfigure"
+    # "set", "undo", "load", "replace", "apply", "restore", "dynamic_reconfigure", UNANSWERED
+    how: str
     takes_back: int = 0  # the number of what it undoes; 0 = nothing
 
 
@@ -85,7 +89,9 @@ class History:
         changes = self._changes.get(component, ())
         undone = {each.takes_back for each in changes}
         numbers = [
-            each.number for each in changes if not each.takes_back and each.number not in undone
+            each.number
+            for each in changes
+            if not each.takes_back and each.number not in undone and each.how != UNANSWERED
         ]
         return [each for each in changes if numbers and each.number == numbers[-1]]
 

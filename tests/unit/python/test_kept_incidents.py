@@ -11,9 +11,10 @@ from typing import Any
 
 import pytest
 from daemon_under_test import DEADLINE_S
+from rtcf.recording.mcap_writer import McapWriter
 from rtcf.v1 import control_pb2
 from rtcfd.common.limits import Limits
-from rtcfd.incidents import copying, frame_file, frame_layout, incidents
+from rtcfd.incidents import copying, frame_file, frame_layout, head, incidents
 from rtcfd.incidents.incidents import Incidents
 from rtcfd.operations.incidents import keep
 from rtcfd_in_process import Rtcfd, until
@@ -180,3 +181,74 @@ def test_what_is_written_anew_during_the_copy_is_left_out(monkeypatch: pytest.Mo
     os.close(copy)
     os.close(live)
     assert ring.cycles.tolist() == [2, 3, 4, 5, 6, 7]
+
+
+def _written(_: int, file: Path, facts: dict[str, Any]) -> None:
+    """Write what an incident's file says of itself, and nothing else."""
+    pairs = {"runner": facts["runner"], "time_ns": str(facts["time_ns"])}
+    if "sequence" in facts:
+        pairs["sequence"] = str(facts["sequence"])
+    with file.open("xb") as out:
+        writer = McapWriter(out)
+        writer.metadata(head.NAME, pairs)
+        writer.close()
+
+
+def test_what_is_kept_is_listed_while_another_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    writing, may_write = threading.Event(), threading.Event()
+
+    async def play() -> None:
+        kept = Incidents(tmp_path / "incidents", Limits)
+        monkeypatch.setattr(incidents, "_write", _written)
+        first = await kept.keep(_frames(b"one"), {"runner": "one", "time_ns": 1})
+
+        def slow_write(frozen: int, file: Path, facts: dict[str, Any]) -> None:
+            writing.set()
+            may_write.wait()
+            _written(frozen, file, facts)
+
+        monkeypatch.setattr(incidents, "_write", slow_write)
+        second = asyncio.create_task(kept.keep(_frames(b"two"), {"runner": "two", "time_ns": 2}))
+        try:
+            await until(writing.is_set, "the second file")
+            async with asyncio.timeout(DEADLINE_S):
+                assert await kept.all() == [first]
+                assert await kept.get("") == first
+                assert await kept.read(first, 0) == Path(first.file).read_bytes()
+                assert await kept.remove([first.name]) == [first]
+        finally:
+            may_write.set()
+        last = await second
+        assert await kept.all() == [last]
+
+    asyncio.run(play())
+
+
+def test_the_newest_is_the_one_that_was_kept_last_whatever_the_clock_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(incidents, "_write", _written)
+    hour_ns = 3600 * 10**9
+
+    async def play() -> None:
+        # One of an rtcfd that did not count is older than all others.
+        old = tmp_path / "incidents" / "old.mcap"
+        old.parent.mkdir()
+        _written(0, old, {"runner": "arm", "time_ns": 1000 * hour_ns})
+        for _ in range(2):
+            kept = Incidents(tmp_path / "incidents", Limits)  # of another rtcfd
+            for now in (500, 100, 300):
+                await kept.keep(_frames(b"x"), {"runner": "arm", "time_ns": now * hour_ns})
+        found = await kept.all()
+        assert [each.sequence for each in found] == list(range(7))
+        hours = [each.time_ns // hour_ns for each in found]
+        assert hours == [1000, 500, 100, 300, 500, 100, 300]
+        assert await kept.get("") == found[-1]
+        # What is kept longest goes first.
+        size = found[-1].bytes
+        incidents._tidy(tmp_path / "incidents", 3 * size, Path(found[-1].file))
+        assert [each.sequence for each in await kept.all()] == [4, 5, 6]
+
+    asyncio.run(play())
