@@ -1,6 +1,6 @@
 /// @file
 /// How the loop tells of what failed in a cycle: what ended the loop, and the
-/// first fault of each component that did not. No record can be lost to others:
+/// first fault of each component that did not, and now and then another. No record can be lost to others:
 /// each component has room for its own.
 #pragma once
 
@@ -35,13 +35,15 @@ struct ComponentFault {
     std::array<char, 160> text{};
 };
 
-/// Room for the first fault of one kind since the loop began.
+/// Room for the first fault of one kind since the loop began, or since rearm().
 class FirstFault {
    public:
     /// Keeps it if it is the first. Whoever runs cycles; real-time safe.
     void note(std::uint64_t iteration, const char* text) noexcept RTCF_NONBLOCKING {
-        if (state_.load(std::memory_order_relaxed) != State::Empty) return;
+        // Acquired: whoever made room has read what was there.
+        if (state_.load(std::memory_order_acquire) != State::Empty) return;
         fault_.iteration = iteration;
+        fault_.text = {};
         std::strncpy(fault_.text.data(), text, fault_.text.size() - 1);
         state_.store(State::Noted, std::memory_order_release);
     }
@@ -50,6 +52,12 @@ class FirstFault {
         if (state_.load(std::memory_order_acquire) != State::Noted) return nullptr;
         state_.store(State::Told, std::memory_order_relaxed);
         return &fault_;
+    }
+    /// Has the next fault noted, if this one has been taken. Graph thread.
+    void rearm() noexcept {
+        State told = State::Told;
+        state_.compare_exchange_strong(told, State::Empty, std::memory_order_release,
+                                       std::memory_order_relaxed);
     }
     /// While no cycle runs.
     void clear() noexcept { state_.store(State::Empty, std::memory_order_relaxed); }

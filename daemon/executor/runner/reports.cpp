@@ -42,8 +42,10 @@ void Runner::noteLoopFault() {
     }
 }
 
-// Components that failed while the loop went on: each kind said once, until the next start.
+// Components that failed while the loop went on: a component is taken out once, and what is not
+// finite is said again after a while.
 void Runner::noteComponentFaults() {
+    told_not_finite_.rearm(monotonicNow());
     const std::uint64_t count = loop_.figures().faults.value();
     if (std::exchange(told_faults_, count) == count) return;
     for (const GraphNode& node : plan_->graph.nodes()) noteFaultsOf(*node.instance);
@@ -51,18 +53,22 @@ void Runner::noteComponentFaults() {
 
 void Runner::noteFaultsOf(Instance& instance) {
     ComponentFaults& faults = instance.figures()->faults;
-    const auto say = [&](const ComponentFault* fault, const char* text) {
+    const auto say = [&](const ComponentFault* fault, const char* text, std::uint64_t more) {
         if (fault == nullptr) return;
         const char* of = fault->text.data();
-        const std::string what = fmt::vformat(text, fmt::make_format_args(of));
+        std::string what = fmt::vformat(text, fmt::make_format_args(of));
+        if (more > 1) what += fmt::format("; {} times since this was told before", more);
         instance.setFault(fmt::format("iteration {}: {}", fault->iteration, what));
         tell({RunnerEvent::Kind::ComponentFailed,
               fmt::format("{}: iteration {}: {}", instance.fullName(), fault->iteration, what),
               instance.fullName(), fault->iteration});
         publish({instance.fullName()});
     };
-    say(faults.not_finite.take(), "output {} is not finite: readers keep its last value");
-    say(faults.taken_out.take(), "update() threw: {}; taken out, the loop goes on");
+    if (const ComponentFault* fault = faults.not_finite.take(); fault != nullptr) {
+        const std::uint64_t more = told_not_finite_.told(instance.figures(), monotonicNow());
+        say(fault, "output {} is not finite: readers keep its last value", more);
+    }
+    say(faults.taken_out.take(), "update() threw: {}; taken out, the loop goes on", 0);
 }
 
 void Runner::noteOverruns(bool last) {

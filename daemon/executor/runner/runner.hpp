@@ -31,6 +31,7 @@
 #include "plugins/library.hpp"
 #include "runner/overrun_report.hpp"
 #include "runner/replay.hpp"
+#include "runner/told_faults.hpp"
 #include "view/runner_view.hpp"
 #include "view/settings.hpp"
 #include "view/snapshot.hpp"
@@ -328,6 +329,7 @@ class Runner final : private RunnerView {
     bool lacks_realtime_ = false;  // the loop runs without something essential
     OverrunReport overrun_report_;
     std::uint64_t told_faults_ = 0;    // LoopFigures::faults at the last look
+    ToldFaults told_not_finite_;
     std::int64_t tuned_spin_ns_ = -1;  // by tuneSpin(); -1 = not yet
     std::unique_ptr<Replay> replay_;   // while one is under way
     bool bridge_served_ = true;        // not while a replay has the ports to itself

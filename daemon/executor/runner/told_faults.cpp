@@ -1,0 +1,44 @@
+#include "runner/told_faults.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+namespace rtcf::executor {
+
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::int64_t kShortest = 10 * kSecond;
+constexpr std::int64_t kLongest = 600 * kSecond;
+// One that follows so soon belongs to those before it.
+constexpr std::int64_t kSoon = kSecond;
+
+}  // namespace
+
+std::uint64_t ToldFaults::told(const std::shared_ptr<ComponentFigures>& of, std::int64_t now_ns) {
+    const std::uint64_t count = of->faults.count.value();
+    const auto [found, is_new] = silences_.try_emplace(of);
+    Silence& silence = found->second;
+    const bool goes_on = !is_new && now_ns - silence.until_ns < kSoon;
+    silence.length_ns = goes_on ? std::min(2 * silence.length_ns, kLongest) : kShortest;
+    silence.until_ns = now_ns + silence.length_ns;
+    silence.over = false;
+    const std::uint64_t before = std::exchange(silence.count, count);
+    // Fewer: another loop has begun.
+    return is_new || count < before ? 0 : count - before;
+}
+
+void ToldFaults::rearm(std::int64_t now_ns) {
+    for (auto it = silences_.begin(); it != silences_.end();) {
+        Silence& silence = it->second;
+        if (!silence.over && now_ns >= silence.until_ns) {
+            it->first->faults.not_finite.rearm();
+            silence.over = true;
+        }
+        const bool forgotten = silence.over && now_ns - silence.until_ns > kLongest;
+        it = forgotten ? silences_.erase(it) : std::next(it);
+    }
+}
+
+}  // namespace rtcf::executor
