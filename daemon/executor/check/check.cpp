@@ -38,11 +38,9 @@ class ValueSource final : public Bridge {
     // Graph thread, as all calls.
     void exchange() {
         for (const auto& injector : table_->inputs) {
-            const std::shared_ptr<SlotHeader> value = injector->type().make_slot(nullptr);
-            std::vector<std::uint8_t> bytes(injector->type().length(*value));
-            injector->type().serialize(*value, bytes.data(),
-                                       static_cast<std::uint32_t>(bytes.size()));
-            injector->deliver(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+            const std::string message = injector->type().sample();
+            injector->deliver(reinterpret_cast<const std::uint8_t*>(message.data()),
+                              static_cast<std::uint32_t>(message.size()));
         }
         for (const auto& tap : table_->outputs) {
             const TypeInfo& type = tap->type();

@@ -5,7 +5,7 @@ namespace rtcf::executor {
 Injector::Injector(std::string topic, const TypeInfo& type)
     : topic_(std::move(topic)), type_(type) {
     for (auto& slot : slots_) slot = type_.make_slot(nullptr);
-    if (type_.fixed_size) fixed_size_ = type_.length(*slots_[0]);
+    if (type_.fixed_size) fixed_size_ = static_cast<std::uint32_t>(type_.sample().size());
 }
 
 bool Injector::deliver(const std::uint8_t* bytes, std::uint32_t size, std::int64_t arrived_ns) {

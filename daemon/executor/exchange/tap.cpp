@@ -17,8 +17,7 @@ Tap::Tap(std::string topic, const TypeInfo& type, std::shared_ptr<const SlotHead
 }
 
 std::size_t Tap::ringBytes(const TypeInfo& type, std::size_t capacity) {
-    // Of a value of its own: the loop may be writing the source's.
-    const std::size_t one = kHead + padded(type.length(*type.make_slot(nullptr)));
+    const std::size_t one = kHead + padded(type.sample().size());
     // A power of two, so that a place in the ring is found without a division.
     std::size_t size = kHead;
     while (size < std::max(capacity, 2 * one)) size *= 2;

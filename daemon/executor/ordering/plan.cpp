@@ -23,7 +23,7 @@ constexpr std::size_t kAllTaps = 256 * kMiB;
 
 std::size_t tapCapacity(const TypeInfo& type, double frequency_hz, std::size_t largest) {
     if (!type.fixed_size) return kVariableTapValues * (largest + 24);
-    const std::size_t record = 24 + type.length(*type.make_slot(nullptr));
+    const std::size_t record = 24 + type.sample().size();
     const auto values =
         static_cast<std::size_t>(std::clamp(frequency_hz * kTapSeconds, 64.0, 16384.0));
     return std::min(record * values, kLargestTap);

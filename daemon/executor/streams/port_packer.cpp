@@ -8,7 +8,7 @@ PortPacker::PortPacker(const FrameColumn& column, std::size_t offset)
     : column_(column), offset_(offset) {
     if (column.output == nullptr) return;
     slot_ = column.output->make_slot(nullptr);
-    length_ = column.output->length(*slot_);
+    length_ = static_cast<std::uint32_t>(column.output->sample().size());
 }
 
 void PortPacker::pack(const std::uint8_t* values, std::string& to) const {

@@ -282,12 +282,8 @@ v1::Response PortStreams::schemaOf(const Stream& stream) const {
         column.set_ros_type(from.output->ros_type);
         column.set_ros_md5(from.output->ros_md5);
         column.set_ros_definition(from.output->ros_definition);
-        const std::shared_ptr<SlotHeader> slot = from.output->make_slot(nullptr);
-        std::string& sample = *column.mutable_sample();
-        sample.resize(from.output->length(*slot));
-        from.output->serialize(*slot, reinterpret_cast<std::uint8_t*>(sample.data()),
-                               static_cast<std::uint32_t>(sample.size()));
-        column.set_size(static_cast<std::uint32_t>(sample.size()));
+        column.set_sample(from.output->sample());
+        column.set_size(static_cast<std::uint32_t>(column.sample().size()));
     }
     return response;
 }

@@ -1,7 +1,6 @@
 #include "streams/port_windows.hpp"
 
 #include <algorithm>
-#include <memory>
 #include <stdexcept>
 
 namespace rtcf::executor {
@@ -10,12 +9,8 @@ namespace {
 
 std::vector<NumberField> numbersOf(const FrameColumn& column) {
     if (column.output == nullptr) return numbersOfState(column.type, column.size);
-    const std::shared_ptr<SlotHeader> slot = column.output->make_slot(nullptr);
-    std::string sample(column.output->length(*slot), '\0');
-    column.output->serialize(*slot, reinterpret_cast<std::uint8_t*>(sample.data()),
-                             static_cast<std::uint32_t>(sample.size()));
     try {
-        return numbersOfMessage(column.output->ros_definition, sample);
+        return numbersOfMessage(column.output->ros_definition, column.output->sample());
     } catch (const std::invalid_argument&) {
         return {};  // whose numbers nobody else could name either
     }

@@ -67,7 +67,8 @@ struct AbiProbe {
              offsetof(TypeInfo, plain), offsetof(TypeInfo, make_slot), offsetof(TypeInfo, copy),
              offsetof(TypeInfo, exchange), offsetof(TypeInfo, length),
              offsetof(TypeInfo, serialize), offsetof(TypeInfo, deserialize),
-             offsetof(TypeInfo, print), offsetof(TypeInfo, finite)});
+             offsetof(TypeInfo, print), offsetof(TypeInfo, finite), offsetof(TypeInfo, sample),
+             offsetof(TypeInfo, copies), sizeof(ByteCopy)});
         using Declaration = ParameterDeclaration;
         add({sizeof(ParameterBase), sizeof(ParameterValue), sizeof(Declaration),
              offsetof(Declaration, name), offsetof(Declaration, type),

@@ -11,6 +11,11 @@
 ///     template <>
 ///     struct rtcf::PortType<Gains> : rtcf::MappedPortType<Gains, my_msgs::Gains, GainsOnRos> {};
 ///
+/// If toMessage() only copies bytes, GainsOnRos may say so, and recordings of incidents then have
+/// such values, too (ByteCopy); rtcf runs no conversion where the loop has none running:
+///
+///         static std::vector<rtcf::ByteCopy> copies() { return {{0, 0, sizeof(Gains)}}; }
+///
 /// Two components exchange such a type if both were built with the same definition of it: compared
 /// are its name, size and alignment. It must hold no pointers: values are copied byte by byte.
 #pragma once
@@ -163,6 +168,7 @@ struct PortType<T, std::enable_if_t<detail::Bytes<T>::kPossible && !std::is_arit
         detail::printAny(text, value);
         return text;
     }
+    static ByteCopies copies() { return std::vector<ByteCopy>{{0, 0, sizeof(T)}}; }
 };
 
 }  // namespace rtcf

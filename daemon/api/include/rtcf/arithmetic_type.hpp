@@ -31,6 +31,7 @@ struct ArithmeticConversion {
     static void fromMessage(const Message& message, T& value) {
         value = static_cast<T>(message.data);
     }
+    static std::vector<ByteCopy> copies() { return {{0, 0, sizeof(T)}}; }
 };
 
 }  // namespace detail

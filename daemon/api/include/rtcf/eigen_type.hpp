@@ -38,6 +38,7 @@ struct Vector3Conversion {
     static void fromMessage(const geometry_msgs::Vector3& message, Eigen::Vector3d& value) {
         value = {message.x, message.y, message.z};
     }
+    static std::vector<ByteCopy> copies() { return {{0, 0, sizeof(Eigen::Vector3d)}}; }
 };
 
 struct QuaternionConversion {
@@ -51,6 +52,8 @@ struct QuaternionConversion {
     static void fromMessage(const geometry_msgs::Quaternion& message, Eigen::Quaterniond& value) {
         value = Eigen::Quaterniond(message.w, message.x, message.y, message.z);
     }
+    // In memory x, y, z, w, as there.
+    static std::vector<ByteCopy> copies() { return {{0, 0, sizeof(Eigen::Quaterniond)}}; }
 };
 
 struct IsometryConversion {
@@ -120,10 +123,7 @@ struct PortType<Eigen::Matrix<Scalar, Rows, Cols, Options, MaxRows, MaxCols>,
     static const char* rosMd5() { return PortType<Message>::md5(); }
     static const char* rosDefinition() { return PortType<Message>::rosDefinition(); }
 
-    static std::uint32_t length(const T&) {
-        // dim count, two dims of (label length, label, size, stride), offset, data count, data
-        return 4 + 2 * (4 + kLabelLength + 4 + 4) + 4 + 4 + sizeof(Scalar) * Rows * Cols;
-    }
+    static std::uint32_t length(const T&) { return kHead + sizeof(Scalar) * Rows * Cols; }
     static void serialize(const T& value, std::uint8_t* to, std::uint32_t size) {
         ros::serialization::OStream stream(to, size);
         stream.next(std::uint32_t{2});
@@ -155,12 +155,38 @@ struct PortType<Eigen::Matrix<Scalar, Rows, Cols, Options, MaxRows, MaxCols>,
                                              "; ", "", "", "[", "]"));
         return text.str();
     }
+    static std::string sample() {
+        std::string bytes(length(T()), '\0');
+        serialize(T::Zero(), reinterpret_cast<std::uint8_t*>(bytes.data()),
+                  static_cast<std::uint32_t>(bytes.size()));
+        return bytes;
+    }
+    static ByteCopies copies() {
+        constexpr std::uint32_t kScalar = sizeof(Scalar);
+        std::vector<ByteCopy> copies;
+        std::uint32_t to = kHead;
+        for (int row = 0; row < Rows; ++row) {
+            for (int col = 0; col < Cols; ++col, to += kScalar) {
+                const int at = T::IsRowMajor ? row * Cols + col : col * Rows + row;
+                const std::uint32_t from = static_cast<std::uint32_t>(at) * kScalar;
+                if (!copies.empty() && copies.back().from + copies.back().size == from) {
+                    copies.back().size += kScalar;
+                } else {
+                    copies.push_back({from, to, kScalar});
+                }
+            }
+        }
+        return copies;
+    }
 
    private:
     // Another type, as readers take values from the writer's memory; a vector is the same either
     // way.
     static constexpr bool kTransposed = (Options & Eigen::RowMajor) != 0 && Rows > 1 && Cols > 1;
     static constexpr std::uint32_t kLabelLength = 4;  // "rows", "cols"
+    // Before the data: dim count, two dims of (label length, label, size, stride), offset, data
+    // count.
+    static constexpr std::uint32_t kHead = 4 + 2 * (4 + kLabelLength + 4 + 4) + 4 + 4;
 
     static void dimension(ros::serialization::OStream& stream, const char* label, int size,
                           int stride) {

@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <sstream>
 #include <stdexcept>
 #include <vector>
@@ -60,6 +62,54 @@ void deserialize(BoundedStream& stream, std::vector<T, Allocator>& values) {
     ros::serialization::deserialize(stream, values);
 }
 
+/// Takes the place of a stream in a message's serializer and notes where each field lies.
+class CopyVisitor {
+   public:
+    /// @param object the message, of `size` bytes in memory
+    CopyVisitor(const void* object, std::size_t size)
+        : object_(static_cast<const std::uint8_t*>(object)), size_(size) {}
+
+    template <typename T>
+    void next(const T& field) {
+        if constexpr (std::is_arithmetic_v<T>) {
+            add(reinterpret_cast<const std::uint8_t*>(&field), sizeof field);
+        } else if constexpr (std::is_same_v<T, ros::Time> || std::is_same_v<T, ros::Duration>) {
+            next(field.sec);
+            next(field.nsec);
+        } else if constexpr (ros::message_traits::IsMessage<T>::value) {
+            ros::serialization::Serializer<T>::template allInOne<CopyVisitor, const T&>(*this,
+                                                                                        field);
+        } else if constexpr (IsSequence<T>::value) {
+            for (const auto& item : field) next(item);
+        } else {
+            known_ = false;
+        }
+    }
+
+    ByteCopies copies() && { return known_ ? ByteCopies(std::move(copies_)) : std::nullopt; }
+
+   private:
+    void add(const std::uint8_t* field, std::uint32_t bytes) {
+        // A serializer of one's own may compute what it writes.
+        known_ = known_ && !std::less<>()(field, object_) &&
+                 !std::less<>()(object_ + size_, field + bytes);
+        if (!known_) return;
+        const auto from = static_cast<std::uint32_t>(field - object_);
+        if (!copies_.empty() && copies_.back().from + copies_.back().size == from) {
+            copies_.back().size += bytes;
+        } else {
+            copies_.push_back({from, written_, bytes});
+        }
+        written_ += bytes;
+    }
+
+    const std::uint8_t* object_;
+    std::size_t size_;
+    std::vector<ByteCopy> copies_;
+    std::uint32_t written_ = 0;
+    bool known_ = true;
+};
+
 }  // namespace detail
 
 template <typename T>
@@ -90,12 +140,20 @@ struct PortType<T, std::enable_if_t<ros::message_traits::IsMessage<T>::value>> {
         ros::message_operations::Printer<T>::stream(text, "", value);
         return detail::joinLines(text.str());
     }
+    static ByteCopies copies() {
+        const auto message = std::make_unique<T>();
+        detail::CopyVisitor visitor(message.get(), sizeof(T));
+        visitor.next(*message);
+        return std::move(visitor).copies();
+    }
 };
 
 namespace detail {
 
 /// A port type that travels as the ROS message `Message`. `Conversion` has
-/// `name()`, `toMessage(const T&, Message&)` and `fromMessage(const Message&, T&)`.
+/// `name()`, `toMessage(const T&, Message&)` and `fromMessage(const Message&, T&)`, and may have
+/// `static std::vector<ByteCopy> copies()`, if copying these bytes into a default-constructed
+/// message does what toMessage() does.
 template <typename T, typename Message, typename Conversion>
 struct MappedPortType {
     using Wire = PortType<Message>;
@@ -105,7 +163,13 @@ struct MappedPortType {
     static const char* rosType() { return Wire::rosType(); }
     static const char* rosMd5() { return Wire::rosMd5(); }
     static const char* rosDefinition() { return Wire::rosDefinition(); }
-    static std::uint32_t length(const T& value) { return Wire::length(message(value)); }
+    static std::uint32_t length(const T& value) {
+        if constexpr (Wire::kFixedSize) {
+            return Wire::length(Message());
+        } else {
+            return Wire::length(message(value));
+        }
+    }
     static void serialize(const T& value, std::uint8_t* to, std::uint32_t size) {
         Wire::serialize(message(value), to, size);
     }
@@ -115,6 +179,14 @@ struct MappedPortType {
         Conversion::fromMessage(wire, value);
     }
     static std::string print(const T& value) { return Wire::print(message(value)); }
+    static std::string sample() { return sampleOf<Message>(); }
+    static ByteCopies copies() {
+        if constexpr (HasCopies<Conversion>::value) {
+            return Conversion::copies();
+        } else {
+            return std::nullopt;
+        }
+    }
 
    private:
     static Message message(const T& value) {

@@ -6,15 +6,31 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "rtcf/finite.hpp"
 #include "rtcf/slot.hpp"
 
 namespace rtcf {
+
+/// Bytes of a value that its message has as they lie in memory.
+struct ByteCopy {
+    std::uint32_t from;  ///< bytes from the beginning of the value
+    std::uint32_t to;    ///< bytes from the beginning of the serialised message
+    std::uint32_t size;  ///< bytes
+    friend bool operator==(const ByteCopy& a, const ByteCopy& b) noexcept {
+        return a.from == b.from && a.to == b.to && a.size == b.size;
+    }
+};
+
+/// How a value becomes its message by copying: all bytes that differ between messages of the type.
+/// Unset if that needs the type's code.
+using ByteCopies = std::optional<std::vector<ByteCopy>>;
 
 /// Type-erased description of a port's type. All functions take slots of this
 /// very type.
@@ -56,6 +72,12 @@ struct TypeInfo {
     std::string (*print)(const SlotHeader& slot);
     /// True if the value holds no NaN and no infinity. Real-time safe.
     bool (*finite)(const SlotHeader& slot);
+    /// A serialised message of no particular value: no conversion of a component's own runs. Not
+    /// real-time safe.
+    std::string (*sample)();
+    /// How a message is made of a value and the sample, for types of fixed size. Not real-time
+    /// safe.
+    ByteCopies (*copies)();
 };
 
 /// True if values of the two types may share a connection.
@@ -69,6 +91,9 @@ bool sameType(const TypeInfo& a, const TypeInfo& b) noexcept;
 ///  - `static void serialize(const T&, std::uint8_t*, std::uint32_t)`
 ///  - `static void deserialize(T&, const std::uint8_t*, std::uint32_t)`, which throws on bad bytes
 ///  - `static std::string print(const T&)`
+/// and, if it can tell (TypeInfo),
+///  - `static std::string sample()`; without it, the message of a default-constructed value
+///  - `static ByteCopies copies()`; without it, only the type's own code makes its messages
 template <typename T, typename Enable = void>
 struct PortType;
 
@@ -124,6 +149,38 @@ template <typename T>
 struct IsPlain<T, std::void_t<decltype(PortType<T>::kPlain)>>
     : std::bool_constant<PortType<T>::kPlain> {};
 
+template <typename T, typename = void>
+struct HasSample : std::false_type {};
+template <typename T>
+struct HasSample<T, std::void_t<decltype(T::sample())>> : std::true_type {};
+
+template <typename T, typename = void>
+struct HasCopies : std::false_type {};
+template <typename T>
+struct HasCopies<T, std::void_t<decltype(T::copies())>> : std::true_type {};
+
+template <typename T>
+std::string sampleOf() {
+    if constexpr (HasSample<PortType<T>>::value) {
+        return PortType<T>::sample();
+    } else {
+        const auto value = std::make_unique<T>();
+        std::string bytes(PortType<T>::length(*value), '\0');
+        PortType<T>::serialize(*value, reinterpret_cast<std::uint8_t*>(bytes.data()),
+                               static_cast<std::uint32_t>(bytes.size()));
+        return bytes;
+    }
+}
+
+template <typename T>
+ByteCopies copiesOf() {
+    if constexpr (PortType<T>::kFixedSize && HasCopies<PortType<T>>::value) {
+        return PortType<T>::copies();
+    } else {
+        return std::nullopt;
+    }
+}
+
 template <typename T>
 std::string printSlot(const SlotHeader& slot) {
     return PortType<T>::print(static_cast<const Slot<T>&>(slot).value);
@@ -150,7 +207,9 @@ const TypeInfo& typeInfo() {
                                &detail::serializeSlot<T>,
                                &detail::deserializeSlot<T>,
                                &detail::printSlot<T>,
-                               &detail::finiteSlot<T>};
+                               &detail::finiteSlot<T>,
+                               &detail::sampleOf<T>,
+                               &detail::copiesOf<T>};
     return info;
 }
 

@@ -46,6 +46,17 @@ TEST_F(Change, LoadedComponentRunsAndOthersKeepTheirState) {
     EXPECT_EQ(journal().count("/B start"), 1U);
 }
 
+// A crash of what is loaded would end the loop that runs.
+TEST_F(Change, ATypeThatDiesOfWhatIsNoneIsLoaded) {
+    startWithA();
+    load(definition("Gearbox", "G"));
+    EXPECT_TRUE(runs());
+    const double gear = value("/G", "gear");
+    EXPECT_TRUE(gear == 10.0 || gear == 20.0) << gear;
+    EXPECT_EQ(state(), RunnerState::Running);
+    unload("/G");
+}
+
 TEST_F(Change, UnloadedComponentIsStoppedAndCleanedUpAfterItLeftTheLoop) {
     startWithA();
     load(recorder("B"));
