@@ -1,6 +1,7 @@
 /// @file
-/// Whether a value holds no NaN and no infinity: numbers, Eigen matrices and
-/// any ROS message, whose fields are visited by roscpp's own serializer.
+/// Whether a value holds no NaN and no infinity: numbers, Eigen types, any ROS message, whose
+/// fields are visited by roscpp's own serializer, structs that name their fields (as in
+/// state_type.hpp), and sequences of these. Outputs of other types cannot be declared Finite.
 #pragma once
 
 #include <ros/message_traits.h>
@@ -12,6 +13,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "rtcf/state_type.hpp"
+
 namespace rtcf {
 
 /// What happens to a value that is not finite, on an output that is declared so.
@@ -20,7 +23,8 @@ enum class OnNonFinite {
     Stop,  ///< besides, the loop stops in order
 };
 
-/// Option of an output: its values are checked after each update(), before anybody reads them.
+/// Option of an output: its values are checked after each update(), before anybody reads them. A
+/// struct has to name its fields for that.
 struct Finite {
     Finite() = default;
     explicit Finite(OnNonFinite on_non_finite) : policy(on_non_finite) {}
@@ -43,6 +47,13 @@ class FiniteVisitor {
 
    private:
     bool finite_ = true;
+};
+
+/// Looks at the fields that a struct names.
+struct FiniteFields {
+    bool finite = true;
+    template <typename Field>
+    void operator()(const char* name, const Field& field) noexcept;
 };
 
 template <typename T, typename = void>
@@ -89,8 +100,57 @@ bool isFinite(const T& value) noexcept {
             if (!isFinite(item)) return false;
         }
         return true;
+    } else if constexpr (NamesFields<T>::value) {
+        FiniteFields visitor;
+        const_cast<T&>(value).fields(visitor);  // the visitor only looks at them
+        return visitor.finite;
     } else {
-        return true;  // text, integers, and time and duration, which are made of integers
+        return true;  // without floating-point numbers, or not declared Finite (kIsCheckable)
+    }
+}
+
+template <typename Field>
+void FiniteFields::operator()(const char* /*name*/, const Field& field) noexcept {
+    if (finite) finite = isFinite(field);
+}
+
+/// Whether isFinite() looks at all numbers of a type; of a struct requireCheckable() looks at its
+/// fields.
+template <typename T, typename = void>
+struct IsCheckable
+    : std::bool_constant<std::is_arithmetic_v<T> || std::is_enum_v<T> || HasMatrix<T>::value ||
+                         HasCoefficients<T>::value || HasAllFinite<T>::value ||
+                         ros::message_traits::IsMessage<T>::value ||
+                         std::is_same_v<T, std::string> || std::is_same_v<T, ros::Time> ||
+                         std::is_same_v<T, ros::Duration> || NamesFields<T>::value> {};
+template <typename T>
+struct IsCheckable<T, std::enable_if_t<IsSequence<T>::value && !HasAllFinite<T>::value &&
+                                       !ros::message_traits::IsMessage<T>::value &&
+                                       !std::is_same_v<T, std::string>>>
+    : IsCheckable<std::decay_t<decltype(*std::declval<const T&>().begin())>> {};
+
+template <typename T>
+void requireCheckable();
+
+struct CheckableFields {
+    template <typename Field>
+    void operator()(const char* /*name*/, const Field& /*field*/) const {
+        requireCheckable<Field>();
+    }
+};
+
+/// Does not compile for a type that isFinite() cannot look into.
+template <typename T>
+void requireCheckable() {
+    static_assert(IsCheckable<T>::value,
+                  "rtcf::Finite cannot look into this type: name its fields by a member "
+                  "`template <typename Visit> void fields(Visit&& visit)`, see state_type.hpp");
+    if constexpr (IsSequence<T>::value && !HasAllFinite<T>::value &&
+                  !ros::message_traits::IsMessage<T>::value && !std::is_same_v<T, std::string>) {
+        (void)&requireCheckable<std::decay_t<decltype(*std::declval<const T&>().begin())>>;
+    } else if constexpr (NamesFields<T>::value) {
+        // Compiled, and never called.
+        (void)static_cast<void (*)(T&)>([](T& value) { value.fields(CheckableFields{}); });
     }
 }
 

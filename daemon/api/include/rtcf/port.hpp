@@ -255,7 +255,9 @@ class Output final : public OutputBase {
         : OutputBase(owner, std::move(name), std::move(unit), typeInfo<T>(), nullptr) {}
     /// An output whose values are checked for NaN and infinity before anybody reads them.
     Output(Component* owner, std::string name, std::string unit, Finite finite)
-        : OutputBase(owner, std::move(name), std::move(unit), typeInfo<T>(), &finite) {}
+        : OutputBase(owner, std::move(name), std::move(unit), typeInfo<T>(), &finite) {
+        detail::requireCheckable<T>();
+    }
 
     /// Writes a value. Real-time safe for types whose assignment is; for messages
     /// of variable size once reserve() has been given the largest one.

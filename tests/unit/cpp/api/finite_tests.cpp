@@ -1,0 +1,118 @@
+// Which values are finite, and of which types that can be told.
+#include <geometry_msgs/Twist.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "rtcf/eigen_type.hpp"
+#include "support/bare_component.hpp"
+
+namespace rtcf::test {
+
+struct Command {
+    std::uint32_t joint = 0;
+    double torque = 0.0;
+    std::array<float, 2> limits{};
+    Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+    template <typename Visit>
+    void fields(Visit&& visit) {
+        visit("joint", joint);
+        visit("torque", torque);
+        visit("limits", limits);
+        visit("direction", direction);
+    }
+};
+struct Pair {
+    Command first;
+    Command second;
+    template <typename Visit>
+    void fields(Visit&& visit) {
+        visit("first", first);
+        visit("second", second);
+    }
+};
+struct Nameless {
+    double torque;
+};
+enum class Gear { Low, High };
+
+// As a type of a component's own becomes a port's type.
+static_assert(std::is_trivially_copyable_v<Nameless>);
+static_assert(!detail::IsCheckable<Nameless>::value, "an output of it is not declared Finite");
+static_assert(!detail::IsCheckable<std::vector<Nameless>>::value);
+static_assert(!detail::IsCheckable<std::array<Nameless, 2>>::value);
+static_assert(detail::IsCheckable<Command>::value);
+static_assert(detail::IsCheckable<std::vector<Command>>::value);
+static_assert(detail::IsCheckable<double>::value);
+static_assert(detail::IsCheckable<Gear>::value);
+static_assert(detail::IsCheckable<std::string>::value);
+static_assert(detail::IsCheckable<Eigen::Vector3d>::value);
+static_assert(detail::IsCheckable<Eigen::Quaterniond>::value);
+static_assert(detail::IsCheckable<Eigen::Isometry3d>::value);
+static_assert(detail::IsCheckable<geometry_msgs::Twist>::value);
+
+}  // namespace rtcf::test
+
+// Structs with Eigen types are no bytes for C++, and travel as messages.
+struct PairOnRos {
+    static const char* name() { return "Pair"; }
+    static void toMessage(const rtcf::test::Pair& value, geometry_msgs::Twist& message) {
+        message.linear.x = value.first.torque;
+        message.angular.x = value.second.torque;
+    }
+    static void fromMessage(const geometry_msgs::Twist& message, rtcf::test::Pair& value) {
+        value.first.torque = message.linear.x;
+        value.second.torque = message.angular.x;
+    }
+};
+template <>
+struct rtcf::PortType<rtcf::test::Pair>
+    : rtcf::MappedPortType<rtcf::test::Pair, geometry_msgs::Twist, PairOnRos> {};
+
+namespace rtcf::test {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+TEST(FiniteCheck, LooksAtEachFieldOfAStruct) {
+    EXPECT_TRUE(detail::isFinite(Command{}));
+    Command command;
+    command.torque = kNan;
+    EXPECT_FALSE(detail::isFinite(command));
+    command = {};
+    command.limits[1] = static_cast<float>(kInfinity);
+    EXPECT_FALSE(detail::isFinite(command));
+    command = {};
+    command.direction.y() = -kInfinity;
+    EXPECT_FALSE(detail::isFinite(command));
+}
+
+TEST(FiniteCheck, LooksAtStructsInStructsAndLists) {
+    Pair pair;
+    EXPECT_TRUE(detail::isFinite(pair));
+    pair.second.torque = kNan;
+    EXPECT_FALSE(detail::isFinite(pair));
+    EXPECT_FALSE(detail::isFinite(std::vector<Command>{Command{}, pair.second}));
+}
+
+TEST(FiniteCheck, KeepsAStructFromReaders) {
+    BareComponent component;
+    Output<Pair> out{&component, "out", "", Finite()};
+    Pair pair;
+    pair.first.torque = 1.0;
+    out.write(pair);
+    EXPECT_TRUE(out.commit());
+    pair.second.torque = kInfinity;
+    out.write(pair);
+    EXPECT_FALSE(out.commit());
+    const auto& seen = static_cast<const Slot<Pair>&>(*out.slot()).value;
+    EXPECT_EQ(seen.first.torque, 1.0);
+    EXPECT_EQ(seen.second.torque, 0.0);
+}
+
+}  // namespace
+}  // namespace rtcf::test
