@@ -11,13 +11,18 @@ Tap::Tap(std::string topic, const TypeInfo& type, std::shared_ptr<const SlotHead
       type_(type),
       source_(std::move(source)),
       passed_over_(UINT32_MAX - 1),  // the first value is taken
-      largest_(type.fixed_size ? SIZE_MAX : largest) {
+      largest_(type.fixed_size ? SIZE_MAX : largest),
+      value_(type.builds_message ? type.make_slot(nullptr) : nullptr) {
     ring_.resize(ringBytes(type, capacity));
     mask_ = ring_.size() - 1;
 }
 
+std::size_t Tap::recordBytes(const TypeInfo& type) {
+    return kHead + padded(type.builds_message ? type.size : type.sample().size());
+}
+
 std::size_t Tap::ringBytes(const TypeInfo& type, std::size_t capacity) {
-    const std::size_t one = kHead + padded(type.sample().size());
+    const std::size_t one = recordBytes(type);
     // A power of two, so that a place in the ring is found without a division.
     std::size_t size = kHead;
     while (size < std::max(capacity, 2 * one)) size *= 2;
@@ -41,9 +46,11 @@ void Tap::push(std::int64_t stamp_ns) noexcept RTCF_NONBLOCKING {
     last_sequence_ = source_->sequence;
     if (++passed_over_ < decimation_.load(std::memory_order_relaxed)) return;
     passed_over_ = 0;
-    const std::uint32_t length = type_.length(*source_);
-    if (length > largest_) {
-        too_large_.store(too_large_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    const bool builds = type_.builds_message;
+    const std::uint32_t length =
+        builds ? static_cast<std::uint32_t>(type_.size) : type_.length(*source_);
+    if (!builds && length > largest_) {
+        countOne(too_large_);
         return;
     }
     const std::size_t record = kHead + padded(length);
@@ -53,7 +60,7 @@ void Tap::push(std::int64_t stamp_ns) noexcept RTCF_NONBLOCKING {
     const std::size_t to_end = mask_ + 1 - offset;
     const std::size_t skipped = record > to_end ? to_end : 0;
     if (record + skipped > free) {
-        dropped_.store(dropped_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+        countOne(dropped_);
         return;
     }
     if (skipped != 0) {
@@ -63,8 +70,30 @@ void Tap::push(std::int64_t stamp_ns) noexcept RTCF_NONBLOCKING {
     }
     std::memcpy(ring_.data() + offset, &length, sizeof length);
     std::memcpy(ring_.data() + offset + kAlign, &stamp_ns, sizeof stamp_ns);
-    type_.serialize(*source_, ring_.data() + offset + kHead, length);
+    std::uint8_t* const to = ring_.data() + offset + kHead;
+    if (builds) {
+        std::memcpy(to, valueOf(type_, *source_), length);
+    } else {
+        type_.serialize(*source_, to, length);
+    }
     head_.store(head + record, std::memory_order_release);
+}
+
+bool Tap::build(const std::uint8_t* value) {
+    std::memcpy(valueOf(type_, *value_), value, type_.size);
+    try {
+        const std::uint32_t length = type_.length(*value_);
+        if (length > largest_) {
+            countOne(too_large_);
+            return false;
+        }
+        message_.resize(length);
+        type_.serialize(*value_, message_.data(), length);
+        return true;
+    } catch (...) {
+        countOne(unbuilt_);
+        return false;
+    }
 }
 
 }  // namespace rtcf::executor

@@ -2,6 +2,8 @@
 /// A tap copies an output's values out of the loop: the real-time thread
 /// serialises each new value into a byte ring, one other thread takes them
 /// out. A value that does not fit is dropped and counted, never waited for.
+/// Of a type whose message has to be built first (TypeInfo::builds_message) the ring has the values
+/// as they lie in memory, and the thread that takes them builds the messages.
 #pragma once
 
 #include <atomic>
@@ -20,7 +22,7 @@ namespace rtcf::executor {
 class Tap {
    public:
     /// @param topic    mapped name of the connection
-    /// @param type     of the output
+    /// @param type     of the output; flat if it builds messages
     /// @param source   the output's slot, kept alive by the tap
     /// @param capacity bytes of the ring; at least one value of fixed-size types always fits
     /// @param largest bytes that a value of a type of variable size may have
@@ -31,6 +33,8 @@ class Tap {
     const TypeInfo& type() const noexcept { return type_; }
     const SlotHeader* source() const noexcept { return source_.get(); }
 
+    /// Bytes of the ring that a value of fixed size or a flat one takes.
+    static std::size_t recordBytes(const TypeInfo& type);
     /// Bytes that the ring of a tap takes that is made with this type and capacity.
     static std::size_t ringBytes(const TypeInfo& type, std::size_t capacity);
     /// Bytes of the ring.
@@ -47,15 +51,18 @@ class Tap {
     void push(std::int64_t stamp_ns) noexcept RTCF_NONBLOCKING;
 
     /// Gives the oldest message to `use(const std::uint8_t* bytes, std::uint32_t size, std::int64_t
-    /// stamp_ns)` and removes it. The bytes are valid during the call. Not by the producer; of two
-    /// who come at once, one finds nothing. @return false if the ring is empty
+    /// stamp_ns)` and removes it; without a call if no message can be made of it. The bytes are
+    /// valid during the call. Not by the producer; of two who come at once, one finds nothing.
+    /// @return false if the ring is empty
     template <typename Use>
     bool pop(Use&& use);
 
     /// Values lost as they were larger than allowed. Any thread.
     std::uint64_t tooLarge() const noexcept { return too_large_.load(std::memory_order_relaxed); }
-    /// Values lost because the ring was full. Any thread.
-    std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
+    /// Values lost because the ring was full, or as their conversion threw. Any thread.
+    std::uint64_t dropped() const noexcept {
+        return dropped_.load(std::memory_order_relaxed) + unbuilt_.load(std::memory_order_relaxed);
+    }
 
    private:
     // A record is a length, a stamp and the bytes, each padded to kAlign. kSkip for a length: the
@@ -66,6 +73,11 @@ class Tap {
 
     static constexpr std::size_t padded(std::size_t bytes) {
         return (bytes + kAlign - 1) / kAlign * kAlign;
+    }
+    // Makes the message of a value that lies in the ring. Consumer. @return whether there is one
+    bool build(const std::uint8_t* value);
+    static void countOne(std::atomic<std::uint64_t>& counter) noexcept RTCF_NONBLOCKING {
+        counter.store(counter.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     }
     std::uint32_t lengthAt(std::size_t offset) const noexcept;
     std::int64_t stampAt(std::size_t offset) const noexcept;
@@ -82,8 +94,12 @@ class Tap {
     std::atomic<std::size_t> head_{0};  // bytes ever written, by the producer
     std::atomic<std::size_t> tail_{0};  // bytes ever read, by the consumer
     std::mutex consumer_;               // held in pop()
+    // The consumer's, of a type that builds messages: a value, and its message.
+    std::shared_ptr<SlotHeader> value_;
+    std::vector<std::uint8_t> message_;
     std::atomic<std::uint64_t> dropped_{0};
-    std::atomic<std::uint64_t> too_large_{0};
+    std::atomic<std::uint64_t> unbuilt_{0};
+    std::atomic<std::uint64_t> too_large_{0};  // by whoever makes the messages
 };
 
 template <typename Use>
@@ -101,7 +117,13 @@ bool Tap::pop(Use&& use) {
         offset = 0;
         length = lengthAt(0);
     }
-    use(static_cast<const std::uint8_t*>(ring_.data() + offset + kHead), length, stampAt(offset));
+    const std::uint8_t* const bytes = ring_.data() + offset + kHead;
+    if (!type_.builds_message) {
+        use(bytes, length, stampAt(offset));
+    } else if (build(bytes)) {
+        use(static_cast<const std::uint8_t*>(message_.data()),
+            static_cast<std::uint32_t>(message_.size()), stampAt(offset));
+    }
     tail_.store(tail + kHead + padded(length), std::memory_order_release);
     return true;
 }

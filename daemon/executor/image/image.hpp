@@ -22,7 +22,7 @@ struct ImageType {
     std::string md5;
     std::uint64_t size = 0;
     std::uint64_t alignment = 0;
-    bool fixed_size = false;
+    bool flat = false;
 };
 ImageType imageTypeOf(const TypeInfo& type);
 /// @return whether values of the one are values of the other
@@ -31,7 +31,7 @@ bool same(const ImageType& image, const TypeInfo& type);
 struct ImageValue {
     std::uint64_t sequence = 0;
     std::int64_t time_ns = 0;
-    std::string bytes;  ///< of fixed size: as they lie in memory; else serialised
+    std::string bytes;  ///< of a flat type: as they lie in memory; else serialised
 };
 
 struct ImageState {

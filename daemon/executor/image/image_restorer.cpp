@@ -256,9 +256,9 @@ std::shared_ptr<SlotHeader> ImageRestorer::slotFrom(const TypeInfo& type, const 
     std::shared_ptr<SlotHeader> slot = type.make_slot(sample);
     const auto* const bytes = reinterpret_cast<const std::uint8_t*>(value.bytes.data());
     bool valid = false;
-    if (type.fixed_size) {
+    if (type.flat) {
         valid = value.bytes.size() == type.size;
-        if (valid) std::memcpy(const_cast<std::uint8_t*>(valueOf(type, *slot)), bytes, type.size);
+        if (valid) std::memcpy(valueOf(type, *slot), bytes, type.size);
     } else {
         valid = type.deserialize(*slot, bytes, static_cast<std::uint32_t>(value.bytes.size()));
     }
@@ -273,12 +273,12 @@ void ImageRestorer::restoreTo(SlotHeader* to, const TypeInfo& type, const ImageV
     const SlotHeader* const sample = outputs_.at(name).second;
     restoration_.values.push_back({&type, to, slotFrom(type, value, name, sample)});
     restoration_.headers.push_back(to);
-    if (!type.fixed_size) reserved_[to] = {name, sample};
+    if (!type.flat) reserved_[to] = {name, sample};
 }
 
 void ImageRestorer::requireReserved() const {
     for (const Restoration::Value& value : restoration_.values) {
-        if (value.type->fixed_size) continue;
+        if (value.type->flat) continue;
         const auto& [name, sample] = reserved_.at(value.to);
         const std::uint32_t room = value.type->length(*sample);
         const std::uint32_t length = value.type->length(*value.from);

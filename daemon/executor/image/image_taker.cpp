@@ -17,6 +17,17 @@ ImageValue valueFrom(const Capture::Value& value) {
             std::string(value.bytes.begin(), value.bytes.begin() + value.length)};
 }
 
+// Values are copied in the cycle.
+void requireCopied(const TypeInfo& type) {
+    if (type.flat || !type.builds_message) return;
+    throw Refusal(
+        RefusalKind::FailedPrecondition,
+        fmt::format("there is no snapshot of values of {}: they have memory of their own, "
+                    "and so have messages of {}, which would be allocated in the cycle; "
+                    "keep the values in a std::array",
+                    type.name, type.ros_type));
+}
+
 // What an input goes on to read whose source is no more; null if it had none.
 const SlotHeader* leftBy(const Binding& binding) {
     if (binding.writer != nullptr) return nullptr;
@@ -81,16 +92,18 @@ ImageTaker::ImageTaker(const Plan& plan) : plan_(plan), sources_(plan) {
     }
     for (const auto& [name, injector] : plan.injectors) {
         const TypeInfo& type = injector->type();
+        requireCopied(type);
         capture_.topics.push_back(
             {injector.get(),
-             {&type, nullptr, std::vector<std::uint8_t>(type.fixed_size ? type.size : 0)}});
+             {&type, nullptr, std::vector<std::uint8_t>(type.flat ? type.size : 0)}});
     }
 }
 
 void ImageTaker::add(const TypeInfo& type, const SlotHeader* slot, const SlotHeader* sample) {
+    requireCopied(type);
     if (slot == nullptr || !values_.emplace(slot, capture_.values.size()).second) return;
     std::size_t room = type.size;
-    if (!type.fixed_size) room = sample != nullptr ? type.length(*sample) : 0;
+    if (!type.flat) room = sample != nullptr ? type.length(*sample) : 0;
     capture_.values.push_back({&type, slot, std::vector<std::uint8_t>(room)});
 }
 

@@ -1,9 +1,17 @@
 #include "loop/probe.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <memory>
 
 namespace rtcf::executor {
+
+namespace {
+
+// Values whose bytes are to be had by a message alone, which only another thread could build.
+bool isAllocated(const TypeInfo& type) { return !type.flat && type.builds_message; }
+
+}  // namespace
 
 std::size_t Probe::add(const InputBase& input) {
     items_.push_back(
@@ -41,18 +49,32 @@ void Probe::take(Item& item, const LoopClock& clock) noexcept {
     item.header = slot;
     if (item.input != nullptr) item.seen = item.input->seen();
     if (slot.sequence == 0) return;
-    item.length = item.type->length(slot);
+    const TypeInfo& type = *item.type;
+    if (isAllocated(type)) return;
+    item.length = type.flat ? static_cast<std::uint32_t>(type.size) : type.length(slot);
     item.copied = item.length <= item.bytes.size();
-    if (item.copied) item.type->serialize(slot, item.bytes.data(), item.length);
+    if (!item.copied) return;
+    if (type.flat) {
+        std::memcpy(item.bytes.data(), valueOf(type, slot), item.length);
+    } else {
+        type.serialize(slot, item.bytes.data(), item.length);
+    }
 }
 
 Probe::Value Probe::value(std::size_t index) const {
     const Item& item = items_[index];
     Value value{item.header.sequence, item.seen, item.now_ns - item.header.time_ns, {}};
-    if (item.copied) {
+    if (item.header.sequence != 0 && isAllocated(*item.type)) {
+        value.text = "(not shown: its message would be allocated in the cycle)";
+    } else if (item.copied) {
         const std::shared_ptr<SlotHeader> slot = item.type->make_slot(nullptr);
-        if (item.type->deserialize(*slot, item.bytes.data(), item.length))
-            value.text = item.type->print(*slot);
+        bool valid = true;
+        if (item.type->flat) {
+            std::memcpy(valueOf(*item.type, *slot), item.bytes.data(), item.length);
+        } else {
+            valid = item.type->deserialize(*slot, item.bytes.data(), item.length);
+        }
+        if (valid) value.text = item.type->print(*slot);
     }
     return value;
 }

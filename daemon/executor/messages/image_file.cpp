@@ -58,13 +58,12 @@ v1::PortType typeTo(const ImageType& type) {
     message.set_md5(type.md5);
     message.set_size(type.size);
     message.set_alignment(type.alignment);
-    message.set_fixed_size(type.fixed_size);
+    message.set_flat(type.flat);
     return message;
 }
 
 ImageType typeFrom(const v1::PortType& message) {
-    return {message.name(), message.md5(), message.size(), message.alignment(),
-            message.fixed_size()};
+    return {message.name(), message.md5(), message.size(), message.alignment(), message.flat()};
 }
 
 v1::PortValue valueTo(const ImageValue& value) {

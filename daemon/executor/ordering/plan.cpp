@@ -22,8 +22,8 @@ constexpr std::size_t kLargestTap = 8 * kMiB;
 constexpr std::size_t kAllTaps = 256 * kMiB;
 
 std::size_t tapCapacity(const TypeInfo& type, double frequency_hz, std::size_t largest) {
-    if (!type.fixed_size) return kVariableTapValues * (largest + 24);
-    const std::size_t record = 24 + type.sample().size();
+    if (!type.flat) return kVariableTapValues * (largest + 24);
+    const std::size_t record = Tap::recordBytes(type);
     const auto values =
         static_cast<std::size_t>(std::clamp(frequency_hz * kTapSeconds, 64.0, 16384.0));
     return std::min(record * values, kLargestTap);

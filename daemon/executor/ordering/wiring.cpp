@@ -175,6 +175,19 @@ void requireOneWriter(const Graph& graph, const std::string& name, const Connect
 // A type of a component's own that is given no message stays inside the runner.
 bool onRos(const TypeInfo& type) { return *type.ros_type != '\0'; }
 
+// Whoever takes an output's values builds their messages of copies, as that allocates.
+void requirePublishable(const Graph& graph, const std::string& name, const Writer& writer) {
+    const TypeInfo& type = writer.output->type();
+    if (!type.builds_message || type.flat) return;
+    throw Refusal(
+        RefusalKind::FailedPrecondition,
+        fmt::format("{} cannot be published as {}: values of {} have memory of their own, and so "
+                    "have messages of {}, which would be allocated in the cycle; keep {} off the "
+                    "whitelist, or keep the values in a std::array",
+                    portName(graph, writer.node, writer.output->name()), name, type.name,
+                    type.ros_type, name));
+}
+
 // Two devices cannot both say when a cycle begins.
 void requireOneSource(const Graph& graph) {
     const Instance* present = nullptr;
@@ -204,7 +217,12 @@ Wiring wire(const Graph& graph, const MappingFilter& filter, const std::string& 
         // An input that a component feeds takes nothing from ROS: no side channel past the loop.
         plan.subscribed = mapped && !plan.writer.has_value();
     }
-    for (const auto& [name, plan] : wiring.connections) requireOneWriter(graph, name, plan);
+    for (const auto& [name, plan] : wiring.connections) {
+        requireOneWriter(graph, name, plan);
+        if (!plan.published) continue;
+        requirePublishable(graph, name, *plan.writer);
+        for (const Writer& writer : plan.others) requirePublishable(graph, name, writer);
+    }
     OrderResult result = findOrder(orderProblem(graph, wiring));
     if (!result.orderable()) refuseLoop(graph, result, loading);
     wiring.order = std::move(result.order);

@@ -14,9 +14,9 @@ std::size_t lines(std::size_t bytes) { return (bytes + kLine - 1) / kLine * kLin
 
 bool Capture::Value::take() noexcept {
     header = *from;
-    length = type->fixed_size ? static_cast<std::uint32_t>(type->size) : type->length(*from);
+    length = type->flat ? static_cast<std::uint32_t>(type->size) : type->length(*from);
     if (length > bytes.size()) return false;
-    if (type->fixed_size) {
+    if (type->flat) {
         std::memcpy(bytes.data(), valueOf(*type, *from), length);
     } else {
         type->serialize(*from, bytes.data(), length);
@@ -25,7 +25,7 @@ bool Capture::Value::take() noexcept {
 }
 
 void Restoration::Value::put() const noexcept {
-    if (type->fixed_size) {
+    if (type->flat) {
         type->copy(*to, *from);
         return;
     }
@@ -45,9 +45,9 @@ std::size_t Restoration::bytes() const {
     std::size_t bytes = (inputs.size() + turns.size() + topics.size()) * kLine;
     for (const StateCopy& state : states) bytes += lines(state.size);
     for (const Value& value : values) {
-        const bool fixed = value.type->fixed_size;
-        bytes += lines(sizeof(SlotHeader) +
-                       (fixed ? value.type->size : value.type->length(*value.from)));
+        const bool flat = value.type->flat;
+        bytes +=
+            lines(sizeof(SlotHeader) + (flat ? value.type->size : value.type->length(*value.from)));
     }
     return bytes;
 }

@@ -23,15 +23,9 @@ struct ClockImage {
     std::int64_t total_elapsed_ns = 0;  ///< what components that skip cycles count in
 };
 
-/// Where a slot's value lies, which is in memory as its type has it.
-inline const std::uint8_t* valueOf(const TypeInfo& type, const SlotHeader& slot) noexcept {
-    const std::size_t offset = (sizeof slot + type.alignment - 1) / type.alignment * type.alignment;
-    return reinterpret_cast<const std::uint8_t*>(&slot) + offset;
-}
-
 /// Copies out of the loop.
 struct Capture {
-    /// A value: of fixed size as it lies in memory, else serialised.
+    /// A value: a flat one as it lies in memory, else serialised.
     struct Value {
         const TypeInfo* type;
         const SlotHeader* from;

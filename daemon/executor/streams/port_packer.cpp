@@ -17,7 +17,7 @@ void PortPacker::pack(const std::uint8_t* values, std::string& to) const {
         to.append(reinterpret_cast<const char*>(value), column_.size);
         return;
     }
-    std::memcpy(const_cast<std::uint8_t*>(valueOf(*column_.output, *slot_)), value, column_.size);
+    std::memcpy(valueOf(*column_.output, *slot_), value, column_.size);
     const std::size_t before = to.size();
     to.resize(before + length_);
     column_.output->serialize(*slot_, reinterpret_cast<std::uint8_t*>(to.data() + before), length_);

@@ -1,7 +1,7 @@
 /// @file
 /// Types of a component's own as port types: trivially copyable structs, enums, std::array, and
 /// std::string and std::vector of such. They stay inside the runner, unless they are given a ROS
-/// message:
+/// message (MappedPortType in message_type.hpp):
 ///
 ///     struct GainsOnRos {
 ///         static const char* name() { return "Gains"; }
@@ -37,13 +37,6 @@
 #include "rtcf/message_type.hpp"
 
 namespace rtcf {
-
-/// The base of a PortType that travels on ROS as `Message`; `Conversion` has `name()`,
-/// `toMessage(const T&, Message&)` and `fromMessage(const Message&, T&)`.
-template <typename T, typename Message, typename Conversion>
-struct MappedPortType : detail::MappedPortType<T, Message, Conversion> {
-    static constexpr bool kFixedSize = ros::message_traits::IsFixedSize<Message>::value;
-};
 
 namespace detail {
 

@@ -37,18 +37,18 @@ struct ArithmeticConversion {
 }  // namespace detail
 
 /// Declares an arithmetic type as a port type; ends at the end of this file.
-#define RTCF_ARITHMETIC_TYPE(TYPE, NAME, MESSAGE)                                              \
-    namespace detail {                                                                         \
-    template <>                                                                                \
-    struct ArithmeticName<TYPE> {                                                              \
-        static constexpr const char* value = NAME;                                             \
-    };                                                                                         \
-    }                                                                                          \
-    template <>                                                                                \
-    struct PortType<TYPE>                                                                      \
-        : detail::MappedPortType<TYPE, MESSAGE, detail::ArithmeticConversion<TYPE, MESSAGE>> { \
-        /* a bool is not any byte that a message may bring */                                  \
-        static constexpr bool kPlain = !std::is_same_v<TYPE, bool>;                            \
+#define RTCF_ARITHMETIC_TYPE(TYPE, NAME, MESSAGE)                                      \
+    namespace detail {                                                                 \
+    template <>                                                                        \
+    struct ArithmeticName<TYPE> {                                                      \
+        static constexpr const char* value = NAME;                                     \
+    };                                                                                 \
+    }                                                                                  \
+    template <>                                                                        \
+    struct PortType<TYPE>                                                              \
+        : MappedPortType<TYPE, MESSAGE, detail::ArithmeticConversion<TYPE, MESSAGE>> { \
+        /* a bool is not any byte that a message may bring */                          \
+        static constexpr bool kPlain = !std::is_same_v<TYPE, bool>;                    \
     }
 
 RTCF_ARITHMETIC_TYPE(bool, "bool", std_msgs::Bool);

@@ -91,16 +91,16 @@ struct MultiArray<float> {
 
 template <>
 struct PortType<Eigen::Vector3d>
-    : detail::MappedPortType<Eigen::Vector3d, geometry_msgs::Vector3, detail::Vector3Conversion> {};
+    : MappedPortType<Eigen::Vector3d, geometry_msgs::Vector3, detail::Vector3Conversion> {};
 
 template <>
 struct PortType<Eigen::Quaterniond>
-    : detail::MappedPortType<Eigen::Quaterniond, geometry_msgs::Quaternion,
-                             detail::QuaternionConversion> {};
+    : MappedPortType<Eigen::Quaterniond, geometry_msgs::Quaternion, detail::QuaternionConversion> {
+};
 
 template <>
 struct PortType<Eigen::Isometry3d>
-    : detail::MappedPortType<Eigen::Isometry3d, geometry_msgs::Pose, detail::IsometryConversion> {};
+    : MappedPortType<Eigen::Isometry3d, geometry_msgs::Pose, detail::IsometryConversion> {};
 
 /// Any other fixed-size matrix. Written to the wire by hand, since filling a
 /// MultiArray message would allocate.

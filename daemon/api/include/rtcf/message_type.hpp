@@ -148,16 +148,15 @@ struct PortType<T, std::enable_if_t<ros::message_traits::IsMessage<T>::value>> {
     }
 };
 
-namespace detail {
-
-/// A port type that travels as the ROS message `Message`. `Conversion` has
+/// The base of a PortType that travels on ROS as `Message`. `Conversion` has
 /// `name()`, `toMessage(const T&, Message&)` and `fromMessage(const Message&, T&)`, and may have
 /// `static std::vector<ByteCopy> copies()`, if copying these bytes into a default-constructed
 /// message does what toMessage() does.
 template <typename T, typename Message, typename Conversion>
 struct MappedPortType {
     using Wire = PortType<Message>;
-    static constexpr bool kFixedSize = true;
+    static constexpr bool kFixedSize = Wire::kFixedSize && std::is_trivially_destructible_v<T>;
+    static constexpr bool kBuildsMessage = !Wire::kFixedSize;
     static const char* name() { return Conversion::name(); }
     static const char* md5() { return Wire::md5(); }
     static const char* rosType() { return Wire::rosType(); }
@@ -179,9 +178,9 @@ struct MappedPortType {
         Conversion::fromMessage(wire, value);
     }
     static std::string print(const T& value) { return Wire::print(message(value)); }
-    static std::string sample() { return sampleOf<Message>(); }
+    static std::string sample() { return detail::sampleOf<Message>(); }
     static ByteCopies copies() {
-        if constexpr (HasCopies<Conversion>::value) {
+        if constexpr (detail::HasCopies<Conversion>::value) {
             return Conversion::copies();
         } else {
             return std::nullopt;
@@ -195,7 +194,5 @@ struct MappedPortType {
         return wire;
     }
 };
-
-}  // namespace detail
 
 }  // namespace rtcf

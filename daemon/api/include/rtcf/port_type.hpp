@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "rtcf/finite.hpp"
+#include "rtcf/realtime.hpp"
 #include "rtcf/slot.hpp"
 
 namespace rtcf {
@@ -53,7 +54,12 @@ struct TypeInfo {
 
     /// The value lies in memory as the message of `ros_type` does: `double` and std_msgs/Float64.
     bool plain;
-    bool fixed_size;  ///< every value has the same serialised length, and copying never allocates
+    bool fixed_size;  ///< flat, and every value has the same serialised length
+    /// The value has no memory beside its `size` bytes: these are all of it, and copying never
+    /// allocates.
+    bool flat;
+    /// length() and serialize() build a message of variable size first: they may allocate.
+    bool builds_message;
 
     /// A new slot, with a copy of the sample's value if there is one. Not real-time safe.
     std::shared_ptr<SlotHeader> (*make_slot)(const SlotHeader* sample);
@@ -62,9 +68,9 @@ struct TypeInfo {
     void (*copy)(SlotHeader& to, const SlotHeader& from);
     /// Exchanges the values, not the headers, of two slots. Real-time safe.
     void (*exchange)(SlotHeader& a, SlotHeader& b);
-    /// Serialised length in bytes. Real-time safe.
+    /// Serialised length in bytes. Real-time safe unless `builds_message`.
     std::uint32_t (*length)(const SlotHeader& slot);
-    /// Writes length() bytes. Real-time safe.
+    /// Writes length() bytes. Real-time safe unless `builds_message`.
     void (*serialize)(const SlotHeader& slot, std::uint8_t* to, std::uint32_t size);
     /// Reads a message into the slot's value; false if the bytes are not one. Not real-time safe.
     bool (*deserialize)(SlotHeader& slot, const std::uint8_t* from, std::uint32_t size);
@@ -83,10 +89,21 @@ struct TypeInfo {
 /// True if values of the two types may share a connection.
 bool sameType(const TypeInfo& a, const TypeInfo& b) noexcept;
 
+/// Where a slot's value lies. Real-time safe.
+inline const std::uint8_t* valueOf(const TypeInfo& type, const SlotHeader& slot) noexcept
+    RTCF_NONBLOCKING {
+    const std::size_t offset = (sizeof slot + type.alignment - 1) / type.alignment * type.alignment;
+    return reinterpret_cast<const std::uint8_t*>(&slot) + offset;
+}
+inline std::uint8_t* valueOf(const TypeInfo& type, SlotHeader& slot) noexcept RTCF_NONBLOCKING {
+    return const_cast<std::uint8_t*>(valueOf(type, static_cast<const SlotHeader&>(slot)));
+}
+
 /// How a type becomes a port's type; specialised in message_type.hpp,
 /// arithmetic_type.hpp and eigen_type.hpp. A specialisation has
 ///  - `static const char* name()`, `md5()`, `rosType()`, `rosMd5()`, `rosDefinition()`
-///  - `static constexpr bool kFixedSize`, and `kPlain` if the type is (TypeInfo::plain)
+///  - `static constexpr bool kFixedSize`, and `kPlain` and `kBuildsMessage` if the type is or does
+///    (TypeInfo)
 ///  - `static std::uint32_t length(const T&)`
 ///  - `static void serialize(const T&, std::uint8_t*, std::uint32_t)`
 ///  - `static void deserialize(T&, const std::uint8_t*, std::uint32_t)`, which throws on bad bytes
@@ -181,6 +198,16 @@ ByteCopies copiesOf() {
     }
 }
 
+/// What frees no memory has none of its own.
+template <typename T>
+constexpr bool kIsFlat = PortType<T>::kFixedSize || std::is_trivially_destructible_v<T>;
+
+template <typename T, typename = void>
+struct BuildsMessage : std::false_type {};
+template <typename T>
+struct BuildsMessage<T, std::void_t<decltype(PortType<T>::kBuildsMessage)>>
+    : std::bool_constant<PortType<T>::kBuildsMessage> {};
+
 template <typename T>
 std::string printSlot(const SlotHeader& slot) {
     return PortType<T>::print(static_cast<const Slot<T>&>(slot).value);
@@ -200,6 +227,8 @@ const TypeInfo& typeInfo() {
                                PortType<T>::rosDefinition(),
                                detail::IsPlain<T>::value,
                                PortType<T>::kFixedSize,
+                               detail::kIsFlat<T>,
+                               detail::BuildsMessage<T>::value,
                                &detail::makeSlot<T>,
                                &detail::copySlot<T>,
                                &detail::exchangeSlots<T>,

@@ -1,8 +1,12 @@
 // Components whose ports carry types of their own that travel as ROS messages.
+#include <std_msgs/Float64MultiArray.h>
 #include <std_msgs/Int32.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <rtcf/component.hpp>
+#include <vector>
 
 namespace rtcf_unit_test {
 
@@ -20,8 +24,46 @@ struct GearOnRos {
     }
 };
 
+// Of a size that stays, in a message that has as many elements as it likes.
+struct Scan {
+    std::uint32_t count = 0;
+    std::array<double, 50> ranges{};
+};
+// With memory of its own.
+struct Trace {
+    std::vector<double> points;
+};
+
+struct ScanOnRos {
+    static const char* name() { return "rtcf_unit_test/Scan"; }
+    static void toMessage(const Scan& value, std_msgs::Float64MultiArray& message) {
+        message.data.assign(value.ranges.begin(), value.ranges.begin() + value.count);
+    }
+    static void fromMessage(const std_msgs::Float64MultiArray& message, Scan& value) {
+        value.count = static_cast<std::uint32_t>(message.data.size());
+        std::copy(message.data.begin(), message.data.end(), value.ranges.begin());
+    }
+};
+struct TraceOnRos {
+    static const char* name() { return "rtcf_unit_test/Trace"; }
+    static void toMessage(const Trace& value, std_msgs::Float64MultiArray& message) {
+        message.data = value.points;
+    }
+    static void fromMessage(const std_msgs::Float64MultiArray& message, Trace& value) {
+        value.points = message.data;
+    }
+};
+
 }  // namespace rtcf_unit_test
 
+template <>
+struct rtcf::PortType<rtcf_unit_test::Scan>
+    : rtcf::MappedPortType<rtcf_unit_test::Scan, std_msgs::Float64MultiArray,
+                           rtcf_unit_test::ScanOnRos> {};
+template <>
+struct rtcf::PortType<rtcf_unit_test::Trace>
+    : rtcf::MappedPortType<rtcf_unit_test::Trace, std_msgs::Float64MultiArray,
+                           rtcf_unit_test::TraceOnRos> {};
 template <>
 struct rtcf::PortType<rtcf_unit_test::Gear>
     : rtcf::MappedPortType<rtcf_unit_test::Gear, std_msgs::Int32, rtcf_unit_test::GearOnRos> {};
@@ -36,6 +78,36 @@ class Gearbox final : public rtcf::Component {
     }
 };
 
+// Writes as many ranges as the cycles before it, up to 50, and tells how many it has read.
+class Scanner final : public rtcf::Component {
+    rtcf::Input<rtcf_unit_test::Scan> in{this, "in"};
+    rtcf::Output<rtcf_unit_test::Scan> scan{this, "scan"};
+    rtcf::Output<double> seen{this, "seen"};
+
+    void update() override {
+        if (in.read() == rtcf::DataStatus::New) seen.write(in.value().count);
+        rtcf_unit_test::Scan& value = scan.value();
+        value.count = static_cast<std::uint32_t>(iteration() % value.ranges.size());
+        for (std::uint32_t i = 0; i < value.count; ++i) value.ranges[i] = i;
+        scan.publish();
+    }
+};
+
+class Tracer final : public rtcf::Component {
+    rtcf::Output<rtcf_unit_test::Trace> trace{this, "trace"};
+
+    bool configure() override {
+        trace.reserve({std::vector<double>(50)});
+        return true;
+    }
+    void update() override {
+        trace.value().points.resize(iteration() % 50);
+        trace.publish();
+    }
+};
+
 }  // namespace
 
+RTCF_COMPONENT(Scanner, "Writes values whose messages have arrays")
+RTCF_COMPONENT(Tracer, "Writes values with memory of their own")
 RTCF_COMPONENT(Gearbox, "Writes values of which not every one is a message")

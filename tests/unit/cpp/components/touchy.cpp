@@ -33,8 +33,8 @@ struct FragileConversion {
 
 template <>
 struct rtcf::PortType<rtcf_unit_test::Fragile>
-    : rtcf::detail::MappedPortType<rtcf_unit_test::Fragile, std_msgs::Float64,
-                                   rtcf_unit_test::FragileConversion> {};
+    : rtcf::MappedPortType<rtcf_unit_test::Fragile, std_msgs::Float64,
+                           rtcf_unit_test::FragileConversion> {};
 
 namespace {
 

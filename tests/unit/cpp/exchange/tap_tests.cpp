@@ -6,11 +6,37 @@
 #include <atomic>
 #include <cstring>
 #include <memory>
+#include <new>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "rtcf/component.hpp"
+
+namespace rtcf::test {
+
+struct Words {
+    std::uint32_t letters = 0;
+};
+// The thread that calls the conversion; it may also throw, or be none.
+struct WordsOnRos {
+    static const char* name() { return "Words"; }
+    static void toMessage(const Words& value, std_msgs::String& message) {
+        converted_by = std::this_thread::get_id();
+        if (value.letters == 13) throw std::bad_alloc();
+        message.data.assign(value.letters, 'x');
+    }
+    static void fromMessage(const std_msgs::String& message, Words& value) {
+        value.letters = static_cast<std::uint32_t>(message.data.size());
+    }
+    static inline std::thread::id converted_by;
+};
+
+}  // namespace rtcf::test
+
+template <>
+struct rtcf::PortType<rtcf::test::Words>
+    : rtcf::MappedPortType<rtcf::test::Words, std_msgs::String, rtcf::test::WordsOnRos> {};
 
 namespace rtcf::test {
 namespace {
@@ -61,6 +87,48 @@ TEST(Tap, TellsTheStampOfTheCycleThatWroteAValue) {
             [&](const std::uint8_t*, std::uint32_t, std::int64_t stamp_ns) { told = stamp_ns; }));
         ASSERT_EQ(told, stamp);
     }
+}
+
+// Which allocates: the cycle copies the value alone.
+TEST(Tap, BuildsMessagesWhereTheyAreTaken) {
+    const auto slot = std::make_shared<Slot<Words>>();
+    Tap tap("/x", typeInfo<Words>(), slot, 1024, 64);
+    WordsOnRos::converted_by = {};
+    std::thread loop([&] {
+        for (const std::uint32_t letters : {3U, 5U}) {
+            write(slot, Words{letters});
+            tap.push(letters);
+        }
+    });
+    loop.join();
+    EXPECT_EQ(WordsOnRos::converted_by, std::thread::id());
+    std::vector<std::string> texts;
+    std::vector<std::int64_t> stamps;
+    while (tap.pop([&](const std::uint8_t* bytes, std::uint32_t size, std::int64_t stamp_ns) {
+        Slot<std_msgs::String> message;
+        ASSERT_TRUE(typeInfo<std_msgs::String>().deserialize(message, bytes, size));
+        texts.push_back(message.value.data);
+        stamps.push_back(stamp_ns);
+    })) {
+    }
+    EXPECT_EQ(WordsOnRos::converted_by, std::this_thread::get_id());
+    EXPECT_EQ(texts, (std::vector<std::string>{"xxx", "xxxxx"}));
+    EXPECT_EQ(stamps, (std::vector<std::int64_t>{3, 5}));
+}
+
+TEST(Tap, CountsMessagesThatCannotBeBuilt) {
+    const auto slot = std::make_shared<Slot<Words>>();
+    Tap tap("/x", typeInfo<Words>(), slot, 1024, 64);
+    for (const std::uint32_t letters : {13U, 100U, 1U}) {
+        write(slot, Words{letters});
+        tap.push(0);
+    }
+    std::size_t taken = 0;
+    while (tap.pop([&](const std::uint8_t*, std::uint32_t, std::int64_t) { ++taken; })) {
+    }
+    EXPECT_EQ(taken, 1U);
+    EXPECT_EQ(tap.dropped(), 1U) << "its conversion throws";
+    EXPECT_EQ(tap.tooLarge(), 1U);
 }
 
 // A topic that is closed and opened again: the old reader has not gone yet.

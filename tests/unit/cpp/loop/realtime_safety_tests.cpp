@@ -79,6 +79,27 @@ TEST_F(RealtimeSafety, QueuesBreakNoRule) {
     EXPECT_EQ(value("/C", "letters"), letters);
 }
 
+// Messages of types of a component's own have arrays, the values have none.
+TEST_F(RealtimeSafety, MappedTypesOfVariableSizeBreakNoRule) {
+    configure([](RunnerSettings& settings) { settings.whitelist = "/scan|/in"; });
+    load(definition("Scanner", "S"));
+    ComponentDefinition late = definition("Scanner", "L");
+    late.remaps = {{"in", "scan"}, {"scan", "late"}, {"seen", "late_seen"}};
+    late.breaks = {"in"};
+    load(late);
+    start();
+    for (int round = 0; round < 30; ++round) {
+        ASSERT_TRUE(runs(10));
+        onGraphThread([this] { return runner().probe("/S"); });
+        onGraphThread([this] { return runner().image(); });
+        const auto tap = bridge().tap("/scan");
+        while (tap->pop([](const std::uint8_t*, std::uint32_t, std::int64_t) {})) {
+        }
+    }
+    stop();
+    EXPECT_EQ(state(), RunnerState::Stopped);
+}
+
 TEST_F(RealtimeSafety, SteppedCyclesBreakNoRule) {
     loadFig1();
     step(5000);

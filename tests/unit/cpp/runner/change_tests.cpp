@@ -57,6 +57,27 @@ TEST_F(Change, ATypeThatDiesOfWhatIsNoneIsLoaded) {
     unload("/G");
 }
 
+TEST_F(Change, WhatCannotBePublishedWithoutAllocationIsRefused) {
+    configure([](RunnerSettings& settings) { settings.whitelist = "/trace"; });
+    startWithA();
+    const auto order_before = order();
+    const auto generation_before = generation();
+    EXPECT_EQ(refusal([&] { load(definition("Tracer", "T")); }),
+              "/T.trace cannot be published as /trace: values of rtcf_unit_test/Trace have memory "
+              "of their own, and so have messages of std_msgs/Float64MultiArray, which would be "
+              "allocated in the cycle; keep /trace off the whitelist, or keep the values in a "
+              "std::array");
+    expectUnchanged(order_before, generation_before);
+    ComponentDefinition elsewhere = definition("Tracer", "T");
+    elsewhere.remaps = {{"trace", "kept"}};
+    load(elsewhere);
+    EXPECT_TRUE(runs());
+    const std::string why =
+        refusal([&] { configure([](RunnerSettings& settings) { settings.whitelist = "/kept"; }); });
+    EXPECT_NE(why.find("/T.trace cannot be published as /kept"), std::string::npos) << why;
+    EXPECT_TRUE(runs());
+}
+
 TEST_F(Change, UnloadedComponentIsStoppedAndCleanedUpAfterItLeftTheLoop) {
     startWithA();
     load(recorder("B"));
