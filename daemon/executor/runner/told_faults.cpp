@@ -4,11 +4,12 @@
 #include <iterator>
 #include <utility>
 
+#include "common/time_units.hpp"
+
 namespace rtcf::executor {
 
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kShortest = 10 * kSecond;
 constexpr std::int64_t kLongest = 600 * kSecond;
 // One that follows so soon belongs to those before it.

@@ -23,7 +23,7 @@ struct Gains {
     std::int32_t joint;
     double gain;
 };
-enum class Mode : std::uint8_t { Idle = 0, Force = 7 };
+enum class Grip : std::uint8_t { Idle = 0, Force = 7 };
 struct Target {
     double x, y, z;
 };
@@ -230,9 +230,9 @@ TEST(AnyType, IsCopiedByteByByte) {
     EXPECT_EQ(gains.joint, 3);
     EXPECT_EQ(gains.gain, 0.5);
     EXPECT_FALSE(deserialize(Bytes(3), gains));
-    Mode mode{};
-    EXPECT_TRUE(deserialize(rtcfBytes(Mode::Force), mode));
-    EXPECT_EQ(mode, Mode::Force);
+    Grip mode{};
+    EXPECT_TRUE(deserialize(rtcfBytes(Grip::Force), mode));
+    EXPECT_EQ(mode, Grip::Force);
     std::vector<double> numbers;
     EXPECT_TRUE(deserialize(rtcfBytes(std::vector<double>{1.0, 2.0}), numbers));
     EXPECT_EQ(numbers, (std::vector<double>{1.0, 2.0}));
@@ -251,10 +251,10 @@ TEST(AnyType, IsNotOnRosAndHasItsNameFromCpp) {
 }
 
 TEST(AnyType, IsPrintedAsFarAsItTellsWhatItIs) {
-    EXPECT_EQ(PortType<Mode>::print(Mode::Force), "7");
+    EXPECT_EQ(PortType<Grip>::print(Grip::Force), "7");
     EXPECT_EQ((PortType<std::array<float, 2>>::print({0.5F, -1.0F})), "[0.5, -1]");
     EXPECT_EQ(PortType<std::string>::print("a b"), "\"a b\"");
-    EXPECT_EQ((PortType<std::array<Mode, 2>>::print({Mode::Idle, Mode::Force})), "[0, 7]");
+    EXPECT_EQ((PortType<std::array<Grip, 2>>::print({Grip::Idle, Grip::Force})), "[0, 7]");
     struct Pair {
         std::uint8_t one, two;
     };
