@@ -135,6 +135,7 @@ TEST_F(CpuClaimTest, WithoutAFolderKnowsOfNobody) {
 TEST_F(CpuClaimTest, OfManyProcessesThatComeAndGoIsOneAtATime) {
     constexpr int kProcesses = 4;
     constexpr int kClaims = 500;
+    constexpr int kNever = 2;  // exit status of who was never alone
     const int last = processCpus().back();
     // Who is alone makes a file that must not be there.
     const std::string mark = names() + "/alone";
@@ -153,13 +154,18 @@ TEST_F(CpuClaimTest, OfManyProcessesThatComeAndGoIsOneAtATime) {
             ::close(fd);
             ::unlink(mark.c_str());
         }
-        ::_exit(alone > 0 ? 0 : 2);
+        ::_exit(alone > 0 ? 0 : kNever);
     }
+    bool any = false;
     for (const pid_t child : children) {
         int status = 0;
         ASSERT_EQ(::waitpid(child, &status, 0), child);
-        EXPECT_EQ(status, 0);
+        ASSERT_TRUE(WIFEXITED(status));
+        // One may come late each time.
+        EXPECT_TRUE(WEXITSTATUS(status) == 0 || WEXITSTATUS(status) == kNever);
+        any = any || WEXITSTATUS(status) == 0;
     }
+    EXPECT_TRUE(any);
     EXPECT_TRUE(files().empty());
 }
 
