@@ -136,7 +136,8 @@ def _run(args: argparse.Namespace, output: "Output") -> int:
         except OSError:
             _drop_output()
             return _fail(f"standard output: {error.strerror}", REFUSED)
-        return _fail(error, REFUSED)
+        what = f"{error.filename}: " if error.filename is not None else ""
+        return _fail(f"{what}{error.strerror or error}", REFUSED)
     return DONE
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 import rtcf
-from daemon_process import Daemon, wait_for
+from daemon_process import Daemon, stopped, wait_for
 from fig_1 import mimo
 from rtcf.streams.events import EventStream
 from rtcf.streams.numbered import Lost, Place
@@ -103,3 +103,45 @@ def test_only_the_runners_that_are_asked_for_are_told_of(client: rtcf.Client, ru
         client.unload(["A"], runner)
         heard = until(events, lambda e: e.message.endswith("unloaded"))
     assert {each.runner for each in heard} == {runner}
+
+
+def test_a_load_is_told_before_its_parameters(client: rtcf.Client) -> None:
+    knobs = rtcf.component("rtcf_test", "Knobs", name="knobs", parameters=["rate:=2.5"])
+    with client.watch_events(["rt_runner"]) as events:
+        client.load(knobs)
+        heard = until(events, lambda each: each.kind == Event.KIND_PARAMETERS)
+        assert [each.message for each in heard] == [
+            "/knobs loaded (rtcf_test/Knobs)",
+            "/knobs: rate = 2.5 set",
+        ]
+        client.replace("knobs", rtcf.component("rtcf_test", "Knobs", parameters=["rate:=3.5"]))
+        heard = until(events, lambda each: each.kind == Event.KIND_PARAMETERS)
+        assert [each.kind for each in heard] == [Event.KIND_GRAPH, Event.KIND_PARAMETERS]
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="knows root's name only")
+def test_whoever_stops_a_loop_at_its_executor_has_a_name(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    client.load(mimo("A", {}))
+    client.start()
+    with client.watch_events(["rt_runner"]) as events:
+        with stopped(daemon.pid):
+            assert daemon.ctl("stop").returncode == 0
+        heard = until(events, lambda each: "at its executor" in each.message)
+    assert heard[-1].user == "root"
+    assert heard[-1].message.startswith("stopped at its executor by root (pid ")
+
+
+def test_values_that_are_not_finite_are_told_of_again(client: rtcf.Client) -> None:
+    client.load(
+        rtcf.component("rtcf_faults", "NotFinite", name="bad", parameters=["after:=50"])
+    )
+    with client.watch_events(["rt_runner"]) as events:
+        client.start()
+        for number in range(2):
+            heard = until(events, lambda each: each.kind == Event.KIND_COMPONENT_FAULT)[-1]
+            assert heard.component == "/bad"
+            assert "output value is not finite: readers keep its last value" in heard.message
+            assert ("times since this was told before" in heard.message) == (number == 1)
+    wait_for(lambda: len(client.list_incidents()) == 2, "an incident of each")

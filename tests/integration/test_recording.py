@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -189,6 +190,41 @@ def test_refused_and_no_file_is_touched(running: Daemon, tmp_path: Path) -> None
     assert "No such file or directory" in done.stderr
     done = running.ctl("record", "-o", str(file), "--duration", "0")
     assert done.returncode == 2
+
+
+@pytest.fixture
+def full_disk(tmp_path: Path) -> Iterator[Path]:
+    """Give a folder on a disk that takes no byte."""
+    disk = tmp_path / "full"
+    disk.mkdir()
+    mounting = ["mount", "-t", "tmpfs", "-o", "size=4k", "none", str(disk)]
+    mounted = subprocess.run(mounting, capture_output=True, text=True, check=False)
+    if mounted.returncode:
+        pytest.skip(f"may not mount here: {mounted.stderr.strip()}")
+    try:
+        (disk / "filler").write_bytes(bytes(4096))
+        yield disk
+    finally:
+        subprocess.run(["umount", "--lazy", disk], check=True)
+
+
+def test_a_disk_that_takes_nothing_is_named_and_left_as_it_was(
+    running: Daemon, full_disk: Path
+) -> None:
+    assert running.ctl("incident", "take").returncode == 0
+    full = "No space left on device"
+    for verb, what in {
+        "record --duration 0.5 -o": f"{full}: no cycle was written, and the file is removed",
+        "trace --cycles 100 -o": f" is not written: {full}",
+        "incident export --to": f" is not written: {full}",
+    }.items():
+        to = full_disk / "out"
+        done = running.ctl(*verb.split(), str(to))
+        assert done.returncode == 1, (verb, done.stderr)
+        (line,) = done.stderr.splitlines()
+        assert line.startswith(f"rtcfctl: {to}"), line
+        assert line.endswith(what), line
+        assert [each.name for each in full_disk.iterdir()] == ["filler"], verb
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="a disk of its own takes root")

@@ -1,5 +1,6 @@
 """Recordings in one file, or in several of a bounded size or time each."""
 
+import contextlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO, TypeVar
@@ -8,6 +9,7 @@ from rtcf_shared.errors import RtcfError
 
 from rtcf.closing import Closing
 from rtcf.recording.mcap_writer import McapWriter
+from rtcf.recording.reader import read_recording
 from rtcf.recording.recorder import Recorder
 from rtcf.streams.ports import PortBatch
 
@@ -99,9 +101,25 @@ class Files(Closing):
         try:
             return work()
         except OSError as error:
-            raise RtcfError(
-                f"{self.paths[-1]}: {error.strerror}: what was written before can be read"
-            ) from None
+            raise RtcfError(f"{self.paths[-1]}: {error.strerror}: {self._left()}") from None
+
+    def _left(self) -> str:
+        """Say what is left of a file that the disk takes no more of; an empty one is removed."""
+        path = self.paths[-1]
+        with contextlib.suppress(OSError):
+            self._file.close()
+        if not path.is_file() or _has_cycles(path):
+            return "what was written before can be read"
+        path.unlink(missing_ok=True)
+        return "no cycle was written, and the file is removed"
+
+
+def _has_cycles(path: Path) -> bool:
+    try:
+        with read_recording(path) as recording:
+            return len(recording.cycles) > 0
+    except (OSError, RtcfError, ValueError):
+        return False
 
 
 def _opened(path: Path, force: bool) -> BinaryIO:

@@ -69,9 +69,16 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         output.data(runners)
 
 
+def _named(args: argparse.Namespace) -> str:
+    """Return the runner that a line names, in one place or the other."""
+    if args.runner and args.name and args.runner != args.name:
+        raise ValueError(f"-r {args.runner} and {args.name}: name one runner")
+    return str(args.name or args.runner)
+
+
 def add_runner(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Add a runner."""
-    status = client.add_runner(args.name, settings_of(args), output.progress)
+    status = client.add_runner(_named(args), settings_of(args), output.progress)
     _changed(output, f"runner {status.runner} added", status)
 
 
@@ -80,19 +87,19 @@ def set_runner(client: rtcf.Client, args: argparse.Namespace, output: Output) ->
     settings = settings_of(args)
     if not settings.ListFields():
         raise ValueError("runner set: no setting named; see `rtcfctl runner set --help`")
-    status = client.set_runner(settings, args.name or args.runner, output.progress)
+    status = client.set_runner(settings, _named(args), output.progress)
     _changed(output, f"runner {status.runner} set", status)
 
 
 def restart_runner(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Restart a runner's executor."""
-    status = client.restart_runner(args.name, output.progress)
+    status = client.restart_runner(_named(args), output.progress)
     _changed(output, f"runner {status.runner} restarted", status)
 
 
 def remove_runner(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Remove a runner."""
-    client.remove_runner(args.name, output.progress)
+    client.remove_runner(_named(args), output.progress)
     if output.for_people:
         print(f"runner {args.name} removed")
     else:

@@ -1,13 +1,16 @@
 """`rtcfctl incident`: what ran just before faults, as files of rtcfd."""
 
 import argparse
+import contextlib
 import json
 import shutil
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import rtcf
 from rtcf.v1 import incidents_pb2
@@ -77,11 +80,11 @@ def show_all(client: rtcf.Client, args: argparse.Namespace, output: Output) -> N
 
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Print what happened."""
-    with tempfile.NamedTemporaryFile(suffix=".mcap") as file:
-        incident = client.get_incident(file, args.name)
-        file.flush()
-        with rtcf.read_recording(file.name) as recording:
-            told = _told(incident, recording)
+    with (
+        _received(client, args.name) as (incident, file),
+        rtcf.read_recording(file.name) as recording,
+    ):
+        told = _told(incident, recording)
     if output.for_people:
         _print(told, output)
     else:
@@ -90,21 +93,39 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 def export(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Copy the file."""
-    with tempfile.TemporaryFile() as received:
-        incident = client.get_incident(received, args.name)
-        received.seek(0)
+    with _received(client, args.name) as (incident, received):
         to = args.to or Path(f"{incident.name}.mcap")
         try:
             with whole_file(to) as part, part.open("wb") as file:
                 shutil.copyfileobj(received, file)
         except FileExistsError:
             raise ValueError(f"{to} is there already: name another file with --to") from None
+        except (FileNotFoundError, NotADirectoryError, PermissionError) as error:
+            raise ValueError(f"{to}: {error.strerror}") from None
         except OSError as error:
-            raise ValueError(f"{to}: {error.strerror or error}") from None
+            raise rtcf.RtcfError(f"{to} is not written: {error.strerror or error}") from None
     if output.for_people:
         output.line(f"{incident.name} in {to}")
     else:
         output.data({"incident": incident.name, "file": str(to)})
+
+
+@contextmanager
+def _received(
+    client: rtcf.Client, name: str
+) -> Iterator[tuple[incidents_pb2.Incident, IO[bytes]]]:
+    """Give an incident and its file, as a temporary one."""
+    with contextlib.ExitStack() as stack:
+        try:
+            received = stack.enter_context(tempfile.NamedTemporaryFile(suffix=".mcap"))
+            incident = client.get_incident(received, name)
+            received.flush()
+            received.seek(0)
+        except OSError as error:
+            raise rtcf.RtcfError(
+                f"an incident takes room in {tempfile.gettempdir()}: {error.strerror or error}"
+            ) from None
+        yield incident, received
 
 
 def remove(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:

@@ -62,6 +62,8 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
                 raise
     except FileExistsError:
         raise ValueError(f"{args.file} is there already: --force writes over it") from None
+    except OSError as error:
+        raise rtcf.RtcfError(f"{args.file} is not written: {error.strerror or error}") from None
     _tell(trace, args, output)
     if error is not None:
         raise error

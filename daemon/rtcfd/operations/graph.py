@@ -40,8 +40,8 @@ async def load(
         result = (await runner.ask(request, progress)).change
         runner.left_out.pop(result.component, None)
         runner.desired.put(result.component, spec)
-        parameters.note(runner, result.component, spec.parameters, {}, acting, "load")
         runner.happened(_Event.KIND_GRAPH, f"{result.component} loaded ({what})", result.component)
+        parameters.note(runner, result.component, spec.parameters, {}, acting, "load")
         return await _saved(runner, result)
 
     what = f"{spec.package}/{spec.type}"
@@ -141,7 +141,7 @@ async def replace(
         result = (await runner.ask(asked, progress)).change
         known = runner.desired.components.get(old, graph_pb2.ComponentSpec()).parameters
         values = {each.name: each.value for each in known}
-        parameters.note(runner, result.component, spec.parameters, values, acting, "replace")
+        given = list(spec.parameters)
         spec.parameters.extend(result.kept)
         runner.left_out.pop(old, None)
         runner.desired.drop([old])
@@ -149,6 +149,7 @@ async def replace(
         runner.happened(
             _Event.KIND_GRAPH, f"{old} replaced by {result.component} ({what})", result.component
         )
+        parameters.note(runner, result.component, given, values, acting, "replace")
         return await _saved(runner, result)
 
     what = f"{package}/{type_name}"

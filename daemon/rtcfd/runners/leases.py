@@ -116,12 +116,10 @@ class Leases:
                 result = (await runner.ask(load, outbox.progress)).change
                 runner.desired.put(name, spec)
                 holder = request.holder or "a lease"
-                parameters.note(runner, name, spec.parameters, {}, None, "launch", holder)
                 runner.happened(
-                    control_pb2.Event.KIND_GRAPH,
-                    f"{name} loaded ({what}) for {request.holder or 'a lease'}",
-                    name,
+                    control_pb2.Event.KIND_GRAPH, f"{name} loaded ({what}) for {holder}", name
                 )
+                parameters.note(runner, name, spec.parameters, {}, None, "launch", holder)
             except BaseException:
                 self._outboxes.pop(name, None)
                 # Left to the next rtcfd, the executor may load it yet: then it is still leased.

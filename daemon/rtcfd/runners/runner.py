@@ -260,11 +260,6 @@ class Runner(RunnerCore):
         self.loop.stopped_at_ns = stop.at_ns
         self.loop.stop()
         self.loop.told(False)
-        self.happened(
-            control_pb2.Event.KIND_RUNNER_STATE,
-            f"stopped at its executor by user {stop.uid} (pid {stop.pid})",
-            user=f"#{stop.uid}",
-        )
         self.operations.withdraw(
             "the loop was stopped at its executor", errors_pb2.REASON_LOOP_STOPPED, only_cycles=True
         )
@@ -272,11 +267,17 @@ class Runner(RunnerCore):
         self.operations.in_background("noting a stop", self._note_direct_stop(stop))
 
     async def _note_direct_stop(self, stop: wire.DirectStop) -> None:
-        await self.save()
+        self.saver.begin()
         who = await self.shared.name_of(stop.uid)
+        self.happened(
+            control_pb2.Event.KIND_RUNNER_STATE,
+            f"stopped at its executor by {who} (pid {stop.pid})",
+            user=who,
+        )
         self.log.warning(
             "loop stopped at its executor by %s (uid %d, pid %d)", who, stop.uid, stop.pid
         )
+        await self.save()  # what goes wrong shows in the status
 
     def parameters_changed(self, changed: wire.ParametersChanged) -> None:
         """A peer on ROS has changed parameters of a component."""

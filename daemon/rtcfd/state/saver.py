@@ -91,5 +91,6 @@ class Saver:
             await self._disk.do(self._disk.store.remove, self._desired.runner)
         except OSError as error:
             self._log.error("its state stays on disk: %s", error.strerror)
+            await self._disk.note_stop(self._desired.runner)
             return f"not removed: {error.strerror}"
         return ""

@@ -64,6 +64,14 @@ class Machine:
 
         monkeypatch.setattr(Link, "connect", classmethod(remember))
 
+    async def kill_all(self) -> None:
+        """End all executors at once."""
+        processes = list(self.peers.values())
+        for each in processes:
+            each.signal(signal.SIGKILL)
+        for each in processes:
+            await each.wait()
+
     def popen(self, arguments: list[str], **_: Any) -> "PeerProcess":
         return PeerProcess(self, arguments[2], arguments[4])
 
@@ -148,7 +156,7 @@ class Rtcfd:
         sockets = folder / "executors"
         sockets.mkdir(exist_ok=True, parents=True)
         catalog = Catalog([Folder(packages)], _Descriptions(packages))
-        self.store = Store(self.state)
+        self.store = Store(self.state, sockets)
         self.store.prepare()
         defaults = runner_settings.defaults(runner_pb2.REALTIME_PREFERRED)
 
@@ -189,15 +197,16 @@ class Rtcfd:
         for runner in self.runners.all():
             await_holder(self.runners, runner)
 
-    async def call(self, method: str, request: Any) -> None:
-        """Make a call and read all its answers; cancelled as gRPC does when its caller leaves."""
+    async def call(self, method: str, request: Any) -> Any:
+        """Make a call and return its last answer; cancelled as gRPC does when its caller leaves."""
         answers = getattr(self.control, method)(request, Context())
         if not hasattr(answers, "__aiter__"):
-            await answers
-            return
+            return await answers
+        last = None
         async with contextlib.aclosing(answers) as stream:
-            async for _ in stream:
+            async for last in stream:
                 pass
+        return last
 
     async def hold(self, method: str, opening: Any, opened: asyncio.Event) -> None:
         """Make a call that lasts; `opened` is set when what it asks for is there."""

@@ -1,7 +1,8 @@
 """Random sequences of what people do to rtcfd, compared with what they may rely on.
 
-After an answered stop no cycle runs until somebody asks for a start; nothing is
-held by the dead; and the disk says what was answered.  A few dozen sequences are
+After an answered stop no cycle runs until somebody asks for a start, whatever the
+disk and the clock do meanwhile; nothing is held by the dead; and the disk says what
+was answered.  A few dozen sequences are
 drawn by each run; `--long` draws 10 000, or as many as RTCF_SEQUENCES says.
 Sequences depend on the seed alone (RTCF_SEED, 1 if there is none), besides those that failed before
 and are kept.
@@ -13,15 +14,18 @@ import json
 import os
 import shutil
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 from daemon_under_test import DEADLINE_S
+from failing_disk import MODES, FailingDisk
 from hypothesis import HealthCheck, Phase, example, given, seed, settings
 from hypothesis import strategies as st
 from rtcf.v1 import control_pb2, runner_pb2
-from rtcfd.runners import held_runners, leases
+from rtcfd.runners import held_runners, leases, runner
+from rtcfd.state import saver
 from rtcfd_in_process import Machine, Refused, Rtcfd, quiet, spec
 
 SEED = int(os.environ.get("RTCF_SEED", "1"))
@@ -36,7 +40,10 @@ actions = st.one_of(
         st.sampled_from(["Load", "Unload", "LeaseComponent"]), runners, st.sampled_from(NAMES)
     ),
     st.tuples(st.sampled_from(["Apply", "HoldRunner"]), runners),
-    st.tuples(st.sampled_from(["SIGTERM", "SIGUSR1"])),
+    # SIGKILL is of rtcfd and all executors at once.
+    st.tuples(st.sampled_from(["SIGTERM", "SIGUSR1", "SIGKILL"])),
+    st.tuples(st.just("disk"), st.sampled_from(MODES)),
+    st.tuples(st.just("clock"), st.sampled_from([-3600.0, 3600.0, 1e9])),
 )
 # What the caller does: waits for the answer, goes on meanwhile, or leaves so many steps later.
 callers = st.one_of(st.just("waits"), st.just("goes on"), st.integers(0, 30))
@@ -46,8 +53,9 @@ steps = st.tuples(actions, callers, st.integers(0, 5))
 class Sequence:
     """One sequence: rtcfd, those who call it, and what they may rely on."""
 
-    def __init__(self, folder: Path, packages: Path, machine: Machine) -> None:
+    def __init__(self, folder: Path, packages: Path, machine: Machine, world: "World") -> None:
         self._folder, self._packages, self._machine = folder, packages, machine
+        self._world = world
         self._callers: set[asyncio.Task[None]] = set()
         # Runners whose last word was an answered stop.
         self._stopped: set[str] = set(RUNNERS)
@@ -62,8 +70,11 @@ class Sequence:
             await self._take(action, caller)
             if watching.done():
                 break
+        self._world.disk.become("well")
         await self._let_all_go()
         await self._quiet()
+        for runner in self.rtcfd.runners.all():
+            assert await runner.saver.begin() == ""
         watching.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await watching
@@ -74,8 +85,14 @@ class Sequence:
             assert saved is None or saved["running"] is False
 
     async def _take(self, action: Any, caller: Any) -> None:
-        if action[0] in ("SIGTERM", "SIGUSR1"):
+        if action[0] in ("SIGTERM", "SIGUSR1", "SIGKILL"):
             await self._restart(action[0])
+            return
+        if action[0] == "disk":
+            self._world.disk.become(action[1])
+            return
+        if action[0] == "clock":
+            self._world.clock_s += action[1]
             return
         task = asyncio.create_task(self._call(*action))
         self._callers.add(task)
@@ -96,11 +113,12 @@ class Sequence:
                 await rtcfd.call("Start", control_pb2.StartRequest(runner=runner))
             elif method == "Stop":
                 starts = self._starts[runner]
-                await rtcfd.call("Stop", control_pb2.StopRequest(runner=runner))
+                answer = await rtcfd.call("Stop", control_pb2.StopRequest(runner=runner))
                 if starts == self._starts[runner]:
                     self._stopped.add(runner)
                     saved = rtcfd.saved(runner)
-                    assert saved is None or not saved["running"], "a stop is on disk"
+                    told = any(note.startswith("not saved") for note in answer.result.notes)
+                    assert told or saved is None or not saved["running"], "a stop is on disk"
             elif method == "Load":
                 request: Any = control_pb2.LoadRequest(runner=runner, component=spec(name))
                 await rtcfd.call("Load", request)
@@ -131,9 +149,14 @@ class Sequence:
         if number == "SIGTERM":
             await self.rtcfd.runners.close(in_order=True)
             self._stopped |= set(RUNNERS)
+        elif number == "SIGKILL":
+            self._world.disk.become("dead")  # what is not on disk never will be
+            await self.rtcfd.runners.leave()
+            await self._machine.kill_all()
         else:
             await self.rtcfd.runners.leave()
         await self._let_all_go()
+        self._world.disk.next_life()
         self.rtcfd = Rtcfd(self._folder, self._packages, self._machine)
         await self.rtcfd.start()
 
@@ -168,7 +191,8 @@ class Sequence:
             saved, peer = self.rtcfd.saved(name), self.rtcfd.peer(name)
             known = name in [runner.name for runner in self.rtcfd.runners.all()]
             assert (peer is not None) == known
-            if name == "arm":
+            # What a bad disk did not remove comes back with the next rtcfd, held.
+            if name == "arm" and not self._world.disk.ever_bad:
                 assert (saved is not None) == known, "a runner is on disk, or is not there"
             if saved is None or peer is None:
                 continue
@@ -191,6 +215,32 @@ def place() -> Any:
     shutil.rmtree(folder)
 
 
+class World:
+    """What is below rtcfd: a disk that may fail, and a clock that may jump."""
+
+    def __init__(self) -> None:
+        self.disk = FailingDisk()
+        self.clock_s = 0.0
+
+    def install(self, monkeypatch: Any) -> None:
+        self.disk.install(monkeypatch)
+        now_s, now_ns = time.time, time.time_ns
+        monkeypatch.setattr(time, "time", lambda: now_s() + self.clock_s)
+        monkeypatch.setattr(time, "time_ns", lambda: now_ns() + int(self.clock_s) * 10**9)
+
+
+@pytest.fixture(scope="module")
+def world() -> Any:
+    world = World()
+    with pytest.MonkeyPatch.context() as patch:
+        world.install(patch)
+        # A disk that hangs is soon taken for one.
+        patch.setattr(saver, "PATIENCE_S", 0.02)
+        patch.setattr(runner, "LEAVE_TIMEOUT_S", 0.1)
+        yield world
+        world.disk.next_life()
+
+
 @pytest.fixture(scope="module")
 def machine() -> Any:
     machine = Machine()
@@ -207,12 +257,14 @@ def machine() -> Any:
         logging.disable(logging.NOTSET)
 
 
-def play(sequence: list[Any], place: Path, machine: Machine) -> None:
+def play(sequence: list[Any], place: Path, machine: Machine, world: World) -> None:
     folder = Path(tempfile.mkdtemp(dir=place))
+    world.disk.begin(folder / "state")
+    world.clock_s = 0.0
 
     async def run() -> None:
         machine.peers.clear()
-        await Sequence(folder, place / "lib", machine).play(sequence)
+        await Sequence(folder, place / "lib", machine, world).play(sequence)
 
     asyncio.run(run())
     shutil.rmtree(folder)
@@ -236,11 +288,21 @@ def drawn(number: int) -> Any:
 
 # A start that comes while a launch's runner is being given back.
 @example(sequence=[(("HoldRunner", "rt_runner"), 3, 0), (("Start", "rt_runner"), "waits", 0)])
+# A stop that a disk which hangs does not take, and the end of everything.
+@example(
+    sequence=[
+        (("AddRunner", "arm"), "waits", 0),
+        (("Start", "arm"), "waits", 0),
+        (("disk", "hangs"), "waits", 0),
+        (("Stop", "arm"), "waits", 0),
+        (("SIGKILL",), "waits", 0),
+    ]
+)
 @drawn(40)  # type: ignore[misc]
 def test_random_sequences_keep_what_is_promised(
-    place: Path, machine: Machine, sequence: list[Any]
+    place: Path, machine: Machine, world: World, sequence: list[Any]
 ) -> None:
-    play(sequence, place, machine)
+    play(sequence, place, machine, world)
 
 
 @pytest.mark.long
@@ -248,6 +310,6 @@ def test_random_sequences_keep_what_is_promised(
     int(os.environ.get("RTCF_SEQUENCES", "10000"))
 )
 def test_ten_thousand_random_sequences_keep_what_is_promised(
-    place: Path, machine: Machine, sequence: list[Any]
+    place: Path, machine: Machine, world: World, sequence: list[Any]
 ) -> None:
-    play(sequence, place, machine)
+    play(sequence, place, machine, world)

@@ -316,3 +316,18 @@ def test_output_that_finds_no_room_is_said_in_a_line(daemon: DaemonUnderTest, wo
         )
     said = "rtcfctl: standard output: No space left on device\n"
     assert (done.returncode, done.stderr) == (1, said)
+
+
+@pytest.mark.parametrize(
+    "line", ["restart rt_runner", "remove rt_runner", "set rt_runner --frequency 7", "add rt_runner"]
+)
+def test_a_line_names_one_runner(daemon: DaemonUnderTest, line: str) -> None:
+    pid = daemon.executor_pid()
+    for runner in ("nope", "nope --socket " + str(daemon.socket)):
+        done = daemon.ctl("-r", *runner.split(), "runner", *line.split())
+        assert (done.returncode, done.stderr) == (
+            2,
+            "rtcfctl: -r nope and rt_runner: name one runner\n",
+        )
+    assert daemon.executor_pid() == pid
+    assert daemon.ctl("-r", "rt_runner", "runner", "restart", "rt_runner").returncode == 0

@@ -1,0 +1,90 @@
+"""A disk below rtcfd's states that hangs, is full or is read-only for a while."""
+
+import errno
+import os
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rtcf_shared import durable
+from rtcfd.common import regular_files
+from rtcfd.state import store
+
+MODES = ("well", "hangs", "full", "read-only")
+_LONGEST_S = 60.0  # of a hang, in a test
+
+
+class FailingDisk:
+    """What rtcfd's threads write goes through it; reading, and other folders, do not."""
+
+    def __init__(self) -> None:
+        self.ever_bad = False
+        self._folder = Path("/nowhere")
+        self._mode = "well"
+        self._life = 0  # of rtcfd: what an earlier one has not written is never written
+        self._changed = threading.Condition()
+
+    def begin(self, folder: Path) -> None:
+        """Stand below another folder, and work."""
+        self.next_life()
+        self._folder = folder
+        self.become("well")
+        self.ever_bad = False
+
+    def become(self, mode: str) -> None:
+        """From here on, behave so, one of MODES; or "dead": nothing is written in this life."""
+        with self._changed:
+            self._mode = mode
+            self.ever_bad |= mode != "well"
+            self._changed.notify_all()
+
+    def next_life(self) -> None:
+        """The rtcfd of now is no more; the next one begins with a disk that answers."""
+        with self._changed:
+            self._life += 1
+            if self._mode in ("hangs", "dead"):
+                self._mode = "well"
+            self._changed.notify_all()
+
+    def install(self, monkeypatch: Any) -> None:
+        """Stand between the store and its folder."""
+        monkeypatch.setattr(store, "durable", self)
+        monkeypatch.setattr(store, "regular_files", self)
+        unmark, remove = store._unmark, store.Store.remove
+        monkeypatch.setattr(store, "_unmark", lambda mark: self._do(mark, lambda: unmark(mark)))
+
+        def remove_all(of: store.Store, runner: str) -> None:
+            self._do(self._folder / runner, lambda: remove(of, runner))
+
+        monkeypatch.setattr(store.Store, "remove", remove_all)
+
+    # As durable and regular_files, of which the store uses no more.
+
+    def replace(self, file: Path, data: bytes, *, sync: bool = True) -> None:
+        self._do(file, lambda: durable.replace(file, data, sync=sync), room=True)
+
+    def sync_folder(self, folder: Path) -> None:
+        self._do(folder / "any", lambda: durable.sync_folder(folder))
+
+    def append(self, file: Path, data: bytes) -> None:
+        self._do(file, lambda: regular_files.append(file, data), room=True)
+
+    read_bytes = staticmethod(regular_files.read_bytes)
+    read_text = staticmethod(regular_files.read_text)
+
+    def _do(self, file: Path, work: Callable[[], None], room: bool = False) -> None:
+        if file.parent != self._folder:
+            work()
+            return
+        with self._changed:
+            life = self._life
+            assert self._changed.wait_for(
+                lambda: self._mode != "hangs" or self._life != life, _LONGEST_S
+            )
+            if self._life != life or self._mode == "dead":
+                raise OSError(errno.EIO, os.strerror(errno.EIO))
+            for mode, number in (("full", errno.ENOSPC), ("read-only", errno.EROFS)):
+                if self._mode == mode and (room or mode == "read-only"):
+                    raise OSError(number, os.strerror(number))
+            work()
