@@ -25,6 +25,7 @@ void Subjects::detach() {
 }
 
 void Subjects::configure(const executor::BridgeSettings& settings) {
+    publishing_.configure(settings);
     reconfiguring_.refuseOutOfRange(settings.refuse_out_of_range);
 }
 
@@ -53,8 +54,6 @@ void Subjects::show(executor::BridgeStatus& status) const {
     if (status.problem.empty()) status.problem = reconfiguring_.problem();
 }
 
-void Subjects::prepare(const executor::BridgeSettings& settings) { publishing_.prepare(settings); }
-
 Reconciled Subjects::reconcile(MasterLink& link, const executor::BridgeSettings& settings) {
     open_ = true;
     if (refusals_ == nullptr) refusals_ = std::make_unique<Refusals>();
@@ -68,7 +67,7 @@ Reconciled Subjects::reconcile(MasterLink& link, const executor::BridgeSettings&
     const bool operates = settings.peers >= executor::Right::Operate;
     reconfiguring_.allow(settings.peers >= executor::Right::Tune);
     const Reconciled topics =
-        publishing_.reconcile(handle, settings) &
+        publishing_.reconcile(handle) &
         subscribing_.reconcile(handle, operates && link.simulated().value_or(false), operates);
     ParallelCalls master = link.calls();
     return topics & reconfiguring_.reconcile(handle, master, link.caller());

@@ -46,8 +46,8 @@ class Subjects {
     void end() { reconfiguring_.end(); }
     /// @}
 
-    /// Makes ready for what is to be opened once there is a node.
-    void prepare(const executor::BridgeSettings& settings);
+    /// Forgets what is closed and not wanted any more.
+    void tidy() { publishing_.tidy(); }
     /// Opens and closes until it is what is wanted. The node is up.
     Reconciled reconcile(MasterLink& link, const executor::BridgeSettings& settings);
     /// What can be done without a master.

@@ -1,11 +1,11 @@
 #include "ros/topics/publishing.hpp"
 
 #include <chrono>
+#include <iterator>
 #include <limits>
 #include <set>
 #include <utility>
 
-#include "names/name_pattern.hpp"
 #include "ros/threads/quiet_thread.hpp"
 #include "ros/transport/idle_subscribers.hpp"
 
@@ -15,25 +15,20 @@ namespace {
 
 constexpr int kMost = 1000;  // a tap that fills as fast as it is emptied starves no other
 
-// What settings say of each topic.
-class Deliveries {
-   public:
-    explicit Deliveries(const executor::BridgeSettings& settings)
-        : queue_(settings.queue),
-          latched_("latch", settings.latch),
-          stamped_("stamped", settings.stamped) {}
-
-    Delivery of(const std::string& topic) const {
-        return {queue_, latched_.matches(topic), stamped_.matches(topic)};
-    }
-
-   private:
-    std::uint32_t queue_;
-    executor::NamePattern latched_;
-    executor::NamePattern stamped_;
-};
-
 }  // namespace
+
+Publishing::Deliveries::Deliveries(const executor::BridgeSettings& settings)
+    : queue_(settings.queue),
+      latched_("latch", settings.latch),
+      stamped_("stamped", settings.stamped) {}
+
+Delivery Publishing::Deliveries::of(const std::string& topic) const {
+    return {queue_, latched_.matches(topic), stamped_.matches(topic)};
+}
+
+Publishing::Key Publishing::keyOf(const executor::Tap& tap) {
+    return {tap.topic(), tap.type().ros_type, tap.type().ros_md5};
+}
 
 Publishing::Publishing(std::function<void(const std::string&)> warn) : warn_(std::move(warn)) {
     thread_ = quietThread("ros-publish", [this] { run(); });
@@ -48,65 +43,66 @@ Publishing::~Publishing() {
     thread_.join();
 }
 
+void Publishing::configure(const executor::BridgeSettings& settings) {
+    Deliveries deliveries(settings);
+    {
+        const std::lock_guard lock(mutex_);
+        deliveries_ = std::move(deliveries);
+        for (const auto& [key, publisher] : publishers_)
+            publisher->setDelivery(deliveries_->of(std::get<0>(key)));
+        makeReady();
+    }
+    changed_.notify_all();
+}
+
 void Publishing::setTaps(Taps taps) {
     {
         const std::lock_guard lock(mutex_);
         taps_ = std::move(taps);
+        makeReady();
         ++generation_;
     }
     changed_.notify_all();
 }
 
-void Publishing::prepare(const executor::BridgeSettings& settings) {
-    const Deliveries deliveries(settings);
-    const std::lock_guard lock(mutex_);
-    bool any = false;
+// A value may be written before the watch thread looks at the master: there is a publisher to keep
+// it from the beginning.
+void Publishing::makeReady() {
+    if (!deliveries_) return;
     for (const auto& tap : taps_) {
-        std::shared_ptr<TopicPublisher>& publisher = publishers_[tap->topic()];
+        std::shared_ptr<TopicPublisher>& publisher = publishers_[keyOf(*tap)];
         if (publisher != nullptr) continue;
         publisher = std::make_shared<TopicPublisher>(tap->topic(), tap->type(),
-                                                     deliveries.of(tap->topic()));
-        any = true;
+                                                     deliveries_->of(tap->topic()));
+        ++generation_;
     }
-    if (!any) return;
-    ++generation_;
-    changed_.notify_all();
 }
 
-Reconciled Publishing::reconcile(ros::NodeHandle& handle,
-                                 const executor::BridgeSettings& settings) {
-    const Deliveries deliveries(settings);
+Reconciled Publishing::reconcile(ros::NodeHandle& handle) {
     Publishers opening;
     Publishers closing;
     {
         const std::lock_guard lock(mutex_);
-        std::map<std::string, std::shared_ptr<TopicPublisher>> wanted;
+        std::set<Key> wanted;
         for (const auto& tap : taps_) {
             // Several outputs may write one topic.
-            if (wanted.count(tap->topic()) != 0) continue;
-            const Delivery delivery = deliveries.of(tap->topic());
-            const auto found = publishers_.find(tap->topic());
-            if (found != publishers_.end() && found->second->serves(tap->type()) &&
-                found->second->delivery() == delivery) {
-                wanted[tap->topic()] = found->second;
-                if (found->second->isDue()) opening.push_back(found->second);
-                continue;
-            }
-            auto publisher = std::make_shared<TopicPublisher>(tap->topic(), tap->type(), delivery);
-            if (found != publishers_.end()) publisher->inherit(*found->second);
-            wanted[tap->topic()] = publisher;
-            opening.push_back(std::move(publisher));
+            const Key key = keyOf(*tap);
+            if (!wanted.insert(key).second) continue;
+            const std::shared_ptr<TopicPublisher>& publisher = publishers_.at(key);
+            const bool outdated = publisher->isOutdated();
+            if (outdated) closing.push_back(publisher);
+            if (outdated || publisher->isDue()) opening.push_back(publisher);
         }
-        for (const auto& [topic, publisher] : publishers_) {
-            const auto found = wanted.find(topic);
-            if (found == wanted.end() || found->second != publisher) closing.push_back(publisher);
+        for (auto each = publishers_.begin(); each != publishers_.end();) {
+            const bool stays = wanted.count(each->first) != 0;
+            if (!stays) closing.push_back(each->second);
+            each = stays ? std::next(each) : publishers_.erase(each);
         }
         if (opening.empty() && closing.empty()) return Reconciled::Done;
-        publishers_ = std::move(wanted);
         ++generation_;
     }
     changed_.notify_all();
-    // Without the lock: peers come and go. A topic that changes its type closes first.
+    // Without the lock: peers come and go.
     close(closing);
     Reconciled result = Reconciled::Done;
     for (const auto& publisher : opening) {
@@ -116,12 +112,22 @@ Reconciled Publishing::reconcile(ros::NodeHandle& handle,
     return result;
 }
 
+void Publishing::tidy() {
+    const std::lock_guard lock(mutex_);
+    std::set<Key> wanted;
+    for (const auto& tap : taps_) wanted.insert(keyOf(*tap));
+    for (auto each = publishers_.begin(); each != publishers_.end();) {
+        const bool stays = wanted.count(each->first) != 0 || each->second->isOpen();
+        each = stays ? std::next(each) : publishers_.erase(each);
+    }
+}
+
 void Publishing::closeAll() {
     Publishers closing;
     {
         // They stay, with the last messages of those that are latched.
         const std::lock_guard lock(mutex_);
-        for (const auto& [topic, publisher] : publishers_) closing.push_back(publisher);
+        for (const auto& [key, publisher] : publishers_) closing.push_back(publisher);
     }
     close(closing);
 }
@@ -143,18 +149,19 @@ void Publishing::close(const Publishers& closing) {
 std::uint32_t Publishing::open() const {
     const std::lock_guard lock(mutex_);
     std::uint32_t count = 0;
-    for (const auto& [topic, publisher] : publishers_) count += publisher->isOpen() ? 1 : 0;
+    for (const auto& [key, publisher] : publishers_) count += publisher->isOpen() ? 1 : 0;
     return count;
 }
 
 std::string Publishing::problem() const {
     const std::lock_guard lock(mutex_);
-    for (const auto& [topic, publisher] : publishers_) {
+    for (const auto& [key, publisher] : publishers_) {
         if (!publisher->problem().empty()) return publisher->problem();
     }
-    for (const auto& [topic, publisher] : publishers_) {
+    for (const auto& [key, publisher] : publishers_) {
         if (publisher->lost() != 0)
-            return topic + ": messages were lost, as too much waits for slow subscribers";
+            return std::get<0>(key) +
+                   ": messages were lost, as too much waits for slow subscribers";
     }
     return {};
 }
@@ -162,10 +169,8 @@ std::string Publishing::problem() const {
 std::vector<Publishing::Stream> Publishing::streams() const {
     std::vector<Stream> streams;
     for (const auto& tap : taps_) {
-        const auto found = publishers_.find(tap->topic());
-        // Until reconcile() replaces it, a publisher of another type must not get the bytes.
-        const bool fits = found != publishers_.end() && found->second->serves(tap->type());
-        streams.push_back({tap, fits ? found->second : nullptr});
+        const auto found = publishers_.find(keyOf(*tap));
+        if (found != publishers_.end()) streams.push_back({tap, found->second});
     }
     return streams;
 }
@@ -173,7 +178,7 @@ std::vector<Publishing::Stream> Publishing::streams() const {
 void Publishing::drain(const Stream& stream, int most) {
     const auto use = [&stream](const std::uint8_t* bytes, std::uint32_t size,
                                std::int64_t stamp_ns) {
-        if (stream.publisher) stream.publisher->publish(bytes, size, stamp_ns);
+        stream.publisher->publish(bytes, size, stamp_ns);
     };
     for (int i = 0; i < most && stream.tap->pop(use); ++i) {
     }

@@ -12,12 +12,17 @@ namespace rtcf::ros1 {
 TopicPublisher::TopicPublisher(std::string topic, const TypeInfo& type, Delivery delivery)
     : topic_(std::move(topic)),
       type_{type.ros_type, type.ros_md5, type.ros_definition},
-      delivery_(delivery),
-      stamped_(delivery.stamped ? stampedType(type_.name) : nullptr),
-      departures_(delivery.latch) {}
+      delivery_(delivery) {}
 
-bool TopicPublisher::serves(const TypeInfo& type) const {
-    return type_.name == type.ros_type && type_.md5 == type.ros_md5;
+void TopicPublisher::setDelivery(const Delivery& delivery) {
+    const std::lock_guard lock(mutex_);
+    delivery_ = delivery;
+    if (!delivery.latch) kept_.reset();
+}
+
+bool TopicPublisher::isOutdated() const {
+    const std::lock_guard lock(mutex_);
+    return publisher_ && !(opened_ == delivery_);
 }
 
 bool TopicPublisher::isOpen() const {
@@ -35,19 +40,30 @@ std::uint64_t TopicPublisher::lost() const {
     return lost_;
 }
 
-void TopicPublisher::send(const std::uint8_t* bytes, std::size_t size) {
+void TopicPublisher::send(const std::uint8_t* bytes, std::uint32_t size, std::int64_t stamp_ns) {
+    if (stamped_ != nullptr) {
+        stampBytes(bytes, size, stamp_ns, message_);
+        bytes = message_.data();
+        size = static_cast<std::uint32_t>(message_.size());
+    }
     try {
-        publisher_.publish(RawView{bytes, static_cast<std::uint32_t>(size), &departures_});
+        publisher_.publish(RawView{bytes, size, &departures_});
     } catch (const std::bad_alloc&) {
         ++lost_;
     }
 }
 
 void TopicPublisher::open(ros::NodeHandle& handle) {
-    const MessageType& type = stamped_ != nullptr ? *stamped_ : type_;
-    ros::AdvertiseOptions options(topic_, delivery_.queue, type.md5, type.name, type.definition);
+    Delivery delivery;
+    {
+        const std::lock_guard lock(mutex_);
+        delivery = delivery_;
+    }
+    const MessageType* const stamped = delivery.stamped ? stampedType(type_.name) : nullptr;
+    const MessageType& type = stamped != nullptr ? *stamped : type_;
+    ros::AdvertiseOptions options(topic_, delivery.queue, type.md5, type.name, type.definition);
     options.has_header = startsWithHeader(type.definition);
-    options.latch = delivery_.latch;
+    options.latch = delivery.latch;
     ros::Publisher publisher;
     std::string problem;
     try {
@@ -58,20 +74,18 @@ void TopicPublisher::open(ros::NodeHandle& handle) {
     }
     const std::lock_guard lock(mutex_);
     publisher_ = publisher;
-    if (publisher_ && !kept_.empty()) send(kept_.data(), kept_.size());
+    opened_ = delivery;
+    stamped_ = stamped;
+    departures_ = Departures(delivery.latch);
+    if (publisher_ && kept_)
+        send(kept_->bytes.data(), static_cast<std::uint32_t>(kept_->bytes.size()),
+             kept_->stamp_ns);
     problem_ =
         problem.empty() ? "" : "cannot publish " + topic_ + " as " + type.name + ": " + problem;
     retry_.note(problem_.empty());
 }
 
 bool TopicPublisher::isDue() const { return !isOpen() && retry_.due(); }
-
-void TopicPublisher::inherit(const TopicPublisher& before) {
-    const std::scoped_lock lock(mutex_, before.mutex_);
-    if (delivery_.latch && before.type_.name == type_.name && before.type_.md5 == type_.md5 &&
-        before.stamped_ == stamped_)
-        kept_ = before.kept_;
-}
 
 bool TopicPublisher::flush(std::chrono::steady_clock::time_point deadline) {
     constexpr auto kPause = std::chrono::milliseconds(1);
@@ -95,13 +109,11 @@ void TopicPublisher::close() {
 
 void TopicPublisher::publish(const std::uint8_t* bytes, std::uint32_t size, std::int64_t stamp_ns) {
     const std::lock_guard lock(mutex_);
-    if (stamped_ != nullptr) {
-        stampBytes(bytes, size, stamp_ns, message_);
-        bytes = message_.data();
-        size = static_cast<std::uint32_t>(message_.size());
-    }
-    if (publisher_) send(bytes, size);
-    if (delivery_.latch) kept_.assign(bytes, bytes + size);
+    if (publisher_) send(bytes, size, stamp_ns);
+    if (!delivery_.latch) return;
+    if (!kept_) kept_.emplace();
+    kept_->bytes.assign(bytes, bytes + size);
+    kept_->stamp_ns = stamp_ns;
 }
 
 }  // namespace rtcf::ros1

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdint>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,14 +40,14 @@ class TopicPublisher {
     /// @param type of the values it is given
     TopicPublisher(std::string topic, const TypeInfo& type, Delivery delivery);
 
-    /// True if it takes values of such a type.
-    bool serves(const TypeInfo& type) const;
-    const Delivery& delivery() const { return delivery_; }
+    /// Sets how subscribers get messages. Subscribers see the change once the topic is closed and
+    /// opened again; a topic that becomes latched keeps values from now on. Any thread.
+    void setDelivery(const Delivery& delivery);
     bool isOpen() const;
+    /// True if it is open with a delivery other than the one that is set.
+    bool isOutdated() const;
     /// It is to be opened: it is not yet, and has not failed just now. Watch thread.
     bool isDue() const;
-    /// Takes over what another one of its topic has kept, if the type is the same.
-    void inherit(const TopicPublisher& before);
     /// Why it could not be opened, one line; empty if it could.
     std::string problem() const;
     /// Messages lost as too much waited for slow subscribers, of all topics.
@@ -61,22 +62,29 @@ class TopicPublisher {
 
     /// Sends one message. While it is closed none is sent; of a latched topic the last one is
     /// kept, and sent whenever it opens. The bytes are copied only for that, or for a subscriber.
+    /// Any thread.
     /// @param stamp_ns of the cycle, ROS time
     void publish(const std::uint8_t* bytes, std::uint32_t size, std::int64_t stamp_ns);
 
    private:
-    void send(const std::uint8_t* bytes, std::size_t size);
+    struct Kept {
+        std::vector<std::uint8_t> bytes;  // of the value
+        std::int64_t stamp_ns = 0;
+    };
 
-    std::string topic_;
-    MessageType type_;  // of the values
-    Delivery delivery_;
-    const MessageType* stamped_;  // null: the values are the messages
-    mutable std::mutex mutex_;    // all below
+    void send(const std::uint8_t* bytes, std::uint32_t size, std::int64_t stamp_ns);
+
+    const std::string topic_;
+    const MessageType type_;    // of the values
+    mutable std::mutex mutex_;  // all below
+    Delivery delivery_;         // that is wanted
+    Delivery opened_;           // that it is open with
+    const MessageType* stamped_ = nullptr;  // it is open with; null: the values are the messages
     std::string problem_;
     std::uint64_t lost_ = 0;
-    std::vector<std::uint8_t> kept_;
+    std::optional<Kept> kept_;           // of a latched topic: its last value
     std::vector<std::uint8_t> message_;  // that is being stamped
-    Departures departures_;
+    Departures departures_{false};
     ros::Publisher publisher_;
     Retry retry_;  // watch thread
 };

@@ -288,6 +288,53 @@ TEST_F(RosNodeTest, KeepsLatchedValuesWhenItGoesAndComes) {
     EXPECT_EQ(listen("/out")->line(20s).value_or(""), "3.5");
 }
 
+// Between a component's load and the node's next look at its master.
+TEST_F(RosNodeTest, KeepsTheOnlyValueOfALatchedTopic) {
+    startMaster();
+    startNode();
+    rtcf::executor::BridgeSettings settings;
+    settings.master_uri = masterUri();
+    settings.latch = "/out.*";
+    rosNode().configure(settings);
+    ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
+    for (int i = 0; i < 5; ++i) {
+        const std::string topic = "/out" + std::to_string(i);
+        Source source(topic);
+        serve({&source}, {});
+        source.write(3.5);
+        EXPECT_EQ(listen(topic)->line(20s).value_or(""), "3.5") << i;
+    }
+}
+
+// Written at any instant of the change.
+TEST_F(RosNodeTest, OfALatchedTopicSurvivesAChangeOfItsSettings) {
+    startMaster();
+    Source source("/out");
+    startNode();
+    rtcf::executor::BridgeSettings settings;
+    settings.master_uri = masterUri();
+    settings.latch = "/out";
+    rosNode().configure(settings);
+    serve({&source}, {});
+    ASSERT_TRUE(eventually([&] { return rosNode().status().publications == 1; }));
+    double value = 0.0;
+    for (int i = 0; i < 10; ++i) {
+        settings.queue = 7 + static_cast<std::uint32_t>(i);
+        rosNode().configure(settings);
+        for (int j = 0; j <= i; ++j) {
+            source.write(++value);
+            std::this_thread::sleep_for(50us);
+        }
+        const auto listener = listen("/out");
+        std::string last;
+        while (last != std::to_string(static_cast<int>(value)) + ".0") {
+            const auto line = listener->line(20s);
+            ASSERT_TRUE(line) << "only " << last << " of " << value;
+            last = *line;
+        }
+    }
+}
+
 TEST_F(RosNodeTest, PublishesNumbersWithTheTimeOfTheirCycleIfAsked) {
     startMaster();
     Source source("/out");
