@@ -185,6 +185,26 @@ def test_a_peer_of_rtcf_2021_loads_looks_and_unloads(
     wait_for(lambda: "refused by service: " in daemon.log(), "the reason")
 
 
+def test_the_rt_launcher_of_rtcf_2021_names_a_component_by_its_full_name(
+    client: rtcf.Client, master: Master
+) -> None:
+    _wait_for_services(master)
+    for name, ns in (("/x", "/"), ("/arm/left/y", "/arm/left")):
+        load = (
+            f"{{component_name: {{data: {name}}}, component_type: {{data: Identity}},"
+            f" component_pkg: {{data: rtcf_examples}}, ns: {{data: {ns}}}, is_first: {{data: false}},"
+            " topics_ignore_for_graph: {data: ''}, mappings: []}"
+        )
+        assert _call(master, "load_orocos_component", load) == {"success": {"data": True}}
+        assert client.get_component(name).spec.ns == ns
+        unload = f"{{component_name: {{data: {name}}}, ns: {{data: {ns}}}}}"
+        assert _call(master, "unload_orocos_component", unload) == {"success": {"data": True}}
+    assert _call(
+        master, "load_component", "{name: /leg/z, package: rtcf_examples, type: Identity}"
+    ) == {"success": True, "message": ""}
+    assert client.get_component("/leg/z").full_name == "/leg/z"
+
+
 def test_diagnostics_tell_the_health_of_loop_and_components(
     client: rtcf.Client, master: Master
 ) -> None:

@@ -8,7 +8,7 @@ from rtcf.v1 import control_pb2, graph_pb2
 from rtcf_shared.enums import choices
 
 from rtcf_launch.codes import Code, Ending
-from rtcf_launch.parameters import Parameters, close_to
+from rtcf_launch.parameters import Parameters, as_boolean, as_integer, close_to
 
 _ON_LOST = choices(control_pb2.OnLeaseLost.DESCRIPTOR)
 PREFIX = "rtcf_"
@@ -111,6 +111,10 @@ def settings(
 
 def _value(info: graph_pb2.ParameterInfo, value: Any) -> graph_pb2.ParameterValue:
     made = graph_pb2.ParameterValue
+    if info.type == "int":
+        value = as_integer(value)
+    elif info.type == "bool":
+        value = as_boolean(value)
     if isinstance(value, bool):
         found = made(bool_value=value)
     elif isinstance(value, int):

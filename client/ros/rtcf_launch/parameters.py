@@ -20,19 +20,21 @@ class Parameters:
         self._values = dict(values)
 
     def boolean(self, name: str, default: bool | None = None) -> bool | None:
-        """Take true or false."""
+        """Take true or false, or 1 or 0."""
         value = self._take(name)
         if value is _MISSING:
             return default
+        value = as_boolean(value)
         if not isinstance(value, bool):
             raise _wrong(f"~{name} must be true or false, not {_shown(value)}")
         return value
 
     def integer(self, name: str, low: int, high: int) -> int | None:
-        """Take an integer in a range."""
+        """Take an integer in a range, also one written as 2.0."""
         value = self._take(name)
         if value is _MISSING:
             return None
+        value = as_integer(value)
         if isinstance(value, bool) or not isinstance(value, int):
             raise _wrong(f"~{name} must be an integer, not {_shown(value)}")
         if not low <= value <= high:
@@ -88,6 +90,16 @@ class Parameters:
 
     def _take(self, name: str) -> Any:
         return self._values.pop(name, _MISSING)
+
+
+def as_integer(value: Any) -> Any:
+    """Return the integer that a number such as 2.0 is; other values as they are."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+def as_boolean(value: Any) -> Any:
+    """Return the truth value that the integer 1 or 0 stands for; other values as they are."""
+    return bool(value) if isinstance(value, int) and value in (0, 1) else value
 
 
 def close_to(name: str, known: Iterable[str]) -> str:

@@ -10,7 +10,7 @@ from rtcf_shared.enums import choices
 from rtcf_shared.quantities import ROS, RUNNER, Quantity
 
 from rtcf_launch.codes import Code, Ending
-from rtcf_launch.parameters import Parameters, close_to
+from rtcf_launch.parameters import Parameters, as_integer, close_to
 from rtcf_launch.rendezvous import NAME as RENDEZVOUS
 
 MODES = ("wait_for_components", "no_wait", "wait_for_trigger")
@@ -127,7 +127,7 @@ def _overrun(given: Parameters) -> int | None:
 def _cpu(given: Parameters) -> int | None:
     """Return the CPU: of a mask the last one, as a loop has one."""
     cpu = given.integer("cpu", -1, 4095)
-    mask = given.raw("cpu_affinity_mask")
+    mask = as_integer(given.raw("cpu_affinity_mask"))
     if mask is None:
         return cpu
     if cpu is not None:
@@ -147,7 +147,7 @@ def _cpu(given: Parameters) -> int | None:
 
 
 def _spin(given: Parameters, settings: runner_pb2.RunnerSettings) -> None:
-    spin = given.raw("spin")
+    spin = as_integer(given.raw("spin"))
     if spin is None:
         return
     if spin == "auto":

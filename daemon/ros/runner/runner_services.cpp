@@ -9,6 +9,8 @@
 #include <rtcf_msgs/UnloadOrocosComponent.h>
 #include <std_srvs/Trigger.h>
 
+#include <algorithm>
+
 #include "names/names.hpp"
 #include "ros/runner/runner_report.hpp"
 #include "ros/threads/quiet_thread.hpp"
@@ -20,13 +22,22 @@ namespace {
 
 using executor::OutsideCall;
 
+// A peer names a component by its base name and its namespace, or by its full name alone, as RTCF
+// 2021's rt_launcher does.
+void setName(executor::ComponentDefinition& component, const std::string& name,
+             const std::string& name_space) {
+    const std::size_t slash = name.rfind('/');
+    const bool full = !name.empty() && name.front() == '/';
+    component.name = full ? name.substr(slash + 1) : name;
+    component.ns = full ? name.substr(0, std::max<std::size_t>(slash, 1)) : name_space;
+}
+
 // @return false, and says why, if a remap is not one
 bool loadCall(const rtcf_msgs::LoadComponent::Request& request, OutsideCall& call,
               std::string& why) {
     call.kind = OutsideCall::Kind::Load;
     executor::ComponentDefinition& component = call.component;
-    component.name = request.name;
-    component.ns = request.ns;
+    setName(component, request.name, request.ns);
     component.package = request.package;
     component.type = request.type;
     component.first = request.is_first != 0;
@@ -46,8 +57,7 @@ OutsideCall loadCall(const rtcf_msgs::LoadOrocosComponent::Request& request) {
     OutsideCall call;
     call.kind = OutsideCall::Kind::Load;
     executor::ComponentDefinition& component = call.component;
-    component.name = request.component_name.data;
-    component.ns = request.ns.data;
+    setName(component, request.component_name.data, request.ns.data);
     component.package = request.component_pkg.data;
     component.type = request.component_type.data;
     component.first = request.is_first.data != 0;

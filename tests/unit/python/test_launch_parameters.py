@@ -7,6 +7,7 @@ import pytest
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 from rtcf_launch import arguments, component_parameters, daemon_choice, runner_parameters
 from rtcf_launch.codes import Code, Ending
+from rtcf_launch.component_words import Words
 from rtcf_launch.runner_node import runner_name
 
 
@@ -97,6 +98,34 @@ def test_what_rtcf_2021_took_is_taken() -> None:
     assert (found.mode, found.settings.stack_kb, lines) == ("no_wait", 16, [])
 
 
+def test_numbers_are_taken_as_roscpp_took_them() -> None:
+    last = max(os.sched_getaffinity(0))
+    found, _ = runner_parameters.read(
+        {
+            "frequency": 500,
+            "num_components_expected": 2.0,
+            "lock_memory": 0,
+            "cpu_affinity_mask": float(1 << last),
+            "spin": 5.0,
+        }
+    )
+    assert (found.settings.frequency_hz, found.components) == (500.0, 2)
+    assert (found.settings.lock_memory, found.settings.cpu) == (False, last)
+    assert found.settings.spin_us == 5
+    launcher, _ = component_parameters.read({"is_first": 1, "every": 2.0})
+    assert (launcher.first, launcher.every) == (True, 2)
+    declared = {
+        name: graph_pb2.ParameterInfo(name=name, type=kind)
+        for name, kind in (("count", "int"), ("on", "bool"), ("gain", "double"))
+    }
+    settings, _, _ = component_parameters.settings({"count": 2.0, "on": 1, "gain": 3}, declared)
+    assert [(each.name, str(each.value).strip()) for each in settings] == [
+        ("count", "int_value: 2"),
+        ("gain", "int_value: 3"),
+        ("on", "bool_value: true"),
+    ]
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [
@@ -106,7 +135,10 @@ def test_what_rtcf_2021_took_is_taken() -> None:
         ({"mode": "wait"}, "~mode must be one of wait_for_components, no_wait, wait_for_trigger"),
         ({"mode": "wait_for_components"}, "how many? Set ~num_components_expected"),
         ({"num_components_expected": 0}, "~num_components_expected of 0 is out of range"),
-        ({"num_components_expected": 2.0}, "~num_components_expected must be an integer, not 2.0"),
+        ({"num_components_expected": 2.5}, "~num_components_expected must be an integer, not 2.5"),
+        ({"num_components_expected": True}, "must be an integer, not True"),
+        ({"lock_memory": 2}, "~lock_memory must be true or false, not 2"),
+        ({"lock_memory": 1.0}, "~lock_memory must be true or false, not 1.0"),
         ({"ros_mapping_whitelist": 5}, "~ros_mapping_whitelist must be a string, not 5"),
         (
             {"wait_policy": "absolut"},
@@ -245,3 +277,34 @@ def test_masters_are_the_same_if_host_and_port_are() -> None:
     assert daemon_choice.same_master("http://localhost:11311", "http://127.0.0.1:11311/")
     assert not daemon_choice.same_master("http://localhost:11311", "http://localhost:11312")
     assert not daemon_choice.same_master("http://localhost:11311", "http://robot.example:11311")
+
+
+def test_the_component_is_named_by_arguments_with_options_anywhere_or_by_parameters() -> None:
+    for words in (["-f", "pkg", "T"], ["--is_first", "pkg", "ns::T"], ["pkg", " T ", "-f"]):
+        assert Words.parse(words).joined({"gain": 1}) == Words("pkg", "T", True)
+    assert Words.parse(["pkg", "T"]).joined({}) == Words("pkg", "T")
+    values = {"rt_package": "pkg", "rt_type": "T", "gain": 1}
+    assert Words.parse(["-f"]).joined(values) == Words("pkg", "T", True)
+    assert values == {"gain": 1}  # the component's alone
+
+
+@pytest.mark.parametrize(
+    ("words", "values", "message"),
+    [
+        (["pkg"], {}, "name a package and a component"),
+        (["pkg", "T", "more"], {}, "name a package and a component"),
+        (["--first", "pkg", "T"], {}, "unknown option --first: there is -f, --is_first"),
+        ([], {}, "by ~rt_package and ~rt_type"),
+        ([], {"rt_type": "T"}, "by ~rt_package and ~rt_type"),
+        (["pkg", "T"], {"rt_type": "T"}, "~rt_type and the arguments both name the component"),
+        (["-f", "pkg", "T"], {"is_first": False}, "~is_first and -f say the same thing"),
+        ([], {"rt_type": 5, "rt_package": "pkg"}, "~rt_type must be a string, not 5"),
+    ],
+)
+def test_a_component_that_is_not_named_once_is_refused(
+    words: list[str], values: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(Ending) as raised:
+        Words.parse(words).joined(values)
+    assert message in str(raised.value)
+    assert raised.value.code == Code.USAGE

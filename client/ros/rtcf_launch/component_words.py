@@ -1,0 +1,65 @@
+"""Which component rt_launcher loads: by the words of its command line, or by parameters."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rtcf_launch.codes import Code, Ending
+from rtcf_launch.parameters import Parameters
+
+_NAMES = ("rt_package", "rt_type")
+_FIRST_FLAGS = ("-f", "--is_first")
+
+
+@dataclass(frozen=True)
+class Words:
+    """A package, a component type, and whether the component is first; empty = not said."""
+
+    package: str = ""
+    type: str = ""
+    first: bool = False
+
+    @classmethod
+    def parse(cls, words: Sequence[str]) -> "Words":
+        """Take `[-f|--is_first] [PACKAGE COMPONENT]` in any order.  Raises Ending."""
+        names = []
+        first = False
+        for word in (each.strip() for each in words):
+            if word in _FIRST_FLAGS:
+                first = True
+            elif word.startswith("-"):
+                raise Ending(Code.USAGE, f"unknown option {word}: there is -f, --is_first")
+            else:
+                names.append(word)
+        if len(names) not in (0, 2):
+            raise Ending(
+                Code.USAGE,
+                f'name a package and a component, as in args="rtcf_examples Mimo", '
+                f"not {len(names)} word{'s' if len(names) > 1 else ''}",
+            )
+        return cls(*names, first=first) if names else cls(first=first)
+
+    def joined(self, values: dict[str, Any]) -> "Words":
+        """Return them with what ~rt_package, ~rt_type and ~is_first say, which are taken out of
+        `values`.  Raises Ending for what is said twice, or not at all."""
+        package, type_name = self.package, self.type
+        given = Parameters(values)
+        named = [name for name in _NAMES if given.has(name)]
+        if package and named:
+            raise Ending(
+                Code.USAGE, f"~{named[0]} and the arguments both name the component: use one"
+            )
+        if self.first and given.has("is_first"):
+            raise Ending(Code.USAGE, "~is_first and -f say the same thing: use one")
+        if not package:
+            package, type_name = ((given.text(name) or "").strip() for name in _NAMES)
+        if not package or not type_name:
+            raise Ending(
+                Code.USAGE,
+                'name a package and a component, as in args="rtcf_examples Mimo", or by '
+                "~rt_package and ~rt_type",
+            )
+        for name in named:
+            del values[name]
+        # A class in a namespace is registered by its last name, whatever RTCF 2021 called it.
+        return Words(package, type_name.rpartition("::")[2], self.first)
