@@ -168,6 +168,48 @@ class Listener : public RTT::TaskContext, public RtcfExtension {
     RTT::OutputPort<std_msgs::Float64> other_{"other"};
 };
 
+/// Has properties and operations of OROCOS, and logs by streams; says what it has.
+class Property21 : public RTT::TaskContext, public RtcfExtension {
+   public:
+    explicit Property21(const std::string& name) : TaskContext(name) {
+        addProperty("gain", gain_).doc("of the loop");
+        provides()->addProperty("count", count_);
+        this->provides("tuning")->addProperty("label", label_);
+        addOperation("reset", &Property21::reset, this, RTT::OwnThread).doc("none").arg("a", "b");
+        addPort("gain_seen", out_);
+    }
+    bool configureHook() override {
+        addProperty("late", late_);
+        rtLogStream(ros::console::levels::Info)
+            << "configured with " << gain_ << ' ' << count_ << ' ' << label_ << std::endl;
+        rtLogStream(ros::console::levels::Debug) << "not shown";
+        active("configureHook");
+        return true;
+    }
+    void updateHook() override {
+        out_.write(gain_ + late_);
+        if (getIteration() == 0) active("updateHook");
+        if (getIteration() == 1) gain_ = 7.0;  // its own, until the parameter changes
+    }
+    void stopHook() override {
+        rtLogStream(ros::console::levels::Warn) << "stopped with " << label_;
+        active("stopHook");
+    }
+
+   private:
+    void reset() { gain_ = 0.0; }
+    void active(const char* hook) {
+        const bool active = RT_ACTIVE;
+        RT_INFO_STREAM(hook << (active ? ": active" : ": not active"));
+    }
+
+    double gain_ = 0.5;
+    int count_ = 3;
+    std::string label_ = "plain";
+    double late_ = 0.0;
+    RTT::OutputPort<double> out_{"gain_seen"};
+};
+
 }  // namespace rtcf_unit_test
 
 ORO_CREATE_COMPONENT_LIBRARY()
@@ -177,4 +219,5 @@ ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::Logger)
 ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::Unlucky)
 ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::Erring)
 ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::Listener)
+ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::Property21)
 ORO_CREATE_COMPONENT_TYPE()

@@ -242,5 +242,43 @@ TEST_F(RttCompat, PortsAreFoundCallBackAndMayBeClearedAndDisconnected) {
                                         "called by in", "3: 2", "4: 1", "5: 0", "6: 0"}));
 }
 
+// Those that a constructor adds are there for the loader, also by way of a service.
+TEST_F(RttCompat, PropertiesAreParametersThatTheirVariablesFollow) {
+    ComponentDefinition component = definition("Property21", "P");
+    component.parameters = {{"gain", 1.5}, {"label", std::string("given")}};
+    const auto load = [&] {
+        return runner().load(component, RTCF_UNIT_COMPONENTS "/old_api.so",
+                             [](const std::string&) {});
+    };
+    onGraphThread(load);
+    EXPECT_TRUE(hasSaid("/P", "configured with 1.5 3 given"));
+    EXPECT_FALSE(hasSaid("/P", "not shown"));
+    step(1);
+    EXPECT_EQ(value("/P", "gain_seen"), 1.5);
+    step(2);
+    EXPECT_EQ(value("/P", "gain_seen"), 7.0);  // the component's own
+    setParameters("/P", {{"gain", 2.0}, {"late", 0.25}, {"label", std::string("late")}});
+    step(1);
+    EXPECT_EQ(value("/P", "gain_seen"), 2.25);
+    stop();
+    EXPECT_TRUE(hasSaid("/P", "stopped with late"));
+}
+
+TEST_F(RttCompat, OperationsCompileAndAreSaidToBeOfNoUse) {
+    loadApi("Property21", "P");
+    EXPECT_TRUE(hasSaid("/P",
+                        "operation 'reset' cannot be called in rtcf: offer a ROS service by "
+                        "getNodeHandle() instead"));
+}
+
+TEST_F(RttCompat, TheLoopIsActiveInTheCycleOnly) {
+    loadApi("Property21", "P");
+    step(1);
+    stop();
+    for (const char* line :
+         {"configureHook: not active", "updateHook: active", "stopHook: not active"})
+        EXPECT_TRUE(hasSaid("/P", line)) << line;
+}
+
 }  // namespace
 }  // namespace rtcf::test

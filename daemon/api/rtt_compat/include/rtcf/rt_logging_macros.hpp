@@ -13,6 +13,15 @@
 
 #include "rtcf/log_buffer.hpp"
 
+/// The logger above those of all components.
+#define NAME_PREFIX "ros.rtcf"
+
+/// True in a component's member function while it runs in the loop; false in all hooks but
+/// updateHook() and errorHook().
+#define RT_ACTIVE              \
+    (this->isRunning() &&      \
+     this->getTargetState() == RTT::base::TaskCore::TaskState::Running)
+
 /// @name Internals of the macros below
 /// @{
 #define RTCF_COMPAT_LOG_(log_level, format, fill_buffer)                                   \

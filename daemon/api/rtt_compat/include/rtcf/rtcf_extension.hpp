@@ -5,15 +5,19 @@
 
 #include <ros/ros.h>
 
-#include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string_view>
 
 #include "rtcf/component.hpp"
 #include "rtcf/ros.hpp"
+#include "rtcf/rt_log_stream.hpp"
 #include "rtcf/rt_logging_macros.hpp"
+#include "rtcf/rt_rosconsole_logging.hpp"
+#include "rtcf/test_logger.hpp"
+#include "rtt/TaskContext.hpp"
 #include "rtt/current_component.hpp"
 
 class RtcfExtension {
@@ -58,7 +62,23 @@ class RtcfExtension {
     void rtLogWarn(std::string_view text) const { say(rtcf::LogLevel::Warn, text); }
     void rtLogError(std::string_view text) const { say(rtcf::LogLevel::Error, text); }
     void rtLogFatal(std::string_view text) const { say(rtcf::LogLevel::Fatal, text); }
+    /// `rtLogStream(ros::console::levels::Info) << "force " << force;`
+    rtcf::rtt_compat::LogStream rtLogStream(ros::console::Level level) const {
+        return {speaker(), rtcf::rtt_compat::levelOf(level)};
+    }
     /// @}
+
+    /// For tests that construct a component by themselves: what it logs goes to rosconsole, under
+    /// `ros.rtcf.<name>`. Does nothing in a loop, which has a log. Not real-time safe.
+    /// @throws std::logic_error of a class that is no RTT::TaskContext
+    void configureTestLogger() {
+        auto* const task = dynamic_cast<RTT::TaskContext*>(this);
+        if (task == nullptr) throw std::logic_error("configureTestLogger() needs a TaskContext");
+        if (test_logger_ != nullptr || task->context().log != nullptr) return;
+        test_logger_ = std::make_unique<rtcf::rtt_compat::TestLogger>(*task, task->getName());
+        component_ = task;
+        ROS_WARN("Component logger was set to non real-time safe test mode.");
+    }
 
     /// By ORO_CREATE_COMPONENT, after construction.
     friend void bindRtcfExtension(RtcfExtension& extension, const rtcf::Component& component) {
@@ -75,22 +95,21 @@ class RtcfExtension {
         return *component_;
     }
 
-    void say(rtcf::LogLevel level, std::string_view text) const {
-        static constexpr auto at = [](rtcf::LogLevel of) {
-            return rtcf::LogSite{of, "", 0, "rtLog", "{}"};
-        };
-        static constexpr std::array<rtcf::LogSite, 5> kSites{
-            at(rtcf::LogLevel::Debug), at(rtcf::LogLevel::Info), at(rtcf::LogLevel::Warn),
-            at(rtcf::LogLevel::Error), at(rtcf::LogLevel::Fatal)};
-        // Constructors may log too.
+    // Constructors may log too.
+    const rtcf::Component* speaker() const noexcept {
+        if (component_ != nullptr) return component_;
         const rtcf::rtt_compat::HookSlot* const slot = rtcf::rtt_compat::hookSlot();
-        const rtcf::Component* who = component_;
-        if (who == nullptr && slot != nullptr) who = slot->component;
+        return slot != nullptr ? slot->component : nullptr;
+    }
+
+    void say(rtcf::LogLevel level, std::string_view text) const {
+        const rtcf::Component* const who = speaker();
         if (who == nullptr || !who->logs(level)) return;
-        rtcf::rtt_compat::log(*who, kSites.at(static_cast<std::size_t>(level) - 1), text);
+        rtcf::rtt_compat::log(*who, rtcf::rtt_compat::logSite(level), text);
     }
 
     const rtcf::Component* component_ = nullptr;
+    std::unique_ptr<rtcf::rtt_compat::TestLogger> test_logger_;
     // Not before they are asked for: a node handle needs a node.
     mutable std::optional<ros::NodeHandle> handle_;
     mutable std::optional<ros::NodeHandle> private_handle_;

@@ -6,13 +6,16 @@
 #include <algorithm>
 #include <atomic>
 #include <functional>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "rtcf/component.hpp"
+#include "rtcf/log_buffer.hpp"
 #include "rtt/Port.hpp"
+#include "rtt/Property.hpp"
 #include "rtt/Time.hpp"
 #include "rtt/current_component.hpp"
 
@@ -97,6 +100,24 @@ class DataFlowInterface {
     std::vector<std::pair<base::PortInterface*, Callback>> callbacks_;
 };
 
+class TaskContext;
+
+/// What provides() returns: a component has one service, itself.
+class Service : public Described {
+   public:
+    explicit Service(TaskContext* owner) noexcept : owner_(owner) {}
+
+    template <typename T>
+    Described& addProperty(const std::string& name, T& variable);
+    template <typename... Arguments>
+    Described& addOperation(const std::string& name, Arguments&&...);
+    Service* provides() noexcept { return this; }
+    Service* provides(const std::string&) noexcept { return this; }
+
+   private:
+    TaskContext* owner_;
+};
+
 /// The base class of RTCF 2021's components.
 class TaskContext : public ::rtcf::Component, public base::TaskCore {
    public:
@@ -104,7 +125,7 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
 
     /// @param initial_state for source compatibility: configureHook() is always called
     explicit TaskContext(std::string name, TaskState initial_state = Stopped)
-        : given_name_(std::move(name)), ports_(this) {
+        : given_name_(std::move(name)), ports_(this), service_(this) {
         (void)initial_state;
         // Who is being constructed is not known before this.
         if (auto* const slot = ::rtcf::rtt_compat::hookSlot(); slot != nullptr)
@@ -172,6 +193,25 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
         return ports_.getPort(name);
     }
 
+    /// Declares a parameter of a variable's name and value. From then on the variable follows it:
+    /// before each hook, and before updateHook(); a text before the other hooks only. In the
+    /// constructor, for the loader to set it, or in configureHook().
+    /// @throws std::logic_error for a name that is taken or not legal, and after configureHook()
+    template <typename T>
+    Described& addProperty(const std::string& name, T& variable) {
+        properties_.push_back(std::make_unique<Property<T>>(this, name, variable));
+        return *properties_.back();
+    }
+    /// Compiles, and says in the log that nothing can call the operation here.
+    template <typename... Arguments>
+    Described& addOperation(const std::string& name, Arguments&&...) {
+        sayNotCallable(name);
+        return service_;
+    }
+    Service* provides() noexcept { return &service_; }
+    /// Names of services are left out: their properties are parameters of the component.
+    Service* provides(const std::string&) noexcept { return &service_; }
+
    private:
     bool configure() final {
         return enter(Stopped, [this] { return configureHook(); });
@@ -181,6 +221,7 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
     }
     void update() final {
         const ::rtcf::rtt_compat::InHook hook(this);
+        for (const auto& property : properties_) property->bring(true);
         ports_.callBack();
         if (inRunTimeError()) {
             errorHook();
@@ -204,6 +245,7 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
     template <typename Hook>
     bool enter(TaskState next, const Hook& hook) {
         const ::rtcf::rtt_compat::InHook here(this);
+        for (const auto& property : properties_) property->bring(false);
         target_.store(next, std::memory_order_relaxed);
         try {
             if (hook()) {
@@ -218,11 +260,32 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
         return false;
     }
 
+    void sayNotCallable(const std::string& name) const {
+        static constexpr ::rtcf::LogSite kSite{::rtcf::LogLevel::Warn, "", 0, "addOperation", "{}"};
+        if (!logs(kSite.level)) return;
+        ::rtcf::rtt_compat::LogBuffer text;
+        text.append("operation '");
+        text.append(name);
+        text.append("' cannot be called in rtcf: offer a ROS service by getNodeHandle() instead");
+        ::rtcf::rtt_compat::log(*this, kSite, text.text());
+    }
+
     std::string given_name_;
     DataFlowInterface ports_;
+    Service service_;
+    std::vector<std::unique_ptr<base::PropertyBase>> properties_;
     // Written in hooks, read by all of them.
     std::atomic<TaskState> state_{PreOperational};
     std::atomic<TaskState> target_{PreOperational};
 };
+
+template <typename T>
+Described& Service::addProperty(const std::string& name, T& variable) {
+    return owner_->addProperty(name, variable);
+}
+template <typename... Arguments>
+Described& Service::addOperation(const std::string& name, Arguments&&... arguments) {
+    return owner_->addOperation(name, std::forward<Arguments>(arguments)...);
+}
 
 }  // namespace RTT

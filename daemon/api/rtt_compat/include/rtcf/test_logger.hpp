@@ -1,0 +1,51 @@
+/// @file
+/// The log of a component that a test constructs by itself, without a loop.
+#pragma once
+
+#include <ros/console.h>
+
+#include <mutex>
+#include <string>
+
+#include "rtcf/component.hpp"
+
+namespace rtcf::rtt_compat {
+
+/// Gives a component without a loop a name, a clock that stands still, and a log that goes to
+/// rosconsole at once. Owned by the component's RtcfExtension. Not real-time safe.
+class TestLogger final : public LogSink {
+   public:
+    /// @param component of whom no loop knows; outlives this
+    TestLogger(Component& component, const std::string& name) {
+        context_.full_name = "/" + name;
+        context_.name = name;
+        context_.clock = &clock_;
+        context_.period_ns = clock_.period_ns = clock_.elapsed_ns = 1'000'000;
+        context_.log = this;
+        context_.log_level = LogLevel::Debug;  // rosconsole decides
+        component.attach(context_);
+    }
+    TestLogger(const TestLogger&) = delete;
+    TestLogger& operator=(const TestLogger&) = delete;
+
+    LogRecord* claim() noexcept override {
+        mutex_.lock();
+        return &record_;
+    }
+    void commit(LogRecord* record) noexcept override {
+        std::string text;
+        record->render(*record, text);
+        const auto level =
+            static_cast<ros::console::Level>(static_cast<int>(record->site->level) - 1);
+        mutex_.unlock();
+        ROS_LOG(level, "ros.rtcf." + context_.name, "%s", text.c_str());
+    }
+
+   private:
+    LoopClock clock_;
+    ComponentContext context_;
+    std::mutex mutex_;  // from claim() to commit()
+    LogRecord record_{};
+};
+
+}  // namespace rtcf::rtt_compat
