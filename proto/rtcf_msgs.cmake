@@ -40,7 +40,9 @@ target_include_directories(rtcf_msgs SYSTEM INTERFACE ${staged}/include)
 add_dependencies(rtcf_msgs rtcf_msgs_build)
 
 install(DIRECTORY ${staged}/include/rtcf_msgs DESTINATION include COMPONENT ros-rtcf)
-install(DIRECTORY ${staged}/share/rtcf_msgs ${staged}/share/pkgconfig DESTINATION share
+install(DIRECTORY ${staged}/share/rtcf_msgs DESTINATION share COMPONENT ros-rtcf)
+# Where catkin puts it depends on the prefix.
+install(FILES ${build}/catkin_generated/installspace/rtcf_msgs.pc DESTINATION share/pkgconfig
         COMPONENT ros-rtcf)
 install(
   DIRECTORY ${staged}/${python_modules}/rtcf_msgs

@@ -207,13 +207,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "frequency", type=_frequency, metavar="FREQUENCY", help="nominal frequency of the loop, Hz"
     )
     parser.add_argument("--topic", default="", help="if the bag has several loops")
-    parser.add_argument("--png", type=Path, help="where the plot goes (default: BAG's name, .png)")
+    parser.add_argument("--png", type=Path, help="where the plot goes (default: BAG.evaluation.png)")
     parser.add_argument("--json", action="store_true", help="print the numbers as JSON")
     given = parser.parse_args(arguments)
     try:
         topic, cycles = read(given.bag, given.topic)
         numbers = evaluate(cycles, given.frequency)
-        file = given.png or given.bag.with_suffix(".png")
+        file = given.png or given.bag.with_name(f"{given.bag.name}.evaluation.png")
         try:
             plot(cycles, given.frequency, f"{topic} at {given.frequency:g} Hz", file)
         except OSError as error:

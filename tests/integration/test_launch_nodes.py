@@ -250,7 +250,7 @@ def test_a_component_that_is_refused_ends_its_launcher(alone: Launching) -> None
 
 def test_a_runner_that_is_refused_says_why_in_one_line(alone: Launching) -> None:
     cases = {
-        ("_ros_mapping_whitelist:=*.ros.*", "__name:=a"): (REFUSED, "*.ros.*"),
+        ("_ros_latch:=*.ros.*", "__name:=a"): (REFUSED, "*.ros.*"),
         ("_frequency:=fast", "__name:=b"): (USAGE, '~frequency must be a number, not "fast"'),
         ("_daemon:=system", "__name:=c"): (REFUSED, "rtcfd is not running at /nonexistent"),
         ("__master:=http://localhost:1", "__name:=d"): (REFUSED, "no ROS master answers"),
@@ -263,6 +263,20 @@ def test_a_runner_that_is_refused_says_why_in_one_line(alone: Launching) -> None
         assert process.wait() == status, process.output()
         (line,) = (each for each in process.output().splitlines() if message in each)
         assert "Traceback" not in process.output(), line
+
+
+def test_an_expression_that_is_none_falls_back_as_in_rtcf_2021(alone: Launching) -> None:
+    runner = alone.node(
+        "rt_runner", "_ros_mapping_whitelist:=*.ros.*", "_ros_mapping_blacklist:=(",
+    )  # fmt: skip
+    runner.wait_for_output("the loop runs")
+    assert "~ros_mapping_whitelist: bad regular expression '*.ros.*': " in runner.output()
+    assert "; falling back to '.*'\n" in runner.output()
+    assert "~ros_mapping_blacklist: bad regular expression '(': " in runner.output()
+    with alone.client() as (client, name):
+        ros = client.get_status(name).runners[0].settings.ros
+        assert (ros.whitelist, ros.blacklist) == (".*", "")
+    assert runner.end() == DONE
 
 
 def test_a_launcher_waits_for_its_runner_and_ends_at_once_if_it_is_asked_to(

@@ -5,6 +5,7 @@ The main thread owns it; each tenancy has a thread of its own that reads it.
 
 import signal
 import threading
+import time
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -24,6 +25,11 @@ class Lost:
     """A tenancy ended without its last message."""
 
     error: rtcf.RtcfError
+
+
+@dataclass(frozen=True)
+class MasterBack:
+    """A ROS master that did not know the node knows it again."""
 
 
 class Inbox:
@@ -48,16 +54,24 @@ class Inbox:
 
     def pause(self, seconds: float) -> bool:
         """Wait, but not longer than until the process is asked to end; tell whether it was."""
-        if not self.asked:
-            event = self.get(seconds)
+        aside = []
+        deadline = time.monotonic() + seconds
+        while not self.asked and (left := deadline - time.monotonic()) > 0:
+            event = self.get(left)
             if event is not None and not isinstance(event, Asked):
-                self._queue.put(event)
+                aside.append(event)
+        for event in aside:
+            self._queue.put(event)
         return self.asked
 
     def ask(self, why: str) -> None:
         """Let the process end, as a signal does.  Any thread."""
         self.asked = True
         self._queue.put(Asked(why))
+
+    def master_back(self) -> None:
+        """Tell that the node is registered again.  Any thread."""
+        self._queue.put(MasterBack())
 
     def _signalled(self, _: int, __: Any) -> None:
         self.asked = True

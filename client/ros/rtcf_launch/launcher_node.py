@@ -16,7 +16,8 @@ from rtcf.v1 import control_pb2, graph_pb2
 
 from rtcf_launch import arguments, component_parameters
 from rtcf_launch.codes import Code, Ending
-from rtcf_launch.inbox import Asked, Inbox, Lost
+from rtcf_launch.component_words import Words
+from rtcf_launch.inbox import Asked, Inbox, Lost, MasterBack
 from rtcf_launch.master import Master, MasterSilent
 from rtcf_launch.rendezvous import Meeting
 from rtcf_launch.ros_node import RosNode, wait_until_gone
@@ -33,14 +34,16 @@ _RETRY_S = 0.3
 _END_S = 3.0
 
 USAGE = """\
-usage: rosrun rtcf rt_launcher PACKAGE COMPONENT [__name:=NAME] [FROM:=TO]... [_PARAMETER:=VALUE]...
+usage: rosrun rtcf rt_launcher [-f] PACKAGE COMPONENT [__name:=NAME] [FROM:=TO]...
+                               [_PARAMETER:=VALUE]...
 
 Loads a component into the loop of an rt_runner, and unloads it at its own end.
 
 private parameters; all others are values of parameters that the component declares:
   runner                   name of the rt_runner (default: the nearest one named rt_runner, else
                            the only one of the launch)
-  is_first                 all connections into it are loop breaks
+  rt_package, rt_type      PACKAGE and COMPONENT, instead of arguments
+  is_first                 all connections into it are loop breaks; also as argument -f, --is_first
   topics_ignore_for_graph  regular expression, or a list: connections that are, for it
   every, phase             run in each n-th cycle, and in which of them
   optional                 after a fault the loop goes on without it
@@ -65,8 +68,9 @@ _CODES = {
 class LauncherNode:
     """One rt_launcher."""
 
-    def __init__(self, given: arguments.Arguments) -> None:
+    def __init__(self, given: arguments.Arguments, words: Words) -> None:
         self._given = given
+        self._component = words
         self._node = given.full_name
         self._screen = Screen(self._node)
         self._inbox = Inbox()
@@ -102,14 +106,22 @@ class LauncherNode:
             self._master.set(f"{self._node}/{name}", value)
         values = self._master.parameter(self._node, {})
         self._values = values if isinstance(values, dict) else {}
+        self._component = self._component.joined(self._values)
         self._run_id = str(self._master.parameter("/run_id", "")) or f"{os.getpid()}"
         # What is wrong whatever the component declares is said before anything is waited for.
         component_parameters.read(self._values)
 
     def _enter_ros(self) -> None:
         """Become a node; wait until one of our name, which that displaces, has unloaded."""
-        self._ros_node = RosNode(self._master, self._node, self._given.hostname, self._inbox.ask)
+        self._ros_node = RosNode(
+            self._master,
+            self._node,
+            self._given.hostname,
+            self._inbox.ask,
+            self._screen.set_level,
+        )
         before = self._ros_node.register()
+        self._ros_node.stay_registered(self._inbox.master_back)
         if before and not wait_until_gone(before, self._inbox.pause, _PREDECESSOR_S):
             raise Ending(
                 Code.DONE if self._inbox.asked else Code.REFUSED,
@@ -149,9 +161,10 @@ class LauncherNode:
         meeting = self._unnamed.look()
         if meeting is None:
             return None
-        package, type_name = self._given.words
+        type_name = self._component.type
         with rtcf.Client(meeting.socket) as client:
-            types = {each.type: each for each in client.list_types(package).types}
+            offered = client.list_types(self._component.package).types
+            types = {each.type: each for each in offered}
         declared = [each.name for each in types[type_name].parameters] if type_name in types else []
         self._unnamed = None  # asked once
         return meeting if "runner" in declared else None
@@ -161,7 +174,7 @@ class LauncherNode:
     def _load(self, meeting: Meeting) -> None:
         self._meeting = meeting
         self._client = rtcf.Client(meeting.socket)
-        package, type_name = self._given.words
+        package, type_name = self._component.package, self._component.type
         offered = {each.type: each for each in self._client.list_types(package).types}
         # A type that is not there is refused by rtcfd, which knows why.
         declared = (
@@ -175,7 +188,7 @@ class LauncherNode:
             type_name,
             name=self._given.name,
             ns=self._given.ns,
-            first=self._parameters.first,
+            first=self._component.first or self._parameters.first,
             ignore=self._parameters.ignore,
             every=self._parameters.every,
             phase=self._parameters.phase,
@@ -207,6 +220,7 @@ class LauncherNode:
                 hold=self._meeting.token,
                 attach=attach,
                 wait=True,
+                unseen=_prints_to_log(self._given.log_file),
             )
         )
         self._inbox.read(self._tenancy)
@@ -227,6 +241,8 @@ class LauncherNode:
                 if deadline is None:
                     self._tenancy.end()
                     deadline = time.monotonic() + _END_S
+                continue
+            if isinstance(event, MasterBack):
                 continue
             if isinstance(event, Lost):
                 if deadline is not None:
@@ -277,6 +293,15 @@ class LauncherNode:
         self._lease(attach=True)
 
 
+def _prints_to_log(log_file: str) -> bool:
+    """Tell whether standard output is the file that roslaunch makes without output="screen"."""
+    try:
+        there = os.stat(f"{log_file.removesuffix('.log')}-stdout.log")
+        return os.path.samestat(os.fstat(sys.stdout.fileno()), there)
+    except OSError:
+        return False
+
+
 def main(argv: Sequence[str] | None = None, build_tree: Path | None = None) -> int:
     """Run rt_launcher; return its exit status."""
     words = sys.argv[1:] if argv is None else argv
@@ -285,19 +310,10 @@ def main(argv: Sequence[str] | None = None, build_tree: Path | None = None) -> i
         return Code.DONE
     try:
         given = arguments.parse(words, os.environ, "")
-    except ValueError as error:
-        print(f"rt_launcher: {error}", file=sys.stderr)
+        component = Words.parse(given.words)
+    except (ValueError, Ending) as error:
+        print(f"rt_launcher: {error}\n{USAGE}", file=sys.stderr, end="")
         return Code.USAGE
-    if len(given.words) != 2:
-        print(
-            f'rt_launcher: name a package and a component, as in args="rtcf_examples Mimo", '
-            f"not {len(given.words)} words\n{USAGE}",
-            file=sys.stderr,
-            end="",
-        )
-        return Code.USAGE
-    # A class in a namespace is registered by its last name, whatever RTCF 2021 called it.
-    given.words = [given.words[0].strip(), given.words[1].strip().rpartition("::")[2]]
     # By rosrun it may have no name: then it is that of the component type.
-    given.name = given.name or given.words[1]
-    return LauncherNode(given).run()
+    given.name = given.name or component.type.rpartition("::")[2] or "rt_launcher"
+    return LauncherNode(given, component).run()

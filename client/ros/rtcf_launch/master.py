@@ -57,6 +57,11 @@ class Master:
         code, _, uri = self._call("lookupNode", name)
         return str(uri) if code == 1 else ""
 
+    def service_uri(self, name: str) -> str:
+        """Return where a service is said to be; empty = there is none of that name."""
+        code, _, uri = self._call("lookupService", name)
+        return str(uri) if code == 1 else ""
+
     def register_service(self, service: str, service_uri: str, node_uri: str) -> None:
         """Register a service of the caller's; another node of its name is told to shut down."""
         self._call("registerService", service, service_uri, node_uri)

@@ -1,7 +1,8 @@
 """A ROS node for those who look: rosnode list, info, ping and kill know it, and a second node of
 its name displaces it.  rospy would be one too, but waits for a master where we are to end.
 
-It has no topics.  Its services are those that every node has, for its loggers.
+It has no topics.  Its services are those that every node has, for its loggers.  When the master is
+started anew, the node registers again.
 """
 
 import os
@@ -19,6 +20,7 @@ from rtcf_launch.master import Master, MasterSilent
 
 _LARGEST_CALL = 64 * 1024  # bytes
 _POLL_S = 0.1
+_LOOK_S = 1.0  # between two looks at the master
 _PROBE_S = 1.0
 
 
@@ -48,15 +50,25 @@ class RosNode:
     """The node; owned by the process' main thread, served by threads of its own."""
 
     def __init__(
-        self, master: Master, name: str, hostname: str, ended: Callable[[str], None]
+        self,
+        master: Master,
+        name: str,
+        hostname: str,
+        ended: Callable[[str], None],
+        level_set: Callable[[str], None],
     ) -> None:
-        """`ended` is called, by any thread, when a ROS peer wants the node to end."""
+        """Serve; register() makes it known.
+
+        ended      called by any thread, when a ROS peer wants the node to end
+        level_set  called by any thread, when a ROS peer sets the level of its logger
+        """
         self._master = master
         self._name = name
         self._ended = ended
         host = hostname or socket.gethostname()
         self._server = _Server(("", 0), requestHandler=_Handler, logRequests=False, allow_none=True)
-        self._services = LoggerServices(name)
+        self._services = LoggerServices(name, level_set)
+        self._ending = threading.Event()
         self._uri = f"http://{host}:{self._server.server_address[1]}/"
         self._service_uri = f"rosrpc://{host}:{self._services.port}"
         self._registered: list[str] = []
@@ -67,13 +79,32 @@ class RosNode:
     def register(self) -> str:
         """Make the node known; return where one of its name was before."""
         before = self._master.node_uri(self._name)
+        self._register()
+        return "" if before == self._uri else before
+
+    def stay_registered(self, back: Callable[[], None]) -> None:
+        """Register again at each master that does not know the node; then call `back`, by a thread
+        of the node's.  Another node of its name is left alone."""
+        threading.Thread(target=self._stay_registered, args=(back,), daemon=True).start()
+
+    def _register(self) -> None:
         for service in self._services.names:
             self._master.register_service(service, self._service_uri, self._uri)
-            self._registered.append(service)
-        return "" if before == self._uri else before
+        self._registered = list(self._services.names)
+
+    def _stay_registered(self, back: Callable[[], None]) -> None:
+        while not self._ending.wait(_LOOK_S):
+            try:
+                if self._master.node_uri(self._name):
+                    continue
+                self._register()
+            except MasterSilent:
+                continue
+            back()
 
     def end(self, master: Master) -> None:
         """Take all back, by a master object whose calls are short."""
+        self._ending.set()
         try:
             for service in self._registered:
                 master.unregister_service(service, self._service_uri)

@@ -8,6 +8,7 @@ import os
 import re
 import secrets
 import sys
+import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,13 +17,14 @@ from typing import Any
 import rtcf
 from rtcf.connection import DEFAULT_SOCKET
 from rtcf.private_daemon import PrivateDaemon, program
+from rtcf.refusals import ExpressionInvalidError
 from rtcf.v1 import control_pb2, runner_pb2
 from rtcf_shared.enums import word
 
-from rtcf_launch import arguments, rendezvous, runner_parameters
+from rtcf_launch import arguments, loop_statistics, rendezvous, runner_parameters
 from rtcf_launch.codes import Code, Ending
 from rtcf_launch.daemon_choice import choose
-from rtcf_launch.inbox import Asked, Inbox, Lost
+from rtcf_launch.inbox import Asked, Inbox, Lost, MasterBack
 from rtcf_launch.master import Master, MasterSilent
 from rtcf_launch.ros_node import RosNode, wait_until_gone
 from rtcf_launch.screen import Screen
@@ -34,6 +36,7 @@ _PREDECESSOR_S = 5.0
 _DISPLACED_S = 10.0
 _END_S = 3.0
 _LAST_CALL_S = 0.5
+_LOOK_S = 1.0
 
 USAGE = """\
 usage: rosrun rtcf rt_runner [__name:=NAME] [_PARAMETER:=VALUE]...
@@ -87,12 +90,18 @@ class RunnerNode:
         self._runner = runner_name(self._node)
         self._screen = Screen(self._node)
         self._inbox = Inbox()
-        self._master = Master(given.master_uri, self._node)
+        self._master = Master(given.master_uri, own_node(self._node))
         self._daemon: PrivateDaemon | None = None
         self._tenancy: rtcf.Tenancy | None = None
         self._client: rtcf.Client | None = None
         self._ros_node: RosNode | None = None
         self._announced = False
+        self._over = threading.Event()
+        self._said_missing: set[str] = set()
+        self._was_running = False
+        self._fault = ""
+        self._complete = False
+        self._warmup_cycles = 0
         self._taken_once = False
         self._token = ""
         self._lost_since: float | None = None
@@ -131,19 +140,30 @@ class RunnerNode:
 
     def _enter_ros(self) -> None:
         """Become a node; wait until one of our name, which that displaces, has given all back."""
-        self._ros_node = RosNode(self._master, self._node, self._given.hostname, self._inbox.ask)
+        self._ros_node = RosNode(
+            self._master,
+            own_node(self._node),
+            self._given.hostname,
+            self._inbox.ask,
+            self._screen.set_level,
+        )
         before = self._ros_node.register()
+        self._ros_node.stay_registered(self._inbox.master_back)
         if before and not wait_until_gone(before, self._inbox.pause, _DISPLACED_S):
             raise Ending(
                 Code.DONE if self._inbox.asked else Code.REFUSED,
                 f"a runner {self._node} is there already at this ROS master, and does not end: "
                 "end its launch, or give this one another name",
             )
-        rendezvous.announce(self._master, self._node, rendezvous.meeting(self._runner))
+        self._announce(rendezvous.meeting(self._runner))
         self._announced = True
 
+    def _announce(self, meeting: rendezvous.Meeting) -> None:
+        self._meeting = meeting
+        rendezvous.announce(self._master, self._node, meeting)
+
     def _last_calls(self) -> Master:
-        return Master(self._given.master_uri, self._node, _LAST_CALL_S)
+        return Master(self._given.master_uri, own_node(self._node), _LAST_CALL_S)
 
     def _take(self) -> None:
         wanted = self._parameters.daemon
@@ -198,15 +218,15 @@ class RunnerNode:
     # -- the loop's life ----------------------------------------------------
 
     def _serve(self) -> Code:
-        self._was_running = False
-        self._fault = ""
-        self._complete = False
         while True:
             event = self._inbox.get()
             if isinstance(event, Asked):
                 if event.why:
                     self._screen.warn(f"asked to end: {event.why}")
                 return Code.DONE
+            if isinstance(event, MasterBack):
+                self._come_back()
+                continue
             if isinstance(event, Lost):
                 self._reconnect(event.error)
                 continue
@@ -221,14 +241,15 @@ class RunnerNode:
                 raise Ending(Code.LOST, event.ended.message)
 
     def _taken(self, status: Any) -> None:
+        self._warmup_cycles = status.settings.warmup_cycles
         if self._lost_since is not None:
             self._lost_since = None
             self._screen.info("rtcfd is back, the runner is kept")
             return
         assert self._client is not None
-        meeting = rendezvous.meeting(self._runner, self._client.socket, self._token)
-        rendezvous.announce(self._master, self._node, meeting)
+        self._announce(rendezvous.meeting(self._runner, self._client.socket, self._token))
         self._taken_once = True
+        threading.Thread(target=self._watch_node, args=(self._client,), daemon=True).start()
         if self._parameters.mode == "wait_for_components":
             what = f"waiting for {self._parameters.components} components"
         elif self._parameters.mode == "wait_for_trigger":
@@ -241,12 +262,28 @@ class RunnerNode:
         if self._parameters.mode == "no_wait":
             self._start()
 
+    def _come_back(self) -> None:
+        """After a restart of the master: launchers and tools look for us there."""
+        with contextlib.suppress(MasterSilent):  # it has gone again
+            self._announce(self._meeting)
+            self._screen.info("registered again at the ROS master")
+
+    def _watch_node(self, client: rtcf.Client) -> None:
+        """End when a ROS peer kills the loop's node, which has the name that people see."""
+        while not self._over.wait(_LOOK_S):
+            with contextlib.suppress(rtcf.RtcfError, ValueError):  # closed meanwhile
+                (status,) = client.get_status(self._runner).runners
+                if status.ros.killed:
+                    self._inbox.ask("a ROS node has asked it to end")
+
     def _report(self, report: control_pb2.HoldReport) -> None:
         if report.running and not self._was_running:
             self._screen.info(f"the loop runs with {report.components} components")
             self._say_what_is_missing()
-        elif self._was_running and not report.running and not report.fault:
-            self._screen.info("the loop is stopped")
+        elif self._was_running and not report.running:
+            if not report.fault:
+                self._screen.info("the loop is stopped")
+            self._say_statistics()
         self._was_running = report.running
         if report.fault and report.fault != self._fault:
             if self._parameters.exit_on_fault:
@@ -261,12 +298,23 @@ class RunnerNode:
             self._start()
 
     def _say_what_is_missing(self) -> None:
-        """Say as loudly as a refusal that the loop is not real-time, whoever started it."""
+        """Warn once a launch that the loop is not real-time, whoever started it."""
         assert self._client is not None
         with contextlib.suppress(rtcf.RtcfError):
             for runner in self._client.get_status(self._runner).runners:
                 for reason in runner.degraded:
-                    self._screen.error(f"!! {self._runner} IS NOT REAL TIME: {reason}")
+                    if reason not in self._said_missing:
+                        self._screen.warn(f"!! {self._runner} IS NOT REAL TIME: {reason}")
+                self._said_missing.update(runner.degraded)
+
+    def _say_statistics(self) -> None:
+        """At the end of a loop, as RTCF 2021 does."""
+        assert self._client is not None
+        with contextlib.suppress(rtcf.RtcfError):
+            for line in loop_statistics.lines(
+                self._client.get_statistics(self._runner), self._warmup_cycles
+            ):
+                self._screen.info(line)
 
     def _start(self) -> None:
         assert self._client is not None
@@ -278,6 +326,9 @@ class RunnerNode:
             self._screen.warn(note)
 
     def _reconnect(self, error: rtcf.RtcfError) -> None:
+        if isinstance(error, ExpressionInvalidError) and self._falls_back(str(error)):
+            self._hold()
+            return
         if isinstance(error, rtcf.RefusedError):
             code = Code.REFUSED if self._lost_since is None else Code.LOST
             raise Ending(code, str(error))
@@ -298,9 +349,27 @@ class RunnerNode:
         else:
             raise Ending(Code.DONE)
 
+    def _falls_back(self, error: str) -> bool:
+        """Replace an expression that is none by the default of RTCF 2021, and say so."""
+        ros = self._parameters.settings.ros
+        for field, default in (("whitelist", ".*"), ("blacklist", "")):
+            bad = getattr(ros, field)
+            if f"{field}: bad regular expression '{bad}'" not in error or bad == default:
+                continue
+            self._screen.error(
+                f"~ros_mapping_{field}: {error.partition(f'{field}: ')[2]}; "
+                f"falling back to '{default}'"
+            )
+            setattr(ros, field, default)
+            return True
+        return False
+
     # -- the end ------------------------------------------------------------
 
     def _end(self) -> None:
+        self._over.set()
+        if self._client is not None and self._was_running:
+            self._say_statistics()
         if self._announced:
             try:
                 master = self._last_calls()
@@ -345,6 +414,11 @@ def _log_folder() -> str:
     """Return where ROS nodes log without roslaunch."""
     home = os.environ.get("ROS_HOME") or os.path.expanduser("~/.ros")
     return os.environ.get("ROS_LOG_DIR") or f"{home}/log"
+
+
+def own_node(runner_node: str) -> str:
+    """Return the name of rt_runner's own node: that of the launch is the loop's."""
+    return f"{runner_node}/launch"
 
 
 def runner_name(node: str) -> str:

@@ -1,11 +1,14 @@
-"""What a node prints: log records and its own words, as rosconsole does.
+"""What a node prints: log records and its own words, as rosconsole does, ROSCONSOLE_FORMAT included.
 
 Warnings and errors go to standard error, which roslaunch always shows; the
 rest to standard output, which it shows with output="screen".
 """
 
 import contextlib
+import os
+import re
 import sys
+import threading
 import time
 from typing import Any
 
@@ -18,7 +21,11 @@ _WORDS = {
     control_pb2.LogRecord.LEVEL_ERROR: "ERROR",
     control_pb2.LogRecord.LEVEL_FATAL: "FATAL",
 }
+_ORDER = list(_WORDS.values())
 _COLOURS = {"DEBUG": "\033[32m", "WARN": "\033[33m", "ERROR": "\033[31m", "FATAL": "\033[31m"}
+
+
+_TOKEN = re.compile(r"\$\{([a-z]+)(?::([^}]*))?\}")
 
 
 class Screen:
@@ -26,18 +33,24 @@ class Screen:
 
     def __init__(self, name: str) -> None:
         self._name = name
+        self._format = os.environ.get("ROSCONSOLE_FORMAT", "")
+        self._least = "INFO"
+
+    def set_level(self, level: str) -> None:
+        """Print no lines of the node's own below a level, e.g. "warn".  Any thread."""
+        self._least = level.upper()
 
     def info(self, text: str) -> None:
         """Print a line of the node's own."""
-        self._print("INFO", time.time(), text)
+        self._print_own("INFO", text)
 
     def warn(self, text: str) -> None:
         """Print a warning of the node's own."""
-        self._print("WARN", time.time(), text)
+        self._print_own("WARN", text)
 
     def error(self, text: str) -> None:
         """Print an error of the node's own."""
-        self._print("ERROR", time.time(), text)
+        self._print_own("ERROR", text)
 
     def records(self, logs: control_pb2.LogRecords) -> None:
         """Print records of a loop."""
@@ -45,11 +58,27 @@ class Screen:
             self.warn(f"{logs.dropped} log records were lost: this terminal is slower than they")
         for record in logs.records:
             word = _WORDS.get(record.level, "INFO")
-            self._print(word, record.time_ns / 1e9, record.message, record.component)
+            place = (record.file, record.line)
+            self._print(word, record.time_ns / 1e9, record.message, record.component, place)
 
-    def _print(self, word: str, time_s: float, text: str, name: str = "") -> None:
+    def _print_own(self, word: str, text: str) -> None:
+        if _ORDER.index(word) >= _ORDER.index(self._least):
+            self._print(word, time.time(), text)
+
+    def _print(
+        self,
+        word: str,
+        time_s: float,
+        text: str,
+        name: str = "",
+        place: tuple[str, int] = ("", 0),
+    ) -> None:
         stream: Any = sys.stderr if word in ("WARN", "ERROR", "FATAL") else sys.stdout
-        line = f"[{word:>5}] [{time_s:.6f}]: {name or self._name}: {text}"
+        line = (
+            self._formatted(word, time_s, text, name, place)
+            if self._format
+            else f"[{word:>5}] [{time_s:.6f}]: {name or self._name}: {text}"
+        )
         if word in _COLOURS and stream.isatty():
             line = f"{_COLOURS[word]}{line}\033[0m"
         # The terminal may have gone; the journal has it all the same.
@@ -58,3 +87,27 @@ class Screen:
             # not buffer, print() writes the end of the line by itself.
             stream.write(f"{line}\n")
             stream.flush()
+
+    def _formatted(
+        self, word: str, time_s: float, text: str, name: str, place: tuple[str, int]
+    ) -> str:
+        """Return a line in the format of the environment; tokens that say nothing here are empty."""
+        values = {
+            "severity": f"{word:>5}",
+            "message": text,
+            "logger": f"ros.rtcf.{name}" if name else "ros.rtcf",
+            "node": self._name,
+            "thread": hex(threading.get_ident()),
+            "file": place[0],
+            "line": str(place[1]),
+            "function": "",
+        }
+
+        def value(token: re.Match[str]) -> str:
+            kind, how = token.groups()
+            if kind in ("time", "walltime"):
+                local = time.localtime(time_s)
+                return time.strftime(how, local) if how else f"{time_s:.9f}"
+            return values.get(kind, token.group())
+
+        return _TOKEN.sub(value, self._format)

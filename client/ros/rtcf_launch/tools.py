@@ -1,10 +1,12 @@
 """The rosrun tools component_list, component_info, component_order, connection_list and
-connection_info: rtcfctl's views of a runner of a launch, wherever its rtcfd is."""
+connection_info: what RTCF 2021's print, by a runner's ROS service and so from any machine; with
+--table or -o rtcfctl's views of a runner of this machine, wherever its rtcfd is."""
 
 import argparse
 import os
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,23 +14,43 @@ import rtcf
 from rtcfctl.graph import component, wires
 from rtcfctl.terminal.output import Output
 
-from rtcf_launch import arguments, rendezvous
+from rtcf_launch import arguments, rendezvous, runner_info, tcpros
 from rtcf_launch.master import Master, MasterSilent
 from rtcf_launch.runner_node import runner_name
 
 DONE, REFUSED, USAGE, UNREACHABLE = range(4)
 _CALL_S = 1.0
+_ANSWER_S = 10.0
+_SERVICE = "get_introspection_information"
 
-Show = Callable[[rtcf.Client, argparse.Namespace, Output], None]
 
-# Of each tool: what it says of itself, what it names, what it shows.
-TOOLS: dict[str, tuple[str, str, Show]] = {
-    "component_list": ("the components of a loop, in their order", "", component.show_all),
-    "component_info": ("one component, with its values", "component", component.show),
-    "component_order": ("the order in which the components run", "", wires.show_order),
-    "connection_list": ("the connections of a loop", "", wires.show_connections),
-    "connection_info": ("one connection: who writes and who reads", "connection",
-                        wires.show_connection),
+@dataclass(frozen=True)
+class Tool:
+    """One of the tools."""
+
+    text: str  # what it says of itself
+    named: str  # what it names
+    lines: Callable[[Any, str], list[str]]  # of a rtcf_msgs/RunnerInfo
+    show: Callable[[rtcf.Client, argparse.Namespace, Output], None]
+
+
+TOOLS = {
+    "component_list": Tool(
+        "the components of a loop", "", runner_info.component_list, component.show_all
+    ),
+    "component_info": Tool(
+        "one component and its ports", "component", runner_info.component_info, component.show
+    ),
+    "component_order": Tool(
+        "the order in which the components run", "", runner_info.component_order, wires.show_order
+    ),
+    "connection_list": Tool(
+        "the connections of a loop", "", runner_info.connection_list, wires.show_connections
+    ),
+    "connection_info": Tool(
+        "one connection: who writes and who reads", "connection", runner_info.connection_info,
+        wires.show_connection,
+    ),
 }  # fmt: skip
 
 
@@ -38,11 +60,15 @@ def main(tool: str, argv: Sequence[str] | None = None, build_tree: Path | None =
     given = arguments.parse(sys.argv[1:] if argv is None else argv, os.environ, tool)
     args = _parser(tool).parse_args(given.words)
     try:
-        socket, args.runner = _place(args, given)
-        with rtcf.Client(socket) as client:
-            TOOLS[tool][2](client, args, Output(args.output))
-            sys.stdout.flush()
-    except rtcf.DaemonUnreachableError as error:
+        if args.output is None:
+            _print(TOOLS[tool], _info(args, given), args)
+        else:
+            _show(TOOLS[tool], args, given)
+        sys.stdout.flush()
+    except runner_info.NotThere as error:
+        print(error)
+        return REFUSED
+    except (rtcf.DaemonUnreachableError, tcpros.CallFailed, MasterSilent) as error:
         return _fail(tool, error, UNREACHABLE)
     except rtcf.RtcfError as error:
         return _fail(tool, error, REFUSED)
@@ -52,16 +78,15 @@ def main(tool: str, argv: Sequence[str] | None = None, build_tree: Path | None =
 
 
 def _parser(tool: str) -> argparse.ArgumentParser:
-    text, named, _ = TOOLS[tool]
     parser = argparse.ArgumentParser(
         prog=f"rosrun rtcf {tool}",
-        description=f"Shows {text}.",
-        epilog="Without --socket the runner is looked for at the ROS master, where rt_runner says "
-        "where it is, then in the system's rtcfd. Exit codes: 0 done, 1 refused, 2 usage, "
-        "3 rtcfd not reachable.",
+        description=f"Shows {TOOLS[tool].text}.",
+        epilog="Asks the runner's ROS service. With --table or -o rtcfd is asked, which must be on "
+        "this machine: without --socket the one that rt_runner names at the ROS master, else the "
+        "system's. Exit codes: 0 done, 1 refused or not there, 2 usage, 3 not reachable.",
     )
-    if named:
-        parser.add_argument(named, metavar=named.upper())
+    if TOOLS[tool].named:
+        parser.add_argument(TOOLS[tool].named, metavar=TOOLS[tool].named.upper())
     parser.add_argument(
         "-r", "--runner", default="rt_runner", metavar="NAME",
         help="rt_runner's node name, or a runner of rtcfd (default: rt_runner)",
@@ -71,9 +96,39 @@ def _parser(tool: str) -> argparse.ArgumentParser:
         help="rtcfd's control socket (default: $RTCF_SOCKET)",
     )  # fmt: skip
     parser.add_argument(
-        "-o", "--output", choices=("table", "json", "yaml"), default="table", help="output format"
+        "-o", "--output", choices=("table", "json", "yaml"), help="show what rtcfctl shows"
+    )
+    parser.add_argument(
+        "--table", dest="output", action="store_const", const="table", help="the same as -o table"
     )
     return parser
+
+
+def _print(tool: Tool, info: Any, args: argparse.Namespace) -> None:
+    for line in tool.lines(info, getattr(args, tool.named) if tool.named else ""):
+        print(line)
+
+
+def _show(tool: Tool, args: argparse.Namespace, given: arguments.Arguments) -> None:
+    socket, args.runner = _place(args, given)
+    with rtcf.Client(socket) as client:
+        tool.show(client, args, Output(args.output))
+
+
+def _info(args: argparse.Namespace, given: arguments.Arguments) -> Any:
+    """Return the rtcf_msgs/RunnerInfo of a runner.  Raises CallFailed and MasterSilent."""
+    from rtcf_msgs.srv import GetRunnerInfo  # takes a while
+
+    master = Master(given.master_uri, given.full_name, _CALL_S)
+    services = [f"{node}/{_SERVICE}" for node in arguments.upward(args.runner, given.ns)]
+    for service in services:
+        if uri := master.service_uri(service):
+            found = tcpros.call(uri, service, GetRunnerInfo, given.full_name, _ANSWER_S)
+            return found.runner_info
+    raise tcpros.CallFailed(
+        f"no {services[0]} at the ROS master {given.master_uri}: start rt_runner, name it by "
+        "--runner, or see a runner of this machine by --table"
+    )
 
 
 def _place(args: argparse.Namespace, given: arguments.Arguments) -> tuple[str | None, str]:

@@ -55,7 +55,9 @@ struct BridgeSettings {
     bool enabled = true;
     std::string master_uri;      ///< empty: of the environment
     std::string hostname;        ///< by which peers reach us; empty: of the environment
-    std::string name_space;      ///< of what is not a port: cycles and services; empty: the runner
+    /// Of what is not a port: cycles and services; at the start of the node its name. Empty: the
+    /// node's own name.
+    std::string name_space;
     std::uint32_t queue = 1000;  ///< messages kept for a slow subscriber
     std::string latch;           ///< outputs whose last value late subscribers get; an expression
     std::uint32_t decimation = 1;                ///< each n-th value of an output is published,
@@ -75,6 +77,7 @@ struct BridgeStatus {
     std::uint32_t publications = 0;
     std::uint32_t subscriptions = 0;
     std::string problem;                 ///< one line; empty = none
+    bool killed = false;                 ///< a peer has asked it to shut down
     std::optional<bool> simulated_time;  ///< of the peers; nothing = they have not been asked yet
     bool follows_clock = false;          ///< ticks go to the clock of setClock()
 };

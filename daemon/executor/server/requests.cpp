@@ -324,6 +324,7 @@ pb::RunnerStatus Server::status() const {
     ros.set_publications(picture.bridge.publications);
     ros.set_subscriptions(picture.bridge.subscriptions);
     ros.set_problem(picture.bridge.problem);
+    ros.set_killed(picture.bridge.killed);
     ros.set_too_large(picture.too_large);
     std::uint64_t passed_over = 0;
     for (const auto& injector : graph->injectors) passed_over += injector->passedOver();

@@ -27,7 +27,7 @@ MasterLink::MasterLink(NodeName name, const executor::Access& access, Say say,
                        const RoscppNode::ParameterWritten& written)
     : access_(access),
       say_(std::move(say)),
-      wanted_name_(name),
+      own_name_(name),
       node_(
           std::move(name),
           [this, wake](const std::string& /*reason*/) {
@@ -47,11 +47,12 @@ std::string MasterLink::uriOf(const executor::BridgeSettings& settings) {
 
 MasterLink::State MasterLink::look(const executor::BridgeSettings& settings) {
     if (failed_) return State::Failed;
+    if (!node_.started()) node_.rename(nodeNameOf(settings.name_space, own_name_));
     const std::string uri = uriOf(settings);
     MasterAddress address;
     if (!locate(uri, address)) return State::Away;
     if (!mayFollow(uri, address, settings.peers)) return node_.started() ? State::Off : State::Away;
-    if (!node_.started() && !start(uri, address, settings.hostname))
+    if (!node_.started() && !start(uri, address, settings))
         return failed_ ? State::Failed : State::Away;
     if (!node_.alive()) {
         failed_ = true;
@@ -178,7 +179,7 @@ bool MasterLink::mayFollow(const std::string& uri, const MasterAddress& address,
 }
 
 bool MasterLink::start(const std::string& uri, const MasterAddress& address,
-                       const std::string& hostname) {
+                       const executor::BridgeSettings& settings) {
     ParallelCalls master(address, hurry_);
     if (!chooseName(master)) {
         away("no ROS master answers at " + uri);
@@ -186,7 +187,7 @@ bool MasterLink::start(const std::string& uri, const MasterAddress& address,
         return false;
     }
     try {
-        node_.start(uri, address, hostname);
+        node_.start(uri, address, settings.hostname);
     } catch (const std::exception& error) {
         failed_ = true;
         problem_ = std::string("the ROS node could not be started: ") + error.what();
@@ -195,31 +196,34 @@ bool MasterLink::start(const std::string& uri, const MasterAddress& address,
     }
     uri_ = uri;
     useAddress(address);
-    hostname_ = hostname;
+    hostname_ = settings.hostname;
     new_ = true;
     say_("ROS node " + name().full() + " is up at " + uri);
     return true;
 }
 
-// The name, or the first one after it that no other node has: a second node of a name would end
-// the first. @return false if the master does not answer
+// The name that is wanted, else the runner's own, or the first one after it that no other node has:
+// a second node of a name would end the first. @return false if the master does not answer
 bool MasterLink::chooseName(ParallelCalls& master) {
     constexpr int kMost = 9;
-    std::vector<MasterCall> calls;
-    std::vector<NodeName> names;
-    for (int i = 1; i <= kMost; ++i) {
-        NodeName name = wanted_name_;
-        if (i > 1) name.base += "_" + std::to_string(i);
-        calls.push_back({"lookupNode", texts({name.full(), name.full()})});
+    const NodeName wanted = node_.name();
+    std::vector<NodeName> names{wanted};
+    if (own_name_.full() != wanted.full()) names.push_back(own_name_);
+    for (int i = 2; i <= kMost; ++i) {
+        NodeName name = own_name_;
+        name.base += "_" + std::to_string(i);
         names.push_back(std::move(name));
     }
+    std::vector<MasterCall> calls;
+    for (const NodeName& name : names)
+        calls.push_back({"lookupNode", texts({name.full(), name.full()})});
     std::vector<MasterAnswer> found = master.run(calls, kCallTimeout, Clock::now() + kCallTimeout);
     for (std::size_t i = 0; i < found.size(); ++i) {
         if (found[i].silent()) return false;
         const bool taken = found[i] && mayLive(found[i].text());
         if (taken && i + 1 < found.size()) continue;
         if (i != 0) {
-            say_("another node named " + wanted_name_.full() +
+            say_("another node named " + wanted.full() +
                  " runs at this ROS master: this one is " + names[i].full());
         }
         node_.rename(std::move(names[i]));

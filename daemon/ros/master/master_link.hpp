@@ -64,6 +64,8 @@ class MasterLink {
 
     /// Why it is not Up, one line; empty if it is.
     const std::string& problem() const { return problem_; }
+    /// Whether a peer has asked the node to go.
+    bool killed() const { return off_ == Why::Killed; }
     /// True once for each master that knows nothing of the node yet.
     bool takeNew() { return std::exchange(new_, false); }
     /// Whether the master says that time is simulated; nothing = it has not been asked.
@@ -90,7 +92,8 @@ class MasterLink {
 
     bool mayFollow(const std::string& uri, const MasterAddress& address, executor::Right needed);
     bool locate(const std::string& uri, MasterAddress& address);
-    bool start(const std::string& uri, const MasterAddress& address, const std::string& hostname);
+    bool start(const std::string& uri, const MasterAddress& address,
+               const executor::BridgeSettings& settings);
     bool chooseName(ParallelCalls& master);
     void moveTo(const std::string& uri, const MasterAddress& address);
     void useAddress(const MasterAddress& address);
@@ -110,7 +113,7 @@ class MasterLink {
     bool revived_ = false;
     std::atomic<bool> hurry_{false};
     const std::atomic<bool> never_{false};
-    const NodeName wanted_name_;
+    const NodeName own_name_;  // where settings name none
     RoscppNode node_;
     HostNames hosts_;
     std::string host_;  // of the master that the settings name

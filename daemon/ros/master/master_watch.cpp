@@ -146,6 +146,7 @@ void MasterWatch::step() {
         const std::lock_guard lock(mutex_);
         settings = *settings_;
     }
+    subjects_.tidy();
     if (!settings.enabled) {
         if (link_.up()) say("ROS node " + link_.name().full() + " is off");
         leave();
@@ -153,7 +154,6 @@ void MasterWatch::step() {
         setProblem("");
         return;
     }
-    subjects_.prepare(settings);
     const MasterLink::State state = link_.look(settings);
     {
         const std::lock_guard lock(mutex_);
@@ -206,12 +206,14 @@ void MasterWatch::setProblem(const std::string& problem) {
     const std::lock_guard lock(mutex_);
     status_.connected = false;
     status_.problem = problem;
+    status_.killed = link_.killed();
     status_.simulated_time.reset();
 }
 
 void MasterWatch::setConnected() {
     const std::lock_guard lock(mutex_);
     status_.connected = true;
+    status_.killed = false;
     status_.problem = subjects_.notice();
 }
 

@@ -28,6 +28,12 @@ NodeName nodeName(const std::string& host, const std::string& daemon, const std:
     return {"/rtcfd/" + legal(host, "localhost") + below, legal(runner, "rt_runner")};
 }
 
+NodeName nodeNameOf(const std::string& name_space, const NodeName& otherwise) {
+    const std::size_t slash = name_space.rfind('/');
+    if (slash == std::string::npos || slash + 1 == name_space.size()) return otherwise;
+    return {name_space.substr(0, slash), name_space.substr(slash + 1)};
+}
+
 NodeName nodeName(const std::string& daemon, const std::string& runner) {
     std::array<char, HOST_NAME_MAX + 1> host{};
     if (gethostname(host.data(), host.size() - 1) != 0) host[0] = '\0';

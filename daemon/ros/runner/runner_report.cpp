@@ -150,10 +150,12 @@ rtcf_msgs::RunnerInfo runnerInfo(const rtcf_msgs::GetLoop::Response& loop) {
         info.components.push_back(std::move(to));
     }
     for (const rtcf_msgs::LoopConnection& connection : loop.connections) {
+        // Of RTCF 2021 a port without a peer in the loop makes no connection.
+        if (connection.writer.empty() || connection.readers.empty()) continue;
         rtcf_msgs::ConnectionInfo to;
         to.name = connection.name;
         to.type = connection.type;
-        if (!connection.writer.empty()) to.publishing_components.push_back(connection.writer);
+        to.publishing_components.push_back(connection.writer);
         to.subscribing_components = connection.readers;
         to.connected_to_ROS = connection.published != 0 || connection.subscribed != 0 ? 1 : 0;
         info.connections.push_back(std::move(to));

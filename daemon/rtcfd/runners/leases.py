@@ -66,6 +66,8 @@ class Leases:
         self._runner = runner
         self._alarm = alarm
         self._outboxes: dict[str, Outbox] = {}  # by component; of holders that are there
+        self._told: set[str] = set()  # notes on the loads of this launch
+        self._unseen: set[str] = set()  # components whose holder shows nothing but warnings
         self._loading: set[str] = set()
         self._losing: set[str] = set()  # their holders have died, and it is being seen to
         self._leaving: dict[str, asyncio.Task[None]] = {}
@@ -109,6 +111,7 @@ class Leases:
                 request.run_id, request.on_lost or control_pb2.ON_LEASE_LOST_STOP, request.holder
             )
             self._outboxes[name] = outbox
+            self._note_screen(name, request)
             self._loading.add(name)
             await runner.save()
             try:
@@ -139,7 +142,16 @@ class Leases:
         if note:
             runner.log.warning(note)
             result.notes.append(note)
+        self._leave_out_told(result)
         return result
+
+    def _leave_out_told(self, result: control_pb2.ChangeResult) -> None:
+        """Remove notes that another holder has been told: launchers print to one screen."""
+        if len(self._terms) <= 1:
+            self._told.clear()
+        fresh = [note for note in result.notes if note not in self._told]
+        self._told.update(fresh)
+        result.notes[:] = fresh
 
     def attach(self, request: control_pb2.OpenLease, outbox: Outbox) -> control_pb2.ChangeResult:
         """Give a component back to its holder."""
@@ -159,6 +171,7 @@ class Leases:
                 component=name,
             )
         self._outboxes[name] = outbox
+        self._note_screen(name, request)
         self._runner.log.info("%s: its holder is back", name)
         return control_pb2.ChangeResult(component=name)
 
@@ -188,11 +201,17 @@ class Leases:
                 "waiting for holders", self._await(waiting)
             )
 
-    def take_log(self, record: control_pb2.LogRecord) -> None:
-        """Hand a record to the holder of its component."""
+    def take_log(self, record: control_pb2.LogRecord) -> bool:
+        """Hand a record to the holder of its component; tell whether that shows it."""
         outbox = self._outboxes.get(record.component)
-        if outbox is not None:
-            outbox.log(record)
+        if outbox is None:
+            return False
+        outbox.log(record)
+        warns = record.level >= control_pb2.LogRecord.LEVEL_WARN
+        return warns or record.component not in self._unseen
+
+    def _note_screen(self, name: str, request: control_pb2.OpenLease) -> None:
+        (self._unseen.add if request.unseen else self._unseen.discard)(name)
 
     def failed(self, component: str, reason: str) -> None:
         """Tell a holder that its component has failed; the component leaves."""

@@ -215,10 +215,11 @@ class Runner(RunnerCore):
             iteration=record.iteration,
             component=record.component,
             message=record.message,
+            file=record.file,
+            line=record.line,
         )
-        if record.component:
-            self.leases.take_log(copy)
-        elif self.hold_outbox is not None:
+        shown = bool(record.component) and self.leases.take_log(copy)
+        if not shown and self.hold_outbox is not None:
             self.hold_outbox.log(copy)
 
     def alarm(self, text: str) -> None:

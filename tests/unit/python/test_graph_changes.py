@@ -4,7 +4,9 @@ import json
 import os
 import signal
 import threading
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 import rtcf
@@ -71,6 +73,33 @@ def test_a_type_that_is_in_two_places_is_said(daemon: DaemonUnderTest, client: r
     (note,) = client.load(rtcf.component("demo", "Fine")).notes
     taken, other = (daemon.packages / "demo" / f"{name}.so" for name in ("elsewhere", "main"))
     assert note == f"demo/Fine is in several places: {taken} is taken, not {other}"
+
+
+def test_holders_of_one_launch_are_told_a_note_once(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
+    daemon.package("demo", "elsewhere", types={"Fine": "fine"})
+
+    def leased(name: str) -> tuple[rtcf.Tenancy, Iterator[Any], list[str]]:
+        spec = rtcf.component("demo", "Fine", name=name)
+        tenancy = client.lease_component(control_pb2.OpenLease(component=spec))
+        messages = iter(tenancy)
+        loaded = next(each.loaded for each in messages if each.WhichOneof("kind") == "loaded")
+        return tenancy, messages, list(loaded.notes)
+
+    def end(tenancy: rtcf.Tenancy, messages: Iterator[Any]) -> None:
+        tenancy.end()
+        assert [each.WhichOneof("kind") for each in messages][-1] == "ended"
+
+    *first, told = leased("one")
+    assert len(told) == 1 and "is in several places" in told[0]
+    *second, nothing = leased("two")
+    assert nothing == []
+    end(*first)
+    end(*second)
+    *third, again = leased("three")  # another launch
+    assert again == told
+    end(*third)
 
 
 def test_duplicate_name_is_refused(client: rtcf.Client) -> None:
