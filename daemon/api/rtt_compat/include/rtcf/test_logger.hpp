@@ -20,7 +20,7 @@ class TestLogger final : public LogSink {
         context_.full_name = "/" + name;
         context_.name = name;
         context_.clock = &clock_;
-        context_.period_ns = clock_.period_ns = clock_.elapsed_ns = 1'000'000;
+        context_.period_ns = clock_.period_ns;
         context_.log = this;
         context_.log_level = LogLevel::Debug;  // rosconsole decides
         component.attach(context_);
