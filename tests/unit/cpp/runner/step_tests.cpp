@@ -161,7 +161,8 @@ TEST_F(Stepping, PausesWhereItIsGivenUp) {
     });
     ASSERT_TRUE(eventually([this] { return iteration() > 100; }));
     given_up = true;
-    EXPECT_EQ(endless.get().cycles, iteration());
+    const std::uint64_t cycles = endless.get().cycles;
+    EXPECT_EQ(cycles, iteration());
     EXPECT_EQ(state(), RunnerState::Stepping);
     const std::uint64_t before = iteration();
     step(5);
