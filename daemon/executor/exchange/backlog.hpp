@@ -17,9 +17,10 @@ namespace rtcf::executor {
 class Backlog {
    public:
     /// For a queue; as long as it.
-    explicit Backlog(QueueBase& queue) : type_(queue.type()), queue_(queue) {
+    explicit Backlog(QueueBase& queue)
+        : type_(queue.type()), queue_(queue), arrived_(type_.make_slot(nullptr)) {
         for (std::size_t i = 0; i < queue.capacity(); ++i)
-            slots_.push_back(type_.make_slot(nullptr));
+            slots_.push_back(type_.make_slot(queue.sample()));
     }
 
     /// Takes a message; bytes that are none are passed over. One thread at a time; not real-time
@@ -30,9 +31,11 @@ class Backlog {
             lost_.fetch_add(1, std::memory_order_relaxed);
             return;
         }
-        SlotHeader& slot = *slots_[head % slots_.size()];
-        if (!type_.deserialize(slot, bytes, size)) return;
-        slot.time_ns = age_ns;
+        // Copied, as that keeps the slot's memory: it becomes the queue's, which a component may
+        // feed one day.
+        if (!type_.deserialize(*arrived_, bytes, size)) return;
+        arrived_->time_ns = age_ns;
+        type_.copy(*slots_[head % slots_.size()], *arrived_);
         head_.store(head + 1, std::memory_order_release);
     }
 
@@ -55,6 +58,7 @@ class Backlog {
    private:
     const TypeInfo& type_;
     QueueBase& queue_;
+    std::shared_ptr<SlotHeader> arrived_;  // delivering side
     std::vector<std::shared_ptr<SlotHeader>> slots_;
     std::atomic<std::size_t> head_{0};  // delivering side
     std::atomic<std::size_t> tail_{0};  // loop side

@@ -59,7 +59,7 @@ struct AbiProbe {
              sizeof(QueueBase::Ring), offsetof(QueueBase::Ring, capacity),
              offsetof(QueueBase::Ring, at), offsetof(QueueBase::Ring, slots),
              offsetof(QueueBase::Ring, oldest), offsetof(QueueBase::Ring, count),
-             offsetof(QueueBase::Ring, dropped)});
+             offsetof(QueueBase::Ring, dropped), offsetof(QueueBase::Ring, sample)});
         add({sizeof(SlotHeader), offsetof(SlotHeader, sequence), offsetof(SlotHeader, time_ns),
              offsetof(Slot<double>, value)});
         add({sizeof(TypeInfo), offsetof(TypeInfo, name), offsetof(TypeInfo, size),

@@ -35,18 +35,29 @@ class QueueBase : public InputBase {
     }
     /// Loop time since the oldest message was written, ns; -1 without one. Real-time safe.
     std::int64_t age() noexcept;
-    /// Messages that came while there were as many as it keeps: they are lost. Real-time safe.
+    /// Messages that were lost: they came while there were as many as it keeps, or no memory.
+    /// Real-time safe.
     std::uint64_t dropped() const noexcept RTCF_NONBLOCKING { return ring_->dropped; }
     /// As many as it keeps.
     std::size_t capacity() const noexcept RTCF_NONBLOCKING { return ring_->capacity; }
 
     /// @name For the executor; real-time safe as TypeInfo::copy is
     /// @{
-    /// Takes what its source has written since it was last looked at.
+    /// Takes what its source has written since it was last looked at. What there is no memory for
+    /// counts as dropped.
     void receive() noexcept {
         if (readStatus() != DataStatus::New) return;
-        if (SlotHeader* const to = claim()) type().copy(*to, *current());
+        SlotHeader* const to = claim();
+        if (to == nullptr) return;
+        try {
+            type().copy(*to, *current());
+        } catch (...) {
+            --ring_->count;
+            ++ring_->dropped;
+        }
     }
+    /// A slot with the capacity that reserve() gave each message; null without it.
+    const SlotHeader* sample() const noexcept { return ring_->sample.get(); }
     /// Takes a message out of `from`, which gets another value. @param time_ns of the loop
     void take(SlotHeader& from, std::int64_t time_ns) noexcept {
         SlotHeader* const to = claim();
@@ -75,6 +86,7 @@ class QueueBase : public InputBase {
         std::size_t oldest = 0;
         std::size_t count = 0;
         std::uint64_t dropped = 0;
+        std::shared_ptr<SlotHeader> sample = nullptr;
     };
 
     QueueBase(Component* owner, std::string name, const TypeInfo& type, const SlotHeader& empty,
@@ -83,6 +95,10 @@ class QueueBase : public InputBase {
         setQueue(this);
     }
     ~QueueBase() = default;
+
+    void setSample(std::shared_ptr<SlotHeader> sample) noexcept {
+        ring_->sample = std::move(sample);
+    }
 
     const SlotHeader* oldest() noexcept {
         receive();
@@ -127,6 +143,7 @@ class Queue final : public QueueBase {
     /// configure(); not real-time safe.
     void reserve(const T& sample) {
         for (Slot<T>& slot : *slots_) slot.value = sample;
+        setSample(type().make_slot(&(*slots_)[0]));
     }
 
    private:

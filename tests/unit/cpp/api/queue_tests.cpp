@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 #include <std_msgs/String.h>
 
+#include <array>
 #include <string>
 #include <vector>
 
+#include "exchange/backlog.hpp"
 #include "rtcf/queue.hpp"
 #include "rtcf/test.hpp"
 #include "support/bare_component.hpp"
@@ -129,6 +131,24 @@ class Summing final : public Component {
     }
 };
 RTCF_COMPONENT(Summing, "sums up a queue")
+
+// The memory of what comes from a topic becomes the queue's, and goes to a topic in turn.
+TEST_F(QueueAlone, ATopicTakesNothingOfTheReserve) {
+    Queue<std_msgs::String, 3> texts{&component, "texts"};
+    std_msgs::String longest;
+    longest.data.assign(100, 'x');
+    texts.reserve(longest);
+    executor::Backlog backlog(texts);
+    const std::array<std::uint8_t, 5> message{1, 0, 0, 0, 'a'};
+    for (int round = 0; round < 10; ++round) {
+        backlog.store(message.data(), message.size(), 0);
+        backlog.enter(0);
+        ASSERT_NE(texts.front(), nullptr);
+        EXPECT_EQ(texts.front()->data, "a");
+        EXPECT_GE(texts.front()->data.capacity(), 100U) << round;
+        texts.pop();
+    }
+}
 
 TEST(QueueInABench, GetsEachWrite) {
     Bench bench("Summing");
