@@ -50,6 +50,9 @@ class Tap {
     /// safe. @param stamp_ns of the cycle, ROS time
     void push(std::int64_t stamp_ns) noexcept RTCF_NONBLOCKING;
 
+    /// The source's sequence at the last push(). Producer only; real-time safe.
+    std::uint64_t lastSequence() const noexcept RTCF_NONBLOCKING { return last_sequence_; }
+
     /// Gives the oldest message to `use(const std::uint8_t* bytes, std::uint32_t size, std::int64_t
     /// stamp_ns)` and removes it; without a call if no message can be made of it. The bytes are
     /// valid during the call. Not by the producer; of two who come at once, one finds nothing.

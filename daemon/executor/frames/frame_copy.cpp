@@ -1,5 +1,6 @@
 #include "frames/frame_copy.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace rtcf::executor {
@@ -56,6 +57,19 @@ void FrameCopy::copyBlocks(Word* to) const noexcept RTCF_NONBLOCKING {
         for (std::size_t i = 0; i < block.words; ++i, next += kWord, ++to)
             put(*to, load<std::uint64_t>(next));
         if (block.rest != 0) put(*to++, loadRest(next, block.rest));
+    }
+}
+
+void FrameCopy::copyBack(const Word* from, std::size_t source, void* to) const noexcept
+    RTCF_NONBLOCKING {
+    from += offsets_[source] / kWord;
+    auto* next = static_cast<std::uint8_t*>(to);
+    for (std::size_t left = sources_[source].size; left != 0; ++from) {
+        const std::uint64_t word = from->load(std::memory_order_relaxed);
+        const std::size_t bytes = std::min(left, kWord);
+        std::memcpy(next, &word, bytes);
+        next += bytes;
+        left -= bytes;
     }
 }
 

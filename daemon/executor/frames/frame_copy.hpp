@@ -50,6 +50,8 @@ class FrameCopy {
         }
         if (!blocks_.empty()) copyBlocks(to);
     }
+    /// Copies the value of a source out of such words. Its writer; real-time safe.
+    void copyBack(const Word* from, std::size_t source, void* to) const noexcept RTCF_NONBLOCKING;
 
    private:
     static constexpr std::size_t kAtOnce = 4;  // words that are gathered

@@ -28,12 +28,21 @@ FrameRing::FrameRing(std::vector<Source> sources, std::size_t frames, FrameMemor
         own_ = std::make_unique<Word[]>(words);  // NOLINT(modernize-avoid-c-arrays)
         for (std::size_t i = 0; i < words; ++i) own_[i].store(0, std::memory_order_relaxed);
     }
+    base_ = std::make_unique<Word[]>(copy_.words());  // NOLINT(modernize-avoid-c-arrays)
     words_ = block_ != nullptr ? block_->words() : own_.get();
     writing_ = words_;
 }
 
 std::size_t FrameRing::capacityFor(const std::vector<Source>& sources, std::size_t frames) {
     return capacityOf(kHeadWords + FrameCopy(sources).words(), frames);
+}
+
+void FrameRing::putBack(void* value) const noexcept RTCF_NONBLOCKING {
+    const std::uint64_t end = end_.load(std::memory_order_relaxed);
+    const Word* const last = end == base_end_ ? base_.get() : at(end - 1) + kHeadWords;
+    for (std::size_t i = 0; i < copy_.sources().size(); ++i) {
+        if (copy_.sources()[i].from == value) copy_.copyBack(last, i, value);
+    }
 }
 
 bool FrameRing::read(std::uint64_t number, Frame& frame) const {

@@ -59,6 +59,14 @@ class FrameRing {
         frame[kMark].store(2 * end_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
         copy_.copy(frame + kHeadWords);
     }
+    /// Notes the values as they are, where they were changed otherwise than by a cycle.
+    void setBase() noexcept RTCF_NONBLOCKING {
+        copy_.copy(base_.get());
+        base_end_ = end_.load(std::memory_order_relaxed);
+    }
+    /// Gives a source the value that it had after the last frame or setBase(). @param value where
+    /// a source lies; what is none stays as it is
+    void putBack(void* value) const noexcept RTCF_NONBLOCKING;
     void commit(const CycleRecord& cycle, bool last_of_loop) noexcept RTCF_NONBLOCKING {
         const auto put = [frame = writing_](Head place, std::uint64_t value) {
             frame[place].store(value, std::memory_order_release);
@@ -113,7 +121,9 @@ class FrameRing {
     std::size_t stride_;  // words of a frame
     std::size_t mask_;    // frames minus 1
     std::shared_ptr<FrameBlock> block_;
-    std::unique_ptr<Word[]> own_;  // NOLINT(modernize-avoid-c-arrays): without a block
+    std::unique_ptr<Word[]> own_;   // NOLINT(modernize-avoid-c-arrays): without a block
+    std::unique_ptr<Word[]> base_;  // NOLINT(modernize-avoid-c-arrays): values; of the writer
+    std::uint64_t base_end_ = 0;    // end_ at the last setBase()
     Word* words_ = nullptr;
     Word* writing_;  // the writer's: its next frame
     std::atomic<std::uint64_t> end_{0};

@@ -12,6 +12,10 @@ namespace rtcf::executor {
 
 namespace {
 
+// Of others a value that update() has half written is put back from the last frame; a larger one
+// costs a cycle less as a copy whenever it is written.
+constexpr std::size_t kLargestPutBack = 4096;  // bytes
+
 const ComponentRecord& findRecord(const Library& library, const ComponentDefinition& definition) {
     if (const ComponentRecord* record = library.find(definition.type)) return *record;
     std::string names;
@@ -198,7 +202,10 @@ void Instance::configure() {
 
 void Instance::freezePorts() {
     component_->freeze();
-    if (definition_.optional) component_->stageOutputs();
+    component_->stageOutputs([this](const OutputBase& output) {
+        const TypeInfo& type = output.type();
+        return definition_.optional || !type.fixed_size || type.size > kLargestPutBack;
+    });
     const auto mapped = [this](const std::string& port) {
         std::string name = mappedName(port, definition_.ns, context_.full_name, definition_.remaps);
         requireLength("mapped name", name);
@@ -208,7 +215,7 @@ void Instance::freezePorts() {
         input_names_.push_back(mapped(input->name()));
     for (const OutputBase* output : component_->outputs()) {
         output_names_.push_back(mapped(output->name()));
-        samples_.push_back(output->type().make_slot(output->slot().get()));
+        samples_.push_back(output->type().make_slot(output->sample()));
     }
     for (const std::string& port : definition_.breaks) {
         if (findInput(port) != nullptr) continue;

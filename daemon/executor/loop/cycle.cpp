@@ -61,6 +61,8 @@ void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles) {
         step.figures->faults.clear();
     }
     noteSchedule();
+    // Hooks may have written since the last cycle.
+    if (frames_ != nullptr) frames_->setBase();
     figures_.iteration.store(0, std::memory_order_relaxed);
     exchanged_at_ = UINT64_MAX;
     fault_ = {};
@@ -70,7 +72,10 @@ void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles) {
 void Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NONBLOCKING {
     const std::int64_t begin = readCycleCounter();
     std::int64_t before = begin;
-    if (exchanges_ || boundary_.waiting()) before = exchange(begin, time_ns);
+    if (exchanges_ || boundary_.waiting()) {
+        before = exchange(begin, time_ns);
+        if (before == kAbandoned) return;  // nobody knows what components would read
+    }
     const Schedule& schedule = *schedule_;
     setTimes(time_ns);
     const std::uint64_t iteration = clock_.iteration;
@@ -110,17 +115,17 @@ void Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
 }
 
 // What comes before the components' turns: a change, values from outside, those of the previous
-// cycle. @return ticks when it has ended
+// cycle. @return ticks when it has ended, or kAbandoned
 [[gnu::noinline]] std::int64_t Cycle::exchange(std::int64_t begin_ticks,
                                                std::int64_t time_ns) noexcept {
     atBoundary();
     setTimes(time_ns);
     feed();
-    for (const Latch& latch : schedule_->latches) latch.copy();
+    const bool copied = copyLatches();
     const std::int64_t end = readCycleCounter();  // that was the work of no component
     exchanged_ticks_ = end - begin_ticks;
     exchanged_at_ = clock_.iteration;
-    return end;
+    return copied && !faulted() ? end : kAbandoned;
 }
 
 // The one frame that catches: a component may throw, the loop may not. `Plain` leaves out what
@@ -181,8 +186,8 @@ bool Cycle::due(const Step& step) const noexcept RTCF_NONBLOCKING {
 }
 
 // Lets readers see what a component has written to outputs that are kept from them until then.
-void Cycle::commit(Component& component, ComponentFigures& figures, OnBadOutput may) noexcept
-    RTCF_NONBLOCKING {
+// @throws what a copy throws
+void Cycle::commit(Component& component, ComponentFigures& figures, OnBadOutput may) {
     for (OutputBase* output : component.stagedOutputs()) {
         if (output->commit()) continue;
         if (output->nonFinitePolicy() == OnNonFinite::Stop && may == OnBadOutput::End &&
@@ -199,8 +204,7 @@ void Cycle::commit(Component& component, ComponentFigures& figures, OnBadOutput 
 // @return whether the cycle goes on with the next component
 bool Cycle::threw(const Step& step, const char* text) noexcept {
     step.context->disabled = true;
-    // Nobody sees what it has half written.
-    for (OutputBase* output : step.component->stagedOutputs()) output->discard();
+    putBack(*step.component);
     if (!step.optional) {
         endLoop(LoopFault::Kind::Exception, step.component, text);
         return false;
@@ -228,7 +232,69 @@ void Cycle::makeSafe(Component& component, ComponentFigures& figures, OnBadOutpu
         const HookNote note(notes_, component, Hook::Safe);
         component.safe();
     }
-    commit(component, figures, may);
+    try {
+        commit(component, figures, may);
+    } catch (...) {
+        // There is no memory to copy a value: its readers keep the one before.
+        figures.faults.count.add(1);
+        figures_.faults.add(1);
+    }
+}
+
+// Nobody sees what a component has half written: neither the readers, nor itself in safe().
+void Cycle::putBack(Component& component) noexcept {
+    for (OutputBase* output : component.outputs()) {
+        if (!output->staged()) {
+            putBack(*output);
+            continue;
+        }
+        try {
+            output->takeBack();
+        } catch (...) {
+            output->discard();  // no memory for its own copy; readers have theirs
+        }
+    }
+}
+
+// The value is that of the last frame. How often it had been written by then, and when, is known by
+// those who took note of it.
+void Cycle::putBack(OutputBase& output) noexcept {
+    SlotHeader& slot = *output.slot();
+    if (frames_ != nullptr) frames_->putBack(valueOf(output.type(), slot));
+    if (slot.time_ns != clock_.time_ns) return;  // it was not written in this cycle
+    slot.sequence = 0;
+    slot.time_ns = clock_.time_ns - clock_.elapsed_ns;
+    const auto known = [&slot](std::uint64_t sequence) {
+        slot.sequence = std::max(slot.sequence, sequence);
+    };
+    for (const Step& step : schedule_->steps) {
+        for (const InputBase* input : step.component->inputs()) {
+            const InputBase::Reading reading = input->reading();
+            if (reading.source == &slot) known(reading.seen);
+        }
+    }
+    for (const Tap* tap : schedule_->taps)
+        if (tap->source() == &slot) known(tap->lastSequence());
+    for (const Latch& latch : schedule_->latches)
+        if (latch.from == &slot) slot = *latch.to;
+}
+
+bool Cycle::copy(const Latch& latch) noexcept {
+    try {
+        latch.copy();
+        return true;
+    } catch (...) {
+        if (active_ && !faulted())
+            endLoop(LoopFault::Kind::NoMemory, latch.writer,
+                    "an output that another one reads late");
+        return false;
+    }
+}
+
+bool Cycle::copyLatches() noexcept {
+    bool copied = true;
+    for (const Latch& latch : schedule_->latches) copied = copy(latch) && copied;
+    return copied;
 }
 
 // In schedule order, so that a driver's safe() reads what the controller's has written.
@@ -237,7 +303,7 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
     setTimes(time_ns);
     notes_.setIteration(clock_.iteration);
     feed();
-    for (const Latch& latch : schedule_->latches) latch.copy();
+    copyLatches();
     for (const Step& step : schedule_->steps) {
         // What was taken out has made safe then.
         if (step.optional && step.context->disabled) continue;
@@ -255,7 +321,7 @@ void Cycle::apply(Adoption& adoption) noexcept {
     const std::int64_t begin = readCycleCounter();
     if (adoption.restoration != nullptr && !restore(*adoption.restoration)) return;
     for (const StateCopy& state : adoption.copies) state.copy();
-    for (const Latch& latch : adoption.new_latches) latch.copy();
+    for (const Latch& latch : adoption.new_latches) copy(latch);
     const auto new_inputs =
         adoption.rewires.begin() + static_cast<std::ptrdiff_t>(adoption.rewires_of_new);
     std::for_each(adoption.rewires.begin(), new_inputs, [](Rewire& each) { each.apply(); });
@@ -272,7 +338,7 @@ void Cycle::apply(Adoption& adoption) noexcept {
             // What threw has made safe then. The loop belongs to those that stay.
             if (!leaving.component->context().disabled)
                 makeSafe(*leaving.component, *leaving.figures, OnBadOutput::GoOn);
-            for (const Latch& latch : leaving.latches) latch.copy();
+            for (const Latch& latch : leaving.latches) copy(latch);
             for (Tap* tap : leaving.taps) tap->push(clock_.stamp_ns);
         }
     }
@@ -284,7 +350,9 @@ void Cycle::apply(Adoption& adoption) noexcept {
         schedule_ = adoption.schedule;
         noteSchedule();
     }
-    if (adoption.frames) frames_ = *adoption.frames;
+    if (adoption.frames != nullptr) frames_ = adoption.frames;
+    if (frames_ != nullptr && (adoption.frames != nullptr || adoption.restoration != nullptr))
+        frames_->setBase();
     if (adoption.period_ns != 0) {
         clock_.period_ns = adoption.period_ns;
         clock_.elapsed_ns = adoption.period_ns;

@@ -116,10 +116,14 @@ class Cycle {
     std::int64_t update(const Step* next, const Step* end, std::int64_t before) noexcept;
     std::int64_t updateSelected(const Step* next, const Step* end, std::int64_t before) noexcept;
     bool due(const Step& step) const noexcept RTCF_NONBLOCKING;
+    // Copies a value for others, which may take memory. @return false if that fails: the loop ends
+    bool copy(const Latch& latch) noexcept;
+    bool copyLatches() noexcept;
+    void putBack(Component& component) noexcept;
+    void putBack(OutputBase& output) noexcept;
     /// What an output that is declared Finite(OnNonFinite::Stop) may do if it is not.
     enum class OnBadOutput { End, GoOn };
-    void commit(Component& component, ComponentFigures& figures, OnBadOutput may) noexcept
-        RTCF_NONBLOCKING;
+    void commit(Component& component, ComponentFigures& figures, OnBadOutput may);
     bool threw(const Step& step, const char* text) noexcept;
     void makeSafe(Component& component, ComponentFigures& figures, OnBadOutput may) noexcept;
     void noteSchedule() noexcept RTCF_NONBLOCKING;

@@ -20,13 +20,13 @@ namespace rtcf::executor {
 
 /// Why a loop ended by itself.
 struct LoopFault {
-    enum class Kind { None, Exception, NotFinite, Overruns };
+    enum class Kind { None, Exception, NotFinite, NoMemory, Overruns };
     Kind kind = Kind::None;
     const Component* component =
         nullptr;  ///< the culprit, if it is one component; for comparison only
     std::array<char, 240> component_name{};  ///< its full name, as it may be gone when this is read
     std::uint64_t iteration = 0;
-    std::array<char, 240> text{};  ///< what the exception said
+    std::array<char, 240> text{};  ///< what the exception said, or which output it is
 };
 
 /// What failed in a component while the loop goes on.

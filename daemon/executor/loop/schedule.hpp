@@ -56,9 +56,10 @@ struct Latch {
     const TypeInfo* type;
     SlotHeader* to;
     const SlotHeader* from;
+    const Component* writer;
 
-    /// Real-time safe as TypeInfo::copy is.
-    void copy() const noexcept {
+    /// Real-time safe as TypeInfo::copy is. @throws what a copy throws
+    void copy() const {
         if (to->sequence != from->sequence) type->copy(*to, *from);
     }
 };
@@ -154,7 +155,7 @@ struct Adoption {
     std::vector<Leaving> leaving;
     std::vector<StagedValue*> values;  ///< parameters, and what derives from them
     std::int64_t period_ns = 0;        ///< the loop's new period; 0 = stays
-    std::optional<FrameRing*> frames;  ///< that cycles fill from now on, null = none; unset = stays
+    FrameRing* frames = nullptr;       ///< that cycles fill from now on; null = stays
     /// Of an earlier state, before anything else; if that refuses, nothing else is done either.
     Restoration* restoration = nullptr;
 };

@@ -189,7 +189,9 @@ class Builder {
                 is_new
                     ? type.make_slot(plan_.graph.nodes()[writer.node].instance->sample(writer.port))
                     : found->second;
-            plan_.schedule.latches.push_back({&type, latch.get(), slot.get()});
+            plan_.schedule.latches.push_back(
+                {&type, latch.get(), slot.get(),
+                 &plan_.graph.nodes()[writer.node].instance->component()});
             if (is_new) adoption_.new_latches.push_back(plan_.schedule.latches.back());
         }
         return latch;
@@ -234,7 +236,8 @@ class Builder {
                 const SlotHeader* const slot = output->slot().get();
                 if (const auto found = previous_.latches.find(slot);
                     found != previous_.latches.end())
-                    leaving.latches.push_back({&output->type(), found->second.get(), slot});
+                    leaving.latches.push_back(
+                        {&output->type(), found->second.get(), slot, leaving.component});
                 for (const auto& [topic, tap] : previous_.taps)
                     if (tap->source() == slot) leaving.taps.push_back(tap.get());
             }

@@ -94,7 +94,7 @@ std::vector<std::string> Runner::adopt(Change change, const Progress& progress) 
     adoption.restoration = change.restoration;
     std::shared_ptr<const FrameTable> frames = framesOf(*plan);
     // What leaves is not to be copied any more, whoever watches.
-    adoption.frames = frames == nullptr ? nullptr : frames->ring.get();
+    adoption.frames = frames->ring.get();
     if (loop_.running() || state_ == RunnerState::Stepping) {
         for (const auto& instance : change.arriving) {
             progress("starting " + instance->fullName());

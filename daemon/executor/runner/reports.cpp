@@ -7,7 +7,22 @@
 
 namespace rtcf::executor {
 
-namespace {}  // namespace
+namespace {
+
+std::string whatFailed(const LoopFault& fault) {
+    const char* const text = fault.text.data();
+    switch (fault.kind) {
+        case LoopFault::Kind::NotFinite:
+            return fmt::format("output {} is not finite", text);
+        case LoopFault::Kind::NoMemory:
+            return fmt::format("no memory to copy the value of {}; reserve() its largest one",
+                               text);
+        default:
+            return fmt::format("update() threw: {}", text);
+    }
+}
+
+}  // namespace
 
 const GraphNode* Runner::nodeOf(const Component* component) const noexcept {
     for (const GraphNode& node : plan_->graph.nodes()) {
@@ -27,9 +42,7 @@ void Runner::noteLoopFault() {
         }
         if (fault.component != nullptr) {
             event.component = fault.component_name.data();
-            const std::string what = fault.kind == LoopFault::Kind::NotFinite
-                                         ? fmt::format("output {} is not finite", fault.text.data())
-                                         : fmt::format("update() threw: {}", fault.text.data());
+            const std::string what = whatFailed(fault);
             event.message = fmt::format("loop stopped in iteration {}: {}: {}", fault.iteration,
                                         event.component, what);
             // It may have been unloaded at the boundary at which the loop ended.

@@ -70,7 +70,6 @@ void Runner::awaitReaders() {
 }
 
 std::shared_ptr<const FrameTable> Runner::framesOf(const Plan& plan) {
-    if (watches_.empty() && settings_.frame_bytes == 0) return nullptr;
     return makeFrameTable(plan, {watches_, settings_.frequency_hz, settings_.frame_bytes,
                                  &frame_memory_, frames_.get()});
 }
@@ -79,7 +78,7 @@ void Runner::renewFrames() {
     noticeEnd();
     std::shared_ptr<const FrameTable> frames = framesOf(*plan_);
     Adoption adoption;
-    adoption.frames = frames == nullptr ? nullptr : frames->ring.get();
+    adoption.frames = frames->ring.get();
     adoptAtBoundary(adoption);
     publishFrames(std::move(frames));
 }

@@ -19,6 +19,7 @@ constexpr std::size_t kNamesInMessage = 8;
 struct Candidate {
     FrameColumn column;
     const void* from;
+    bool needed;  // to be put back after an update() that throws
 };
 
 std::vector<Candidate> candidatesOf(const Plan& plan) {
@@ -33,7 +34,8 @@ std::vector<Candidate> candidatesOf(const Plan& plan) {
             if (!type.fixed_size) continue;
             found.push_back({{instance.fullName(), output.name(), type.name, output.unit(),
                               instance.outputNames()[port], &type, type.size, instance.code()},
-                             valueOf(type, *output.slot())});
+                             valueOf(type, *output.slot()),
+                             !output.staged()});
         }
         for (const StateDeclaration& state : component.states()) {
             found.push_back({{instance.fullName(),
@@ -44,7 +46,8 @@ std::vector<Candidate> candidatesOf(const Plan& plan) {
                               nullptr,
                               state.size,
                               instance.code()},
-                             state.value});
+                             state.value,
+                             false});
         }
     }
     return found;
@@ -56,7 +59,8 @@ bool watched(const Candidate& candidate, const Watches& watches) {
                        [&](const auto& watch) { return watch.second.matches(name); });
 }
 
-// Which there is room for, in schedule order: what is watched first, then the others.
+// Which are needed, and which of the others there is room for: what is watched first. In schedule
+// order.
 std::vector<Candidate> chosenOf(const Plan& plan, const FrameDemand& demand, FrameTable& table) {
     std::vector<Candidate> candidates = candidatesOf(plan);
     const bool all = demand.most_bytes != 0;
@@ -64,8 +68,10 @@ std::vector<Candidate> chosenOf(const Plan& plan, const FrameDemand& demand, Fra
     std::vector<bool> chosen(candidates.size(), false);
     std::size_t bytes = 0;
     std::size_t left_out = 0;
+    for (std::size_t i = 0; i < candidates.size(); ++i) chosen[i] = candidates[i].needed;
     for (const bool first : {true, false}) {
         for (std::size_t i = 0; i < candidates.size(); ++i) {
+            if (candidates[i].needed) continue;
             if (watched(candidates[i], demand.watches) != first || (!first && !all)) continue;
             const std::size_t size = (candidates[i].column.size + 7) / 8 * 8;
             chosen[i] = bytes + size <= most;
@@ -73,9 +79,9 @@ std::vector<Candidate> chosenOf(const Plan& plan, const FrameDemand& demand, Fra
         }
     }
     if (left_out != 0) {
-        table.notes.push_back(
-            fmt::format("{} outputs and states are left out: a cycle copies {} bytes at most: {}",
-                        left_out, most, all ? "raise frame_kb of the runner" : "select fewer"));
+        table.notes.push_back(fmt::format(
+            "{} outputs and states are left out: a cycle copies {} bytes of such at most: {}",
+            left_out, most, all ? "raise frame_kb of the runner" : "select fewer"));
     }
     std::vector<Candidate> found;
     for (std::size_t i = 0; i < candidates.size(); ++i) {
@@ -89,19 +95,23 @@ std::vector<Candidate> chosenOf(const Plan& plan, const FrameDemand& demand, Fra
 std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const FrameDemand& demand) {
     auto table = std::make_shared<FrameTable>();
     table->watches = demand.watches;
+    table->kept = demand.most_bytes != 0 || !demand.watches.empty();
     std::vector<FrameRing::Source> sources;
     for (Candidate& candidate : chosenOf(plan, demand, *table)) {
         sources.push_back({candidate.from, candidate.column.size});
         table->columns.push_back(std::move(candidate.column));
     }
-    const auto frames = static_cast<std::size_t>(std::ceil(kSeconds * demand.frequency_hz));
+    const auto frames =
+        table->kept ? static_cast<std::size_t>(std::ceil(kSeconds * demand.frequency_hz)) : 1;
     const FrameTable* const previous = demand.previous;
-    if (previous != nullptr && previous->ring->sources() == sources &&
+    if (previous != nullptr && previous->kept == table->kept &&
+        previous->ring->sources() == sources &&
         previous->ring->capacity() == FrameRing::capacityFor(sources, frames)) {
         table->ring = previous->ring;
         return table;
     }
-    table->ring = std::make_shared<FrameRing>(std::move(sources), frames, demand.memory);
+    table->ring = std::make_shared<FrameRing>(std::move(sources), frames,
+                                              table->kept ? demand.memory : nullptr);
     if (const auto& block = table->ring->block(); block != nullptr) {
         demand.memory->announce(block, table->ring->capacity(), table->ring->wordsOfFrame(),
                                 frameLayout(*table->ring, table->columns, table->notes));

@@ -24,19 +24,23 @@ struct FrameTable {
     std::vector<FrameColumn> columns;  ///< in schedule order, as the ring's sources
     std::vector<std::string> notes;    ///< what is left out, a line each
     std::shared_ptr<FrameRing> ring;
-    Watches watches;  ///< whom it is for
+    Watches watches;    ///< whom it is for
+    bool kept = false;  ///< for them or an incident; else the last frame alone counts, for the loop
 };
 
 /// What is wanted of frames.
 struct FrameDemand {
     const Watches& watches;
-    double frequency_hz;         ///< of the loop; the ring holds about a second
-    std::size_t most_bytes;      ///< of values in each cycle, whoever watches; 0 = what is watched
+    double frequency_hz;  ///< of the loop; the ring holds about a second
+    /// Of states and staged outputs in each cycle, whoever watches; 0 = what is watched. The other
+    /// outputs are always there: the loop puts them back after an update() that throws.
+    std::size_t most_bytes;
     FrameMemory* memory;         ///< that outlives the process; may be null
     const FrameTable* previous;  ///< whose ring is kept if that copies the same; may be null
 };
 
-/// The most bytes of values that a cycle copies, where what is watched alone is copied.
+/// The most bytes of such values that a cycle copies, where those that are watched alone are
+/// copied.
 constexpr std::size_t kLargestFrame = std::size_t{64} * 1024;
 
 /// Makes the table for a plan. What is watched comes first where there is not room for all.

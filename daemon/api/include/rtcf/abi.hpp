@@ -50,8 +50,9 @@ struct AbiProbe {
         add({sizeof(OutputBase), offsetof(OutputBase, raw_), offsetof(OutputBase, clock_),
              offsetof(OutputBase, rest_), sizeof(OutputBase::Rest),
              offsetof(OutputBase::Rest, identity), offsetof(OutputBase::Rest, slot),
-             offsetof(OutputBase::Rest, staged), offsetof(OutputBase::Rest, checked),
-             offsetof(OutputBase::Rest, examined), offsetof(OutputBase::Rest, policy)});
+             offsetof(OutputBase::Rest, staged), offsetof(OutputBase::Rest, sample),
+             offsetof(OutputBase::Rest, checked), offsetof(OutputBase::Rest, examined),
+             offsetof(OutputBase::Rest, policy)});
         add({sizeof(PortIdentity), offsetof(PortIdentity, owner), offsetof(PortIdentity, name),
              offsetof(PortIdentity, unit), offsetof(PortIdentity, type),
              offsetof(PortIdentity, connected), offsetof(PortIdentity, kept_is_new),

@@ -150,10 +150,15 @@ class Component {
     const std::vector<StateDeclaration>& states() const noexcept { return rest_->states; }
     /// Outputs whose values nobody reads before the executor has let them pass.
     const std::vector<OutputBase*>& stagedOutputs() const noexcept { return rest_->staged_outputs; }
-    /// Makes all outputs such, before anybody reads them.
-    void stageOutputs() {
-        for (OutputBase* output : rest_->outputs) output->stage();
-        rest_->staged_outputs = rest_->outputs;
+    /// Makes those outputs such of which `which(const OutputBase&)` is true, before anybody reads
+    /// them.
+    template <typename Which>
+    void stageOutputs(const Which& which) {
+        rest_->staged_outputs.clear();
+        for (OutputBase* output : rest_->outputs) {
+            if (which(*output)) output->stage();
+            if (output->staged()) rest_->staged_outputs.push_back(output);
+        }
     }
     ComponentContext& context() const noexcept { return *context_; }
     const std::string& failure() const noexcept { return rest_->failure; }
@@ -321,7 +326,7 @@ inline OutputBase::OutputBase(Component* owner, std::string name, std::string un
                               const TypeInfo& type, const Finite* finite)
     : clock_(&owner->clock()),
       rest_(new Rest{
-          {owner, std::move(name), std::move(unit), type}, type.make_slot(nullptr), nullptr}) {
+          {owner, std::move(name), std::move(unit), type}, type.make_slot(nullptr), {}, {}}) {
     raw_ = rest_->slot.get();
     owner->declare(this);
     if (finite == nullptr) return;

@@ -113,11 +113,13 @@ class InputBase {
     }
     /// @}
 
+    /// Its component.
+    Component& owner() const noexcept RTCF_NONBLOCKING { return *identity_->owner; }
+
    protected:
     ~InputBase() = default;
 
     void setQueue(QueueBase* queue) noexcept { identity_->queue = queue; }
-    Component& owner() const noexcept { return *identity_->owner; }
 
     DataStatus readStatus() noexcept RTCF_NONBLOCKING {
         if (__builtin_expect(static_cast<long>(source_->sequence != seen_), 1) != 0) {
@@ -191,37 +193,59 @@ class OutputBase {
     const std::shared_ptr<SlotHeader>& slot() const noexcept { return rest_->slot; }
     /// What the component writes into: the slot, or the staged one. For the executor.
     SlotHeader* written() const noexcept RTCF_NONBLOCKING { return raw_; }
+    /// A slot with the capacity that reserve() gave this output, for copies of its values.
+    const SlotHeader* sample() const noexcept {
+        return rest_->sample != nullptr ? rest_->sample.get() : rest_->slot.get();
+    }
     /// The clock that stamps what is written; for the executor.
     void setClock(const LoopClock& clock) noexcept { clock_ = &clock; }
 
     /// @name Of an output that is staged, as one declared Finite is; for the executor
     /// @{
+    bool staged() const noexcept RTCF_NONBLOCKING { return rest_->staged != nullptr; }
     /// From here on readers see nothing before commit(). Before there are any; not real-time safe.
     void stage() {
         if (rest_->staged != nullptr) return;
-        rest_->staged = type().make_slot(rest_->slot.get());
-        *rest_->staged = *rest_->slot;
+        rest_->staged = type().make_slot(sample());
+        type().copy(*rest_->staged, *rest_->slot);
         rest_->examined = rest_->staged->sequence;
         raw_ = rest_->staged.get();
     }
     /// Lets readers see what was written; if it is declared Finite, only a finite value. After
-    /// update(); real-time safe. @return false if it is not
-    bool commit() noexcept RTCF_NONBLOCKING {
+    /// update(); real-time safe as TypeInfo::copy is. @return false if it is not
+    /// @throws what a copy throws; readers have the value before then, or this one
+    bool commit() {
         Rest& rest = *rest_;
         if (rest.staged->sequence == rest.examined) return true;
         rest.examined = rest.staged->sequence;
         if (rest.checked && !type().finite(*rest.staged)) return false;
-        type().copy(*rest.slot, *rest.staged);
+        if (type().flat) {
+            type().copy(*rest.slot, *rest.staged);
+            return true;
+        }
+        type().exchange(*rest.slot, *rest.staged);
+        *rest.slot = *rest.staged;
+        type().copy(*rest.staged, *rest.slot);  // the component goes on from the value it wrote
         return true;
     }
     /// What was written since the last commit() is never seen. Real-time safe.
     void discard() noexcept RTCF_NONBLOCKING { rest_->examined = rest_->staged->sequence; }
+    /// As discard(), and the component has the last value that readers saw. Real-time safe as
+    /// TypeInfo::copy is. @throws what a copy throws
+    void takeBack() {
+        discard();
+        type().copy(*rest_->staged, *rest_->slot);
+        discard();
+    }
     OnNonFinite nonFinitePolicy() const noexcept RTCF_NONBLOCKING { return rest_->policy; }
     /// @}
 
    protected:
     ~OutputBase() = default;
 
+    void setSample(std::shared_ptr<SlotHeader> sample) noexcept {
+        rest_->sample = std::move(sample);
+    }
     void stampWrite() noexcept RTCF_NONBLOCKING {
         ++raw_->sequence;
         raw_->time_ns = clock_->time_ns;
@@ -235,6 +259,7 @@ class OutputBase {
         PortIdentity identity;
         std::shared_ptr<SlotHeader> slot;
         std::shared_ptr<SlotHeader> staged;  // null = readers see at once what is written
+        std::shared_ptr<SlotHeader> sample;  // null = none was given to reserve()
         bool checked = false;                // declared Finite
         std::uint64_t examined = 0;          // the staged one's sequence at the last check
         OnNonFinite policy = OnNonFinite::Hold;
@@ -276,6 +301,7 @@ class Output final : public OutputBase {
     void reserve(const T& sample) {
         static_cast<Slot<T>*>(raw_)->value = sample;
         static_cast<Slot<T>*>(slot().get())->value = sample;
+        if constexpr (!PortType<T>::kFixedSize) setSample(type().make_slot(slot().get()));
     }
 };
 

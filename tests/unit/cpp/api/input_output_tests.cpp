@@ -1,10 +1,49 @@
 // Inputs and outputs wired by hand, as the loop does it at a cycle boundary.
 #include <gtest/gtest.h>
 #include <std_msgs/Float64.h>
+#include <std_msgs/Float64MultiArray.h>
 
+#include <new>
 #include <stdexcept>
+#include <vector>
 
 #include "support/bare_component.hpp"
+
+namespace rtcf::test {
+
+// Of which a copy may fail between its halves.
+struct Halves {
+    Halves() = default;
+    Halves(const Halves& other) { *this = other; }
+    Halves(Halves&&) = default;
+    Halves& operator=(const Halves& other) {
+        first = other.first;
+        if (copies_throw) throw std::bad_alloc();
+        second = other.second;
+        return *this;
+    }
+    Halves& operator=(Halves&&) = default;
+    ~Halves() = default;
+    std::vector<double> first;
+    std::vector<double> second;
+    static inline bool copies_throw = false;
+};
+struct HalvesOnRos {
+    static const char* name() { return "Halves"; }
+    static void toMessage(const Halves& value, std_msgs::Float64MultiArray& message) {
+        message.data = value.first;
+    }
+    static void fromMessage(const std_msgs::Float64MultiArray& message, Halves& value) {
+        value.first = value.second = message.data;
+    }
+};
+
+}  // namespace rtcf::test
+
+template <>
+struct rtcf::PortType<rtcf::test::Halves>
+    : rtcf::MappedPortType<rtcf::test::Halves, std_msgs::Float64MultiArray,
+                           rtcf::test::HalvesOnRos> {};
 
 namespace rtcf::test {
 namespace {
@@ -181,6 +220,47 @@ TEST_F(InputOutput, SlotOutlivesItsOutput) {
     }
     in.read();
     EXPECT_EQ(in.value(), 5.0);
+}
+
+TEST(StagedOutput, ReadersOfItSeeWholeValuesWhateverACopyDoes) {
+    BareComponent component;
+    Output<Halves> out{&component, "out"};
+    Input<Halves> in{&component, "in"};
+    out.stage();
+    in.rewire(out.slot().get(), false);
+    out.value().first = out.value().second = {1.0};
+    out.publish();
+    EXPECT_EQ(in.read(), DataStatus::None);
+    EXPECT_TRUE(out.commit());
+    EXPECT_EQ(in.read(), DataStatus::New);
+    out.value().first = out.value().second = {2.0, 3.0};
+    out.publish();
+    Halves::copies_throw = true;
+    EXPECT_THROW(out.commit(), std::bad_alloc);
+    Halves::copies_throw = false;
+    in.read();
+    EXPECT_EQ(in.value().first, in.value().second);
+}
+
+TEST(StagedOutput, ComponentGoesOnFromTheValueThatItWrote) {
+    BareComponent component;
+    Output<std::vector<int>> out{&component, "out"};
+    out.reserve(std::vector<int>(100));
+    out.stage();
+    const auto& seen = static_cast<const Slot<std::vector<int>>&>(*out.slot()).value;
+    out.write({1});
+    EXPECT_TRUE(out.commit());
+    out.value().push_back(2);
+    out.publish();
+    EXPECT_EQ(seen, std::vector<int>({1}));
+    EXPECT_TRUE(out.commit());
+    EXPECT_EQ(seen, std::vector<int>({1, 2}));
+    EXPECT_EQ(out.value(), seen);
+    out.value().push_back(3);
+    out.takeBack();
+    EXPECT_EQ(out.value(), std::vector<int>({1, 2}));
+    EXPECT_GE(out.value().capacity(), 100U);
+    EXPECT_GE(seen.capacity(), 100U);
 }
 
 TEST(Declaration, OfATakenNameIsRefused) {

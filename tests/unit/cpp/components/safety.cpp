@@ -1,4 +1,7 @@
 // A controller and a driver of which one can see what they made of the last cycle.
+#include <std_msgs/String.h>
+
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -25,6 +28,7 @@ class Controller final : public rtcf::Component {
     rtcf::Parameter<bool> wild{this, "wild", false, rtcf::Doc("makes safe by NaN")};
     rtcf::Parameter<std::int64_t> nan_from{this, "nan_from", -1, rtcf::Doc("update that begins")};
     rtcf::Parameter<std::int64_t> throws_at{this, "throws_at", -1};
+    rtcf::Parameter<bool> keeps{this, "keeps", false, rtcf::Doc("writes nothing in safe()")};
     std::int64_t count_ = 0;
 
     void update() override {
@@ -44,6 +48,7 @@ class Controller final : public rtcf::Component {
     }
     void safe() noexcept override {
         note(*this, "safe");
+        if (keeps) return;
         effort.write(0.0);
         other.write(0.0);
         const double zero = wild ? std::numeric_limits<double>::quiet_NaN() : 0.0;
@@ -59,6 +64,7 @@ class Controller final : public rtcf::Component {
 class Driver final : public rtcf::Component {
     rtcf::Input<double> command{this, "command"};
     rtcf::Output<double> applied{this, "applied", "", rtcf::Finite()};
+    rtcf::Output<double> held{this, "held"};
     rtcf::Output<double> lowest{this, "lowest"};
     rtcf::Output<std::int32_t> last_status{this, "last_status"};
     rtcf::Output<std::int32_t> zeros{this, "zeros"};
@@ -77,10 +83,52 @@ class Driver final : public rtcf::Component {
     void apply() noexcept {
         const rtcf::DataStatus status = command.read();
         last_status.write(static_cast<std::int32_t>(status));
+        if (status != rtcf::DataStatus::None) held.write(command.value());
         if (status != rtcf::DataStatus::New) return;
         applied.write(command.value());
         if (command.value() == 0.0) zeros.write(++zeros_);
         if (command.value() < lowest_) lowest.write(lowest_ = command.value());
+    }
+};
+
+// Writes what lies elsewhere than in the frame: a text, and a table that is large. May leave half
+// of both when it throws.
+class Author final : public rtcf::Component {
+    rtcf::Output<std_msgs::String> text{this, "text"};
+    rtcf::Output<std::array<double, 1024>> table{this, "table"};
+    rtcf::Parameter<std::int64_t> throws_at{this, "throws_at", -1};
+    std::int64_t count_ = 0;
+
+    bool configure() override {
+        std_msgs::String longest;
+        longest.data = "whole";
+        text.reserve(longest);
+        return true;
+    }
+    void update() override {
+        const bool throws = count_++ == throws_at;
+        text.value().data = "whol";
+        table.value()[1023] = 0.5;
+        if (throws) throw std::runtime_error("as told");
+        text.value().data += 'e';
+        table.value()[1023] = 1.0;
+        text.publish();
+        table.publish();
+    }
+};
+
+// Tells how many of what it has read are whole.
+class Critic final : public rtcf::Component {
+    rtcf::Input<std_msgs::String> text{this, "text"};
+    rtcf::Input<std::array<double, 1024>> table{this, "table"};
+    rtcf::Output<double> whole{this, "whole"};
+
+    void update() override { look(); }
+    void safe() noexcept override { look(); }
+    void look() noexcept {
+        text.read();
+        table.read();
+        whole.write((text.value().data == "whole" ? 1.0 : 0.0) + table.value()[1023]);
     }
 };
 
@@ -100,4 +148,6 @@ class Watcher final : public rtcf::Component {
 
 RTCF_COMPONENT(Controller, "Commands 5, and 0 in safe()")
 RTCF_COMPONENT(Driver, "Applies new commands")
+RTCF_COMPONENT(Author, "Writes a text and a table")
+RTCF_COMPONENT(Critic, "Tells what is whole of a text and a table")
 RTCF_COMPONENT(Watcher, "Tells the highest value")

@@ -43,7 +43,11 @@ class Touchy final : public rtcf::Component {
     rtcf::Output<rtcf_unit_test::Fragile> out{this, "out"};
     rtcf::Parameter<double> gain{this, "gain", 1.0};
 
-    void update() override { in.read(); }
+    void update() override {
+        in.read();
+        out.value().number += gain;
+        out.publish();
+    }
 };
 
 }  // namespace

@@ -110,6 +110,44 @@ TEST_F(Rollback, AnyExceptionTakesTheWholeChangeBack) {
     EXPECT_EQ(apply({writer, reader}).differences.size(), 2U) << "neither has happened yet";
 }
 
+// Of a value that outgrew what its component has reserved, say.
+TEST_F(Rollback, NoMemoryInTheCycleEndsTheLoopInOrder) {
+    WantedComponent writer = wanted("Touchy", "A");
+    WantedComponent reader = wanted("Touchy", "B");
+    reader.definition.remaps = {{"in", "A_out"}, {"out", "B_out"}};
+    reader.definition.breaks = {"in"};
+    apply({writer, reader});
+    start();
+    ASSERT_TRUE(runs());
+    journal().copies_throw = true;
+    EXPECT_TRUE(eventually([this] { return state() == RunnerState::Faulted; }));
+    journal().copies_throw = false;
+    const auto all = events();
+    EXPECT_TRUE(std::any_of(all.begin(), all.end(), [](const RunnerEvent& event) {
+        return event.component == "/A" &&
+               event.message.find("no memory to copy the value of an output") != std::string::npos;
+    }));
+}
+
+TEST_F(Rollback, NoMemoryForAnOptionalComponentsValueTakesItOut) {
+    WantedComponent writer = wanted("Touchy", "A");
+    writer.definition.optional = true;
+    apply({writer});
+    start();
+    ASSERT_TRUE(runs());
+    journal().copies_throw = true;
+    EXPECT_TRUE(eventually([this] {
+        const auto all = events();
+        return std::any_of(all.begin(), all.end(), [](const RunnerEvent& event) {
+            return event.component == "/A" &&
+                   event.message.find("std::bad_alloc; taken out") != std::string::npos;
+        });
+    }));
+    journal().copies_throw = false;
+    EXPECT_TRUE(runs());
+    stop();
+}
+
 TEST_F(Rollback, NoExceptionInAChangeByRosEndsTheProcess) {
     load(definition("Recorder", "A"));
     start();

@@ -26,7 +26,7 @@ class Safe : public RunnerFixture {
     static ComponentDefinition driver(const std::string& name = "D") {
         ComponentDefinition result = definition("Driver", name);
         result.remaps = {{"command", "/command"}};
-        for (const char* port : {"applied", "lowest", "last_status", "zeros", "periods"})
+        for (const char* port : {"applied", "held", "lowest", "last_status", "zeros", "periods"})
             result.remaps.emplace_back(port, name + "_" + port);
         return result;
     }
@@ -270,6 +270,78 @@ TEST_F(Safe, HalfOfWhatAThrowingOptionalComponentWritesIsNotSeen) {
         unload("/C_" + port);
         unload("/W_" + port);
     }
+}
+
+// The loop ends: the last that it reads, in safe(), is the command of the cycle before.
+TEST_F(Safe, HalfOfWhatAThrowingControllerWritesReachesNoDriver) {
+    for (const std::string port : {"effort", "other", "checked"}) {
+        ComponentDefinition throwing = controller("C_" + port, port);
+        throwing.parameters = {{"throws_at", std::int64_t{3}}, {"keeps", true}};
+        load(throwing);
+        load(driver("D_" + port));
+        step(3);
+        EXPECT_EQ(value("/D_" + port, "held"), 5.0) << port;
+        step(1);
+        ASSERT_EQ(state(), RunnerState::Faulted) << port;
+        EXPECT_EQ(value("/D_" + port, "held"), 5.0) << port;
+        EXPECT_EQ(value("/D_" + port, "applied"), 5.0) << port;
+        EXPECT_EQ(value("/D_" + port, "last_status"), static_cast<double>(DataStatus::Old)) << port;
+        unload("/C_" + port);
+        unload("/D_" + port);
+    }
+}
+
+TEST_F(Safe, HalfOfWhatIsWrittenInTheFirstCycleIsNoValue) {
+    ComponentDefinition throwing = controller("C", "other");
+    throwing.parameters = {{"throws_at", std::int64_t{0}}, {"keeps", true}};
+    load(throwing);
+    load(driver());
+    start();
+    ASSERT_TRUE(eventually([this] { return state() == RunnerState::Faulted; }));
+    EXPECT_EQ(value("/D", "last_status"), static_cast<double>(DataStatus::None));
+}
+
+TEST_F(Safe, HalfOfATextOrALargeValueIsNotRead) {
+    ComponentDefinition throwing = definition("Author", "A");
+    throwing.parameters = {{"throws_at", std::int64_t{3}}};
+    load(throwing);
+    load(definition("Critic", "C"));
+    step(3);
+    EXPECT_EQ(value("/C", "whole"), 2.0);
+    step(1);
+    ASSERT_EQ(state(), RunnerState::Faulted);
+    EXPECT_EQ(value("/C", "whole"), 2.0);
+}
+
+// What nobody watches is put back, too.
+TEST_F(Safe, HalfOfACommandIsNotReadWithoutFrames) {
+    configure([](RunnerSettings& settings) { settings.frame_bytes = 0; });
+    ComponentDefinition throwing = controller("C", "effort");
+    throwing.parameters = {{"throws_at", std::int64_t{3}}, {"keeps", true}};
+    load(throwing);
+    load(driver());
+    step(4);
+    ASSERT_EQ(state(), RunnerState::Faulted);
+    EXPECT_EQ(value("/D", "held"), 5.0);
+}
+
+// Of what nobody has taken it is the same: no topic or queue gets it as a message.
+TEST_F(Safe, HalfOfWhatAThrowingControllerWritesIsNoMessage) {
+    ComponentDefinition throwing = controller("C", "other");
+    throwing.parameters = {{"throws_at", std::int64_t{3}}, {"keeps", true}};
+    load(throwing);
+    ComponentDefinition collector = definition("Collector", "Q");
+    collector.remaps = {{"in", "command"}};
+    load(collector);
+    mapEverything();
+    step(3);
+    EXPECT_EQ(value("/Q", "order"), 555.0);
+    while (bridge().tap("/command")->pop([](const std::uint8_t*, std::uint32_t, std::int64_t) {})) {
+    }
+    step(1);
+    ASSERT_EQ(state(), RunnerState::Faulted);
+    EXPECT_FALSE(published(bridge().tap("/command")).has_value());
+    EXPECT_EQ(value("/Q", "waiting"), 0.0);
 }
 
 TEST_F(Safe, NothingIsTakenOverFromWhatThrew) {
