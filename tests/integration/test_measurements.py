@@ -3,26 +3,22 @@
 Instructions are counted one by one: they are the same on any machine, whatever else it does.
 """
 
+import itertools
+import json
 import platform
-import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
-from daemon_process import BUILD_TREE
+from daemon_process import BUILD_TREE, clean_environment
 from pages import TREE
 
-sys.path.append(str(TREE / "tests" / "bench" / "suite"))
-
-import instructions
-from cost import cost_of
-from processes import output_of
-from setting import Setting
-
 PAGE = TREE / "docs" / "performance.md"
+BENCH = TREE / "tests" / "bench"
 TOLERANCE = 0.03  # of a figure
-# Threads that come and go, each of which takes some CPU time; says of how much when they ended.
+# Threads that come and go, each of which takes some CPU time; says how much when they have ended.
 THREADS = """
 import sys, threading, time
 taken = 0.0
@@ -41,74 +37,109 @@ for _ in sys.stdin:
         thread.join()
     print(taken, flush=True)
 """
+# As benches measure: what the threads took, in ms, and the cost that was found.
+COST_OF_THREADS = f"""
+import subprocess, sys
+from cost import cost_of
+
+with subprocess.Popen([sys.executable, "-c", {THREADS!r}], stdin=subprocess.PIPE,
+                      stdout=subprocess.PIPE, text=True) as process:
+    process.stdout.readline()
+    taken = []
+
+    def work():
+        process.stdin.write("go\\n")
+        process.stdin.flush()
+        taken.append(float(process.stdout.readline()))
+
+    cost = cost_of(work, [process.pid])
+    process.stdin.close()
+print(1e3 * taken[0], cost.cpu)
+"""
+SHORT_THREADS = """
+import threading
+print("ready", flush=True)
+while True:
+    threads = [threading.Thread(target=int) for _ in range(20)]
+    [each.start() for each in threads]
+    [each.join() for each in threads]
+"""
+COST_WHILE_THREADS_END = f"""
+import subprocess, sys
+from cost import cost_of
+
+with subprocess.Popen([sys.executable, "-c", {SHORT_THREADS!r}],
+                      stdout=subprocess.PIPE) as process:
+    process.stdout.readline()
+    try:
+        for _ in range(2000):
+            cost_of(lambda: None, [process.pid])
+    finally:
+        process.kill()
+"""
+
+
+def bench(code: str) -> str:
+    """Run code with the modules of the benches; return what it prints."""
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=BENCH / "suite", timeout=60, check=True,
+        env=clean_environment() | {"PYTHONPATH": str(BENCH / "suite")}, stdout=subprocess.PIPE,
+        text=True,
+    )  # fmt: skip
+    return done.stdout
+
+
+def measured(folder: Path) -> list[dict[str, Any]]:
+    """Run the bench of instructions; return the figures that it holds against budgets."""
+    # Its results are not those of the build tree.
+    (folder / "bench").mkdir()
+    for part in ("bench/bin", "lib", "python"):
+        (folder / part).symlink_to(BUILD_TREE / part)
+    done = subprocess.run(
+        [BENCH / "run", "instructions"], capture_output=True, text=True, timeout=300,
+        env=clean_environment() | {"RTCF_BUILD": str(folder)},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    (result,) = json.loads((folder / "bench" / "results.json").read_text())["results"]
+    found: list[dict[str, Any]] = result["budgets"]
+    return found
 
 
 def stated() -> dict[str, tuple[float, str]]:
     """Return the figures of the page for this release's compiler, and its word on each budget."""
-    release = output_of([str(TREE / "tools" / "release"), "codename"]).strip()
-    rows = [
-        [cell.strip() for cell in line.strip("|\n").split("|")]
-        for line in PAGE.read_text().splitlines()
-        if line.startswith("|")
-    ]
-    head = next(i for i, row in enumerate(rows) if row[0] == "instructions of a cycle")
-    columns = rows[head][1:]
+    release = subprocess.check_output([TREE / "tools" / "release", "codename"], text=True).strip()
+    lines = PAGE.read_text().splitlines()
+    head = next(i for i, line in enumerate(lines) if line.startswith("| instructions of a cycle"))
+    columns = cells(lines[head])
     if release not in columns:
         pytest.skip(f"{PAGE.name} states no counts for the compiler of {release}")
-    place = 1 + columns.index(release)
-    found = {}
-    for row in rows[head + 2 :]:
-        if len(row) != len(rows[head]):
-            break
-        found[row[0]] = (float(row[place]), row[-1])
-    return found
+    place = columns.index(release)
+    table = itertools.takewhile(lambda line: line.startswith("|"), lines[head + 2 :])
+    rows = [cells(line) for line in table]
+    return {row[0]: (float(row[place]), row[-1]) for row in rows}
+
+
+def cells(line: str) -> list[str]:
+    """Return the cells of a line of a table."""
+    return [cell.strip() for cell in line.strip("|").split("|")]
 
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the counter is for x86-64")
-def test_instructions_of_a_cycle_are_those_that_the_page_states() -> None:
+def test_instructions_of_a_cycle_are_those_that_the_page_states(tmp_path: Path) -> None:
     figures = stated()
-    measured = instructions.measured(Setting(BUILD_TREE, BUILD_TREE / "bench"))
-    assert figures.keys() == {each.text for each in measured}
-    for each in measured:
-        figure, verdict = figures[each.text]
-        assert each.measured == pytest.approx(figure, rel=TOLERANCE), each.text
-        assert verdict == f"{each.limit:.0f}: {'kept' if each.kept else 'over'}", each.text
+    found = measured(tmp_path)
+    assert figures.keys() == {each["text"] for each in found}
+    for each in found:
+        figure, verdict = figures[each["text"]]
+        assert each["measured"] == pytest.approx(figure, rel=TOLERANCE), each["text"]
+        word = "kept" if each["kept"] else "over"
+        assert verdict == f"{each['limit']:.0f}: {word}", each["text"]
 
 
 def test_the_cost_of_a_process_has_what_ended_threads_took() -> None:
-    with subprocess.Popen(
-        [sys.executable, "-c", THREADS], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdin is not None and process.stdout is not None
-        assert process.stdout.readline() == "ready\n"
-        stdin, stdout = process.stdin, process.stdout
-        taken = []
-
-        def work() -> None:
-            stdin.write("go\n")
-            stdin.flush()
-            taken.append(float(stdout.readline()))
-
-        cost = cost_of(work, [process.pid])
-        stdin.close()
-    assert cost.cpu >= taken[0] * 1e3
+    taken, cost = map(float, bench(COST_OF_THREADS).split())
+    assert cost >= taken
 
 
-def test_the_cost_of_a_process_is_read_while_threads_end(tmp_path: Path) -> None:
-    script = tmp_path / "threads.py"
-    script.write_text(
-        "import threading\n"
-        "while True:\n"
-        "    threads = [threading.Thread(target=int) for _ in range(20)]\n"
-        "    [each.start() for each in threads]\n"
-        "    [each.join() for each in threads]\n"
-    )
-    with subprocess.Popen(["timeout", "60", sys.executable, script]) as wrapper:
-        children = Path(f"/proc/{wrapper.pid}/task/{wrapper.pid}/children")
-        while not (found := re.findall(r"\d+", children.read_text())):
-            assert wrapper.poll() is None
-        try:
-            for _ in range(2000):
-                cost_of(lambda: None, [int(found[0])])
-        finally:
-            wrapper.terminate()
+def test_the_cost_of_a_process_is_read_while_threads_end() -> None:
+    bench(COST_WHILE_THREADS_END)
