@@ -53,6 +53,7 @@ ELSEWHERE: dict[str, dict[str, str]] = {
         "sudo ": "takes the unit, of the package",
     },
     "security.md": {"journalctl ": _BOOTED},
+    "signals.md": {"sudo rtcfctl trace ": "takes tracefs: tests/integration/test_trace_kernel.py"},
     "simulation.md": {
         "rosparam ": "takes a master: tests/integration/test_sim_time.py",
         "rosbag play ": "takes a master: tests/integration/test_sim_time.py",

@@ -5,7 +5,7 @@ here they are counted from the first cycle.
 """
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +15,16 @@ from rtcf.streams.numbered import Lost
 from rtcf.streams.ports import PortBatch
 from rtcf.v1 import control_pb2, runner_pb2
 
-_CYCLES, _EVENTS, _LOGS = 1, 2, 3  # numbers of tracks; components have those behind
+_CYCLES, _EVENTS, _LOGS, _KERNEL = 1, 2, 3, 4  # numbers of tracks; components have those behind
 _REAL = 10**18  # ns since 1970 are more, those of a simulated clock fewer
 _FAULTS = (
     control_pb2.Event.KIND_LOOP_FAULT,
     control_pb2.Event.KIND_COMPONENT_FAULT,
     control_pb2.Event.KIND_EXECUTOR_FAULT,
 )
+
+
+OnLate = Callable[[int, int, int, int, int], None]
 
 
 class Trace:
@@ -57,8 +60,11 @@ class Trace:
         """Let go of a file that is not to be."""
         self._file.close()
 
-    def add_cycles(self, batch: PortBatch) -> None:
-        """Add cycles in order: when each began, what it took, whether it was late."""
+    def add_cycles(self, batch: PortBatch, on_late: OnLate | None = None) -> None:
+        """Add cycles in order: when each began, what it took, whether it was late.
+
+        `on_late` gets the number of each late one, its deadline, its beginning, its end, and by
+        how much it was late, ns."""
         message = batch.message
         for index, stamp_ns in enumerate(message.stamps_ns):
             cycle = batch.first_cycle + index * batch.every
@@ -82,10 +88,19 @@ class Trace:
             self._count("wake-up latency (µs)", begin_ns, latency_ns / 1e3)
             if late_ns > 0:
                 self.late += 1
+                if on_late is not None:
+                    on_late(cycle, stamp_ns, begin_ns, begin_ns + duration_ns, round(late_ns))
                 self._mark(
                     _EVENTS, "overrun", begin_ns + duration_ns, {**facts, "late_us": late_ns / 1e3}
                 )
             self.cycles += 1
+
+    def add_culprit(self, cycle: int, end_ns: int, words: str) -> None:
+        """Add what made a cycle late that ended then, on a track of the kernel."""
+        if "kernel" not in self._tracks:
+            self._tracks["kernel"] = _KERNEL
+            self._track(_KERNEL, "kernel: what made cycles late")
+        self._mark(_KERNEL, words, end_ns, {"cycle": cycle})
 
     def add_events(self, events: Iterable[control_pb2.Event | Lost]) -> None:
         """Add what happened: swaps and other changes, states, faults."""
@@ -142,7 +157,7 @@ class Trace:
 
     def _track_of(self, name: str) -> int:
         if name not in self._tracks:
-            self._tracks[name] = _LOGS + 1 + len(self._tracks)
+            self._tracks[name] = _KERNEL + 1 + len(self._tracks)
             self._track(self._tracks[name], name)
         return self._tracks[name]
 

@@ -4,13 +4,17 @@ import argparse
 import contextlib
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import rtcf
+from rtcf.kernel.late_cycles import LateCycles
+from rtcf.kernel.tracefs import KernelTrace
 from rtcf.recording.trace import Trace
 from rtcf.streams.numbered import Place
 from rtcf.streams.ports import PortStream
+from rtcf.v1 import runner_pb2
 from rtcf_shared.whole_file import whole_file
 
 from rtcfctl.signals.ending import ended_by_signals
@@ -38,6 +42,9 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--cycles", type=whole, metavar="N", help="end after so many (default: Ctrl-C)"
     )
+    verb.add_argument(
+        "--kernel", action="store_true", help="tell of each late cycle what ran instead (as root)"
+    )
     verb.add_argument("--force", action="store_true", help="write over a file that is there")
     verb.set_defaults(run=run)
 
@@ -53,9 +60,16 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
             trace = Trace(part, runner, status.settings.frequency_hz)
             try:
                 # Refused where there is nothing to see.
-                with client.watch_ports((), runner) as stream, ended_by_signals(stream):
+                with (
+                    _kernel(status, args) as kernel,  # before the first cycle
+                    client.watch_ports((), runner) as stream,
+                    ended_by_signals(stream),
+                ):
                     say_if_idle(client, runner, output)
-                    error = _follow(client, stream, trace, args, output)
+                    late = LateCycles(trace, kernel) if kernel is not None else None
+                    error = _follow(client, stream, trace, late, args, output)
+                    if late is not None:
+                        late.finish()
                 trace.close()
             except BaseException:
                 trace.abandon()
@@ -64,9 +78,28 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         raise ValueError(f"{args.file} is there already: --force writes over it") from None
     except OSError as error:
         raise rtcf.RtcfError(f"{args.file} is not written: {error.strerror or error}") from None
-    _tell(trace, args, output)
+    _tell(trace, late, args, output)
     if error is not None:
         raise error
+
+
+@contextlib.contextmanager
+def _kernel(
+    status: runner_pb2.RunnerStatus, args: argparse.Namespace
+) -> Iterator[KernelTrace | None]:
+    """Trace the kernel meanwhile, if that is asked for."""
+    if not args.kernel:
+        yield None
+        return
+    if args.host is not None:
+        raise ValueError(
+            f"--kernel reads the trace of this machine: ssh {args.host} rtcfctl trace --kernel"
+        )
+    if not status.realtime_tid:
+        raise ValueError(f"--kernel: the loop of {status.runner} does not run: start it first")
+    cpu = status.loop_cpu if status.HasField("loop_cpu") else None
+    with KernelTrace(status.realtime_tid, cpu) as kernel:
+        yield kernel
 
 
 class _Beside:
@@ -98,13 +131,14 @@ def _follow(
     client: rtcf.Client,
     stream: PortStream,
     trace: Trace,
+    late: LateCycles | None,
     args: argparse.Namespace,
     output: Output,
 ) -> rtcf.RtcfError | None:
     """Follow the loop; return what has ended it, of a trace that has cycles."""
     beside = _Beside(client, args.runner or "rt_runner", trace)
     try:
-        _follow_cycles(stream, beside, trace, args, output)
+        _follow_cycles(stream, beside, trace, late, args, output)
         time.sleep(_SETTLE_S)
         beside.ask()
     except rtcf.RtcfError as error:
@@ -122,30 +156,51 @@ def _follow(
 
 
 def _follow_cycles(
-    stream: PortStream, beside: _Beside, trace: Trace, args: argparse.Namespace, output: Output
+    stream: PortStream,
+    beside: _Beside,
+    trace: Trace,
+    late: LateCycles | None,
+    args: argparse.Namespace,
+    output: Output,
 ) -> None:
     due = time.monotonic() + _EVERY_S
     for batch in stream:
         left = None if args.cycles is None else args.cycles - trace.cycles
-        trace.add_cycles(batch if left is None or len(batch) <= left else batch.part(0, left))
+        if left is not None and len(batch) > left:
+            batch = batch.part(0, left)
+        trace.add_cycles(batch, None if late is None else late.add)
         if args.cycles is not None and trace.cycles >= args.cycles:
             return
         say_if_ended(batch, args.runner, output)
         if time.monotonic() >= due:
             beside.ask()
+            if late is not None:
+                late.ask()
             due = time.monotonic() + _EVERY_S
 
 
-def _tell(trace: Trace, args: argparse.Namespace, output: Output) -> None:
+def _tell(trace: Trace, late: LateCycles | None, args: argparse.Namespace, output: Output) -> None:
     if not output.for_people:
-        output.data(
-            {"file": str(args.file), "cycles": trace.cycles, "late": trace.late,
-             "lost": trace.lost, "events": trace.events, "records": trace.records}
-        )  # fmt: skip
+        told: dict[str, Any] = {
+            "file": str(args.file), "cycles": trace.cycles, "late": trace.late,
+            "lost": trace.lost, "events": trace.events, "records": trace.records,
+        }  # fmt: skip
+        if late is not None:
+            told["kernel"] = [
+                {"cycle": cycle, "kind": culprit.kind.value, "instead": culprit.words,
+                 "us": culprit.taken_ns / 1e3}
+                for cycle, culprit in late.found
+            ]  # fmt: skip
+        output.data(told)
         return
     lost = f"{counted(trace.lost, 'cycle')} lost" if trace.lost else "none lost"
     output.line(
         f"{args.file}: {counted(trace.cycles, 'cycle')}, {trace.late} late, {lost}, "
         f"{counted(trace.events, 'event')}, {counted(trace.records, 'log record')}"
     )
+    if late is not None:
+        for words, count in late.counts():
+            output.line(f"{counted(count, 'late cycle')}: {words}")
+        if late.problem:
+            print(f"rtcfctl: --kernel ended early: {late.problem}", file=sys.stderr)
     print("open it at https://ui.perfetto.dev or chrome://tracing", file=sys.stderr)

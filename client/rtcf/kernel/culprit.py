@@ -1,0 +1,321 @@
+"""The culprit of a late cycle: what ran instead, by the kernel's trace.
+
+A pure function of events.  It sorts each nanosecond from a cycle's deadline to its end by what had
+the CPU.  A cause is named only if the cycle would have been on time without it; all else is
+unknown.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import NamedTuple
+
+_IDLE = 0  # pid of what a CPU does when there is nothing to do
+_FIRST_FAIR_PRIORITY = 100  # of the kernel; smaller ones are real-time
+_FAULT_NS = 5_000  # a page fault takes so long, if its page is in memory
+_FAULT_TO_WAIT_NS = 200_000  # and else it waits after so long at most
+
+
+@dataclass(frozen=True)
+class Switch:
+    """A CPU goes from one thread to another (sched_switch)."""
+
+    time_ns: int
+    cpu: int
+    previous: int  # pid, as the next ones
+    runnable: bool  # the previous one would go on: it was preempted
+    previous_priority: int  # of the kernel: 0 to 99 are real-time, the smallest first
+    next: int
+    next_name: str
+    next_priority: int
+    uninterruptible: bool = False  # the previous one waits for the kernel, not for an event
+
+
+@dataclass(frozen=True)
+class Wake:
+    """A thread is woken (sched_waking)."""
+
+    time_ns: int
+    cpu: int  # that wakes it
+    thread: int
+
+
+@dataclass(frozen=True)
+class Enter:
+    """A CPU begins an interrupt or a softirq."""
+
+    time_ns: int
+    cpu: int
+    key: str  # by which its end is found
+    name: str  # in words
+
+
+@dataclass(frozen=True)
+class Leave:
+    """A CPU ends the innermost interrupt or softirq of a key."""
+
+    time_ns: int
+    cpu: int
+    key: str
+
+
+@dataclass(frozen=True)
+class Fault:
+    """The thread on a CPU accesses a page that is not there (page_fault_user and _kernel)."""
+
+    time_ns: int
+    cpu: int
+
+
+@dataclass(frozen=True)
+class Lost:
+    """Events of a CPU are missing since the one before."""
+
+    time_ns: int
+    cpu: int
+
+
+Event = Switch | Wake | Enter | Leave | Fault | Lost
+
+
+@dataclass(frozen=True)
+class LateCycle:
+    """A cycle that ended behind the deadline of the next one; times on the clock of the events."""
+
+    deadline_ns: int
+    begin_ns: int
+    end_ns: int
+    late_ns: int
+
+    @property
+    def delay_ns(self) -> int:
+        """From the deadline to the end."""
+        return self.end_ns - self.deadline_ns
+
+
+class Kind(Enum):
+    """What a cause is."""
+
+    THREAD = "thread"
+    INTERRUPT = "interrupt"
+    THROTTLED = "throttled"
+    PAGE_FAULT = "page fault"
+    BLOCKED = "blocked"
+    PREVIOUS_CYCLE = "previous cycle"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class Culprit:
+    """What made a cycle late, and for how long it had the CPU."""
+
+    kind: Kind
+    words: str
+    taken_ns: int = 0
+
+    def __str__(self) -> str:
+        """Return it for a person."""
+        taken = f" for {self.taken_ns / 1000:.0f} µs" if self.taken_ns else ""
+        return f"{self.words}{taken}"
+
+
+class _Cause(NamedTuple):
+    kind: Kind
+    words: str
+    group: str = ""  # in words, of threads with one name
+
+
+_OWN = _Cause(Kind.UNKNOWN, "")  # the loop's thread has its CPU, in the cycle
+_NOTHING_ELSE = _Cause(
+    Kind.UNKNOWN,
+    "unknown: nothing else ran: a component took long, or the machine stood still "
+    "(SMI, hypervisor)",
+)
+_LATE_TIMER = _Cause(
+    Kind.UNKNOWN,
+    "unknown: the timer came late (interrupts off, idle state, SMI or hypervisor)",
+)
+_LOST = _Cause(Kind.UNKNOWN, "unknown: the kernel's trace has a gap there")
+_SEVERAL = _Cause(Kind.UNKNOWN, "unknown: several causes, none of which is enough by itself")
+_PREVIOUS = _Cause(Kind.PREVIOUS_CYCLE, "the cycle before, which ended late")
+_FAULTS = _Cause(Kind.PAGE_FAULT, "page faults of the loop's thread")
+_WAITED = _Cause(Kind.PAGE_FAULT, "a page fault of the loop's thread, which waited for its page")
+_BLOCKED = _Cause(Kind.BLOCKED, "a component slept in a system call")
+
+
+def find_culprit(events: Iterable[Event], thread: int, cycle: LateCycle) -> Culprit:
+    """Return what made a cycle late.
+
+    `thread`: pid of the loop's thread.  The events are in order of time, of the CPU of the loop at
+    least, and begin before the deadline with a switch at which it is seen who runs.
+    """
+    taken = _shares(list(events), thread, cycle)
+    lost = taken.pop(_LOST, 0)
+    taken.pop(_OWN, 0)
+    if lost:
+        return _culprit(_LOST)
+    if not taken:
+        return _culprit(_NOTHING_ELSE)
+    for causes in (taken, _grouped(taken)):
+        cause, most_ns = max(causes.items(), key=lambda each: (each[1], each[0].words))
+        if most_ns >= cycle.late_ns:
+            return _culprit(cause, 0 if cause.kind is Kind.UNKNOWN else most_ns)
+    return _culprit(_SEVERAL if sum(taken.values()) >= cycle.late_ns else _NOTHING_ELSE)
+
+
+def _culprit(cause: _Cause, taken_ns: int = 0) -> Culprit:
+    return Culprit(cause.kind, cause.words, taken_ns)
+
+
+def _grouped(taken: dict[_Cause, int]) -> dict[_Cause, int]:
+    """Return the same with threads of one name as one cause."""
+    groups: dict[_Cause, int] = {}
+    for cause, ns in taken.items():
+        _add(groups, _Cause(cause.kind, cause.group) if cause.group else cause, ns)
+    return groups
+
+
+def _shares(events: list[Event], thread: int, cycle: LateCycle) -> dict[_Cause, int]:
+    """Return for how long each cause had the CPU between deadline and end, ns."""
+    cpu = _cpu_of(events, thread, cycle)
+    taken: dict[_Cause, int] = {}
+    state = _State(thread)
+    now = cycle.deadline_ns
+    seen = False
+    for event in events:
+        if event.cpu != cpu and not isinstance(event, Wake):
+            continue
+        if event.time_ns >= cycle.end_ns:
+            break
+        if event.time_ns > now:
+            state.add(taken, now, event.time_ns, cycle)
+            now = event.time_ns
+        state.take(event)
+        seen = True
+    if seen:
+        state.add(taken, now, cycle.end_ns, cycle)
+    else:
+        taken[_LOST] = cycle.delay_ns
+    return {cause: ns for cause, ns in taken.items() if ns}
+
+
+def _cpu_of(events: list[Event], thread: int, cycle: LateCycle) -> int | None:
+    """Return the CPU that the thread ran on in a cycle: where it waited for it, too."""
+    found: int | None = None
+    for event in events:
+        if isinstance(event, Switch) and thread in (event.previous, event.next):
+            if event.time_ns >= cycle.end_ns and found is not None:
+                break
+            found = event.cpu
+    return found
+
+
+@dataclass
+class _State:
+    """What a CPU does, and what the loop's thread waits for."""
+
+    thread: int
+    current: int | None = None  # pid; None: not seen yet
+    name: str = ""
+    priority: int = 0
+    own_priority: int | None = None
+    nested: list[Enter] = field(default_factory=list)  # interrupts, the innermost last
+    runnable: bool = False  # the loop's thread waits for the CPU
+    throttled: bool = False  # others were chosen though it would run
+    asleep: bool = False  # it went to sleep, and has not run since
+    woke_ns: int = 0  # since when it runs after a sleep
+    fault_ns: int | None = None  # of its last one since it has the CPU
+    waits_for_page: bool = False
+
+    def take(self, event: Event) -> None:
+        match event:
+            case Switch():
+                self._switch(event)
+            case Wake(thread=woken) if woken == self.thread:
+                self.runnable = self.current != self.thread
+            case Enter():
+                self.nested.append(event)
+            case Leave(key=key) if any(each.key == key for each in self.nested):
+                while self.nested.pop().key != key:
+                    pass  # whose end is missing
+            case Fault(time_ns=time_ns) if self.current == self.thread:
+                self.fault_ns = time_ns
+            case Lost():
+                self.current = None
+                self.nested.clear()
+
+    def _switch(self, event: Switch) -> None:
+        self.nested.clear()  # of an interrupt no thread is switched
+        if event.previous == self.thread:
+            self.own_priority = event.previous_priority
+            self.runnable = event.runnable
+            self.asleep = not event.runnable
+            self.waits_for_page = (
+                event.uninterruptible
+                and self.fault_ns is not None
+                and event.time_ns - self.fault_ns <= _FAULT_TO_WAIT_NS
+            )
+        self.current, self.name = event.next, event.next_name
+        self.priority = event.next_priority
+        if event.next == self.thread:
+            self.own_priority = event.next_priority
+            self.runnable = self.throttled = False
+            if self.asleep:
+                self.woke_ns = event.time_ns
+            self.asleep = False
+            self.fault_ns = None
+        elif self.runnable and self._is_less_urgent():
+            self.throttled = True
+
+    def _is_less_urgent(self) -> bool:
+        """Tell whether the scheduler would choose the loop's thread, were it free to."""
+        if self.current == _IDLE:
+            return True
+        own = self.own_priority
+        # Among threads without real-time priority each has its share.
+        return own is not None and own < _FIRST_FAIR_PRIORITY and self.priority > own
+
+    def add(self, taken: dict[_Cause, int], begin: int, end: int, cycle: LateCycle) -> None:
+        """Add a time in which nothing changes to its causes."""
+        for at, until in ((begin, min(end, cycle.begin_ns)), (max(begin, cycle.begin_ns), end)):
+            if at >= until:
+                continue
+            own_fault = self.current == self.thread and not self.nested and self.fault_ns
+            if own_fault and at >= cycle.begin_ns:
+                # The kernel does not say when it is done.
+                done = max(at, min(until, own_fault + _FAULT_NS))
+                _add(taken, _FAULTS, done - at)
+                _add(taken, _OWN, until - done)
+            else:
+                _add(taken, self._cause(at < cycle.begin_ns, cycle), until - at)
+
+    def _cause(self, before_begin: bool, cycle: LateCycle) -> _Cause:
+        if self.current is None:
+            return _LOST
+        if self.nested:
+            return _Cause(Kind.INTERRUPT, self.nested[-1].name)
+        if self.current == self.thread:
+            return _PREVIOUS if before_begin and self.woke_ns < cycle.deadline_ns else _OWN
+        if self.throttled:
+            limit = "a limit of CPU time (cgroup, sched_rt_runtime_us or fair server)"
+            who = "the CPU was idle" if self.current == _IDLE else f"{self._who()} ran"
+            return _Cause(Kind.THROTTLED, f"{limit}: {who}", f"{limit}: others ran")
+        if self.runnable and self.current != _IDLE:
+            return _Cause(Kind.THREAD, self._who(), f"threads {self.name}")
+        if self.runnable or before_begin:
+            return _LATE_TIMER
+        return _WAITED if self.waits_for_page else _BLOCKED
+
+    def _who(self) -> str:
+        kind = (
+            f"real-time priority {_FIRST_FAIR_PRIORITY - 1 - self.priority}"
+            if 0 <= self.priority < _FIRST_FAIR_PRIORITY
+            else f"nice {self.priority - 120}"
+            if self.priority >= _FIRST_FAIR_PRIORITY
+            else "SCHED_DEADLINE"
+        )
+        return f"thread {self.name} (pid {self.current}, {kind})"
+
+
+def _add(taken: dict[_Cause, int], cause: _Cause, ns: int) -> None:
+    taken[cause] = taken.get(cause, 0) + ns

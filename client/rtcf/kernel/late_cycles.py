@@ -1,0 +1,50 @@
+"""The late cycles of a trace, each with what made it late."""
+
+import time
+from collections import Counter, deque
+
+from rtcf.kernel.culprit import Culprit, LateCycle
+from rtcf.kernel.tracefs import KernelTrace
+from rtcf.recording.trace import Trace
+
+_SHORT_S = 0.02
+
+
+class LateCycles:
+    """Owned by who follows the loop; `found` are cycles with their culprits, in order."""
+
+    def __init__(self, trace: Trace, kernel: KernelTrace) -> None:
+        self.found: list[tuple[int, Culprit]] = []
+        self._trace = trace
+        self._kernel = kernel
+        self._waiting: deque[tuple[int, int, LateCycle]] = deque()
+
+    def add(self, cycle: int, stamp_ns: int, begin_ns: int, end_ns: int, late_ns: int) -> None:
+        """Take a late cycle, by its stamps; the kernel's events of it may be still to come."""
+        # Stamps are of the wall clock, the loop and the kernel's trace of the monotonic one.
+        offset = time.clock_gettime_ns(time.CLOCK_REALTIME) - time.monotonic_ns()
+        late = LateCycle(stamp_ns - offset, begin_ns - offset, end_ns - offset, late_ns)
+        self._waiting.append((cycle, end_ns, late))
+
+    def ask(self) -> None:
+        """Find the culprits of those whose events are there."""
+        while self._waiting and self._kernel.settled(self._waiting[0][2]):
+            cycle, end_ns, late = self._waiting.popleft()
+            culprit = self._kernel.culprit(late)
+            self.found.append((cycle, culprit))
+            self._trace.add_culprit(cycle, end_ns, str(culprit))
+
+    def finish(self) -> None:
+        """Wait for the rest, a moment."""
+        while self._waiting:
+            self.ask()
+            time.sleep(_SHORT_S)
+
+    def counts(self) -> list[tuple[str, int]]:
+        """Return how often each culprit was found, the most frequent first."""
+        return Counter(culprit.words for _, culprit in self.found).most_common()
+
+    @property
+    def problem(self) -> str:
+        """Why the kernel's trace ended; empty: it did not."""
+        return self._kernel.problem

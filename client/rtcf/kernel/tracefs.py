@@ -1,0 +1,235 @@
+"""The kernel's tracer, by tracefs: an instance of our own, whose pages a thread takes in time.
+
+See Documentation/trace/ftrace.rst of the kernel.  Other users of the tracer are not disturbed.
+"""
+
+import contextlib
+import functools
+import os
+import threading
+import time
+from collections import deque
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+
+from rtcf.errors import RtcfError
+from rtcf.kernel.culprit import Culprit, Event, LateCycle, Switch, find_culprit
+from rtcf.kernel.pages import Decoder, Format, Page
+
+_EVENTS = (
+    "sched/sched_switch",
+    "sched/sched_waking",
+    "irq/irq_handler_entry",
+    "irq/irq_handler_exit",
+    "irq/softirq_entry",
+    "irq/softirq_exit",
+)
+# Of processors that have them.
+_MORE_EVENTS = ("exceptions/page_fault_user", "exceptions/page_fault_kernel")
+_VECTORS = "irq_vectors"
+_WAKING = "sched/sched_waking"
+_BUFFER_KB = 4096  # of each CPU
+_KEPT_BYTES = 64 * 1024 * 1024
+_EVERY_S = 0.02
+_LONGEST_BACK_NS = 200_000_000  # from a deadline to the loop's turn before it
+_DECODED = 64  # pages that are kept as events, too: cycles in a row are late together
+_MARK = "rtcfctl trace\n"
+
+
+class KernelTrace:
+    """What the kernel does on the CPU of a loop, while it is entered; its own thread reads it."""
+
+    def __init__(self, thread: int, cpu: int | None) -> None:
+        """`thread`: id of the loop's thread; `cpu`: the one that it is bound to, None: none."""
+        self._thread = thread
+        self._cpu = cpu
+        self._pages: deque[Page] = deque()  # in order of time for each CPU
+        self._kept = 0  # bytes
+        self._lock = threading.Lock()
+        self._end = threading.Event()
+        self._descriptors: dict[int, int] = {}  # by CPU
+        self._problem = ""
+        self._read_ns = 0  # events up to then have been read
+
+    def __enter__(self) -> "KernelTrace":
+        """Begin.  Raises RtcfError where the kernel's trace cannot be read."""
+        root = _root()
+        self._folder = root / "instances" / f"rtcf-{os.getpid()}"
+        with _told(root):
+            _remove_left(root / "instances")
+            self._folder.mkdir()
+            try:
+                self._begin()
+            except BaseException:
+                self._remove()
+                raise
+        self._reader = threading.Thread(target=self._read, name="kernel-trace", daemon=True)
+        self._reader.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._end.set()
+        self._reader.join()
+        self._remove()
+
+    def culprit(self, cycle: LateCycle) -> Culprit:
+        """Return what made a cycle late that is settled()."""
+        with self._lock:
+            pages = [each for each in self._pages if each.begin_ns <= cycle.end_ns]
+        events: list[Event] = []
+        for cpu in {each.cpu for each in pages}:
+            events += self._since_last_turn([each for each in pages if each.cpu == cpu], cycle)
+        events.sort(key=lambda each: each.time_ns)
+        return find_culprit(events, self._thread, cycle)
+
+    def _since_last_turn(self, pages: list[Page], cycle: LateCycle) -> list[Event]:
+        """Return the events of a CPU, from the loop's turn before a deadline on."""
+        events: list[Event] = []
+        # Of CPUs that it does not run on only who wakes it counts.
+        back_ns = 0 if self._cpu not in (None, pages[0].cpu) else _LONGEST_BACK_NS
+        for page in reversed(pages):
+            found = self._events(page)
+            events = found + events
+            if page.begin_ns <= cycle.deadline_ns and (
+                page.begin_ns < cycle.deadline_ns - back_ns or self._has_turn(found, cycle)
+            ):
+                break
+        return events
+
+    def _has_turn(self, events: list[Event], cycle: LateCycle) -> bool:
+        return any(
+            isinstance(each, Switch)
+            and each.time_ns <= cycle.deadline_ns
+            and self._thread in (each.previous, each.next)
+            for each in events
+        )
+
+    def settled(self, cycle: LateCycle) -> bool:
+        """Tell whether all events of a cycle have been read, or none will be."""
+        return bool(self._problem) or self._read_ns > cycle.end_ns
+
+    @property
+    def problem(self) -> str:
+        """Why nothing is read any more; empty: it is."""
+        return self._problem
+
+    def _begin(self) -> None:
+        events = self._folder / "events"
+        self._write("tracing_on", "0")
+        self._write("trace_clock", "mono")  # that of the loop
+        self._write("buffer_size_kb", str(_BUFFER_KB))
+        names = list(_EVENTS) + [each for each in _MORE_EVENTS if (events / each).is_dir()]
+        for entry in sorted((events / _VECTORS).glob("*_entry")):
+            stem = entry.name.removesuffix("_entry")
+            if (entry.parent / f"{stem}_exit").is_dir():
+                names += [f"{_VECTORS}/{stem}_entry", f"{_VECTORS}/{stem}_exit"]
+        formats = {}
+        for name in names:
+            formats[name.rpartition("/")[2]] = (events / name / "format").read_text()
+            if name == _WAKING:
+                self._write(f"events/{name}/filter", f"pid == {self._thread}")
+            elif self._cpu is not None:
+                self._write(f"events/{name}/filter", f"CPU == {self._cpu}")
+        self._decoder = decoder = Decoder(formats, (events / "header_page").read_text())
+        self._events = functools.lru_cache(_DECODED)(lambda page: list(decoder.events(page)))
+        for folder in sorted((self._folder / "per_cpu").glob("cpu[0-9]*")):
+            flags = os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC
+            number = int(folder.name.removeprefix("cpu"))
+            self._descriptors[number] = os.open(folder / "trace_pipe_raw", flags)
+        self._require_own_numbers((events / "ftrace/print/format").read_text())
+        for name in names:
+            self._write(f"events/{name}/enable", "1")
+
+    def _require_own_numbers(self, text: str) -> None:
+        """Refuse where the kernel numbers processes otherwise than they are numbered here."""
+        described = Format(text)
+        self._write("tracing_on", "1")
+        with open(self._folder / "trace_marker", "w") as marker:
+            marker.write(_MARK)
+        self._take_all()
+        writers = {
+            described.get(data, "common_pid")
+            for page in self._pages
+            for data in self._decoder.entries(page, described.id)
+        }
+        if os.getpid() not in writers:
+            raise RtcfError(
+                "trace --kernel: this is a container, where processes have other numbers than the "
+                "kernel's: run it on the machine itself"
+            )
+        self._pages.clear()
+
+    def _write(self, file: str, text: str) -> None:
+        (self._folder / file).write_text(text)
+
+    def _read(self) -> None:
+        try:
+            while not self._end.wait(_EVERY_S):
+                begin_ns = time.monotonic_ns()
+                self._take_all()
+                self._read_ns = begin_ns
+        except OSError as error:
+            self._problem = f"{error.filename or self._folder}: {error.strerror}"
+
+    def _take_all(self) -> None:
+        size = os.sysconf("SC_PAGE_SIZE")
+        for cpu, descriptor in self._descriptors.items():
+            with contextlib.suppress(BlockingIOError):
+                while data := os.read(descriptor, size):
+                    self._keep(Page(cpu, data))
+
+    def _keep(self, page: Page) -> None:
+        with self._lock:
+            self._pages.append(page)
+            self._kept += len(page.data)
+            while self._kept > _KEPT_BYTES:
+                self._kept -= len(self._pages.popleft().data)
+
+    def _remove(self) -> None:
+        for descriptor in self._descriptors.values():
+            os.close(descriptor)
+        with contextlib.suppress(OSError):
+            self._folder.rmdir()
+
+
+def _root() -> Path:
+    """Return where tracefs is mounted.  Raises RtcfError."""
+    for line in Path("/proc/self/mounts").read_text().splitlines():
+        _, place, kind, *_ = line.split()
+        if kind == "tracefs":
+            return Path(place)
+    raise RtcfError(
+        "trace --kernel: no tracefs is mounted: sudo mount -t tracefs tracefs /sys/kernel/tracing"
+    )
+
+
+@contextlib.contextmanager
+def _told(root: Path) -> Iterator[None]:
+    """Name the file of an OSError, and what to do."""
+    try:
+        yield
+    except PermissionError:
+        raise RtcfError(
+            f"trace --kernel: {root} is root's: run it as root (sudo rtcfctl … trace --kernel)"
+        ) from None
+    except OSError as error:
+        raise RtcfError(f"trace --kernel: {error.filename or root}: {error.strerror}") from None
+    except (KeyError, ValueError) as error:
+        raise RtcfError(
+            f"trace --kernel: the kernel's trace has another format than known: {error}"
+        ) from None
+
+
+def _remove_left(instances: Path) -> None:
+    """Remove instances whose rtcfctl was killed."""
+    for folder in instances.glob("rtcf-*"):
+        number = folder.name.removeprefix("rtcf-")
+        if number.isdecimal() and not Path(f"/proc/{number}").exists():
+            with contextlib.suppress(OSError):
+                folder.rmdir()

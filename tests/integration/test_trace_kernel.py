@@ -1,0 +1,123 @@
+"""`rtcfctl trace --kernel`: the kernel's own trace of a real loop that is made late."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import rtcf
+from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for
+from realtime_thread import RealtimeThread
+
+MOUNTED = ("unshare", "--mount", "sh", "-c",
+           'mount -t tracefs tracefs /sys/kernel/tracing && exec "$0" "$@"')  # fmt: skip
+# Takes the CPU for 5 cycles, 20 times; ends by itself.
+HOG = """
+import time
+open("/proc/self/comm", "w").write("the hog")
+for _ in range(20):
+    time.sleep(0.02)
+    until = time.monotonic() + 0.005
+    while time.monotonic() < until:
+        pass
+"""
+
+
+def trace(daemon: Daemon, *words: str | Path) -> list[str]:
+    """Return a command that traces."""
+    program = str(BUILD_TREE / "bin" / "rtcfctl")
+    return [program, "--socket", str(daemon.socket), "trace", *map(str, words)]
+
+
+@pytest.fixture
+def mounted() -> tuple[str, ...]:
+    """Give a command before which tracefs is mounted."""
+    done = subprocess.run([*MOUNTED, "true"], capture_output=True, text=True)
+    if done.returncode != 0:
+        pytest.skip(f"tracefs cannot be mounted here: {done.stderr.strip()}")
+    return MOUNTED
+
+
+def test_a_thread_above_the_loop_is_named(
+    running: Daemon, client: rtcf.Client, tmp_path: Path, mounted: tuple[str, ...]
+) -> None:
+    RealtimeThread(client)
+    (status,) = client.get_status("rt_runner").runners
+    if not status.HasField("loop_cpu"):
+        pytest.skip("the loop does not run in real time here: " + "; ".join(status.degraded))
+    file = tmp_path / "trace.json"
+    tracing = subprocess.Popen(
+        [*mounted, *trace(running, "-o", file, "--kernel", "--output", "json")],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=clean_environment(),
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+
+    def begun() -> bool:
+        assert tracing.poll() is None, tracing.communicate()
+        parts = list(tmp_path.glob(f".{file.name}.*.part"))
+        return bool(parts) and '"ph": "X"' in parts[0].read_text()
+
+    try:
+        wait_for(begun, "the first cycles")
+        hog = subprocess.Popen(
+            ["timeout", "60", "taskset", "--cpu-list", str(status.loop_cpu), "chrt", "--fifo", "90",
+             sys.executable, "-c", HOG],
+        )  # fmt: skip
+        assert hog.wait(60) == 0
+        tracing.send_signal(signal.SIGINT)
+        said, complaint = tracing.communicate(timeout=60)
+    finally:
+        tracing.kill()
+        tracing.wait()
+    assert tracing.returncode == 0, complaint
+    told = json.loads(said)
+    assert len(told["kernel"]) == told["late"] > 0
+    hogs = [each for each in told["kernel"] if "thread the hog (pid " in each["instead"]]
+    assert len(hogs) >= 10, told["kernel"]
+    for each in hogs:
+        assert each["kind"] == "thread"
+        assert each["instead"].endswith(", real-time priority 90)")
+        assert each["us"] > 500
+    marks = [each for each in json.loads(file.read_text()) if "the hog" in each["name"]]
+    assert [each["args"]["cycle"] for each in marks] == [each["cycle"] for each in hogs]
+    assert not list(Path("/sys/kernel/tracing").glob("instances/rtcf-*"))
+
+
+def test_nothing_is_left_in_the_kernel(
+    running: Daemon, tmp_path: Path, mounted: tuple[str, ...]
+) -> None:
+    """Also of one that was killed: the next one removes it."""
+    left = "/sys/kernel/tracing/instances/rtcf-999999999"
+    listed = 'mkdir "$0" && "$@" && ls /sys/kernel/tracing/instances'
+    command = trace(running, "-o", tmp_path / "t.json", "--kernel", "--cycles", "100")
+    done = subprocess.run(
+        [*mounted, "sh", "-c", listed, left, *command],
+        capture_output=True, text=True, env=clean_environment(),
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "rtcf-" not in done.stdout.partition("t.json: ")[2].partition("\n")[2]
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="is about what root lacks")
+def test_refused_in_a_line(running: Daemon, client: rtcf.Client, tmp_path: Path) -> None:
+    command = trace(running, "-o", tmp_path / "t.json", "--kernel")
+    unmounted = ("unshare", "--mount", "sh", "-c",
+                 'umount -a -t tracefs 2>/dev/null; exec "$0" "$@"')  # fmt: skip
+    done = subprocess.run(
+        [*unmounted, *command], capture_output=True, text=True, env=clean_environment()
+    )
+    assert done.returncode == 1
+    assert done.stderr.splitlines() == [
+        "rtcfctl: trace --kernel: no tracefs is mounted: "
+        "sudo mount -t tracefs tracefs /sys/kernel/tracing"
+    ]
+    client.stop()
+    done = subprocess.run(command, capture_output=True, text=True, env=clean_environment())
+    assert done.returncode == 2
+    assert done.stderr == (
+        "rtcfctl: --kernel: the loop of rt_runner does not run: start it first\n"
+    )
+    assert not list(tmp_path.glob("*t.json*"))
