@@ -204,13 +204,17 @@ def resumes(runner: RunnerCore, verdict: Verdict, crashes: Crashes) -> bool:
 
 def _held(runner: RunnerCore, verdict: Verdict, trouble: str) -> str:
     """Return what the status says after a recovery."""
-    loop = "its loop goes on" if runner.loop.running else f"held: `rtcfctl -r {runner.name} start`"
-    if verdict.culprit not in runner.desired.quarantined:
+    name, culprit = runner.name, verdict.culprit
+    if culprit not in runner.desired.quarantined:
+        loop = "its loop goes on" if runner.loop.running else f"held: `rtcfctl -r {name} start`"
         return f"{trouble}; {loop} with all its components"
-    return (
-        f"{trouble}; {loop} without {verdict.culprit}, which "
-        f"`rtcfctl -r {runner.name} release {verdict.culprit}` loads again"
-    )
+    again = f"`rtcfctl -r {name} release {culprit}` loads again"
+    if runner.loop.running:
+        return f"{trouble}; its loop goes on without {culprit}, which {again}"
+    spec = runner.desired.components.get(culprit)
+    agreed = "" if spec is None or spec.optional else f" --without {culprit}"
+    start = f"`rtcfctl -r {name} start{agreed}`"
+    return f"{trouble}; held: {start} runs it without {culprit}, which {again}"
 
 
 async def _settle(runner: RunnerCore) -> None:

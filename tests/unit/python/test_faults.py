@@ -7,6 +7,7 @@ import pytest
 import rtcf
 from daemon_under_test import DaemonUnderTest, is_alive, wait_for
 from flight_writer import FlightWriter
+from rtcf import refusals
 from rtcf.v1 import graph_pb2, runner_pb2
 from rtcfd.executor.flight_recorder import FlightRecorder, Note
 from rtcfd.executor.process import End
@@ -47,14 +48,19 @@ def test_a_crash_in_an_update_is_named_and_its_component_quarantined(
     assert status.state == runner_pb2.RUNNER_STATE_FAULTED
     assert "was killed by SIGSEGV" in status.status
     assert "at address 0x10 while /bad.update was running in cycle" in status.status
-    assert "held: `rtcfctl -r rt_runner start` without /bad" in status.status
+    assert (
+        "held: `rtcfctl -r rt_runner start --without /bad` runs it without /bad, which "
+        "`rtcfctl -r rt_runner release /bad` loads again"
+    ) in status.status
     left_out = running.get_component("bad")
     assert left_out.state == graph_pb2.COMPONENT_STATE_LEFT_OUT
     assert "/bad.update" in left_out.fault
     assert "/bad" in daemon.saved()["quarantined"]
     assert daemon.saved()["running"] is False
 
-    assert running.start().order == ["/extra", "/good"]
+    with pytest.raises(refusals.ComponentLeftOutError, match="left out of its loop: /bad"):
+        running.start()
+    assert running.start(without=["bad"]).order == ["/extra", "/good"]
     assert state(running).state == runner_pb2.RUNNER_STATE_RUNNING
     running.release(["bad"])
     assert running.get_order() == ["/bad", "/extra", "/good"]
