@@ -73,7 +73,9 @@ async def _change(runner: RunnerCore, call: wire.ServiceCall) -> control_pb2.Cha
         return await graph.load(runner, call.load, _ignore)
     if kind == "unload":
         return await graph.unload(runner, [call.unload], _ignore)
-    return await (start if kind == "start" else stop)(runner, _ignore)
+    if kind == "start":
+        return await start(runner, control_pb2.StartRequest(), _ignore)
+    return await stop(runner, _ignore)
 
 
 def _ignore(_line: str) -> None:
