@@ -105,12 +105,26 @@ def where_rtcfd_does_not(
     except DaemonUnreachableError:
         return asked.result()  # what rtcfd says in the end
     if stopped.died:
-        # An executor that has died says no more; rtcfd knows of what, if it answers at all.
-        with contextlib.suppress(TimeoutError):
-            return asked.result(_VERDICT_S)
-        return control_pb2.ChangeResult(notes=["the loop has ended with its executor, which died"])
+        return _after_a_death(asked)
     told = f"the loop was stopped at its executor, as {problem}"
     return control_pb2.ChangeResult(notes=[told, *stopped.notes])
+
+
+def _after_a_death(asked: "Future[control_pb2.ChangeResult]") -> control_pb2.ChangeResult:
+    """Return what to say of a loop that has ended with its executor: that says no more, and rtcfd
+    knows of what it died, if it answers at all."""
+    why = "which died"
+    try:
+        return asked.result(_VERDICT_S)
+    except TimeoutError:
+        pass
+    except RefusedError as error:
+        # It was told before the death that the loop does not end. What did not become safe is no
+        # stop, though.
+        if error.reason != "LOOP_STUCK" or ".safe()" in str(error):
+            raise
+        why = f"as {error}"
+    return control_pb2.ChangeResult(notes=[f"the loop has ended with its executor, {why}"])
 
 
 def _is_rtcfds_trouble(error: RtcfError) -> bool:

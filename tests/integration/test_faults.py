@@ -101,7 +101,8 @@ def test_a_crash_is_named_with_its_source_line(
     if code is not None:
         source = TREE / "tests" / "components" / "faults" / "crashes.cpp"
         assert code in source.read_text().splitlines()[int(found[3]) - 1]
-        assert re.search(r"Faulty::update\(\) at faulty\.hpp:\d+", line), "and what called it"
+    else:
+        assert line.count("deeper at crashes.cpp:") > 2, "and what called it"
     assert "rtcf-executor" not in line
     wait_for(lambda: "crashes.cpp:" in state(client).status, "the status")
     assert client.get_component("bad").fault.endswith(f"at crashes.cpp:{found[3]}")
