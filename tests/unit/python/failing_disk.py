@@ -15,6 +15,10 @@ MODES = ("well", "hangs", "full", "read-only")
 _LONGEST_S = 60.0  # of a hang, in a test
 
 
+class Killed(BaseException):
+    """Of a thread of an rtcfd that is no more: it does nothing else."""
+
+
 class FailingDisk:
     """What rtcfd's threads write goes through it; reading, and other folders, do not."""
 
@@ -83,7 +87,7 @@ class FailingDisk:
                 lambda: self._mode != "hangs" or self._life != life, _LONGEST_S
             )
             if self._life != life or self._mode == "dead":
-                raise OSError(errno.EIO, os.strerror(errno.EIO))
+                raise Killed
             for mode, number in (("full", errno.ENOSPC), ("read-only", errno.EROFS)):
                 if self._mode == mode and (room or mode == "read-only"):
                     raise OSError(number, os.strerror(number))
