@@ -304,9 +304,7 @@ def test_an_executor_stops_again_and_again_whatever_its_disk_does(
                         assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
                         assert NOT_YET in done.stderr
                 wait_for(lambda: not runs(client), "rtcfd to know")
-                before = iteration(client)
-                client.start()
-                wait_for(lambda: iteration(client) not in (0, before), "cycles")
+                begin(client)
             done = daemon.ctl("stop", "--all")
             assert (done.returncode, done.stdout) == (0, "rt_runner stopped\n"), done.stderr
             assert f"rt_runner: {NOT_YET}" in done.stderr

@@ -134,9 +134,7 @@ def test_whoever_stops_a_loop_at_its_executor_has_a_name(
 
 
 def test_values_that_are_not_finite_are_told_of_again(client: rtcf.Client) -> None:
-    client.load(
-        rtcf.component("rtcf_faults", "NotFinite", name="bad", parameters=["after:=50"])
-    )
+    client.load(rtcf.component("rtcf_faults", "NotFinite", name="bad", parameters=["after:=50"]))
     with client.watch_events(["rt_runner"]) as events:
         client.start()
         for number in range(2):

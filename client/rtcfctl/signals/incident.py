@@ -111,9 +111,7 @@ def export(client: rtcf.Client, args: argparse.Namespace, output: Output) -> Non
 
 
 @contextmanager
-def _received(
-    client: rtcf.Client, name: str
-) -> Iterator[tuple[incidents_pb2.Incident, IO[bytes]]]:
+def _received(client: rtcf.Client, name: str) -> Iterator[tuple[incidents_pb2.Incident, IO[bytes]]]:
     """Give an incident and its file, as a temporary one."""
     with contextlib.ExitStack() as stack:
         try:

@@ -1,7 +1,7 @@
 /// @file
 /// How the loop tells of what failed in a cycle: what ended the loop, and the
-/// first fault of each component that did not, and now and then another. No record can be lost to others:
-/// each component has room for its own.
+/// first fault of each component that did not, and now and then another. No record can be lost to
+/// others: each component has room for its own.
 #pragma once
 
 #include <array>

@@ -66,8 +66,7 @@ class Loop {
     /// while the loop does not run. The same graph and inputs give the same values, bit by bit.
     /// @param given_up looked at before each cycle; null = nobody gives up
     /// @return cycles done; fewer if a component failed, was given up, or after requestStop()
-    std::uint64_t step(std::uint64_t cycles,
-                       const std::atomic<bool>* given_up = nullptr) noexcept;
+    std::uint64_t step(std::uint64_t cycles, const std::atomic<bool>* given_up = nullptr) noexcept;
     /// Sets counters and clock as start() does, for step(). @param stamp_ns of the first cycle
     /// @throws Refusal as start() does if a stop was requested since
     void beginStepping(const LoopSettings& settings, std::uint64_t stops_known,

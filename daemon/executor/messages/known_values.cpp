@@ -40,9 +40,8 @@ void requireKnownValues(const Message& message) {
         const int count = repeated ? reflection.FieldSize(message, field) : 1;
         if (field->cpp_type() == FieldDescriptor::CPPTYPE_ENUM) {
             for (int i = 0; i < count; ++i) {
-                requireKnown(*field, repeated
-                                         ? reflection.GetRepeatedEnumValue(message, field, i)
-                                         : reflection.GetEnumValue(message, field));
+                requireKnown(*field, repeated ? reflection.GetRepeatedEnumValue(message, field, i)
+                                              : reflection.GetEnumValue(message, field));
             }
         } else if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) {
             for (int i = 0; i < count; ++i) {

@@ -328,7 +328,7 @@ class Runner final : private RunnerView {
     std::string status_;
     bool lacks_realtime_ = false;  // the loop runs without something essential
     OverrunReport overrun_report_;
-    std::uint64_t told_faults_ = 0;    // LoopFigures::faults at the last look
+    std::uint64_t told_faults_ = 0;  // LoopFigures::faults at the last look
     ToldFaults told_not_finite_;
     std::int64_t tuned_spin_ns_ = -1;  // by tuneSpin(); -1 = not yet
     std::unique_ptr<Replay> replay_;   // while one is under way

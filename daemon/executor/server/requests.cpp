@@ -126,7 +126,8 @@ bool Server::answerQuery(std::uint64_t connection, const v1::Request& request) {
         }
         case v1::Request::kEndStep: {
             const auto step = waiting_.find({connection, request.end_step().step()});
-            if (step != waiting_.end() && step->second.endless()) step->second.given_up->store(true);
+            if (step != waiting_.end() && step->second.endless())
+                step->second.given_up->store(true);
             response.mutable_done();
             break;
         }
@@ -202,7 +203,8 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
             } else if (request.kind_case() == v1::Request::kTakeSnapshot) {
                 *response.mutable_snapshot() = snapshotTo(runner_->takeImage());
             } else {
-                *response.mutable_change() = outcomeTo(change(*runner_, request, progress, *given_up));
+                *response.mutable_change() =
+                    outcomeTo(change(*runner_, request, progress, *given_up));
             }
         } catch (const Refusal& refusal) {
             response = errorResponse(id, refusal.kind(), refusal.what());

@@ -23,7 +23,7 @@ constexpr std::chrono::milliseconds kPatience{300};  // with a disk, at the end
 std::string unlinked(const std::string& path) {
     if (::unlink(path.c_str()) == 0 || errno == ENOENT || errno == ENOTDIR) return {};
     const int error = errno;
-    struct stat found {};
+    struct stat found{};
     // Nothing but a regular file is a mark.
     if (::lstat(path.c_str(), &found) == 0 && !S_ISREG(found.st_mode)) return {};
     return std::strerror(error);  // NOLINT(concurrency-mt-unsafe): of glibc it is safe

@@ -141,7 +141,7 @@ async def replace(
         result = (await runner.ask(asked, progress)).change
         known = runner.desired.components.get(old, graph_pb2.ComponentSpec()).parameters
         values = {each.name: each.value for each in known}
-        given = list(spec.parameters)
+        set_now = list(spec.parameters)
         spec.parameters.extend(result.kept)
         runner.left_out.pop(old, None)
         runner.desired.drop([old])
@@ -149,7 +149,7 @@ async def replace(
         runner.happened(
             _Event.KIND_GRAPH, f"{old} replaced by {result.component} ({what})", result.component
         )
-        parameters.note(runner, result.component, given, values, acting, "replace")
+        parameters.note(runner, result.component, set_now, values, acting, "replace")
         return await _saved(runner, result)
 
     what = f"{package}/{type_name}"

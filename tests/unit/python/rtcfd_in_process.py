@@ -204,8 +204,8 @@ class Rtcfd:
             return await answers
         last = None
         async with contextlib.aclosing(answers) as stream:
-            async for last in stream:
-                pass
+            async for answer in stream:
+                last = answer
         return last
 
     async def hold(self, method: str, opening: Any, opened: asyncio.Event) -> None:

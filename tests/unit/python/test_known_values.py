@@ -19,7 +19,9 @@ REQUESTS = [
 ]
 
 
-def enumerators(message: Descriptor, above: tuple[str, ...] = ()) -> Iterator[list[FieldDescriptor]]:
+def enumerators(
+    message: Descriptor, above: tuple[str, ...] = ()
+) -> Iterator[list[FieldDescriptor]]:
     """Yield the way to each enumerator of a message."""
     for field in message.fields:
         if field.enum_type is not None:

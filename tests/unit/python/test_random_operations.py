@@ -24,7 +24,7 @@ from failing_disk import MODES, FailingDisk
 from hypothesis import HealthCheck, Phase, example, given, seed, settings
 from hypothesis import strategies as st
 from rtcf.v1 import control_pb2, runner_pb2
-from rtcfd.runners import held_runners, leases, runner
+from rtcfd.runners import held_runners, leases
 from rtcfd.state import saver
 from rtcfd_in_process import Machine, Refused, Rtcfd, quiet, spec
 
@@ -236,7 +236,7 @@ def world() -> Any:
         world.install(patch)
         # A disk that hangs is soon taken for one.
         patch.setattr(saver, "PATIENCE_S", 0.02)
-        patch.setattr(runner, "LEAVE_TIMEOUT_S", 0.1)
+        patch.setattr("rtcfd.runners.runner.LEAVE_TIMEOUT_S", 0.1)
         yield world
         world.disk.next_life()
 

@@ -319,7 +319,8 @@ def test_output_that_finds_no_room_is_said_in_a_line(daemon: DaemonUnderTest, wo
 
 
 @pytest.mark.parametrize(
-    "line", ["restart rt_runner", "remove rt_runner", "set rt_runner --frequency 7", "add rt_runner"]
+    "line",
+    ["restart rt_runner", "remove rt_runner", "set rt_runner --frequency 7", "add rt_runner"],
 )
 def test_a_line_names_one_runner(daemon: DaemonUnderTest, line: str) -> None:
     pid = daemon.executor_pid()
