@@ -7,7 +7,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -197,3 +197,53 @@ def test_the_oldest_go_when_there_are_too_many(tmp_path: Path) -> None:
             assert Path(second.file).exists()
     finally:
         daemon.end()
+
+
+def test_the_faulting_cycle_is_shown_of_a_loop_that_goes_on(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter", name="a"))
+    bad = faulty("Throws", 200)
+    bad.optional = True
+    client.load(bad)
+    client.start()
+    incident = newest(client, 0)
+    assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
+    with rtcf.read_recording(incident.file) as recording:
+        cycles = recording.cycles
+    told = json.loads(daemon.ctl("-o", "json", "incident", "show").stdout)
+    assert told["cycle"] in cycles
+    assert cycles[-1] > told["cycle"], "the loop went on"
+    assert [each["cycle"] for each in told["last_cycles"]] == list(
+        range(told["cycle"] - 9, told["cycle"] + 1)
+    )
+    # It counts its updates, and failed in the 201st, which nobody reads.
+    assert told["values"]["/bad.out"] == {"cycle": told["cycle"], "value": 200}
+
+
+def test_parameters_changed_lately_are_shown_with_values(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    client.load(rtcf.component("rtcf_test", "Knobs", name="knobs"))
+    client.set_parameters("knobs", [rtcf.parse_parameter("count:=7")])
+    client.set_parameters("knobs", [rtcf.parse_parameter("label:=xyz")])
+    client.take_incident()
+    shown = daemon.ctl("incident", "show").stdout
+    assert "/knobs.count 2 -> 7 by " in shown, shown
+    assert "/knobs.label abc -> xyz by " in shown, shown
+
+
+def test_the_set_that_an_executor_died_of_is_known(daemon: Daemon, client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter", name="a"))
+    client.load(faulty("NullDereference", 1_000_000_000))
+    client.start()
+    wait_for(lambda: state(client).iteration > 100, "100 cycles")
+    # Whether it answers before it dies is a matter of microseconds.
+    with suppress(rtcf.RtcfError):
+        client.set_parameters("bad", [rtcf.parse_parameter("after:=0")])
+    newest(client, 0)
+    shown = daemon.ctl("incident", "show").stdout
+    assert "/bad.after 1000000000 -> 0 by " in shown, shown
+    assert "/bad: after = 0 set" in daemon.log()
+    changes = client.get_history("bad").changes
+    assert changes[-1].value.int_value == 0
