@@ -50,7 +50,8 @@ def stopped(pid: int) -> Iterator[None]:
             threads = [each.read_text() for each in Path(f"/proc/{pid}/task").glob("*/stat")]
         except OSError:
             return False  # one has just ended
-        return all(text.rpartition(")")[2].split()[0] == "T" for text in threads)
+        # One that waits in the kernel for a disk stands, too: it stops before it returns.
+        return all(text.rpartition(")")[2].split()[0] in "TD" for text in threads)
 
     os.kill(pid, signal.SIGSTOP)
     try:

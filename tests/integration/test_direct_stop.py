@@ -257,17 +257,20 @@ def hanging_disk(tmp_path: Path) -> Iterator[HangingDisk]:
         yield disk
 
 
-def begun_on(disk: HangingDisk) -> Daemon:
-    """Start an rtcfd whose state is on a disk."""
-    daemon = Daemon(disk.folder.parent, RESUME)
+@pytest.fixture
+def daemon_on_it(hanging_disk: HangingDisk) -> Iterator[Daemon]:
+    """Give an rtcfd whose state is on that disk."""
+    daemon = Daemon(hanging_disk.folder.parent, RESUME)
     daemon.start()
-    return daemon
+    yield daemon
+    if not daemon.ended:
+        daemon.end()
 
 
 def test_a_disk_that_hangs_holds_up_no_stop_and_is_right_when_it_answers(
-    hanging_disk: HangingDisk,
+    daemon_on_it: Daemon, hanging_disk: HangingDisk
 ) -> None:
-    daemon = begun_on(hanging_disk)
+    daemon = daemon_on_it
     with rtcf.Client(daemon.socket) as client:
         begin(client)
         with hanging_disk.hanging():
@@ -287,13 +290,12 @@ def test_a_disk_that_hangs_holds_up_no_stop_and_is_right_when_it_answers(
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
         assert not runs(client)
-    daemon.end()
 
 
 def test_an_executor_stops_again_and_again_whatever_its_disk_does(
-    hanging_disk: HangingDisk,
+    daemon_on_it: Daemon, hanging_disk: HangingDisk
 ) -> None:
-    daemon = begun_on(hanging_disk)
+    daemon = daemon_on_it
     with rtcf.Client(daemon.socket) as client:
         begin(client)
         with hanging_disk.hanging():
@@ -310,11 +312,12 @@ def test_an_executor_stops_again_and_again_whatever_its_disk_does(
             assert f"rt_runner: {NOT_YET}" in done.stderr
             assert not runs(client)
         wait_for(lambda: not mark(daemon).exists(), "the disk")
-    daemon.end()
 
 
-def test_the_end_of_rtcfd_ends_loops_whatever_its_disk_does(hanging_disk: HangingDisk) -> None:
-    daemon = begun_on(hanging_disk)
+def test_the_end_of_rtcfd_ends_loops_whatever_its_disk_does(
+    daemon_on_it: Daemon, hanging_disk: HangingDisk
+) -> None:
+    daemon = daemon_on_it
     with rtcf.Client(daemon.socket) as client:
         begin(client)
         executor = client.get_status("rt_runner").runners[0].pid
@@ -325,11 +328,12 @@ def test_the_end_of_rtcfd_ends_loops_whatever_its_disk_does(hanging_disk: Hangin
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
         assert not runs(client)
-    daemon.end()
 
 
-def test_a_read_only_disk_is_told_of_by_the_executor_that_stops(hanging_disk: HangingDisk) -> None:
-    daemon = begun_on(hanging_disk)
+def test_a_read_only_disk_is_told_of_by_the_executor_that_stops(
+    daemon_on_it: Daemon, hanging_disk: HangingDisk
+) -> None:
+    daemon = daemon_on_it
     with rtcf.Client(daemon.socket) as client:
         begin(client)
         remount = ["mount", "-o", "remount,ro", str(hanging_disk.folder)]
@@ -339,7 +343,6 @@ def test_a_read_only_disk_is_told_of_by_the_executor_that_stops(hanging_disk: Ha
             assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
             assert "not saved: Read-only file system" in done.stderr
         wait_for(lambda: not runs(client), "rtcfd to know")
-    daemon.end()
 
 
 @pytest.fixture

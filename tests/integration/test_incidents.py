@@ -245,5 +245,5 @@ def test_the_set_that_an_executor_died_of_is_known(daemon: Daemon, client: rtcf.
     shown = daemon.ctl("incident", "show").stdout
     assert "/bad.after 1000000000 -> 0 by " in shown, shown
     assert "/bad: after = 0 set" in daemon.log()
-    changes = client.get_history("bad").changes
+    changes = client.get_history("bad")
     assert changes[-1].value.int_value == 0
