@@ -72,7 +72,7 @@ def test_numbers_of_a_bag_are_exact(tmp_path: Path, make: Callable[..., Any]) ->
         "jitter_us": {"min": 2.0, "mean": 2.0, "p50": 2.0, "p99": 2.0, "p999": 2.0, "max": 2.0},
     }  # fmt: skip
     # The plot stands beside the bag.
-    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "a.bag.evaluation.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_lost_messages_and_restarts_of_the_loop_are_told_apart(tmp_path: Path) -> None:

@@ -88,13 +88,11 @@ def nodes(master: Master) -> set[str]:
 
 
 def node_of_the_loop(master: Master) -> str:
-    """Return its name, once it has one."""
-
-    def found() -> str:
-        return next((name for name in nodes(master) if name.startswith("/rtcfd/")), "")
-
-    name: str = wait_for(found, "the node of the loop")
-    return name
+    """Return its name, once it has topics."""
+    wait_for(lambda: "/rt_runner/cycles" in master.topics()[0], "the node of the loop")
+    state = rosgraph.Master("/test", master.uri).getSystemState()
+    (node,) = next(users for topic, users in state[0] if topic == "/rt_runner/cycles")
+    return str(node)
 
 
 def test_the_papers_evaluation_runs_and_the_tools_find_it(
@@ -106,18 +104,19 @@ def test_the_papers_evaluation_runs_and_the_tools_find_it(
     wanted = dict.fromkeys(("/R3_G2H1", "/R1_H1R2", "/G2_R2"), "std_msgs/Float64")
     wait_until_it_is(wanted, lambda: topics(master), "the topics")
     loop = node_of_the_loop(master)
-    assert loop.endswith("/rt_runner")
-    ours = {"/rt_runner", "/H1", "/F1", "/R1", "/R2", "/R3"}
+    assert loop == "/rt_runner"
+    ours = {"/rt_runner/launch", "/H1", "/F1", "/R1", "/R2", "/R3"}
     wait_until_it_is({loop, "/G1", "/G2"} | ours, lambda: nodes(master), "the nodes")
 
-    assert launching.tool("component_order").stdout.split() == fig_1.ORDER
-    listed = launching.tool("component_list").stdout
+    assert launching.tool("component_order", "--table").stdout.split() == fig_1.ORDER
+    assert launching.tool("component_list").stdout.split() == sorted(fig_1.ORDER)
+    listed = launching.tool("component_list", "--table").stdout
     assert all(name in listed for name in fig_1.ORDER) and "rt_launcher /R2" in listed
     assert "rtcf_examples/Mimo" in launching.tool("component_info", "R2").stdout
-    assert "/R1_H1R2" in launching.tool("connection_list").stdout
-    info = launching.tool("connection_info", "R1_H1R2")
+    assert "/R1_H1R2" in launching.tool("connection_list").stdout.split()
+    info = launching.tool("connection_info", "R1_H1R2", "--table")
     assert "written by /R1.out1" in info.stdout and "published" in info.stdout
-    unknown = launching.tool("connection_info", "R1_H1R3")
+    unknown = launching.tool("connection_info", "R1_H1R3", "--table")
     assert (unknown.returncode, unknown.stderr) == (
         1,
         "connection_info: no connection /R1_H1R3; did you mean /R1_H1R2?\n",
@@ -136,7 +135,8 @@ def test_listing_2_of_the_paper_runs(launching: Launching, master: Master) -> No
     launch = launching.roslaunch("rtcf_examples", "paper_example.launch")
     launch.wait_for_output("the loop runs with 2 components")
     wait_until_it_is({"/ros/in", "/ros/out"}, lambda: set(topics(master)), "the topics")
-    assert launching.tool("component_order").stdout.split() == ["/example1", "/example2"]
+    order = launching.tool("component_order").stdout.splitlines()
+    assert order[1:3] == ["1. /example1", "2. /example2"]
     with launching.client() as (client, runner):
         assert client.get_component("example1", runner).spec.first
     press_ctrl_c(launch)
@@ -351,7 +351,8 @@ def test_one_launch_file_has_several_runners(launching: Launching, master: Maste
             assert client.get_order(runner) == [component]
             # What it shows of itself is under its node's name, as of any node.
             wait_until_shown(master, node)
-    assert launching.tool("component_order", "-r", "/left/rt_runner").stdout == "/left/same\n"
+    order = launching.tool("component_order", "-r", "/left/rt_runner").stdout
+    assert "1. /left/same\n" in order
     press_ctrl_c(launch)
 
 

@@ -40,11 +40,11 @@ def test_nodes_are_seen_pinged_and_killed_as_others(launching: Launching, master
     runner = running(launching)
     launcher = identity(launching, "mine", "__ns:=/arm")
     launcher.wait_for_output("loaded into runner")
-    assert {"/rt_runner", "/arm/mine"} <= nodes(master)
+    wait_for(lambda: {"/rt_runner", "/arm/mine"} <= nodes(master), "the nodes")
     assert "xmlrpc reply from" in master.run("/usr/bin/rosnode", "ping", "-c", "1", "/rt_runner")
     told = master.run("/usr/bin/rosnode", "info", "/arm/mine")
     assert f"Pid: {launcher.pid}" in told
-    assert master.call("/rt_runner/get_loggers")["loggers"] == [
+    assert master.call("/arm/mine/get_loggers")["loggers"] == [
         {"name": "ros.rtcf", "level": "info"}
     ]
     master.run("/usr/bin/rosnode", "kill", "/arm/mine")

@@ -174,3 +174,48 @@ def test_what_has_no_place_in_rtcf_is_said_when_cmake_runs(
     if instead:
         assert instead in output
         assert "CMakeLists.txt:5 (orocos_" in output, "which line it is"
+
+
+def package(folder: Path, name: str, depends: str, lines: str) -> None:
+    folder.mkdir(parents=True)
+    (folder / "package.xml").write_text(
+        f"<package format='2'><name>{name}</name><version>1.0.0</version><description>none</description>"
+        "<maintainer email='a@example.org'>a</maintainer><license>none</license>"
+        f"<buildtool_depend>catkin</buildtool_depend>{depends}</package>"
+    )
+    (folder / "CMakeLists.txt").write_text(
+        f"cmake_minimum_required(VERSION 3.0.2)\nproject({name})\n{lines}\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("depends", "lines"),
+    [
+        # As RTCF's own begins.
+        ("", "find_package(catkin REQUIRED COMPONENTS roscpp rtt_ros)"),
+        # One of that name which knows nothing of rtcf.
+        ("<depend>std_msgs</depend>", "find_package(catkin REQUIRED)\ncatkin_package()"),
+    ],
+    ids=["rtcf's checkout", "another package"],
+)
+def test_a_package_that_hides_rtcf_is_said_when_cmake_runs(
+    tmp_path: Path, depends: str, lines: str
+) -> None:
+    package(tmp_path / "src" / "left" / "rtcf", "rtcf", depends, lines)
+    package(
+        tmp_path / "src" / "mine", "mine", "<depend>rtcf</depend>",
+        "find_package(OROCOS-RTT REQUIRED)",
+    )  # fmt: skip
+    done = subprocess.run(
+        ["/usr/bin/catkin_make", "-C", str(tmp_path), "-DPYTHON_EXECUTABLE=/usr/bin/python3"],
+        cwd=tmp_path,
+        env=build_tree_environment(clean_environment()),
+        capture_output=True,
+        text=True,
+        timeout=BUILD_S,
+        check=False,
+    )
+    output = " ".join(f"{done.stdout} {done.stderr}".split())
+    assert done.returncode != DONE
+    assert f"The package rtcf of this workspace ({tmp_path}/src/left/rtcf) hides" in output
+    assert "put a file CATKIN_IGNORE beside its package.xml" in output

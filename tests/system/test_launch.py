@@ -28,7 +28,7 @@ def test_the_papers_evaluation_runs_from_the_packages(machine: Machine, user: st
             return output.exists() and "the loop runs with 5 components" in output.read_text()
 
         wait_for(running, "the loop of the launch file")
-        done = machine.shell(f"{ROS} /usr/lib/rtcf/component_order", user=user)
+        done = machine.shell(f"{ROS} /usr/lib/rtcf/component_order --table", user=user)
         assert done.stdout.split() == ["/H1", "/F1", "/R1", "/R2", "/R3"]
     finally:
         machine.shell(f"pkill -INT -u {user} -o -f '[r]oslaunch -p {PORT}'", check=False)

@@ -1,11 +1,11 @@
 # find_package(OROCOS-RTT) of packages that were written for RTCF 2021: OROCOS' variables, with
 # rtcf's headers of the same names behind them. UseOROCOS-RTT.cmake has the macros.
+find_package(rtcf REQUIRED CONFIG)
 get_filename_component(OROCOS-RTT_USE_FILE_PATH ${CMAKE_CURRENT_LIST_DIR} ABSOLUTE)
 set(OROCOS-RTT_USE_FILE ${OROCOS-RTT_USE_FILE_PATH}/UseOROCOS-RTT.cmake)
 set(OROCOS-RTT_FOUND TRUE)
 set(OROCOS_TARGET gnulinux)
 
-find_package(rtcf REQUIRED CONFIG)
 set(OROCOS-RTT_INCLUDE_DIRS ${rtcf_INCLUDE_DIRS})
 set(OROCOS-RTT_LIBRARIES ${rtcf_LIBRARIES})
 set(OROCOS-RTT_VERSION 2.9.0)
