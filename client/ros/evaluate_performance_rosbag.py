@@ -207,7 +207,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "frequency", type=_frequency, metavar="FREQUENCY", help="nominal frequency of the loop, Hz"
     )
     parser.add_argument("--topic", default="", help="if the bag has several loops")
-    parser.add_argument("--png", type=Path, help="where the plot goes (default: BAG.evaluation.png)")
+    parser.add_argument(
+        "--png", type=Path, help="where the plot goes (default: BAG.evaluation.png)"
+    )
     parser.add_argument("--json", action="store_true", help="print the numbers as JSON")
     given = parser.parse_args(arguments)
     try:

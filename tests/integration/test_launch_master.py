@@ -51,15 +51,13 @@ def test_the_runners_node_has_the_loops_topics_services_and_loggers(
     assert nodes == {"/rosout", "/rt_runner", "/rt_runner/launch", "/it"}
     # As rqt_logger_level does it.
     loggers = {
-        each["name"]: each["level"]
-        for each in own_master.call("/rt_runner/get_loggers")["loggers"]
+        each["name"]: each["level"] for each in own_master.call("/rt_runner/get_loggers")["loggers"]
     }
     assert loggers["ros.rtcf.it"] == "info"
     debug = "{logger: ros.rtcf.it, level: debug}"
     own_master.call("/rt_runner/set_logger_level", debug)
     loggers = {
-        each["name"]: each["level"]
-        for each in own_master.call("/rt_runner/get_loggers")["loggers"]
+        each["name"]: each["level"] for each in own_master.call("/rt_runner/get_loggers")["loggers"]
     }
     assert loggers["ros.rtcf.it"] == "debug"
     assert (launcher.end(), runner.end()) == (DONE, DONE)
@@ -97,9 +95,7 @@ def test_a_launch_is_there_again_after_a_restart_of_roscore(
     own_master.start()
     runner.wait_for_output("registered again at the ROS master")
     for node in ("/rt_runner", "/rt_runner/launch", "/it"):
-        wait_for(
-            lambda node=node: node in own_master.run("/usr/bin/rosnode", "list").split(), node
-        )
+        wait_for(lambda node=node: node in own_master.run("/usr/bin/rosnode", "list").split(), node)
         assert "xmlrpc reply from" in own_master.run("/usr/bin/rosnode", "ping", "-c", "1", node)
     wait_for(lambda: "/rt_runner/get_loop" in own_master.services(), "the services")
     told = launching.tool("component_list")
@@ -110,9 +106,7 @@ def test_a_launch_is_there_again_after_a_restart_of_roscore(
     assert (late.end(), launcher.end(), runner.end()) == (DONE, DONE, DONE)
 
 
-def test_tools_of_another_machine_ask_the_service(
-    launching: Launching, own_master: Master
-) -> None:
+def test_tools_of_another_machine_ask_the_service(launching: Launching, own_master: Master) -> None:
     runner, launcher = running(launching, own_master)
     # What is of the other machine is out of reach here: its file system, its host name.
     parameters = own_master.parameter("/rt_runner/rtcf_runner")
@@ -126,9 +120,7 @@ def test_tools_of_another_machine_ask_the_service(
     assert far.wait() == 1
     assert "runner /rt_runner is on elsewhere, this launcher on " in far.output()
     assert "start both on one machine" in far.output()
-    own_master.run(
-        "/usr/bin/rosparam", "set", "/rt_runner/rtcf_runner/host", parameters["host"]
-    )
+    own_master.run("/usr/bin/rosparam", "set", "/rt_runner/rtcf_runner/host", parameters["host"])
     assert (launcher.end(), runner.end()) == (DONE, DONE)
 
 

@@ -223,8 +223,8 @@ bool MasterLink::chooseName(ParallelCalls& master) {
         const bool taken = found[i] && mayLive(found[i].text());
         if (taken && i + 1 < found.size()) continue;
         if (i != 0) {
-            say_("another node named " + wanted.full() +
-                 " runs at this ROS master: this one is " + names[i].full());
+            say_("another node named " + wanted.full() + " runs at this ROS master: this one is " +
+                 names[i].full());
         }
         node_.rename(std::move(names[i]));
         return true;

@@ -91,7 +91,7 @@ class Publishing {
     mutable std::mutex mutex_;  // all below
     std::condition_variable changed_;
     Taps taps_;
-    std::optional<Deliveries> deliveries_;  // none before configure()
+    std::optional<Deliveries> deliveries_;                       // none before configure()
     std::map<Key, std::shared_ptr<TopicPublisher>> publishers_;  // one for each tap, and more
     std::uint64_t generation_ = 0;
     std::uint64_t served_ =

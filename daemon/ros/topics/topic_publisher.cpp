@@ -78,8 +78,7 @@ void TopicPublisher::open(ros::NodeHandle& handle) {
     stamped_ = stamped;
     departures_ = Departures(delivery.latch);
     if (publisher_ && kept_)
-        send(kept_->bytes.data(), static_cast<std::uint32_t>(kept_->bytes.size()),
-             kept_->stamp_ns);
+        send(kept_->bytes.data(), static_cast<std::uint32_t>(kept_->bytes.size()), kept_->stamp_ns);
     problem_ =
         problem.empty() ? "" : "cannot publish " + topic_ + " as " + type.name + ": " + problem;
     retry_.note(problem_.empty());

@@ -75,10 +75,10 @@ class TopicPublisher {
     void send(const std::uint8_t* bytes, std::uint32_t size, std::int64_t stamp_ns);
 
     const std::string topic_;
-    const MessageType type_;    // of the values
-    mutable std::mutex mutex_;  // all below
-    Delivery delivery_;         // that is wanted
-    Delivery opened_;           // that it is open with
+    const MessageType type_;                // of the values
+    mutable std::mutex mutex_;              // all below
+    Delivery delivery_;                     // that is wanted
+    Delivery opened_;                       // that it is open with
     const MessageType* stamped_ = nullptr;  // it is open with; null: the values are the messages
     std::string problem_;
     std::uint64_t lost_ = 0;

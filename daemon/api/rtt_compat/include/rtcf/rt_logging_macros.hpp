@@ -18,9 +18,8 @@
 
 /// True in a component's member function while it runs in the loop; false in all hooks but
 /// updateHook() and errorHook().
-#define RT_ACTIVE              \
-    (this->isRunning() &&      \
-     this->getTargetState() == RTT::base::TaskCore::TaskState::Running)
+#define RT_ACTIVE \
+    (this->isRunning() && this->getTargetState() == RTT::base::TaskCore::TaskState::Running)
 
 /// @name Internals of the macros below
 /// @{
