@@ -192,8 +192,8 @@ def test_the_rt_launcher_of_rtcf_2021_names_a_component_by_its_full_name(
     for name, ns in (("/x", "/"), ("/arm/left/y", "/arm/left")):
         load = (
             f"{{component_name: {{data: {name}}}, component_type: {{data: Identity}},"
-            f" component_pkg: {{data: rtcf_examples}}, ns: {{data: {ns}}}, is_first: {{data: false}},"
-            " topics_ignore_for_graph: {data: ''}, mappings: []}"
+            f" component_pkg: {{data: rtcf_examples}}, ns: {{data: {ns}}},"
+            " is_first: {data: false}, topics_ignore_for_graph: {data: ''}, mappings: []}"
         )
         assert _call(master, "load_orocos_component", load) == {"success": {"data": True}}
         assert client.get_component(name).spec.ns == ns

@@ -179,7 +179,8 @@ def test_what_has_no_place_in_rtcf_is_said_when_cmake_runs(
 def package(folder: Path, name: str, depends: str, lines: str) -> None:
     folder.mkdir(parents=True)
     (folder / "package.xml").write_text(
-        f"<package format='2'><name>{name}</name><version>1.0.0</version><description>none</description>"
+        f"<package format='2'><name>{name}</name><version>1.0.0</version>"
+        "<description>none</description>"
         "<maintainer email='a@example.org'>a</maintainer><license>none</license>"
         f"<buildtool_depend>catkin</buildtool_depend>{depends}</package>"
     )

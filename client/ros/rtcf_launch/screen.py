@@ -1,4 +1,5 @@
-"""What a node prints: log records and its own words, as rosconsole does, ROSCONSOLE_FORMAT included.
+"""What a node prints: log records and its own words, as rosconsole does, also in the format of
+ROSCONSOLE_FORMAT.
 
 Warnings and errors go to standard error, which roslaunch always shows; the
 rest to standard output, which it shows with output="screen".
@@ -91,7 +92,7 @@ class Screen:
     def _formatted(
         self, word: str, time_s: float, text: str, name: str, place: tuple[str, int]
     ) -> str:
-        """Return a line in the format of the environment; tokens that say nothing here are empty."""
+        """Return a line in the format of the environment."""
         values = {
             "severity": f"{word:>5}",
             "message": text,
