@@ -4,6 +4,7 @@
 
 #include <ros/console.h>
 
+#include <cstdint>
 #include <mutex>
 #include <string>
 
@@ -42,6 +43,7 @@ class TestLogger final : public LogSink {
     }
 
    private:
+
     LoopClock clock_;
     ComponentContext context_;
     std::mutex mutex_;  // from claim() to commit()
