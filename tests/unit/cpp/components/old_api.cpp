@@ -175,11 +175,11 @@ class Property21 : public RTT::TaskContext, public RtcfExtension {
         addProperty("gain", gain_).doc("of the loop");
         provides()->addProperty("count", count_);
         this->provides("tuning")->addProperty("label", label_);
+        addProperty("late", late_);
         addOperation("reset", &Property21::reset, this, RTT::OwnThread).doc("none").arg("a", "b");
         addPort("gain_seen", out_);
     }
     bool configureHook() override {
-        addProperty("late", late_);
         rtLogStream(ros::console::levels::Info)
             << "configured with " << gain_ << ' ' << count_ << ' ' << label_ << std::endl;
         rtLogStream(ros::console::levels::Debug) << "not shown";
@@ -210,6 +210,19 @@ class Property21 : public RTT::TaskContext, public RtcfExtension {
     RTT::OutputPort<double> out_{"gain_seen"};
 };
 
+/// Adds a property where nobody can set it any more.
+class LateProperty : public RTT::TaskContext {
+   public:
+    explicit LateProperty(const std::string& name) : TaskContext(name) {}
+    bool configureHook() override {
+        addProperty("late", late_);
+        return true;
+    }
+
+   private:
+    double late_ = 0.0;
+};
+
 }  // namespace rtcf_unit_test
 
 ORO_CREATE_COMPONENT_LIBRARY()
@@ -220,4 +233,5 @@ ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::Unlucky)
 ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::Erring)
 ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::Listener)
 ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::Property21)
+ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::LateProperty)
 ORO_CREATE_COMPONENT_TYPE()

@@ -264,6 +264,12 @@ TEST_F(RttCompat, PropertiesAreParametersThatTheirVariablesFollow) {
     EXPECT_TRUE(hasSaid("/P", "stopped with late"));
 }
 
+TEST_F(RttCompat, PropertiesAfterTheConstructorAreRefused) {
+    EXPECT_EQ(refusal([this] { loadApi("LateProperty", "L"); }),
+              "/L (rtcf_unit_test/LateProperty): configure failed: it threw: property 'late' is "
+              "added too late: add it in the constructor");
+}
+
 TEST_F(RttCompat, OperationsCompileAndAreSaidToBeOfNoUse) {
     loadApi("Property21", "P");
     EXPECT_TRUE(hasSaid("/P",

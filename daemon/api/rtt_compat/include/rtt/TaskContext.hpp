@@ -194,11 +194,15 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
     }
 
     /// Declares a parameter of a variable's name and value. From then on the variable follows it:
-    /// before each hook, and before updateHook(); a text before the other hooks only. In the
-    /// constructor, for the loader to set it, or in configureHook().
-    /// @throws std::logic_error for a name that is taken or not legal, and after configureHook()
+    /// before each hook, and before updateHook(); a text before the other hooks only.
+    /// @throws std::logic_error for a name that is taken or not legal, and after the constructor:
+    /// the loader sets parameters before configureHook()
     template <typename T>
     Described& addProperty(const std::string& name, T& variable) {
+        if (constructed_) {
+            throw std::logic_error("property '" + name +
+                                   "' is added too late: add it in the constructor");
+        }
         properties_.push_back(std::make_unique<Property<T>>(this, name, variable));
         return *properties_.back();
     }
@@ -214,6 +218,7 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
 
    private:
     bool configure() final {
+        constructed_ = true;
         return enter(Stopped, [this] { return configureHook(); });
     }
     bool start() final {
@@ -274,6 +279,7 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
     DataFlowInterface ports_;
     Service service_;
     std::vector<std::unique_ptr<base::PropertyBase>> properties_;
+    bool constructed_ = false;
     // Written in hooks, read by all of them.
     std::atomic<TaskState> state_{PreOperational};
     std::atomic<TaskState> target_{PreOperational};
