@@ -85,17 +85,24 @@ void Loop::followRealTime() noexcept {
         const std::int64_t begin = readCycleCounter();
         cycle_.run(device != nullptr ? wake_up.wake_ns : wake_up.deadline_ns,
                    wake_up.wake_ns - wake_up.deadline_ns);
-        end = wake_up.wake_ns + cycle_.counter().toNs(readCycleCounter() - begin);
-        if (device != nullptr) {
-            // The next cycle begins when the device says so; what it then has missed is seen there.
-            deadline = wake_up.wake_ns + cycle_.clock().period_ns;
-            if (end >= deadline) noteOverrun(wake_up, begin, end, false);
-        } else {
-            if (end >= deadline + cycle_.clock().period_ns)
-                noteOverrun(wake_up, begin, end, behind);
-            deadline = nextDeadline(deadline, end);
-        }
+        // With a device the next cycle begins when that says so; what it then has missed is seen
+        // there.
+        const std::int64_t limit =
+            (device != nullptr ? wake_up.wake_ns : wake_up.deadline_ns) + cycle_.clock().period_ns;
+        end = endOfCycle(wake_up, begin, limit);
+        if (end >= limit) noteOverrun(wake_up, begin, end, behind);
+        deadline = device != nullptr ? limit : nextDeadline(wake_up.deadline_ns, end);
     }
+}
+
+// The processor's counter tells it for one instruction. But over a suspend of the machine it may go
+// on, where CLOCK_MONOTONIC stands still, or begin anew: a cycle that seems late, or to have ended
+// before it began, is looked at by that clock.
+std::int64_t Loop::endOfCycle(const WakeUp& wake_up, std::int64_t begin_ticks,
+                              std::int64_t limit_ns) const noexcept RTCF_NONBLOCKING {
+    const std::int64_t ticks = readCycleCounter() - begin_ticks;
+    const std::int64_t end = wake_up.wake_ns + cycle_.counter().toNs(ticks);
+    return ticks >= 0 && end < limit_ns ? end : monotonicNow();
 }
 
 // Components' time() goes on by a period each cycle, whatever the simulated clock does; stamps are

@@ -1,0 +1,95 @@
+// A loop and one component, without a runner: what is done in the middle of a cycle.
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <utility>
+
+#include "common/time_units.hpp"
+#include "faults/flight_recorder.hpp"
+#include "logging/log.hpp"
+#include "loop/loop.hpp"
+#include "rtcf/component.hpp"
+#include "support/eventually.hpp"
+#include "support/shifted_counter.hpp"
+
+namespace rtcf::test {
+namespace {
+
+using namespace executor;
+
+class LoopAlone : public ::testing::Test {
+   protected:
+    // Does in each cycle what the test says.
+    class Worker final : public Component {
+       public:
+        explicit Worker(std::function<void(std::uint64_t)> work) : work_(std::move(work)) {}
+        void update() override { work_(iteration()); }
+
+       private:
+        std::function<void(std::uint64_t)> work_;
+    };
+
+    ~LoopAlone() override {
+        loop_.requestStop();
+        loop_.join(kSecond);
+    }
+
+    void start(std::function<void(std::uint64_t iteration)> work) {
+        worker_ = std::make_unique<Worker>(std::move(work));
+        context_.full_name = "/worker";
+        context_.clock = &loop_.clock();
+        context_.recorder_slot = recorder_.addSlot("/worker");
+        worker_->attach(context_);
+        schedule_.steps.push_back({worker_.get(), &context_, &component_, context_.recorder_slot});
+        schedule_.findStretches();
+        Adoption adoption;
+        adoption.schedule = &schedule_;
+        ASSERT_TRUE(loop_.adopt(adoption, kSecond));
+        loop_.start(settings_, loop_.stops());
+    }
+
+    // What the test's own objects are used for has ended then.
+    void stop() {
+        loop_.requestStop();
+        EXPECT_TRUE(eventually([this] { return loop_.join(0); }));
+    }
+
+    std::uint64_t iteration() const { return loop_.figures().iteration.load(); }
+    bool reaches(std::uint64_t iteration) {
+        return eventually([&] { return this->iteration() >= iteration; });
+    }
+
+    LoopSettings settings_;
+    FlightRecorder recorder_;
+    Log log_{[](LogEntry&&) {}};
+    Loop loop_{log_, recorder_};
+    ComponentContext context_;
+    ComponentFigures component_;
+    Schedule schedule_;
+    std::unique_ptr<Worker> worker_;
+};
+
+// Amid a cycle. The counter goes on or begins anew, CLOCK_MONOTONIC stands still.
+class LoopSuspended : public LoopAlone, public ::testing::WithParamInterface<std::int64_t> {};
+
+TEST_P(LoopSuspended, ASuspendNeitherHoldsNorStallsTheLoop) {
+    if (!ShiftedCounter::possible()) GTEST_SKIP() << "the counter cannot be trapped here";
+    constexpr std::int64_t kSlept = 5;  // s
+    constexpr std::uint64_t kAt = 50;
+    const std::int64_t ticks = loop_.counter().toTicks(GetParam() * kSlept * kSecond);
+    ShiftedCounter counter;
+    start([&](std::uint64_t iteration) {
+        if (iteration == kAt) counter.shift(ticks);
+    });
+    ASSERT_TRUE(reaches(kAt + 100));
+    EXPECT_LT(loop_.figures().missed.load(), static_cast<std::uint64_t>(kSlept) * 1000)
+        << "cycles that did not run for as long as the machine slept";
+    stop();
+}
+
+INSTANTIATE_TEST_SUITE_P(LoopAlone, LoopSuspended, ::testing::Values(1, -1));
+
+}  // namespace
+}  // namespace rtcf::test
