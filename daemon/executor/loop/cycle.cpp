@@ -118,7 +118,10 @@ void Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
 // cycle. @return ticks when it has ended, or kAbandoned
 [[gnu::noinline]] std::int64_t Cycle::exchange(std::int64_t begin_ticks,
                                                std::int64_t time_ns) noexcept {
-    atBoundary();
+    // What has passed since the last cycle is known already, whatever the period is from now on.
+    const std::int64_t elapsed = clock_.elapsed_ns;
+    atBoundary(time_ns);
+    clock_.elapsed_ns = elapsed;
     setTimes(time_ns);
     feed();
     const bool copied = copyLatches();
@@ -322,6 +325,31 @@ void Cycle::apply(Adoption& adoption) noexcept {
     if (adoption.restoration != nullptr && !restore(*adoption.restoration)) return;
     for (const StateCopy& state : adoption.copies) state.copy();
     for (const Latch& latch : adoption.new_latches) copy(latch);
+    changeComponents(adoption);
+    for (const Audience& audience : adoption.audiences)
+        audience.output->setConnected(audience.present);
+    for (StagedValue* value : adoption.values) value->commit();
+    if (adoption.schedule != nullptr) {
+        schedule_ = adoption.schedule;
+        noteSchedule();
+    }
+    if (adoption.frames != nullptr) frames_ = adoption.frames;
+    if (frames_ != nullptr && (adoption.frames != nullptr || adoption.restoration != nullptr))
+        frames_->setBase();
+    if (adoption.period_ns != 0) {
+        clock_.period_ns = adoption.period_ns;
+        clock_.elapsed_ns = adoption.period_ns;
+        for (const Step& step : schedule_->steps)
+            step.context->period_ns = adoption.period_ns * step.every;
+    }
+    figures_.adoption.add(readCycleCounter() - begin);
+}
+
+// Connections, and the hooks of what comes and goes, at the time of the cycle that begins here.
+void Cycle::changeComponents(Adoption& adoption) noexcept {
+    const std::int64_t time = clock_.time_ns;
+    const std::int64_t stamp = clock_.stamp_ns;
+    if (active_) setTimes(boundary_time_ns_);
     const auto new_inputs =
         adoption.rewires.begin() + static_cast<std::ptrdiff_t>(adoption.rewires_of_new);
     std::for_each(adoption.rewires.begin(), new_inputs, [](Rewire& each) { each.apply(); });
@@ -343,23 +371,8 @@ void Cycle::apply(Adoption& adoption) noexcept {
         }
     }
     std::for_each(new_inputs, adoption.rewires.end(), [](Rewire& each) { each.apply(); });
-    for (const Audience& audience : adoption.audiences)
-        audience.output->setConnected(audience.present);
-    for (StagedValue* value : adoption.values) value->commit();
-    if (adoption.schedule != nullptr) {
-        schedule_ = adoption.schedule;
-        noteSchedule();
-    }
-    if (adoption.frames != nullptr) frames_ = adoption.frames;
-    if (frames_ != nullptr && (adoption.frames != nullptr || adoption.restoration != nullptr))
-        frames_->setBase();
-    if (adoption.period_ns != 0) {
-        clock_.period_ns = adoption.period_ns;
-        clock_.elapsed_ns = adoption.period_ns;
-        for (const Step& step : schedule_->steps)
-            step.context->period_ns = adoption.period_ns * step.every;
-    }
-    figures_.adoption.add(readCycleCounter() - begin);
+    clock_.time_ns = time;
+    clock_.stamp_ns = stamp;
 }
 
 void Cycle::capture(Capture& capture) noexcept {

@@ -66,9 +66,12 @@ class Cycle {
     /// @{
     const Schedule& schedule() const noexcept { return *schedule_; }
     bool faulted() const noexcept { return fault_.kind != LoopFault::Kind::None; }
-    /// Does what waits for a boundary, between cycles.
-    void atBoundary() noexcept {
-        if (boundary_.waiting()) boundary_.perform(*this);
+    /// Does what waits for a boundary, between cycles. @param time_ns of the cycle that it begins:
+    /// what hooks see that run at the boundary
+    void atBoundary(std::int64_t time_ns) noexcept {
+        if (!boundary_.waiting()) return;
+        boundary_time_ns_ = time_ns;
+        boundary_.perform(*this);
     }
     /// Makes a change.
     void apply(Adoption& adoption) noexcept;
@@ -111,6 +114,7 @@ class Cycle {
         clock_.time_ns = time_ns;
         clock_.stamp_ns = time_ns + stamp_offset_ns_.load(std::memory_order_relaxed);
     }
+    void changeComponents(Adoption& adoption) noexcept;
     std::int64_t exchange(std::int64_t begin_ticks, std::int64_t time_ns) noexcept;
     template <bool Plain>
     std::int64_t update(const Step* next, const Step* end, std::int64_t before) noexcept;
@@ -145,6 +149,7 @@ class Cycle {
 
     CycleCounter counter_;
     // As above: of whoever runs cycles.
+    std::int64_t boundary_time_ns_ = 0;        // of the cycle that the present boundary begins
     std::int64_t total_elapsed_ns_ = 0;        // loop time in whole periods
     std::int64_t exchanged_ticks_ = 0;         // what the last exchange took,
     std::uint64_t exchanged_at_ = UINT64_MAX;  // and its iteration

@@ -43,7 +43,8 @@ std::uint64_t Loop::step(std::uint64_t cycles, const std::atomic<bool>* given_up
     for (; done < cycles && goesOn() && wanted(); ++done) {
         const Counting::Turn turn(cycle_.figures().counting);
         cycle_.run(nextStep(), 0);
-        cycle_.setElapsed(cycle_.clock().period_ns);  // also if a snapshot said otherwise
+        // Also if a snapshot said otherwise, or the period has changed in it.
+        cycle_.setElapsed(cycle_.clock().period_ns);
     }
     Log::setRealtimeThread(false);
     return done;
@@ -113,7 +114,7 @@ void Loop::followClock() noexcept {
         const std::optional<SimulatedCycle> due =
             simulation_->next(cycle_.clock().period_ns, kPatience);
         if (!due) {
-            cycle_.atBoundary();
+            cycle_.atBoundary(nextStep());
             continue;
         }
         for (const Feed& feed : cycle_.schedule().feeds) {
@@ -123,6 +124,7 @@ void Loop::followClock() noexcept {
         cycle_.setStampOffset(due->time_ns - now);
         const Counting::Turn turn(cycle_.figures().counting);
         cycle_.run(now, 0);
+        cycle_.setElapsed(cycle_.clock().period_ns);
     }
 }
 
@@ -138,7 +140,7 @@ Loop::WakeUp Loop::waitForSource(Source& device) noexcept {
     waits_.add(1);
     const std::int64_t now = monotonicNow();
     if (!ready) {
-        cycle_.atBoundary();
+        cycle_.atBoundary(now);
         return {false, 0, now};
     }
     const std::int64_t period = cycle_.clock().period_ns;

@@ -112,7 +112,7 @@ class Component {
     std::uint64_t iteration() const noexcept RTCF_NONBLOCKING { return context_->clock->iteration; }
     /// This component's nominal period, ns.
     std::int64_t period() const noexcept RTCF_NONBLOCKING { return context_->period_ns; }
-    /// Time since this component's last update in whole periods, ns; never below period().
+    /// Time since this component's last update in whole periods, as long as they were, ns.
     std::int64_t elapsed() const noexcept RTCF_NONBLOCKING {
         return std::max<std::int64_t>(context_->clock->elapsed_ns, context_->elapsed_ns);
     }

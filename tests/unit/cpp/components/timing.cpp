@@ -1,7 +1,9 @@
 // A device that paces its loop, and a component that tells what it is told of time.
 #include <time.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <cstdlib>
 #include <rtcf/component.hpp>
 
 #include "journal.hpp"
@@ -52,6 +54,31 @@ class Watch final : public rtcf::Component {
     static constexpr double kMillisecond = 1e6;
 };
 
+// Whether elapsed() is what time() has gone on by, and safe() comes at a later time than updates.
+class Stopwatch final : public rtcf::Component {
+    rtcf::Output<std::int64_t> furthest_off{this, "furthest_off", "ns"};
+    rtcf::Output<std::int64_t> last{this, "last", "ns"};
+    std::int64_t before_ = -1;
+    std::int64_t furthest_off_ = 0;
+
+    bool start() override {
+        before_ = -1;
+        return true;
+    }
+    void update() override {
+        if (before_ >= 0) {
+            const std::int64_t off = std::abs(time() - before_ - elapsed());
+            furthest_off_ = std::max(furthest_off_, off);
+        }
+        before_ = time();
+        furthest_off.write(furthest_off_);
+        last.write(elapsed());
+    }
+    void safe() noexcept override {
+        rtcf_unit_test_journal()->note(fullName(), time() > before_ ? "safe later" : "safe before");
+    }
+};
+
 // Takes 6 ms to take over.
 class SlowSuccessor final : public rtcf::Component {
     void update() override {}
@@ -85,6 +112,7 @@ class Subnormal final : public rtcf::Component {
 
 RTCF_COMPONENT(Gated, "Has an update that waits for the test")
 RTCF_COMPONENT(SlowSuccessor, "Takes long to take over")
+RTCF_COMPONENT(Stopwatch, "Compares time() and elapsed()")
 RTCF_COMPONENT(Subnormal, "Writes a subnormal number")
 RTCF_COMPONENT(Device, "Paces the loop")
 RTCF_COMPONENT(Watch, "Tells what it is told of time")

@@ -289,6 +289,27 @@ TEST_F(Change, FrequencyChangesWhileTheLoopRuns) {
     EXPECT_EQ(journal().count("/A start"), 1U);
 }
 
+TEST_F(Change, AFrequencyThatChangesLeavesElapsedWhatTimeHasGoneOnBy) {
+    load(definition("Stopwatch", "W"));
+    start();
+    for (const double frequency : {10.0, 1000.0, 300.0, 1000.0}) {
+        ASSERT_TRUE(runs(3));
+        configure([&](RunnerSettings& settings) { settings.frequency_hz = frequency; });
+        ASSERT_TRUE(runs(3));
+        EXPECT_EQ(value("/W", "furthest_off"), 0.0) << "from then on at " << frequency << " Hz";
+    }
+}
+
+TEST_F(Change, AFrequencyThatChangesBetweenStepsIsThatOfTheNextOne) {
+    load(definition("Stopwatch", "W"));
+    for (const double frequency : {1000.0, 10.0, 1000.0}) {
+        configure([&](RunnerSettings& settings) { settings.frequency_hz = frequency; });
+        step(2);
+        EXPECT_EQ(value("/W", "furthest_off"), 0.0);
+        EXPECT_EQ(value("/W", "last"), 1e9 / frequency);
+    }
+}
+
 TEST_F(Change, BadSettingsAreRefusedAndTheOldOnesStay) {
     startWithA();
     EXPECT_NE(refusal([&] { configure([](RunnerSettings& s) { s.frequency_hz = std::nan(""); }); }),

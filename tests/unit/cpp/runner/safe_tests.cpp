@@ -206,6 +206,30 @@ TEST_F(Safe, ReplacedBySilenceLeavesASafeCommand) {
     EXPECT_EQ(value("/D", "last_status"), static_cast<double>(DataStatus::Old));
 }
 
+TEST_F(Safe, OfALeavingComponentSeesTheTimeOfItsOwnCycle) {
+    for (const char* name : {"A", "B", "C", "D"}) {
+        ComponentDefinition watch = definition("Stopwatch", name);
+        watch.remaps = {{"furthest_off", std::string(name) + "_off"},
+                        {"last", std::string(name) + "_last"}};
+        load(watch);
+    }
+    step(3);
+    unload("/A");
+    step(1);
+    stop();
+    start();
+    ASSERT_TRUE(runs());
+    unload("/B");
+    ComponentDefinition successor = definition("Stopwatch", "C");
+    successor.remaps = {{"furthest_off", "C_off"}, {"last", "C_last"}};
+    replace("/C", successor);
+    ASSERT_TRUE(runs());
+    EXPECT_EQ(journal().count("/A safe later"), 1U) << "between two steps";
+    EXPECT_EQ(journal().count("/B safe later"), 2U) << "at the end of the steps, and in the loop";
+    EXPECT_EQ(journal().count("/C safe later"), 2U);
+    EXPECT_EQ(value("/D", "furthest_off"), 0.0) << "those that stay see no other time for it";
+}
+
 TEST_F(Safe, IsNotCalledAgainOnceTheLoopHasEnded) {
     load(controller("C"));
     start();
