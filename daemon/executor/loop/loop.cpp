@@ -190,7 +190,7 @@ RealtimeSettings Loop::placed(RealtimeSettings settings, RealtimeProblems& probl
         cpu_claim_.reset();
         cpu_claim_ = std::make_unique<CpuClaim>(settings.cpu, cpu_claims_);
         cpu_.store(cpu_claim_->cpu(), std::memory_order_relaxed);
-        keepThreadsOff(cpu(), threadId());
+        other_threads_.keepOff(cpu(), threadId());
     }
     if (!cpu_claim_->alone()) {
         problems.push_back(
@@ -204,7 +204,7 @@ RealtimeSettings Loop::placed(RealtimeSettings settings, RealtimeProblems& probl
 }
 
 void Loop::leaveCpu() {
-    if (cpu_claim_ != nullptr) keepThreadsOff(-1, 0);  // they may use all of them again
+    other_threads_.release();
     cpu_claim_.reset();
     cpu_.store(-1, std::memory_order_relaxed);
 }

@@ -19,6 +19,7 @@
 #include "loop/probe.hpp"
 #include "loop/schedule.hpp"
 #include "realtime/cpu_claim.hpp"
+#include "realtime/other_threads.hpp"
 #include "realtime/realtime.hpp"
 #include "realtime/thread_locals.hpp"
 
@@ -183,6 +184,7 @@ class Loop {
     pthread_t thread_{};
     std::unique_ptr<IdleStateGuard> idle_guard_;
     std::unique_ptr<CpuClaim> cpu_claim_;  // while it runs in real time
+    OtherThreads other_threads_;           // while it runs in real time
     std::atomic<int> cpu_{-1};
     std::shared_ptr<SimulatedClock> simulation_;  // that the thread follows; null = real time
     std::size_t stack_bytes_ = 0;

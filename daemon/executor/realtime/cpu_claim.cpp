@@ -7,10 +7,8 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <sstream>
-#include <system_error>
 
 namespace rtcf::executor {
 
@@ -26,20 +24,6 @@ const std::vector<int>& processCpus() {
         return found;
     }();
     return cpus;
-}
-
-void keepThreadsOff(int cpu, int except) {
-    cpu_set_t others;
-    CPU_ZERO(&others);
-    for (const int each : processCpus()) {
-        if (each != cpu) CPU_SET(each, &others);
-    }
-    if (CPU_COUNT(&others) == 0) return;
-    std::error_code gone;  // a thread that ends meanwhile
-    for (const auto& task : std::filesystem::directory_iterator("/proc/self/task", gone)) {
-        const auto thread = static_cast<pid_t>(std::stol(task.path().filename()));
-        if (thread != except) sched_setaffinity(thread, sizeof others, &others);
-    }
 }
 
 std::vector<int> byPreference(const std::vector<int>& cpus, const std::string& isolated) {

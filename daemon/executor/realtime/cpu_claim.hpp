@@ -21,10 +21,6 @@ const std::vector<int>& processCpus();
 /// @param isolated as in /sys/devices/system/cpu/isolated: "2-3,6"
 std::vector<int> byPreference(const std::vector<int>& cpus, const std::string& isolated);
 
-/// Keeps all threads of this process off a CPU where there is another one, but for one thread.
-/// Threads that are made later by those inherit it. @param except 0 = none
-void keepThreadsOff(int cpu, int except);
-
 class CpuClaim {
    public:
     /// @param wanted -1 = of all CPUs of this process the best of those with the fewest loops

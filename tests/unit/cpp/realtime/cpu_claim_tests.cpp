@@ -10,9 +10,9 @@
 #include <csignal>
 #include <filesystem>
 #include <future>
+#include <memory>
 #include <set>
 #include <string>
-#include <thread>
 
 #include "support/temporary_folder.hpp"
 
@@ -167,28 +167,6 @@ TEST_F(CpuClaimTest, OfManyProcessesThatComeAndGoIsOneAtATime) {
     }
     EXPECT_TRUE(any);
     EXPECT_TRUE(files().empty());
-}
-
-TEST_F(CpuClaimTest, ThreadsKeepOffTheLoopsCpuWhereThereIsAnother) {
-    if (processCpus().size() < 2) GTEST_SKIP() << "one CPU";
-    const auto mayUse = [](int cpu) {
-        cpu_set_t allowed;
-        CPU_ZERO(&allowed);
-        sched_getaffinity(0, sizeof allowed, &allowed);
-        return CPU_ISSET(cpu, &allowed) != 0;
-    };
-    const int first = processCpus().front();
-    const int last = processCpus().back();
-    keepThreadsOff(last, 0);
-    EXPECT_FALSE(mayUse(last));
-    EXPECT_TRUE(mayUse(first));
-    std::thread made_later([&] { EXPECT_FALSE(mayUse(last)); });
-    made_later.join();
-    keepThreadsOff(first, 0);  // a loop that has moved
-    EXPECT_TRUE(mayUse(last));
-    EXPECT_FALSE(mayUse(first));
-    EXPECT_GE(processCpus().size(), 2U) << "it is still known what there was";
-    keepThreadsOff(-1, 0);
 }
 
 }  // namespace
