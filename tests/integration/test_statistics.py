@@ -122,7 +122,12 @@ def test_a_reset_is_one_instant_of_all_figures_of_a_loop_that_is_always_late(
     assert (status.overruns, status.missed) == (figures.overruns, figures.missed)
     # Catching up drops cycles too, but only after a hundred in a row.
     assert figures.missed > 0 or policy == runner_pb2.OVERRUN_POLICY_CATCH_UP
-    causes = figures.late_wake_ups + figures.exchange_overruns + figures.catching_up
+    causes = (
+        figures.late_wake_ups
+        + figures.exchange_overruns
+        + figures.frame_overruns
+        + figures.catching_up
+    )
     assert causes + sum(each.overruns for each in figures.components) == figures.overruns
     counts = [each.duration.count for each in figures.components]
     assert counts == [figures.iterations] * 4

@@ -92,6 +92,7 @@ def _print(found: runner_pb2.RunnerStatistics, output: Output) -> None:
     causes = (
         (found.late_wake_ups, "began late: the machine woke the loop late"),
         (found.exchange_overruns, "were late by changes or values that were taken over"),
+        (found.frame_overruns, "were late by copying values into frames: lower frame_kb"),
         (found.catching_up, "were late by the overrun before (catch_up)"),
     )
     for count, cause in causes:

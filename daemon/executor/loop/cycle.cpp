@@ -96,6 +96,7 @@ void Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     if (exchanges_ && before != kAbandoned) {
         for (QueueBase* queue : schedule.queues) queue->receive();
         for (Tap* tap : schedule.taps) tap->push(clock_.stamp_ns);
+        given_ticks_ = readCycleCounter();
     }
     FrameRing* const frames = frames_;
     if (frames != nullptr) frames->take();
@@ -462,6 +463,11 @@ void Cycle::blame(std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept R
             if (step.ended_ticks < begin_ticks || step.ended_ticks <= limit_ticks)
                 continue;  // not now, or in time
             bump(step.figures->overruns);
+            return;
+        }
+        // All of them in time: what comes after them was not.
+        if (frames_ != nullptr && (!exchanges_ || given_ticks_ <= limit_ticks)) {
+            figures_.frame_overruns.add(1);
             return;
         }
     }

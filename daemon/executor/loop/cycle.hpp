@@ -35,6 +35,7 @@ struct LoopFigures {
     // Causes of overruns that no component is.
     Counter late_wake_ups;      ///< the cycle took less than a period, but began late
     Counter exchange_overruns;  ///< changes, values from outside and to it took too long
+    Counter frame_overruns;     ///< copying values into a frame took too long
     Counter catching_up;        ///< late by the overrun before, with OverrunPolicy::CatchUp
 };
 
@@ -153,6 +154,7 @@ class Cycle {
     std::int64_t total_elapsed_ns_ = 0;        // loop time in whole periods
     std::int64_t exchanged_ticks_ = 0;         // what the last exchange took,
     std::uint64_t exchanged_at_ = UINT64_MAX;  // and its iteration
+    std::int64_t given_ticks_ = 0;             // when values for outside were last in their taps
     LoopFault fault_;
     LoopFigures figures_;
     DeviceFigures uncounted_;  // what components' devices cost in cycles that are not counted

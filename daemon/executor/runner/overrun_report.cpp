@@ -56,10 +56,13 @@ std::string OverrunReport::mostFrequentCause(const LoopFigures& figures, const G
     told_of_ = std::move(present);
     const std::uint64_t late = figures.late_wake_ups.value();
     const std::uint64_t exchanges = figures.exchange_overruns.value();
+    const std::uint64_t frames = figures.frame_overruns.value();
     consider(late - std::exchange(told_late_, late),
              ", most of them as the machine woke the loop late");
     consider(exchanges - std::exchange(told_exchanges_, exchanges),
              ", most of them while changes or values were taken over");
+    consider(frames - std::exchange(told_frames_, frames),
+             ", most of them while values were copied into frames: lower frame_kb of the runner");
     return text;
 }
 

@@ -27,6 +27,7 @@ class OverrunReport {
     std::uint64_t told_missed_ = 0;
     std::uint64_t told_late_ = 0;
     std::uint64_t told_exchanges_ = 0;
+    std::uint64_t told_frames_ = 0;
     std::map<std::shared_ptr<const ComponentFigures>, std::uint64_t> told_of_;
 };
 

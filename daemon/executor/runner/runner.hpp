@@ -286,7 +286,7 @@ class Runner final : private RunnerView {
     /// Has the loop fill the frames that the watches want, of the present plan.
     void renewFrames();
     std::shared_ptr<const FrameTable> framesOf(const Plan& plan);
-    void publishFrames(std::shared_ptr<const FrameTable> frames);
+    void publishFrames(std::shared_ptr<const FrameTable> frames) noexcept;
     std::uint64_t stepWatched(std::uint64_t cycles, const std::atomic<bool>* given_up);
     void awaitReaders();
     void startAll(const Progress& progress);

@@ -84,11 +84,18 @@ void Runner::renewFrames() {
 }
 
 // Once the loop fills them.
-void Runner::publishFrames(std::shared_ptr<const FrameTable> frames) {
-    frames_ = std::move(frames);
-    if (watches_.empty()) return;
-    const std::lock_guard<std::mutex> lock(published_mutex_);
-    new_frames_.push_back(frames_);
+void Runner::publishFrames(std::shared_ptr<const FrameTable> frames) noexcept {
+    const std::shared_ptr<const FrameTable> previous = std::exchange(frames_, std::move(frames));
+    guarded("making frames known", [&] {
+        if (!watches_.empty()) {
+            const std::lock_guard<std::mutex> lock(published_mutex_);
+            new_frames_.push_back(frames_);
+        }
+        if (frames_ == nullptr || frames_->shortness.empty()) return;
+        const bool told = previous != nullptr && !previous->shortness.empty() &&
+                          previous->ring->capacity() <= frames_->ring->capacity();
+        if (!told) log_.write(LogLevel::Warn, {}, frames_->shortness);
+    });
 }
 
 std::vector<std::shared_ptr<const FrameTable>> Runner::takeFrameTables() {

@@ -23,7 +23,7 @@ void addBuckets(google::protobuf::RepeatedPtrField<pb::Bucket>& buckets,
     for (std::size_t i = 0; i < snapshot.buckets.size(); ++i) {
         if (snapshot.buckets[i] == 0) continue;
         pb::Bucket& bucket = *buckets.Add();
-        const std::int64_t last = Histogram::lowerBound(i) + Histogram::width(i) - 1;
+        const std::int64_t last = Histogram::lowerBound(number) + Histogram::width(number) - 1;
         bucket.set_upper_ns(static_cast<double>(last) * scale);
         bucket.set_count(snapshot.buckets[i]);
     }
@@ -66,6 +66,7 @@ pb::RunnerStatistics Figures::statistics(bool buckets) const {
     message.set_missed(now.missed - baseline->missed);
     message.set_late_wake_ups(now.late_wake_ups - baseline->late_wake_ups);
     message.set_exchange_overruns(now.exchange_overruns - baseline->exchange_overruns);
+    message.set_frame_overruns(now.frame_overruns - baseline->frame_overruns);
     message.set_catching_up(now.catching_up - baseline->catching_up);
     for (const auto& component : graph->components) {
         pb::ComponentStatistics& statistics = *message.add_components();
@@ -124,6 +125,7 @@ Figures::Counted Figures::counted(const GraphSnapshot& graph) const {
     figures.missed = loop.missed.load(relaxed);
     figures.late_wake_ups = loop.late_wake_ups.value();
     figures.exchange_overruns = loop.exchange_overruns.value();
+    figures.frame_overruns = loop.frame_overruns.value();
     figures.catching_up = loop.catching_up.value();
     figures.log_dropped = log_.dropped();
     for (const auto& tap : graph.taps) figures.tap_dropped[tap] = tap->dropped();

@@ -49,6 +49,7 @@ class Figures {
         std::uint64_t missed = 0;
         std::uint64_t late_wake_ups = 0;
         std::uint64_t exchange_overruns = 0;
+        std::uint64_t frame_overruns = 0;
         std::uint64_t catching_up = 0;
         std::uint64_t log_dropped = 0;
         // Not held, as their rings are large.

@@ -90,6 +90,17 @@ std::vector<Candidate> chosenOf(const Plan& plan, const FrameDemand& demand, Fra
     return found;
 }
 
+std::string shortnessOf(std::size_t kept, const std::vector<FrameRing::Source>& sources,
+                        double frequency_hz) {
+    std::size_t bytes = 0;
+    for (const FrameRing::Source& source : sources) bytes += source.size;
+    return fmt::format(
+        "frames hold the last {} cycles ({:.2g} s), not a second: each has {:.1f} KiB of values, "
+        "and all together take {} MiB at most: lower frame_kb of the runner, or watch less",
+        kept, static_cast<double>(kept) / frequency_hz, static_cast<double>(bytes) / 1024.0,
+        FrameRing::kLargestRing >> 20U);
+}
+
 }  // namespace
 
 std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const FrameDemand& demand) {
@@ -103,18 +114,22 @@ std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const FrameDe
     }
     const auto frames =
         table->kept ? static_cast<std::size_t>(std::ceil(kSeconds * demand.frequency_hz)) : 1;
+    const std::size_t capacity = FrameRing::capacityFor(sources, frames);
     const FrameTable* const previous = demand.previous;
+    if (capacity < frames) table->shortness = shortnessOf(capacity, sources, demand.frequency_hz);
     if (previous != nullptr && previous->kept == table->kept &&
-        previous->ring->sources() == sources &&
-        previous->ring->capacity() == FrameRing::capacityFor(sources, frames)) {
+        previous->ring->sources() == sources && previous->ring->capacity() == capacity &&
+        previous->shortness == table->shortness) {
         table->ring = previous->ring;
         return table;
     }
     table->ring = std::make_shared<FrameRing>(std::move(sources), frames,
                                               table->kept ? demand.memory : nullptr);
     if (const auto& block = table->ring->block(); block != nullptr) {
+        std::vector<std::string> remarks = table->notes;
+        if (!table->shortness.empty()) remarks.push_back(table->shortness);
         demand.memory->announce(block, table->ring->capacity(), table->ring->wordsOfFrame(),
-                                frameLayout(*table->ring, table->columns, table->notes));
+                                frameLayout(*table->ring, table->columns, remarks));
     }
     return table;
 }

@@ -23,6 +23,7 @@ using Watches = std::map<std::uint64_t, PortSelection>;
 struct FrameTable {
     std::vector<FrameColumn> columns;  ///< in schedule order, as the ring's sources
     std::vector<std::string> notes;    ///< what is left out, a line each
+    std::string shortness;             ///< if less than a second is kept: how much; else empty
     std::shared_ptr<FrameRing> ring;
     Watches watches;    ///< whom it is for
     bool kept = false;  ///< for them or an incident; else the last frame alone counts, for the loop

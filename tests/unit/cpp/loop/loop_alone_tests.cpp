@@ -5,9 +5,11 @@
 #include <functional>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "common/time_units.hpp"
 #include "faults/flight_recorder.hpp"
+#include "frames/frame_ring.hpp"
 #include "logging/log.hpp"
 #include "loop/loop.hpp"
 #include "rtcf/component.hpp"
@@ -46,6 +48,7 @@ class LoopAlone : public ::testing::Test {
         schedule_.findStretches();
         Adoption adoption;
         adoption.schedule = &schedule_;
+        adoption.frames = frames_;
         ASSERT_TRUE(loop_.adopt(adoption, kSecond));
         loop_.start(settings_, loop_.stops());
     }
@@ -54,6 +57,12 @@ class LoopAlone : public ::testing::Test {
     void stop() {
         loop_.requestStop();
         EXPECT_TRUE(eventually([this] { return loop_.join(0); }));
+    }
+
+    static void spin(std::int64_t ns) {
+        const std::int64_t until = monotonicNow() + ns;
+        while (monotonicNow() < until) {
+        }
     }
 
     std::uint64_t iteration() const { return loop_.figures().iteration.load(); }
@@ -68,6 +77,7 @@ class LoopAlone : public ::testing::Test {
     ComponentContext context_;
     ComponentFigures component_;
     Schedule schedule_;
+    FrameRing* frames_ = nullptr;
     std::unique_ptr<Worker> worker_;
 };
 
@@ -90,6 +100,23 @@ TEST_P(LoopSuspended, ASuspendNeitherHoldsNorStallsTheLoop) {
 }
 
 INSTANTIATE_TEST_SUITE_P(LoopAlone, LoopSuspended, ::testing::Values(1, -1));
+
+// Copies that take longer than the cycle may.
+TEST_F(LoopAlone, FramesAreACauseOfOverrunsOfTheirOwn) {
+    std::vector<std::uint8_t> large(4 * 1024 * 1024);
+    FrameRing ring({{large.data(), large.size()}}, 16);
+    frames_ = &ring;
+    settings_.period_ns = 50'000;
+    start([](std::uint64_t) {});
+    ASSERT_TRUE(reaches(60));
+    stop();
+    const LoopFigures& figures = loop_.figures();
+    EXPECT_GE(figures.frame_overruns.value(), 20U);
+    // A cycle that is held up elsewhere has a cause of its own.
+    EXPECT_EQ(figures.frame_overruns.value() + figures.exchange_overruns.value() +
+                  figures.late_wake_ups.value() + component_.overruns.load(),
+              figures.overruns.load());
+}
 
 }  // namespace
 }  // namespace rtcf::test

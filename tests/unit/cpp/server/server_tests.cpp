@@ -490,8 +490,8 @@ TEST_F(ServerTest, ResetIsOneInstantOfALoopThatIsAlwaysLate) {
         EXPECT_EQ(status.overruns(), figures.overruns());
         EXPECT_EQ(status.missed(), figures.missed());
         EXPECT_EQ(figures.latency().count(), figures.iterations());
-        std::uint64_t causes =
-            figures.late_wake_ups() + figures.exchange_overruns() + figures.catching_up();
+        std::uint64_t causes = figures.late_wake_ups() + figures.exchange_overruns() +
+                               figures.frame_overruns() + figures.catching_up();
         for (const auto& component : figures.components()) {
             EXPECT_EQ(component.duration().count(), figures.iterations()) << component.component();
             causes += component.overruns();
