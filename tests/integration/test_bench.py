@@ -110,6 +110,16 @@ def test_a_component_that_fails_is_a_refusal_with_its_words() -> None:
                 bench.run(steps=100)
 
 
+def test_a_component_that_crashes_is_named() -> None:
+    with (
+        Bench("rtcf_faults/NullDereference", path=PATH) as bench,
+        pytest.raises(
+            rtcf.RtcfError, match=r"SIGSEGV .* while /NullDereference\.update was running"
+        ),
+    ):
+        bench.run(steps=100)
+
+
 @pytest.mark.parametrize(
     ("inputs", "steps", "said"),
     [

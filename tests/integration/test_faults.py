@@ -114,6 +114,19 @@ def saved(daemon: Daemon) -> str:
     return (daemon.folder / "state" / "rt_runner.json").read_text()
 
 
+@pytest.mark.parametrize("type_name", ["NullDereference", "CallsAbort"])
+def test_what_crashes_a_step_is_named_and_taken_out(
+    daemon: Daemon, client: rtcf.Client, type_name: str
+) -> None:
+    load(client, faulty(type_name))
+    with pytest.raises(rtcf.RefusedError, match=CRASHES[type_name]):
+        client.step(100)
+    wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
+    assert re.search(rf"{CRASHES[type_name]} was running in cycle \d+", state(client).status)
+    assert client.get_order() == ["/a", "/z"]
+    client.step(100)
+
+
 def _stop_in_vain(daemon: Daemon, client: rtcf.Client, faulty: str) -> str:
     """Stop a loop whose safe() ends its executor: the answer names it; return the log."""
     client.load(rtcf.component("rtcf_faults", faulty, name="bad"))

@@ -12,6 +12,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
+#include <utility>
 
 namespace rtcf::executor {
 
@@ -111,5 +112,9 @@ CrashContext::~CrashContext() {
     sigaltstack(&stack, nullptr);
     this_thread = ThreadRole::Other;
 }
+
+CrashRole::CrashRole(ThreadRole role) noexcept : before_(std::exchange(this_thread, role)) {}
+
+CrashRole::~CrashRole() { this_thread = before_; }
 
 }  // namespace rtcf::executor

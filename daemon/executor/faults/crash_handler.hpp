@@ -33,4 +33,17 @@ class CrashContext {
     std::unique_ptr<unsigned char[]> stack_;
 };
 
+/// The calling thread does another's work as long as this lives: a crash is then that one's.
+/// Real-time safe.
+class CrashRole {
+   public:
+    explicit CrashRole(ThreadRole role) noexcept;
+    ~CrashRole();
+    CrashRole(const CrashRole&) = delete;
+    CrashRole& operator=(const CrashRole&) = delete;
+
+   private:
+    ThreadRole before_;
+};
+
 }  // namespace rtcf::executor

@@ -137,7 +137,8 @@ bool Loop::perform(BoundaryWork& work, std::int64_t timeout_ns) {
         if (!running()) {
             if (!join(timeout_ns)) break;
             // It may have come too late for the last cycle.
-            while (boundary.pending()) boundary.perform(cycle_);
+            const CrashRole crash_role(ThreadRole::Realtime);
+            while (boundary.pending()) cycle_.atBoundary(nextStep());
             return true;
         }
         if (monotonicNow() > until) break;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/time_units.hpp"
+#include "faults/crash_handler.hpp"
 #include "logging/log.hpp"
 #include "loop/loop.hpp"
 #include "loop/simulated_clock.hpp"
@@ -38,7 +39,8 @@ std::uint64_t Loop::step(std::uint64_t cycles, const std::atomic<bool>* given_up
         stepped_loads_ = loads;
     }
     const FloatingPointDefaults floating_point;
-    // Components log as in any cycle; there is no other thread that runs one.
+    // Components log and crash as in any cycle; there is no other thread that runs one.
+    const CrashRole crash_role(ThreadRole::Realtime);
     Log::setRealtimeThread(true);
     for (; done < cycles && goesOn() && wanted(); ++done) {
         const Counting::Turn turn(cycle_.figures().counting);
@@ -52,6 +54,7 @@ std::uint64_t Loop::step(std::uint64_t cycles, const std::atomic<bool>* given_up
 
 void Loop::endStepping() noexcept {
     const FloatingPointDefaults floating_point;
+    const CrashRole crash_role(ThreadRole::Realtime);
     cycle_.makeSafe(nextStep());
 }
 

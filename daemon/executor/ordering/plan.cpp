@@ -257,7 +257,7 @@ class Builder {
 
 }  // namespace
 
-void Plan::noteKept(const Adoption& adoption, const Plan& previous) {
+void Plan::noteKept(const Adoption& adoption, const Plan& previous) noexcept {
     for (const Rewire& rewire : adoption.rewires) {
         const auto found = bindings.find(rewire.input);
         if (found == bindings.end()) continue;

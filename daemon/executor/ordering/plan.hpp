@@ -36,7 +36,7 @@ struct Plan {
     std::map<std::string, std::shared_ptr<Injector>> injectors;  ///< by topic
 
     /// Notes which earlier values inputs still refer to, once the loop has adopted the plan.
-    void noteKept(const Adoption& adoption, const Plan& previous);
+    void noteKept(const Adoption& adoption, const Plan& previous) noexcept;
 
     BridgeTable bridgeTable() const;
 };

@@ -20,12 +20,11 @@ void setDistribution(pb::Distribution& message, const DistributionSummary& summa
 
 void addBuckets(google::protobuf::RepeatedPtrField<pb::Bucket>& buckets,
                 const HistogramSnapshot& snapshot, double scale) {
-    for (std::size_t i = 0; i < snapshot.buckets.size(); ++i) {
-        if (snapshot.buckets[i] == 0) continue;
+    for (const auto& [number, count] : snapshot.buckets) {
         pb::Bucket& bucket = *buckets.Add();
         const std::int64_t last = Histogram::lowerBound(number) + Histogram::width(number) - 1;
         bucket.set_upper_ns(static_cast<double>(last) * scale);
-        bucket.set_count(snapshot.buckets[i]);
+        bucket.set_count(count);
     }
 }
 

@@ -28,16 +28,18 @@ std::int64_t Histogram::width(std::size_t bucket) noexcept {
 
 HistogramSnapshot Histogram::snapshot() const {
     HistogramSnapshot result;
-    result.buckets.reserve(kBuckets);
+    result.buckets.reserve(static_cast<std::size_t>(
+        std::count_if(buckets_.begin(), buckets_.end(),
+                      [](const Counter& bucket) { return bucket.value() != 0; })));
     result.sum = static_cast<std::int64_t>(large_sum_.value());
     result.maximum = maximum_.load(std::memory_order_relaxed);
-    for (const Counter& bucket : buckets_) {
-        const std::size_t index = result.buckets.size();
-        const std::uint64_t count = bucket.value();
-        result.buckets.push_back(count);
+    for (std::size_t number = 0; number < kBuckets; ++number) {
+        const std::uint64_t count = buckets_[number].value();
+        if (count == 0) continue;
+        result.buckets.push_back({number, count});
         result.count += count;
-        if (index >= kExact || count == 0) continue;
-        const auto value = static_cast<std::int64_t>(index);
+        if (number >= kExact) continue;
+        const auto value = static_cast<std::int64_t>(number);
         result.sum += value * static_cast<std::int64_t>(count);
         result.maximum = std::max(result.maximum, value);
     }
@@ -45,11 +47,17 @@ HistogramSnapshot Histogram::snapshot() const {
 }
 
 HistogramSnapshot difference(const HistogramSnapshot& now, const HistogramSnapshot& earlier) {
-    HistogramSnapshot result = now;
-    if (earlier.buckets.empty()) return result;
-    result.count -= earlier.count;
-    result.sum -= earlier.sum;
-    for (std::size_t i = 0; i < result.buckets.size(); ++i) result.buckets[i] -= earlier.buckets[i];
+    HistogramSnapshot result;
+    result.count = now.count - earlier.count;
+    result.sum = now.sum - earlier.sum;
+    result.maximum = now.maximum;
+    auto before = earlier.buckets.begin();
+    for (const HistogramSnapshot::Bucket& bucket : now.buckets) {
+        while (before != earlier.buckets.end() && before->number < bucket.number) ++before;
+        const bool both = before != earlier.buckets.end() && before->number == bucket.number;
+        const std::uint64_t since = bucket.count - (both ? before->count : 0);
+        if (since != 0) result.buckets.push_back({bucket.number, since});
+    }
     return result;
 }
 
@@ -61,14 +69,10 @@ DistributionSummary summarize(const HistogramSnapshot& snapshot, double scale) {
         return static_cast<double>(Histogram::lowerBound(bucket)) +
                0.5 * static_cast<double>(Histogram::width(bucket) - 1);
     };
+    if (snapshot.buckets.empty()) return result;
+    const std::size_t bottom = snapshot.buckets.front().number;
+    const std::size_t top = snapshot.buckets.back().number;
     // The exact maximum may be older than what is summarised: it counts only in the top bucket.
-    std::size_t top = 0;
-    std::size_t bottom = snapshot.buckets.size();
-    for (std::size_t i = 0; i < snapshot.buckets.size(); ++i) {
-        if (snapshot.buckets[i] == 0) continue;
-        top = i;
-        bottom = std::min(bottom, i);
-    }
     const double maximum = Histogram::bucketOf(snapshot.maximum) == top
                                ? static_cast<double>(snapshot.maximum)
                                : middle(top);
@@ -76,9 +80,9 @@ DistributionSummary summarize(const HistogramSnapshot& snapshot, double scale) {
         const auto rank =
             static_cast<std::uint64_t>(std::ceil(q * static_cast<double>(snapshot.count)));
         std::uint64_t below = 0;
-        for (std::size_t i = bottom; i <= top; ++i) {
-            below += snapshot.buckets[i];
-            if (below >= rank) return std::min(middle(i), maximum);
+        for (const HistogramSnapshot::Bucket& bucket : snapshot.buckets) {
+            below += bucket.count;
+            if (below >= rank) return std::min(middle(bucket.number), maximum);
         }
         return maximum;
     };

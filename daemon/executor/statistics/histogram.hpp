@@ -18,7 +18,12 @@ namespace rtcf::executor {
 
 /// A histogram's counts at one time. Values are in the writer's unit.
 struct HistogramSnapshot {
-    std::vector<std::uint64_t> buckets;
+    struct Bucket {
+        std::size_t number;
+        std::uint64_t count;
+    };
+    /// Those with values, from the smallest on: the others are most, and snapshots are kept.
+    std::vector<Bucket> buckets;
     std::uint64_t count = 0;
     std::int64_t sum = 0;
     std::int64_t maximum = 0;  ///< exact, since the beginning

@@ -15,6 +15,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -102,9 +103,7 @@ class Bench {
         }
         for (started_ = true; cycles > 0; --cycles) {
             component_->update();
-            for (OutputBase* output : component_->stagedOutputs()) {
-                if (!output->commit()) ++non_finite_;
-            }
+            commit();
             clock_.iteration = clock_.iteration + 1;
             clock_.time_ns = clock_.time_ns + clock_.period_ns;
             clock_.stamp_ns = clock_.stamp_ns + clock_.period_ns;
@@ -113,9 +112,7 @@ class Bench {
     /// As at the end of a loop.
     void safe() {
         component_->safe();
-        for (OutputBase* output : component_->stagedOutputs()) {
-            if (!output->commit()) ++non_finite_;
-        }
+        commit();
     }
 
     /// What an output wrote last. @return null if it has not written yet
@@ -129,7 +126,9 @@ class Bench {
     }
     /// How often an output has been written, non-finite values of Finite outputs not counted.
     std::uint64_t writes(const std::string& name) const {
-        return named(component_->outputs(), name, "output").slot()->sequence;
+        const OutputBase& output = named(component_->outputs(), name, "output");
+        const auto found = staged_writes_.find(&output);
+        return found == staged_writes_.end() ? output.slot()->sequence : found->second.seen;
     }
     /// Values that were not finite on outputs declared Finite.
     std::uint64_t nonFinite() const noexcept { return non_finite_; }
@@ -181,6 +180,11 @@ class Bench {
         LogRecord record_{};
     };
 
+    struct StagedWrites {
+        std::uint64_t seen = 0;      // by readers
+        std::uint64_t examined = 0;  // all
+    };
+
     static const ComponentRecord& find(const std::string& type) {
         std::string known;
         for (const ComponentRecord* each = rtcf::detail::component_records; each != nullptr;
@@ -219,6 +223,19 @@ class Bench {
         if (passed) return;
         throw std::runtime_error(std::string(hook) + " failed: " + component_->failure());
     }
+    /// Lets pass what was written to outputs that are checked.
+    void commit() {
+        for (OutputBase* output : component_->stagedOutputs()) {
+            StagedWrites& writes = staged_writes_[output];
+            const std::uint64_t written = output->written()->sequence;
+            if (output->commit()) {
+                writes.seen += written - writes.examined;
+            } else {
+                ++non_finite_;
+            }
+            writes.examined = written;
+        }
+    }
     void release() {
         for (ParameterBase* parameter : component_->parameters()) parameter->release();
         for (DerivedBase* derived : component_->derived()) derived->release();
@@ -238,6 +255,7 @@ class Bench {
     std::vector<std::string> lines_;
     Lines log_;
     std::vector<std::pair<InputBase*, std::shared_ptr<SlotHeader>>> slots_;
+    std::map<const OutputBase*, StagedWrites> staged_writes_;
     std::uint64_t non_finite_ = 0;
     bool started_ = false;
     std::unique_ptr<Component> component_;

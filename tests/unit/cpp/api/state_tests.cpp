@@ -150,6 +150,21 @@ TEST(Bench, CountsWhatIsNotFinite) {
     EXPECT_EQ(pi.read<double>("effort"), nullptr);
 }
 
+TEST(Bench, CountsWhatReadersSee) {
+    Bench pi("BenchPi");
+    pi.write("setpoint", 1.0);
+    pi.cycle(3);
+    EXPECT_EQ(pi.writes("effort"), 3U);
+    pi.write("setpoint", std::numeric_limits<double>::quiet_NaN());
+    pi.cycle(2);
+    EXPECT_EQ(pi.writes("effort"), 3U);
+    pi.write("setpoint", 1.0);
+    pi.state<double>("integral") = 0.0;
+    pi.cycle();
+    EXPECT_EQ(pi.writes("effort"), 4U) << "without those in between";
+    EXPECT_EQ(pi.nonFinite(), 2U);
+}
+
 TEST(Bench, SaysWhatIsWrong) {
     EXPECT_THROW(Bench("Nothing"), std::invalid_argument);
     EXPECT_THROW(Bench("BenchPi", {{"limit", -1.0}}), std::runtime_error);

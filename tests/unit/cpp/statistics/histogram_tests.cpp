@@ -95,6 +95,18 @@ TEST(Histogram, OfNothingIsAllZero) {
     EXPECT_EQ(summary.max, 0.0);
 }
 
+// Of 4000 components 37 MB otherwise, which the process keeps locked from the first look on.
+TEST(Histogram, ASnapshotTakesNoMemoryForBucketsWithoutValues) {
+    Histogram histogram;
+    for (int i = 0; i < 1000; ++i) histogram.add(100 + 1'000'000 * (i % 3));
+    const HistogramSnapshot snapshot = histogram.snapshot();
+    EXPECT_LE(snapshot.buckets.capacity() * sizeof snapshot.buckets[0], 64U);
+    histogram.add(100);
+    const HistogramSnapshot since = difference(histogram.snapshot(), snapshot);
+    EXPECT_LE(since.buckets.capacity() * sizeof since.buckets[0], 64U);
+    EXPECT_EQ(summarize(since, 1.0).max, 100.0);
+}
+
 TEST(Histogram, ScalesItsFigures) {
     Histogram histogram;
     histogram.add(40);
