@@ -435,15 +435,21 @@ def test_each_orderly_end_makes_all_safe_once(
         client.load(faulty("Sleeps"))
     client.load(rtcf.component("rtcf_test", "Witness", name="second"))
     client.start()
-    if end == "stop":
-        wait_for(lambda: state(client).iteration > 10, "some cycles")
+    # Where anything is missing for real time a loop is not to blame for being late.
+    spared = end == "overruns" and bool(state(client).degraded)
+    if end == "stop" or spared:
+        wait_for(lambda: state(client).iteration > 100, "more cycles than overruns are allowed")
         client.stop()
     else:
         wait_for(lambda: state(client).state == runner_pb2.RUNNER_STATE_FAULTED, "its end")
     wait_for(lambda: daemon.log().count("hook stop") == 2, "the stop hooks")
     # Those that failed, too.
     assert safe_calls(daemon) == (3 if end in ("Throws", "NotFiniteStops") else 2)
-    if end == "overruns":
+    if spared:
+        wait_for(
+            lambda: "; max_overruns ends no loop that runs" in daemon.log(), "the log"
+        )
+    elif end == "overruns":
         assert re.search(
             r"loop stopped in iteration \d+: more than 10 overruns", state(client).status
         )

@@ -90,6 +90,10 @@ class Loop {
     void setSpin(std::int64_t spin_ns) noexcept {
         spin_ns_.store(spin_ns, std::memory_order_relaxed);
     }
+    /// Ends the loop after so many overruns, see LoopSettings, from here on.
+    void setMostOverruns(std::uint32_t most) noexcept {
+        max_overruns_.store(most, std::memory_order_relaxed);
+    }
     /// New settings for a running loop (CPU, priority, spin, overrun policy); the period goes by
     /// adopt().
     RealtimeProblems retune(const LoopSettings& settings);

@@ -87,7 +87,7 @@ void Runner::noteFaultsOf(Instance& instance) {
 void Runner::noteOverruns(bool last) {
     std::string line = overrun_report_.take(loop_, plan_->graph, last);
     if (line.empty()) return;
-    if (lacks_realtime_ && settings_.loop.max_overruns != 0)
+    if (!degraded_.empty() && settings_.loop.max_overruns != 0)
         line += "; max_overruns ends no loop that runs degraded";
     tell({RunnerEvent::Kind::Overruns, std::move(line), {}, loop_.figures().iteration.load()});
 }

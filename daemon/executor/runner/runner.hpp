@@ -295,6 +295,7 @@ class Runner final : private RunnerView {
     ChangeOutcome outcomeOf(const Instance& arrived) const;
     void addRemarks(ChangeOutcome& outcome, const std::set<std::string>& components) const;
     RealtimeProblems lockAndStart();
+    std::uint32_t mostOverruns() const noexcept;
     LoopSettings loopSettings() const;
     bool wantsSimulation(const Progress& progress);
     void simulate(bool simulated);
@@ -326,7 +327,6 @@ class Runner final : private RunnerView {
     std::uint64_t job_stops_ = 0;  // Job::stops of the present one
     std::vector<std::string> degraded_;
     std::string status_;
-    bool lacks_realtime_ = false;  // the loop runs without something essential
     OverrunReport overrun_report_;
     std::uint64_t told_faults_ = 0;  // LoopFigures::faults at the last look
     ToldFaults told_not_finite_;

@@ -36,6 +36,7 @@ void Runner::configure(RunnerSettings settings) {
         for (const RealtimeProblem& problem : loop_.retune(loopSettings())) {
             if (!contains(degraded_, problem.text)) degraded_.push_back(problem.text);
         }
+        loop_.setMostOverruns(mostOverruns());
     }
     stall_monitor_.setTimeout(settings_.stall_timeout_ns);
     log_.setLimit(settings_.log_limit);
@@ -54,6 +55,7 @@ ChangeOutcome Runner::start(const Progress& progress) {
         degraded_.clear();
         for (RealtimeProblem& problem : lockAndStart())
             degraded_.push_back(std::move(problem.text));
+        loop_.setMostOverruns(mostOverruns());
     } catch (...) {
         simulate(false);
         stopAll();
@@ -79,30 +81,34 @@ void Runner::requireNoStop() const {
 }
 
 RealtimeProblems Runner::lockAndStart() {
-    lacks_realtime_ = false;
-    if (simulated_) return loop_.start(loopSettings(), job_stops_);
+    LoopSettings settings = settings_.loop;
+    settings.max_overruns = 0;  // until all is known that is missing
+    if (simulated_) return loop_.start(settings, job_stops_);
     RealtimeProblems problems = lockMemory(settings_.loop.realtime);
     for (RealtimeProblem& problem : checkScheduling(settings_.loop.realtime))
         problems.push_back(std::move(problem));
     for (const RealtimeProblem& problem : problems) {
-        if (!problem.essential) continue;
-        lacks_realtime_ = true;
-        if (!settings_.realtime_required) continue;
+        if (!problem.essential || !settings_.realtime_required) continue;
         throw Refusal(RefusalKind::NoRealtime,
                       fmt::format("no real time: {}; or let it run degraded: rtcfctl runner set {} "
                                   "--realtime preferred",
                                   problem.text, name_));
     }
     tuned_spin_ns_ = -1;
-    for (RealtimeProblem& problem : loop_.start(loopSettings(), job_stops_))
+    for (RealtimeProblem& problem : loop_.start(settings, job_stops_))
         problems.push_back(std::move(problem));
     return problems;
 }
 
-// As chosen; but where there is no real time, cycles are late that the graph is not to blame for.
+// As chosen; but where anything is missing for real time, cycles are late that the graph is not to
+// blame for.
+std::uint32_t Runner::mostOverruns() const noexcept {
+    return degraded_.empty() ? settings_.loop.max_overruns : 0;
+}
+
 LoopSettings Runner::loopSettings() const {
     LoopSettings settings = settings_.loop;
-    if (lacks_realtime_) settings.max_overruns = 0;
+    settings.max_overruns = mostOverruns();
     return settings;
 }
 

@@ -101,6 +101,26 @@ TEST_P(LoopSuspended, ASuspendNeitherHoldsNorStallsTheLoop) {
 
 INSTANTIATE_TEST_SUITE_P(LoopAlone, LoopSuspended, ::testing::Values(1, -1));
 
+// Here, as a runner lets it be full only where nothing is missing for real time.
+TEST_F(LoopAlone, FullBucketEndsTheLoop) {
+    settings_.max_overruns = 3;
+    start([](std::uint64_t iteration) {
+        if (iteration >= 20) spin(3'000'000);
+    });
+    ASSERT_TRUE(eventually([this] { return loop_.join(0); }));
+    EXPECT_EQ(loop_.fault().kind, LoopFault::Kind::Overruns);
+    EXPECT_EQ(loop_.figures().overruns.load(), 4U);
+}
+
+TEST_F(LoopAlone, BucketOfNoSizeIsNeverFull) {
+    start([](std::uint64_t iteration) {
+        if (iteration >= 20) spin(3'000'000);
+    });
+    EXPECT_TRUE(reaches(40));
+    EXPECT_TRUE(loop_.running());
+    stop();
+}
+
 // Copies that take longer than the cycle may.
 TEST_F(LoopAlone, FramesAreACauseOfOverrunsOfTheirOwn) {
     std::vector<std::uint8_t> large(4 * 1024 * 1024);
