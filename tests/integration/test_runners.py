@@ -143,3 +143,29 @@ def test_a_bare_stop_names_the_loops_that_run_on(daemon: Daemon, client: rtcf.Cl
     done = daemon.ctl("-r", "second", "stop")
     assert (done.returncode, done.stdout, done.stderr) == (0, "stopped\n", "")
     assert daemon.ctl("stop").stderr == ""
+
+
+def test_loops_claim_their_cpus_where_only_their_user_writes(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    client.add_runner("second")
+    files: set[Path] = set()
+    for runner in ("rt_runner", "second"):
+        client.load(rtcf.component("rtcf_test", "Counter"), runner)
+        client.start(runner)
+        (status,) = client.get_status(runner).runners
+        words = Path(f"/proc/{status.pid}/cmdline").read_text().split("\0")
+        folder = Path(words[words.index("--cpu-claims") + 1])
+        assert folder.stat().st_mode & 0o077 == 0
+        held = {
+            Path(os.readlink(each))
+            for each in Path(f"/proc/{status.pid}/fd").iterdir()
+            if os.path.islink(each) and os.readlink(each).startswith(f"{folder}/cpu-")
+        }
+        (file,) = held
+        assert file.name.split("-")[1] == str(status.loop_cpu)
+        files |= held
+    assert len(files) == 2
+    for runner in ("rt_runner", "second"):
+        client.stop(runner)
+    assert not [file for file in files if file.exists()]
