@@ -25,7 +25,7 @@ struct Command {
         visit("direction", direction);
     }
 };
-struct Pair {
+struct Commands {
     Command first;
     Command second;
     template <typename Visit>
@@ -37,7 +37,7 @@ struct Pair {
 struct Nameless {
     double torque;
 };
-enum class Gear { Low, High };
+enum class Shift { Low, High };
 
 // As a type of a component's own becomes a port's type.
 static_assert(std::is_trivially_copyable_v<Nameless>);
@@ -47,7 +47,7 @@ static_assert(!detail::IsCheckable<std::array<Nameless, 2>>::value);
 static_assert(detail::IsCheckable<Command>::value);
 static_assert(detail::IsCheckable<std::vector<Command>>::value);
 static_assert(detail::IsCheckable<double>::value);
-static_assert(detail::IsCheckable<Gear>::value);
+static_assert(detail::IsCheckable<Shift>::value);
 static_assert(detail::IsCheckable<std::string>::value);
 static_assert(detail::IsCheckable<Eigen::Vector3d>::value);
 static_assert(detail::IsCheckable<Eigen::Quaterniond>::value);
@@ -57,20 +57,20 @@ static_assert(detail::IsCheckable<geometry_msgs::Twist>::value);
 }  // namespace rtcf::test
 
 // Structs with Eigen types are no bytes for C++, and travel as messages.
-struct PairOnRos {
-    static const char* name() { return "Pair"; }
-    static void toMessage(const rtcf::test::Pair& value, geometry_msgs::Twist& message) {
+struct CommandsOnRos {
+    static const char* name() { return "Commands"; }
+    static void toMessage(const rtcf::test::Commands& value, geometry_msgs::Twist& message) {
         message.linear.x = value.first.torque;
         message.angular.x = value.second.torque;
     }
-    static void fromMessage(const geometry_msgs::Twist& message, rtcf::test::Pair& value) {
+    static void fromMessage(const geometry_msgs::Twist& message, rtcf::test::Commands& value) {
         value.first.torque = message.linear.x;
         value.second.torque = message.angular.x;
     }
 };
 template <>
-struct rtcf::PortType<rtcf::test::Pair>
-    : rtcf::MappedPortType<rtcf::test::Pair, geometry_msgs::Twist, PairOnRos> {};
+struct rtcf::PortType<rtcf::test::Commands>
+    : rtcf::MappedPortType<rtcf::test::Commands, geometry_msgs::Twist, CommandsOnRos> {};
 
 namespace rtcf::test {
 namespace {
@@ -92,7 +92,7 @@ TEST(FiniteCheck, LooksAtEachFieldOfAStruct) {
 }
 
 TEST(FiniteCheck, LooksAtStructsInStructsAndLists) {
-    Pair pair;
+    Commands pair;
     EXPECT_TRUE(detail::isFinite(pair));
     pair.second.torque = kNan;
     EXPECT_FALSE(detail::isFinite(pair));
@@ -101,15 +101,15 @@ TEST(FiniteCheck, LooksAtStructsInStructsAndLists) {
 
 TEST(FiniteCheck, KeepsAStructFromReaders) {
     BareComponent component;
-    Output<Pair> out{&component, "out", "", Finite()};
-    Pair pair;
+    Output<Commands> out{&component, "out", "", Finite()};
+    Commands pair;
     pair.first.torque = 1.0;
     out.write(pair);
     EXPECT_TRUE(out.commit());
     pair.second.torque = kInfinity;
     out.write(pair);
     EXPECT_FALSE(out.commit());
-    const auto& seen = static_cast<const Slot<Pair>&>(*out.slot()).value;
+    const auto& seen = static_cast<const Slot<Commands>&>(*out.slot()).value;
     EXPECT_EQ(seen.first.torque, 1.0);
     EXPECT_EQ(seen.second.torque, 0.0);
 }

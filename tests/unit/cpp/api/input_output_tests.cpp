@@ -242,6 +242,20 @@ TEST(StagedOutput, ReadersOfItSeeWholeValuesWhateverACopyDoes) {
     EXPECT_EQ(in.value().first, in.value().second);
 }
 
+TEST(QueueWithoutMemory, DropsWhatItCannotCopy) {
+    BareComponent component;
+    Output<Halves> out{&component, "out"};
+    Queue<Halves, 2> queue{&component, "queue"};
+    queue.rewire(out.slot().get(), false);
+    Halves::copies_throw = true;
+    out.publish();
+    EXPECT_EQ(queue.size(), 0U);
+    EXPECT_EQ(queue.dropped(), 1U);
+    Halves::copies_throw = false;
+    out.publish();
+    EXPECT_EQ(queue.size(), 1U);
+}
+
 TEST(StagedOutput, ComponentGoesOnFromTheValueThatItWrote) {
     BareComponent component;
     Output<std::vector<int>> out{&component, "out"};
