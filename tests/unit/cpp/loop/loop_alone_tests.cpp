@@ -73,7 +73,7 @@ class LoopAlone : public ::testing::Test {
     LoopSettings settings_;
     FlightRecorder recorder_;
     Log log_{[](LogEntry&&) {}};
-    Loop loop_{log_, recorder_};
+    Loop loop_{log_, recorder_, {}};
     ComponentContext context_;
     ComponentFigures component_;
     Schedule schedule_;
