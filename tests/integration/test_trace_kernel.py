@@ -12,8 +12,8 @@ import rtcf
 from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for
 from realtime_thread import RealtimeThread
 
-MOUNTED = ("unshare", "--mount", "sh", "-c",
-           'mount -t tracefs tracefs /sys/kernel/tracing && exec "$0" "$@"')  # fmt: skip
+MOUNT = "mountpoint -q /sys/kernel/tracing || mount -t tracefs tracefs /sys/kernel/tracing"
+MOUNTED = ("unshare", "--mount", "sh", "-c", f'{{ {MOUNT}; }} && exec "$0" "$@"')
 # Takes the CPU for 5 cycles, 20 times; ends by itself.
 HOG = """
 import time
