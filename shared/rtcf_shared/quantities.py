@@ -42,7 +42,7 @@ RUNNER = {
     "log_limit": Quantity(0, 1_000_000, 100),  # of one line, a second; 0 = any number
     "heap_kb": Quantity(0, 1024 * 1024, 8192, "KiB"),
     "stack_kb": Quantity(16, 64 * 1024, 256, "KiB"),
-    "frame_kb": Quantity(0, 1024, 64, "KiB"),  # 0 = only what is watched
+    "frame_kb": Quantity(0, 1024, 64, "KiB"),  # 0 = only watched values
 }
 # Named as in RosSettings.
 ROS = {

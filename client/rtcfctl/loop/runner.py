@@ -183,7 +183,7 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
     add_quantity(to, "--heap-kb", "heap_kb", "heap touched at start")
     add_quantity(to, "--stack-kb", "stack_kb", "stack of the real-time thread")
     add_quantity(
-        to, "--frame-kb", "frame_kb", "values that each cycle keeps; 0: only what is watched"
+        to, "--frame-kb", "frame_kb", "larger values that each cycle keeps; 0: only watched ones"
     )
     to.add_argument(
         "--refuse-out-of-range",
