@@ -174,10 +174,16 @@ def test_a_peer_of_rtcf_2021_loads_looks_and_unloads(
         "msg_type": "std_msgs/Float64", "connected_to_ROS": False,
     } in component["output_ports"]  # fmt: skip
     assert len(component["input_ports"]) == 4
-    assert {
+    assert told["connections"] == []  # nothing reads what it writes
+    assert _call(master, "load_orocos_component", load.replace("Sum", "Next").replace(
+        "from_topic: {data: out1}", "from_topic: {data: in1}"
+    )) == {"success": {"data": True}}  # fmt: skip
+    told = _call(master, "get_introspection_information")["runner_info"]
+    assert isinstance(told, dict)
+    assert told["connections"] == [{
         "name": "/arm/total", "type": "std_msgs/Float64", "publishing_components": ["/arm/Sum"],
-        "subscribing_components": [], "connected_to_ROS": False,
-    } in told["connections"]  # fmt: skip
+        "subscribing_components": ["/arm/Next"], "connected_to_ROS": False,
+    }]  # fmt: skip
     unload = "{component_name: {data: Sum}, ns: {data: /arm}}"
     assert _call(master, "unload_orocos_component", unload) == {"success": {"data": True}}
     # Its answer has no room for the reason.

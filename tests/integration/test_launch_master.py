@@ -100,7 +100,7 @@ def test_a_launch_is_there_again_after_a_restart_of_roscore(
     wait_for(lambda: "/rt_runner/get_loop" in own_master.services(), "the services")
     told = launching.tool("component_list")
     assert (told.stdout, told.stderr) == ("/it\n", "")
-    late = launching.node("rt_launcher", "rtcf_examples", "Identity", "__name:=late")
+    late = launching.node("rt_launcher", "rtcf_examples", "Identity", "__name:=late", "out:=~out")
     late.wait_for_output("loaded into runner rt_runner")
     assert launching.tool("component_list").stdout == "/it\n/late\n"
     assert (late.end(), launcher.end(), runner.end()) == (DONE, DONE, DONE)

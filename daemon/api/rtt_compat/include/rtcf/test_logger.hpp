@@ -43,7 +43,6 @@ class TestLogger final : public LogSink {
     }
 
    private:
-
     LoopClock clock_;
     ComponentContext context_;
     std::mutex mutex_;  // from claim() to commit()
