@@ -5,6 +5,7 @@ import re
 import socket
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 import rtcf
@@ -115,15 +116,20 @@ def test_a_peer_that_never_catches_up_costs_what_it_has_not_taken(
         assert _resident_bytes(pid) - before < 64 * MIB
 
 
+def _unknown() -> Any:
+    """Return a number that is no enumerator of any enumeration; its type is none of theirs."""
+    return 99
+
+
 def test_enumerators_that_are_none_are_refused(daemon: Daemon, client: rtcf.Client) -> None:
     requests = [
-        wire.Request(id=2, configure=runner_pb2.RunnerSettings(realtime=99)),
+        wire.Request(id=2, configure=runner_pb2.RunnerSettings(realtime=_unknown())),
         wire.Request(
-            id=2, configure=runner_pb2.RunnerSettings(ros=runner_pb2.RosSettings(peers=99))
+            id=2, configure=runner_pb2.RunnerSettings(ros=runner_pb2.RosSettings(peers=_unknown()))
         ),
         wire.Request(
             id=2,
-            access=wire.AccessRules(users=[wire.AccessRules.Entry(id=1, right=99)]),
+            access=wire.AccessRules(users=[wire.AccessRules.Entry(id=1, right=_unknown())]),
         ),
     ]
     before = client.get_status().runners[0].settings
@@ -140,7 +146,7 @@ def test_enumerators_that_are_none_are_refused(daemon: Daemon, client: rtcf.Clie
     assert client.get_status().runners[0].settings == before
     checked = subprocess.run(
         [BUILD_TREE / "bin" / "rtcf-executor", "--check-settings"],
-        input=runner_pb2.RunnerSettings(on_crash=99).SerializeToString(),
+        input=runner_pb2.RunnerSettings(on_crash=_unknown()).SerializeToString(),
         capture_output=True,
         check=False,
     )

@@ -94,8 +94,9 @@ def test_a_launch_is_there_again_after_a_restart_of_roscore(
     own_master.end()
     own_master.start()
     runner.wait_for_output("registered again at the ROS master")
-    for node in ("/rt_runner", "/rt_runner/launch", "/it"):
-        wait_for(lambda node=node: node in own_master.run("/usr/bin/rosnode", "list").split(), node)
+    nodes = {"/rt_runner", "/rt_runner/launch", "/it"}
+    wait_for(lambda: nodes <= set(own_master.run("/usr/bin/rosnode", "list").split()), "the nodes")
+    for node in nodes:
         assert "xmlrpc reply from" in own_master.run("/usr/bin/rosnode", "ping", "-c", "1", node)
     wait_for(lambda: "/rt_runner/get_loop" in own_master.services(), "the services")
     told = launching.tool("component_list")

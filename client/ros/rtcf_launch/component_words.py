@@ -37,7 +37,8 @@ class Words:
                 f'name a package and a component, as in args="rtcf_examples Mimo", '
                 f"not {len(names)} word{'s' if len(names) > 1 else ''}",
             )
-        return cls(*names, first=first) if names else cls(first=first)
+        package, type_name = names or ("", "")
+        return cls(package, type_name, first)
 
     def joined(self, values: dict[str, Any]) -> "Words":
         """Return them with what ~rt_package, ~rt_type and ~is_first say, which are taken out of

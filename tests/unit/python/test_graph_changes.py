@@ -80,24 +80,24 @@ def test_holders_of_one_launch_are_told_a_note_once(
 ) -> None:
     daemon.package("demo", "elsewhere", types={"Fine": "fine"})
 
-    def leased(name: str) -> tuple[rtcf.Tenancy, Iterator[Any], list[str]]:
+    def leased(name: str) -> tuple[tuple[rtcf.Tenancy, Iterator[Any]], list[str]]:
         spec = rtcf.component("demo", "Fine", name=name)
         tenancy = client.lease_component(control_pb2.OpenLease(component=spec))
         messages = iter(tenancy)
         loaded = next(each.loaded for each in messages if each.WhichOneof("kind") == "loaded")
-        return tenancy, messages, list(loaded.notes)
+        return (tenancy, messages), list(loaded.notes)
 
     def end(tenancy: rtcf.Tenancy, messages: Iterator[Any]) -> None:
         tenancy.end()
         assert [each.WhichOneof("kind") for each in messages][-1] == "ended"
 
-    *first, told = leased("one")
+    first, told = leased("one")
     assert len(told) == 1 and "is in several places" in told[0]
-    *second, nothing = leased("two")
+    second, nothing = leased("two")
     assert nothing == []
     end(*first)
     end(*second)
-    *third, again = leased("three")  # another launch
+    third, again = leased("three")  # another launch
     assert again == told
     end(*third)
 

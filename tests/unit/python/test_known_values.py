@@ -13,7 +13,7 @@ from rtcf.v1 import control_pb2, runner_pb2
 from rtcfd.common import known_values
 from rtcfd.common.refusals import InvalidArgument
 
-UNKNOWN = 99
+UNKNOWN: Any = 99  # of no enumeration
 REQUESTS = [
     method.input_type for method in control_pb2.DESCRIPTOR.services_by_name["Control"].methods
 ]

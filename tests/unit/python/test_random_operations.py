@@ -80,8 +80,8 @@ class Sequence:
             await watching
         self._check_end()
         await self.rtcfd.runners.close(in_order=True)
-        for runner in RUNNERS:
-            saved = self.rtcfd.saved(runner)
+        for name in RUNNERS:
+            saved = self.rtcfd.saved(name)
             assert saved is None or saved["running"] is False
 
     async def _take(self, action: Any, caller: Any) -> None:
