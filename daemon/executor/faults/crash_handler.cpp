@@ -27,8 +27,10 @@ thread_local ThreadRole this_thread = ThreadRole::Other;
 const void* placeOf(const void* context) {
     const mcontext_t& machine = static_cast<const ucontext_t*>(context)->uc_mcontext;
 #if defined(__x86_64__)
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): a register
     return reinterpret_cast<const void*>(machine.gregs[REG_RIP]);
 #elif defined(__aarch64__)
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): a register
     return reinterpret_cast<const void*>(machine.pc);
 #else
     static_cast<void>(machine);
@@ -43,8 +45,8 @@ void noteTrace(FlightRecorder& recorder, const void* context) {
     std::array<void*, FlightRecorder::kMostFrames + kOurs> frames{};
     const void* place = placeOf(context);
     const int count = ::backtrace(frames.data(), static_cast<int>(frames.size()));
-    const auto end = frames.begin() + count;
-    auto begin = std::find(frames.begin(), end, place);
+    auto* const end = frames.begin() + count;
+    auto* begin = std::find(frames.begin(), end, place);
     if (begin == end) {
         // It is not on its stack: a call of what is no function.
         begin = frames.begin() + std::min(count, kOurs);

@@ -115,7 +115,7 @@ bool FlightRecorder::noteCrash(int signal, ThreadRole thread, CrashReason reason
 }
 
 // Behind the page, where nothing is until then: memory that is locked is not spent on it.
-void FlightRecorder::noteTrace(const void* const* frames, std::size_t count) noexcept {
+void FlightRecorder::noteTrace(const void* const* frames, std::size_t count) const noexcept {
     constexpr off_t kFrames = sizeof(Page) + sizeof(std::uint64_t);
     off_t at = kFrames + static_cast<off_t>(kMostFrames * sizeof(std::uint64_t));
     const int maps = ::open("/proc/self/maps", O_RDONLY | O_CLOEXEC);
@@ -130,7 +130,7 @@ void FlightRecorder::noteTrace(const void* const* frames, std::size_t count) noe
     ::close(maps);
     count = std::min(count, kMostFrames);
     for (std::size_t i = 0; i < count; ++i) {
-        const std::uint64_t frame = reinterpret_cast<std::uintptr_t>(frames[i]);
+        const auto frame = reinterpret_cast<std::uintptr_t>(frames[i]);
         const auto place = kFrames + static_cast<off_t>(i * sizeof frame);
         if (::pwrite(fd_, &frame, sizeof frame, place) != sizeof frame) return;
     }

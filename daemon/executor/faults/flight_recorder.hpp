@@ -75,7 +75,7 @@ class FlightRecorder {
     bool noteCrash(int signal, ThreadRole thread, CrashReason reason, const void* address) noexcept;
     /// Keeps where a crash was, and the process's mappings, by which others find its source lines.
     /// Async-signal-safe; once. @param frames addresses of code, innermost first
-    void noteTrace(const void* const* frames, std::size_t count) noexcept;
+    void noteTrace(const void* const* frames, std::size_t count) const noexcept;
     /// @}
 
     /// Slot of the component that the real-time thread runs; 0 = none.

@@ -22,7 +22,7 @@ void TopicPublisher::setDelivery(const Delivery& delivery) {
 
 bool TopicPublisher::isOutdated() const {
     const std::lock_guard lock(mutex_);
-    return publisher_ && !(opened_ == delivery_);
+    return publisher_ != nullptr && !(opened_ == delivery_);
 }
 
 bool TopicPublisher::isOpen() const {

@@ -181,7 +181,8 @@ class Property21 : public RTT::TaskContext, public RtcfExtension {
     }
     bool configureHook() override {
         rtLogStream(ros::console::levels::Info)
-            << "configured with " << gain_ << ' ' << count_ << ' ' << label_ << std::endl;
+            << "configured with " << gain_ << ' ' << count_ << ' ' << label_
+            << std::endl;  // NOLINT(performance-avoid-endl): as people wrote it
         rtLogStream(ros::console::levels::Debug) << "not shown";
         active("configureHook");
         return true;

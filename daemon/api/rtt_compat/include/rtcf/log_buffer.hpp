@@ -92,6 +92,7 @@ inline void log(const Component& component, const LogSite& site, std::string_vie
 /// Of the forms without a stream: a text as it is.
 inline void fill(LogBuffer& buffer, std::string_view text) noexcept { buffer.append(text); }
 /// A format with its arguments, as of std::printf.
+// NOLINTNEXTLINE(modernize-avoid-variadic-functions): as the macros of RTCF 2021
 [[gnu::format(printf, 2, 3)]] inline void print(LogBuffer& buffer, const char* format,
                                                 ...) noexcept {
     std::va_list arguments;
