@@ -145,7 +145,7 @@ def test_an_executor_that_does_not_answer_is_stuck(
     try:
         status = client.get_status().runners[0]
         assert status.state == runner_pb2.RUNNER_STATE_STUCK
-        assert "did not answer get_status" in status.status
+        assert f"(pid {pid}) is frozen, by a signal or a debugger" in status.status
     finally:
         os.kill(pid, signal.SIGCONT)
 
