@@ -18,6 +18,7 @@ from rtcfd.configuration import options
 from rtcfd.configuration.last_good import Settings
 from rtcfd.journal import standing_alone
 from rtcfd.main import Daemon
+from rtcfd.state import store
 
 GOOD = "[runner]\nfrequency_hz = 250.0\n"
 BAD = '[runner]\nfrequency_hz = "fast"\n'
@@ -78,9 +79,13 @@ def test_a_restart_warns_of_settings_that_the_next_rtcfd_will_not_take(
 
 
 def test_settings_that_cannot_be_read_hold_up_no_restart(
-    stopped_daemon: DaemonUnderTest, caplog: pytest.LogCaptureFixture
+    stopped_daemon: DaemonUnderTest,
+    caplog: pytest.LogCaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     daemon = stopped_daemon
+    # The lock would last as long as this process, which is not rtcfd's own.
+    monkeypatch.setattr(store, "lock", lambda _: None)
     daemon.settings.touch()
     daemon.graphs.mkdir()
     given = options.parse(
