@@ -392,12 +392,12 @@ class Client(Incidents):
             request.page_token = response.next_page_token
 
     def get_statistics(
-        self, runner: str = "", buckets: bool = False
+        self, runner: str = "", buckets: bool = False, timeout_s: float = QUERY_TIMEOUT_S
     ) -> runner_pb2.RunnerStatistics:
         """Return the figures of a runner's loop and of its components; with `buckets`, how often
         the loop took how long, too."""
         request = control_pb2.GetStatisticsRequest(runner=runner, buckets=buckets)
-        return self._ask(self._stub.GetStatistics, request).statistics  # type: ignore[no-any-return]
+        return self._ask(self._stub.GetStatistics, request, timeout_s).statistics  # type: ignore[no-any-return]
 
     def reset_statistics(self, runner: str = "") -> None:
         """Begin the figures anew."""

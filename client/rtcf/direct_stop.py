@@ -6,10 +6,10 @@ whoever has the right `operate`: `echo stop | nc -U /run/rtcfd/stop/rt_runner` d
 
 import contextlib
 import os
+import select
 import socket as sockets
 import struct
 import threading
-import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -116,12 +116,13 @@ def _after_a_death(asked: "Future[control_pb2.ChangeResult]") -> control_pb2.Cha
     why = "which died"
     try:
         return asked.result(_VERDICT_S)
-    except TimeoutError:
+    except (TimeoutError, DaemonUnreachableError):
         pass
     except RefusedError as error:
         # It was told before the death that the loop does not end. What did not become safe is no
         # stop, though.
-        if error.reason != "LOOP_STUCK" or ".safe()" in str(error):
+        early = error.reason == "LOOP_STUCK" or error.code == "RESOURCE_EXHAUSTED"
+        if not early or ".safe()" in str(error):
             raise
         why = f"as {error}"
     return control_pb2.ChangeResult(notes=[f"the loop has ended with its executor, {why}"])
@@ -225,12 +226,18 @@ def _ask(path: Path, runner: str) -> Stopped:
 
 def _wait_for_end(pid: int) -> bool:
     """Wait for the end of a process that has closed its sockets; tell whether it came."""
-    until = time.monotonic() + TIMEOUT_S
-    while _state(pid) not in ("", "Z", "X"):
-        if time.monotonic() > until:
-            return False
-        time.sleep(0.01)
-    return True
+    if not pid:
+        return False
+    try:
+        process = os.pidfd_open(pid)
+    except ProcessLookupError:
+        return True
+    try:
+        waiting = select.poll()
+        waiting.register(process, select.POLLIN)
+        return bool(waiting.poll(TIMEOUT_S * 1000))
+    finally:
+        os.close(process)
 
 
 def _state(pid: int) -> str:

@@ -3,6 +3,7 @@
 Exit statuses: codes.py.
 """
 
+import contextlib
 import os
 import sys
 import time
@@ -142,12 +143,10 @@ class LauncherNode:
         begin = time.monotonic()
         say_at = begin + _SAY_EVERY_S
         while True:
-            meeting = choice.look()
-            if meeting is not None:
-                return meeting
             now = time.monotonic()
-            if meeting := self._yielded(now - begin):
-                return meeting
+            with contextlib.suppress(MasterSilent):  # it may be restarted just now
+                if meeting := choice.look() or self._yielded(now - begin):
+                    return meeting
             if now > say_at:
                 self._screen.info(f"waiting for {now - begin:.0f} s for {choice.waiting}")
                 say_at = now + _SAY_EVERY_S

@@ -37,6 +37,7 @@ _DISPLACED_S = 10.0
 _END_S = 3.0
 _LAST_CALL_S = 0.5
 _LOOK_S = 1.0
+_STATISTICS_S = 1.0  # for the executor to say them
 
 USAGE = """\
 usage: rosrun rtcf rt_runner [__name:=NAME] [_PARAMETER:=VALUE]...
@@ -312,7 +313,8 @@ class RunnerNode:
         assert self._client is not None
         with contextlib.suppress(rtcf.RtcfError):
             for line in loop_statistics.lines(
-                self._client.get_statistics(self._runner), self._warmup_cycles
+                self._client.get_statistics(self._runner, timeout_s=_STATISTICS_S),
+                self._warmup_cycles,
             ):
                 self._screen.info(line)
 
@@ -368,8 +370,6 @@ class RunnerNode:
 
     def _end(self) -> None:
         self._over.set()
-        if self._client is not None and self._was_running:
-            self._say_statistics()
         if self._announced:
             try:
                 master = self._last_calls()
@@ -378,6 +378,8 @@ class RunnerNode:
                     rendezvous.withdraw(master, self._node)
             except MasterSilent:
                 pass
+        if self._client is not None and self._was_running:
+            self._say_statistics()
         if self._tenancy is not None and (self._daemon is None or not self._daemon.ended):
             self._give_back(self._tenancy)
         if self._daemon is not None:

@@ -8,6 +8,7 @@ from rtcf.kernel.tracefs import KernelTrace
 from rtcf.recording.trace import Trace
 
 _SHORT_S = 0.02
+_FINISH_S = 1.0
 
 
 class LateCycles:
@@ -35,8 +36,9 @@ class LateCycles:
             self._trace.add_culprit(cycle, end_ns, str(culprit))
 
     def finish(self) -> None:
-        """Wait for the rest, a moment."""
-        while self._waiting:
+        """Wait for the rest, a moment: events of a time to come (the clock was set) never come."""
+        until = time.monotonic() + _FINISH_S
+        while self._waiting and time.monotonic() < until:
             self.ask()
             time.sleep(_SHORT_S)
 

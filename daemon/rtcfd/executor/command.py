@@ -101,7 +101,7 @@ def claims_folder_of_user(fallback: Path) -> Path:
     """Return where the loops of all private daemons of our user claim CPUs; `fallback`: of a
     daemon that is alone with it, where somebody else has the name."""
     runtime = os.environ.get("XDG_RUNTIME_DIR")
-    if runtime and os.access(runtime, os.W_OK):
+    if runtime and _is_ours(Path(runtime)):  # su keeps the variable
         return Path(runtime) / "rtcf-cpus"
     folder = Path(tempfile.gettempdir()) / f"rtcf-cpus-{os.geteuid()}"
     try:
@@ -113,6 +113,14 @@ def claims_folder_of_user(fallback: Path) -> Path:
     except OSError:
         return fallback
     return folder
+
+
+def _is_ours(folder: Path) -> bool:
+    try:
+        found = folder.stat()
+    except OSError:
+        return False
+    return found.st_uid == os.geteuid() and os.access(folder, os.W_OK)
 
 
 def _make(folder: Path, mode: int) -> None:

@@ -15,9 +15,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from rtcfd.common.aside import Aside
 from rtcfd.executor.flight_recorder import Trace
 
-_TIMEOUT_S = 10.0
+_READ_TIMEOUT_S = 2.0  # for the headers of one file
+_TIMEOUT_S = 10.0  # for addr2line, on one file
 _LONGEST_ANSWER = 256 * 1024
 _LONGEST_FUNCTION = 200
 _MOST_SHOWN = 12  # frames
@@ -53,11 +55,11 @@ class Found:
     lines: tuple[str, ...] = ()
 
 
-async def find(trace: Trace, libraries: Iterable[str], program: str) -> Found:
-    """Find the lines of a crash.
+async def find(trace: Trace, libraries: Iterable[str], program: str, folders: Aside) -> Found:
+    """Find the lines of a crash; raises Unavailable if a disk does not answer, TimeoutError.
 
     `libraries` are the files that components were loaded from, unless they have changed since;
-    `program` is the executor, whose own frames at the outer end are left out.
+    `program` is the executor, whose own frames at the outer end are left out; `folders` reads them.
     """
     known = set(libraries)
     frames = _placed(trace, known)
@@ -70,8 +72,8 @@ async def find(trace: Trace, libraries: Iterable[str], program: str) -> Found:
     tool = shutil.which("addr2line")
     lines: dict[_Frame, str] = {}
     for file, those in by_file.items():
-        if tool and os.access(file, os.R_OK):
-            lines.update(zip(those, await _lines(tool, file, those), strict=False))
+        if tool and file:
+            lines.update(zip(those, await _lines(tool, file, those, folders), strict=False))
     found = tuple(lines.get(each) or _where(each) for each in frames)
     inside = (line for line, frame in zip(found, frames, strict=True) if frame.file in known)
     return Found(next(inside, found[0] if found else ""), found)
@@ -110,10 +112,12 @@ def _where(frame: _Frame) -> str:
     return f"{frame.name}+{frame.offset:#x}" if frame.offset else frame.name
 
 
-async def _lines(tool: str, file: str, frames: list[_Frame]) -> list[str]:
+async def _lines(tool: str, file: str, frames: list[_Frame], folders: Aside) -> list[str]:
     """Return what addr2line says of some places in one file; nothing of what it does not know."""
     try:
-        addresses = [_linked(Path(file), each.offset) for each in frames]
+        addresses = await folders.run(
+            lambda: [_linked(Path(file), each.offset) for each in frames], _READ_TIMEOUT_S
+        )
     except (OSError, ValueError, struct.error):
         return []
     # The line that was reached and those it was inlined into.

@@ -198,7 +198,7 @@ def _all(folder: Path) -> list[incidents_pb2.Incident]:
     """Return what there is in the order in which it was kept, whatever the clock said."""
     found = []
     for each in folder.glob("*" + _SUFFIX):
-        with contextlib.suppress(FileNotFoundError):  # removed since
+        with contextlib.suppress(OSError):  # removed since, or not ours to read
             if _NAME.match(each.stem):
                 found.append(_incident(each))
     # Those of an older rtcfd have no number, and are older.

@@ -164,11 +164,17 @@ async def recover(runner: RunnerCore, verdict: Verdict, crashes: Crashes, troubl
         if crashes.recent >= MOST_ATTEMPTS:
             _give_up(runner, f"{trouble}, the last of {crashes.recent} in {WINDOW_S:g} s")
             return
+        agreed = {*runner.left_out, verdict.culprit}
         await bring_up(runner)
         if not runner.up:
             return  # that one died too: its own recovery follows
         not_resumed = ""
-        if runner.loop.wanted:
+        missing = [name for name in missing_components(runner) if name not in agreed]
+        if runner.loop.wanted and missing:
+            not_resumed = f"; not resumed: left out of its loop: {listing(missing)}"
+            runner.loop.want(False)
+            await runner.save()
+        elif runner.loop.wanted:
             try:
                 await start_in_turn(runner, asked)
             except Refusal as refusal:
@@ -182,6 +188,16 @@ async def recover(runner: RunnerCore, verdict: Verdict, crashes: Crashes, troubl
     except Refusal as refusal:
         if not runner.up and not runner.closing:
             _give_up(runner, f"{trouble}; not recovered: {refusal}")
+
+
+def missing_components(runner: RunnerCore) -> list[str]:
+    """Return the components that are left out and not optional."""
+    components = runner.desired.components
+    return [
+        name
+        for name in sorted(runner.left_out)
+        if name in components and not components[name].optional
+    ]
 
 
 def _give_up(runner: RunnerCore, trouble: str) -> None:

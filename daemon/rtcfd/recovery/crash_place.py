@@ -3,12 +3,17 @@
 A function on a RunnerCore; runs beside the recovery, which it does not hold up.
 """
 
+import asyncio
+
 from rtcf.v1 import control_pb2
 
+from rtcfd.common.refusals import Unavailable
 from rtcfd.executor import source_lines
 from rtcfd.executor.flight_recorder import Trace
 from rtcfd.operations.runner_core import RunnerCore
 from rtcfd.recovery.verdict import Verdict
+
+_TIMEOUT_S = 15.0  # for all files
 
 
 async def name_source(runner: RunnerCore, trace: Trace, verdict: Verdict) -> None:
@@ -17,7 +22,12 @@ async def name_source(runner: RunnerCore, trace: Trace, verdict: Verdict) -> Non
     loaded = {path for path, *_ in runner.code.files().values()}
     changed = set((await runner.code.changed()).values())
     program = str(runner.shared.command.binary.resolve())
-    found = await source_lines.find(trace, loaded - changed, program)
+    try:
+        async with asyncio.timeout(_TIMEOUT_S):
+            folders = runner.shared.folders
+            found = await source_lines.find(trace, loaded - changed, program, folders)
+    except (TimeoutError, Unavailable):
+        return
     if not found.lines:
         return
     place = f"it crashed in {found.place}"

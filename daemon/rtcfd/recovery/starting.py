@@ -17,7 +17,7 @@ from rtcfd.common.refusals import FailedPrecondition, NotFound, Refusal
 from rtcfd.executor.link import Progress
 from rtcfd.operations.loop import asked_now, require_no_stop, start_in_turn
 from rtcfd.operations.runner_core import RunnerCore
-from rtcfd.recovery.bring_up import bring_up
+from rtcfd.recovery.bring_up import bring_up, missing_components
 
 
 async def start(
@@ -106,12 +106,7 @@ def _require_whole(runner: RunnerCore, request: control_pb2.StartRequest) -> Non
             errors_pb2.REASON_COMPONENT_NOT_LEFT_OUT,
             component=unknown[0],
         )
-    components = runner.desired.components
-    missing = [
-        name
-        for name in sorted(runner.left_out)
-        if name not in without and name in components and not components[name].optional
-    ]
+    missing = [name for name in missing_components(runner) if name not in without]
     if not missing or request.partial:
         return
     first = missing[0]

@@ -70,10 +70,12 @@ class Runner(RunnerCore):
         self.closing = True
         self.loop.stops += 1
         self.operations.withdraw(message, errors_pb2.REASON_RUNNER_ENDING)
+        saving: list[asyncio.Task[list[str]]] = []
         if in_order and self.loop.wanted:
             self.loop.stop()
-            self.saver.begin()
+            saving.append(asyncio.create_task(self.save()))
         await self.end_executor("it is being ended")
+        await asyncio.gather(*saving)
         self.end_leases(why, f"runner {self.name}: {message}")
         self.logs.end()
         await self.operations.drain()
@@ -97,6 +99,7 @@ class Runner(RunnerCore):
         """Begin anew with a fresh executor, whatever the one of now is stuck in; what is desired
         is loaded, held."""
         self.loop.stop()
+        self.saver.begin()
         self.operations.withdraw(
             "its executor is being restarted", errors_pb2.REASON_LOOP_STOPPED, only_cycles=True
         )
@@ -157,7 +160,8 @@ class Runner(RunnerCore):
         )
         self.happened(control_pb2.Event.KIND_EXECUTOR_FAULT, died, verdict.culprit)
         if (trace := executor.trace()) is not None:
-            self.operations.in_background(
+            # Not an operation of ours: no removal waits for it.
+            self.shared.keeping.in_background(
                 "finding the source lines of a crash", name_source(self, trace, verdict)
             )
         self.shared.on_change()

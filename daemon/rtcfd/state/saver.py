@@ -76,6 +76,8 @@ class Saver:
         changes, anew = self._desired.history.to_write()
         try:
             await self._disk.do(store.save, runner, text, running)
+            if self._next is None:  # else a stop may wait there
+                await self._disk.do(store.forget_stop, runner)
             await self._disk.do(store.save_history, runner, changes, anew)
         except OSError as error:
             self._desired.history.not_written()

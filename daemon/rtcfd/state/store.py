@@ -202,7 +202,6 @@ class Store:
             # Whatever else has its name is none.
             durable.replace(mark, b"", sync=False)
         durable.sync_folder(self._folder)
-        self._forget_stop(runner)
 
     def save_history(self, runner: str, changes: Sequence[Change], anew: bool) -> None:
         """Write what History.to_write() gave; raises OSError.  May run on any thread.
@@ -234,7 +233,7 @@ class Store:
         if self._folder is None:
             return
         _unmark(self._folder / f"{runner}{_MARK}")
-        self._forget_stop(runner)
+        self.forget_stop(runner)
         for suffix in (_SUFFIX, _HISTORY):
             file = self._folder / f"{runner}{suffix}"
             self._require_known(file)
@@ -256,7 +255,8 @@ class Store:
         note = self._note(runner)
         return note is not None and os.path.lexists(note)
 
-    def _forget_stop(self, runner: str) -> None:
+    def forget_stop(self, runner: str) -> None:
+        """Remove the note of a stop, once the state folder has what came after it."""
         note = self._note(runner)
         if note is not None:
             with contextlib.suppress(OSError):

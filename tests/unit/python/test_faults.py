@@ -153,6 +153,21 @@ def test_a_loop_is_held_without_a_culprit_that_is_not_optional(
     assert state(running).state == runner_pb2.RUNNER_STATE_FAULTED
 
 
+def test_a_loop_is_held_without_what_is_not_optional_and_does_not_come_back(
+    daemon: DaemonUnderTest, running: rtcf.Client
+) -> None:
+    daemon.package("gone", types={"Gone": "fine"})
+    running.load(rtcf.component("gone", "Gone"))
+    running.set_runner(runner_pb2.RunnerSettings(on_crash=runner_pb2.ON_CRASH_RESUME))
+    (daemon.packages / "gone" / "main.so").unlink()
+    die(running, "/extra", "SIGSEGV")
+    recovered(daemon)
+    status = state(running)
+    assert status.state != runner_pb2.RUNNER_STATE_RUNNING
+    assert "not resumed: left out of its loop: /Gone" in status.status
+    assert daemon.saved()["running"] is False
+
+
 def test_many_crashes_hold_the_loop_and_then_end_the_attempts(
     daemon: DaemonUnderTest, running: rtcf.Client
 ) -> None:

@@ -29,6 +29,8 @@ class HangingStore(Store):
         super().__init__(self.state, self.boot)
         self.prepare()
         self.saves: list[bool] = []
+        self.begun = 0  # saves
+        self.takes_one = False  # the disk answers once more, then it hangs again
         self._answers = threading.Event()
         self._answers.set()
 
@@ -41,9 +43,18 @@ class HangingStore(Store):
             self._answers.set()
 
     def save(self, runner: str, text: bytes, running: bool) -> None:
+        self.begun += 1
         assert self._answers.wait(DEADLINE_S)
         super().save(runner, text, running)
         self.saves.append(running)
+        if self.takes_one:
+            self.takes_one = False
+            self._answers.clear()
+
+    def take_one(self) -> None:
+        """Let one save of those that hang pass."""
+        self.takes_one = True
+        self._answers.set()
 
     def remove(self, runner: str) -> None:
         assert self._answers.wait(DEADLINE_S)
@@ -120,6 +131,27 @@ def test_a_stop_that_a_hanging_disk_does_not_take_is_known_to_the_next_rtcfd(
 
     asyncio.run(run())
     assert loaded(store).running, "the start came last"
+
+
+def test_a_save_that_is_older_than_a_stop_does_not_undo_its_note(store: HangingStore) -> None:
+    async def run() -> None:
+        desired = Desired("arm")
+        saver = saver_of(desired, store)
+        with store.hanging():
+            desired.running = True
+            assert await saver.save() == NOT_YET
+            desired.running = False
+            assert await saver.save() == NOT_YET
+            store.take_one()
+            async with asyncio.timeout(DEADLINE_S):
+                while store.begun < 2:
+                    await asyncio.sleep(0.01)
+            assert store.saves == [True]
+            assert not loaded(store).running
+        await saver.finish(DEADLINE_S)
+
+    asyncio.run(run())
+    assert not loaded(store).running
 
 
 def test_a_runner_that_is_added_again_is_not_removed_by_what_its_disk_did_not_do_in_time(

@@ -5,6 +5,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from rtcfd.common.aside import Aside
 from rtcfd.executor import source_lines
 from rtcfd.executor.flight_recorder import Trace
 
@@ -49,7 +50,10 @@ def trace_of(library: Path, mapped: str, functions: tuple[str, ...]) -> Trace:
 
 
 def find(trace: Trace, *libraries: Path) -> source_lines.Found:
-    return asyncio.run(source_lines.find(trace, map(str, libraries), PROGRAM))
+    async def run() -> source_lines.Found:
+        return await source_lines.find(trace, map(str, libraries), PROGRAM, Aside("folders"))
+
+    return asyncio.run(run())
 
 
 @pytest.mark.parametrize("mapped", ["{library}", "/memfd:my_code.so (deleted)"])
