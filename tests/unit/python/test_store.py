@@ -51,7 +51,6 @@ def test_a_stop_on_a_read_only_disk_outlives_rtcfd(
     desired = Desired("arm")
     desired.running = True
     store.save("arm", store.text(desired), running=True)
-    store.forget_stop("arm")  # as whoever saves does when no stop has come since
 
     def read_only(*_: object, **__: object) -> None:
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
@@ -67,6 +66,7 @@ def test_a_stop_on_a_read_only_disk_outlives_rtcfd(
     assert state.ended_boot == this_boot()
     desired.running = True
     store.save("arm", store.text(desired), running=True)
+    store.forget_stop("arm")  # as whoever saves does when no stop has come since
     (state,) = Store(folder, this_boots).load()
     assert state.running
 
