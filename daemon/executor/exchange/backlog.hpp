@@ -35,7 +35,12 @@ class Backlog {
         // feed one day.
         if (!type_.deserialize(*arrived_, bytes, size)) return;
         arrived_->time_ns = age_ns;
-        type_.copy(*slots_[head % slots_.size()], *arrived_);
+        try {
+            type_.copy(*slots_[head % slots_.size()], *arrived_);
+        } catch (...) {  // no memory
+            lost_.fetch_add(1, std::memory_order_relaxed);
+            return;
+        }
         head_.store(head + 1, std::memory_order_release);
     }
 

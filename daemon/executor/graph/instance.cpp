@@ -226,7 +226,14 @@ void Instance::freezePorts() {
 
 void Instance::start() {
     if (started_) return;
-    callHook(Hook::Start, [this] { return component_->start(); });
+    callHook(Hook::Start, [this] {
+        if (!component_->start()) return false;
+        // Its first values are there for those that run before it. Checked ones wait for the cycle,
+        // which reports what is not finite.
+        for (OutputBase* output : component_->stagedOutputs())
+            if (!output->checked()) output->commit();
+        return true;
+    });
     for (MailboxBase* mailbox : component_->mailboxes()) mailbox->open();
     started_ = true;
 }

@@ -266,6 +266,7 @@ void Cycle::putBack(OutputBase& output) noexcept {
     SlotHeader& slot = *output.slot();
     if (frames_ != nullptr) frames_->putBack(valueOf(output.type(), slot));
     if (slot.time_ns != clock_.time_ns) return;  // it was not written in this cycle
+    const bool had_value = slot.sequence > 1;
     slot.sequence = 0;
     slot.time_ns = clock_.time_ns - clock_.elapsed_ns;
     const auto known = [&slot](std::uint64_t sequence) {
@@ -281,6 +282,8 @@ void Cycle::putBack(OutputBase& output) noexcept {
         if (tap->source() == &slot) known(tap->lastSequence());
     for (const Latch& latch : schedule_->latches)
         if (latch.from == &slot) slot = *latch.to;
+    // Read by nobody so far, it may be read by safe().
+    if (slot.sequence == 0 && had_value) slot.sequence = 1;
 }
 
 bool Cycle::copy(const Latch& latch) noexcept {

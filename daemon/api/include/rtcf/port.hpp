@@ -203,13 +203,16 @@ class OutputBase {
     /// @name Of an output that is staged, as one declared Finite is; for the executor
     /// @{
     bool staged() const noexcept RTCF_NONBLOCKING { return rest_->staged != nullptr; }
+    /// True if it is declared Finite.
+    bool checked() const noexcept RTCF_NONBLOCKING { return rest_->checked; }
     /// From here on readers see nothing before commit(). Before there are any; not real-time safe.
     void stage() {
         if (rest_->staged != nullptr) return;
-        rest_->staged = type().make_slot(sample());
-        type().copy(*rest_->staged, *rest_->slot);
+        // The component keeps its object, to which it may have a reference; readers get the other.
+        std::shared_ptr<SlotHeader> seen = type().make_slot(sample());
+        type().copy(*seen, *rest_->slot);
+        rest_->staged = std::exchange(rest_->slot, std::move(seen));
         rest_->examined = rest_->staged->sequence;
-        raw_ = rest_->staged.get();
     }
     /// Lets readers see what was written; if it is declared Finite, only a finite value. After
     /// update(); real-time safe as TypeInfo::copy is. @return false if it is not
