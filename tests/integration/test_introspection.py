@@ -252,6 +252,7 @@ def test_what_is_missing_for_real_time_is_a_warning_once(
     client: rtcf.Client, master: Master
 ) -> None:
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=10.0, lock_memory=False))
+    _wait_for_services(master)  # by then the node has its name
     name = f"{_node(client)}: loop"
     peer = _peer(master, "diagnostics", name, "0")
     assert _lines(peer)  # it listens, and the loop is stopped
