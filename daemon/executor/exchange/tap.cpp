@@ -12,14 +12,19 @@ Tap::Tap(std::string topic, const TypeInfo& type, std::shared_ptr<const SlotHead
       source_(std::move(source)),
       passed_over_(UINT32_MAX - 1),  // the first value is taken
       largest_(type.fixed_size ? SIZE_MAX : largest),
+      fixed_length_(type.builds_message || type.fixed_size
+                        ? static_cast<std::uint32_t>(valueBytes(type))
+                        : 0),
       value_(type.builds_message ? type.make_slot(nullptr) : nullptr) {
     ring_.resize(ringBytes(type, capacity));
     mask_ = ring_.size() - 1;
 }
 
-std::size_t Tap::recordBytes(const TypeInfo& type) {
-    return kHead + padded(type.builds_message ? type.size : type.sample().size());
+std::size_t Tap::valueBytes(const TypeInfo& type) {
+    return type.builds_message ? type.size : type.sample().size();
 }
+
+std::size_t Tap::recordBytes(const TypeInfo& type) { return kHead + padded(valueBytes(type)); }
 
 std::size_t Tap::ringBytes(const TypeInfo& type, std::size_t capacity) {
     const std::size_t one = recordBytes(type);
@@ -46,12 +51,13 @@ void Tap::push(std::int64_t stamp_ns) noexcept RTCF_NONBLOCKING {
     last_sequence_ = source_->sequence;
     if (++passed_over_ < decimation_.load(std::memory_order_relaxed)) return;
     passed_over_ = 0;
-    const bool builds = type_.builds_message;
-    const std::uint32_t length =
-        builds ? static_cast<std::uint32_t>(type_.size) : type_.length(*source_);
-    if (!builds && length > largest_) {
-        countOne(too_large_);
-        return;
+    std::uint32_t length = fixed_length_;
+    if (length == 0) {
+        length = type_.length(*source_);
+        if (length > largest_) {
+            countOne(too_large_);
+            return;
+        }
     }
     const std::size_t record = kHead + padded(length);
     std::size_t head = head_.load(std::memory_order_relaxed);
@@ -71,7 +77,7 @@ void Tap::push(std::int64_t stamp_ns) noexcept RTCF_NONBLOCKING {
     std::memcpy(ring_.data() + offset, &length, sizeof length);
     std::memcpy(ring_.data() + offset + kAlign, &stamp_ns, sizeof stamp_ns);
     std::uint8_t* const to = ring_.data() + offset + kHead;
-    if (builds) {
+    if (type_.builds_message) {
         std::memcpy(to, valueOf(type_, *source_), length);
     } else {
         type_.serialize(*source_, to, length);

@@ -77,6 +77,8 @@ class Tap {
     static constexpr std::size_t padded(std::size_t bytes) {
         return (bytes + kAlign - 1) / kAlign * kAlign;
     }
+    // Bytes of a value in the ring, of a sample if they differ.
+    static std::size_t valueBytes(const TypeInfo& type);
     // Makes the message of a value that lies in the ring. Consumer. @return whether there is one
     bool build(const std::uint8_t* value);
     static void countOne(std::atomic<std::uint64_t>& counter) noexcept RTCF_NONBLOCKING {
@@ -92,6 +94,7 @@ class Tap {
     std::uint32_t passed_over_ = 0;  // values since the last one that was taken
     std::atomic<std::uint32_t> decimation_{1};
     std::size_t largest_;
+    std::uint32_t fixed_length_;  // bytes of each value in the ring; 0 = they differ
     std::vector<std::uint8_t> ring_;
     std::size_t mask_ = 0;              // the ring's size minus 1
     std::atomic<std::size_t> head_{0};  // bytes ever written, by the producer

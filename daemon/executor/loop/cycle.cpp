@@ -119,17 +119,20 @@ void Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
 // cycle. @return ticks when it has ended, or kAbandoned
 [[gnu::noinline]] std::int64_t Cycle::exchange(std::int64_t begin_ticks,
                                                std::int64_t time_ns) noexcept {
-    // What has passed since the last cycle is known already, whatever the period is from now on.
-    const std::int64_t elapsed = clock_.elapsed_ns;
-    atBoundary(time_ns);
-    clock_.elapsed_ns = elapsed;
+    if (boundary_.waiting()) {
+        // What has passed since the last cycle is known, whatever the period is from now on.
+        const std::int64_t elapsed = clock_.elapsed_ns;
+        atBoundary(time_ns);
+        clock_.elapsed_ns = elapsed;
+        if (faulted()) return kAbandoned;
+    }
     setTimes(time_ns);
     feed();
-    const bool copied = copyLatches();
+    if (!schedule_->latches.empty() && !copyLatches()) return kAbandoned;
     const std::int64_t end = readCycleCounter();  // that was the work of no component
     exchanged_ticks_ = end - begin_ticks;
     exchanged_at_ = clock_.iteration;
-    return copied && !faulted() ? end : kAbandoned;
+    return end;
 }
 
 // The one frame that catches: a component may throw, the loop may not. `Plain` leaves out what
