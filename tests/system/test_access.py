@@ -238,17 +238,18 @@ def test_nobody_else_moves_a_loop_to_another_cpu(service: Service) -> None:
         "        print('taken', flush=True)\n"
         "    except PermissionError:\n"
         "        pass\n"
-        "print('ready', flush=True)\n"
+        "print('ready', os.getpid(), flush=True)\n"
         "time.sleep(1000)\n"
     )
     holder = service.machine.start("/usr/bin/python3", "-c", take, user="alice")
+    assert holder.stdout is not None
+    said, pid = holder.stdout.readline().split()
     try:
-        assert holder.stdout is not None
-        assert holder.stdout.readline() == "ready\n"
+        assert said == "ready"
         service.ctl("start")
         after = service.status()
         assert after.get("loop_cpu") == before.get("loop_cpu")
         assert not any("has another loop" in line for line in after.get("degraded", []))
     finally:
-        holder.kill()
+        service.machine.run("kill", pid)
         holder.communicate()
