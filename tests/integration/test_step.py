@@ -149,6 +149,8 @@ def test_a_step_whose_caller_leaves_pauses(
         env=daemon.environment(),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
+        # A shell's background job has it ignored.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     ) as caller:
         wait_for(lambda: iteration(client) > 1000, "cycles")
         caller.send_signal(number)
