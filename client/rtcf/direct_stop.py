@@ -23,7 +23,7 @@ from rtcf.v1 import control_pb2
 
 PATIENCE_S = 0.5  # with rtcfd, until a loop's executor is asked instead
 TIMEOUT_S = 5.0  # above the executor's own for a component that does not return
-_VERDICT_S = 3.0  # for rtcfd to say of what an executor died
+_VERDICT_S = 3.0  # for rtcfd to name the cause of an executor's death
 _CREDENTIALS = struct.Struct("3i")  # struct ucred: pid, uid, gid
 
 
@@ -33,7 +33,7 @@ class Stopped:
 
     runner: str
     error: RtcfError | None = None
-    notes: tuple[str, ...] = ()  # what the caller should know, a line each
+    notes: tuple[str, ...] = ()  # for the caller, a line each
     died: bool = False  # ended with its executor, which died
 
 

@@ -119,7 +119,7 @@ class PrivateDaemon:
         with socket.socket(socket.AF_UNIX) as probe, contextlib.suppress(OSError):
             probe.connect(str(self.socket))
             found = probe.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
-            listener, _, _ = _CREDENTIALS.unpack(found)  # of who called listen(2), see unix(7)
+            listener, _, _ = _CREDENTIALS.unpack(found)  # of the caller of listen(2), see unix(7)
             return self._process is not None and listener == self._process.pid
         return False
 

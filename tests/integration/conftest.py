@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import rtcf
 from daemon_process import NO_ROS, Daemon
+from launch_processes import Launching
 from ros_processes import Master
 
 
@@ -49,3 +50,12 @@ def master(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Master]:
     master.start()
     yield master
     master.end()
+
+
+@pytest.fixture
+def launching(tmp_path: Path, master: Master) -> Iterator[Launching]:
+    """Start launch nodes at the module's master; end them."""
+    launching = Launching(master, tmp_path)
+    launching.forget()
+    yield launching
+    launching.end()

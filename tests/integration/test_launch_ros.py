@@ -1,23 +1,11 @@
 """rt_runner and rt_launcher as ROS nodes, and how a launcher finds its runner."""
 
-from collections.abc import Iterator
-from pathlib import Path
-
-import pytest
 import rosgraph
 from daemon_process import wait_for
 from launch_processes import Launching, Process
 from ros_processes import Master
 
 DONE, _, USAGE, _, LOST = range(5)
-
-
-@pytest.fixture
-def launching(tmp_path: Path, master: Master) -> Iterator[Launching]:
-    launching = Launching(master, tmp_path)
-    launching.forget()
-    yield launching
-    launching.end()
 
 
 def identity(launching: Launching, name: str, *words: str) -> Process:

@@ -1,13 +1,9 @@
 """What the nodes of a launch print, and where."""
 
 import re
-from collections.abc import Iterator
-from pathlib import Path
 
-import pytest
 from daemon_process import wait_for
 from launch_processes import Launching
-from ros_processes import Master
 
 DONE = 0
 LAUNCH = """
@@ -20,14 +16,6 @@ LAUNCH = """
   <node name="loud" pkg="rtcf" type="rt_launcher" args="rtcf_compat PaperExample" output="screen"/>
 </launch>
 """
-
-
-@pytest.fixture
-def launching(tmp_path: Path, master: Master) -> Iterator[Launching]:
-    launching = Launching(master, tmp_path)
-    launching.forget()
-    yield launching
-    launching.end()
 
 
 def test_components_log_on_the_runners_screen_where_their_launcher_has_none(

@@ -5,10 +5,8 @@ after a `$`, and its output.
 """
 
 import shlex
-from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
 from daemon_process import wait_for
 from launch_processes import Launching
 from ros_processes import Master
@@ -36,14 +34,6 @@ LAUNCH = """
   </group>
 </launch>
 """
-
-
-@pytest.fixture
-def launching(tmp_path: Path, master: Master) -> Iterator[Launching]:
-    launching = Launching(master, tmp_path)
-    launching.forget()
-    yield launching
-    launching.end()
 
 
 def test_the_tools_print_what_those_of_rtcf_2021_print(

@@ -1,4 +1,4 @@
-"""What rt_runner prints at the end of a loop: the figures that RTCF 2021 prints there."""
+"""The statistics at the end of a loop, as RTCF 2021 prints them."""
 
 from rtcf.v1 import runner_pb2
 

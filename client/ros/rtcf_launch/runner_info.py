@@ -1,5 +1,5 @@
-"""What the rosrun tools print of a rtcf_msgs/RunnerInfo: the texts of RTCF 2021, for scripts that
-read them.  Each raises NotThere, with the text of that time, where there is nothing to show."""
+"""The output of the rosrun tools for a rtcf_msgs/RunnerInfo: the texts of RTCF 2021, for scripts.
+Each raises NotThere, with the text of that time, where there is nothing to show."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -8,7 +8,7 @@ _LINE = "-" * 80
 
 
 class NotThere(Exception):
-    """What was asked for is not there."""
+    """There is no such component, connection or order."""
 
 
 def component_list(info: Any, _: str) -> list[str]:
@@ -43,7 +43,7 @@ def connection_list(info: Any, _: str) -> list[str]:
 
 
 def connection_info(info: Any, name: str) -> list[str]:
-    """Return who writes and reads a connection."""
+    """Return the writers and readers of a connection."""
     found = _named(info.connections, name, "connection")
     return [
         _LINE,

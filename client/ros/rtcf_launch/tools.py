@@ -28,8 +28,8 @@ _SERVICE = "get_introspection_information"
 class Tool:
     """One of the tools."""
 
-    text: str  # what it says of itself
-    named: str  # what it names
+    text: str  # its message
+    named: str  # the name in it
     lines: Callable[[Any, str], list[str]]  # of a rtcf_msgs/RunnerInfo
     show: Callable[[rtcf.Client, argparse.Namespace, Output], None]
 

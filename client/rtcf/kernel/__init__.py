@@ -1,1 +1,1 @@
-"""The kernel's trace of the CPU of a loop, and what made a cycle late by it."""
+"""The kernel's trace of a loop's CPU, and the causes of late cycles."""

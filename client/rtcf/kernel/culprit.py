@@ -1,8 +1,8 @@
-"""The culprit of a late cycle: what ran instead, by the kernel's trace.
+"""The culprit of a late cycle, by the kernel's trace.
 
-A pure function of events.  It sorts each nanosecond from a cycle's deadline to its end by what had
-the CPU.  A cause is named only if the cycle would have been on time without it; all else is
-unknown.
+A pure function of events.  It assigns each nanosecond from a cycle's deadline to its end to the
+owner of the CPU.  A cause is named only if the cycle would have been on time without it; all else
+is unknown.
 """
 
 from collections.abc import Iterable
@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
-_IDLE = 0  # pid of what a CPU does when there is nothing to do
+_IDLE = 0  # pid of the idle thread
 _FIRST_FAIR_PRIORITY = 100  # of the kernel; smaller ones are real-time
 _FAULT_NS = 5_000  # a page fault takes so long, if its page is in memory
 _FAULT_TO_WAIT_NS = 200_000  # and else it waits after so long at most
@@ -94,7 +94,7 @@ class LateCycle:
 
 
 class Kind(Enum):
-    """What a cause is."""
+    """The kinds of causes."""
 
     THREAD = "thread"
     INTERRUPT = "interrupt"
@@ -107,7 +107,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Culprit:
-    """What made a cycle late, and for how long it had the CPU."""
+    """The cause of a late cycle, and its time on the CPU."""
 
     kind: Kind
     words: str
@@ -144,10 +144,10 @@ _BLOCKED = _Cause(Kind.BLOCKED, "a component slept in a system call")
 
 
 def find_culprit(events: Iterable[Event], thread: int, cycle: LateCycle) -> Culprit:
-    """Return what made a cycle late.
+    """Return the cause of a late cycle.
 
     `thread`: pid of the loop's thread.  The events are in order of time, of the CPU of the loop at
-    least, and begin before the deadline with a switch at which it is seen who runs.
+    least, and begin before the deadline with a switch, which names the running thread.
     """
     taken = _shares(list(events), thread, cycle)
     lost = taken.pop(_LOST, 0)
@@ -212,7 +212,7 @@ def _cpu_of(events: list[Event], thread: int, cycle: LateCycle) -> int | None:
 
 @dataclass
 class _State:
-    """What a CPU does, and what the loop's thread waits for."""
+    """The state of a CPU and of the loop's thread."""
 
     thread: int
     current: int | None = None  # pid; None: not seen yet

@@ -1,4 +1,4 @@
-"""The late cycles of a trace, each with what made it late."""
+"""The late cycles of a trace, each with its cause."""
 
 import time
 from collections import Counter, deque
@@ -12,7 +12,7 @@ _FINISH_S = 1.0
 
 
 class LateCycles:
-    """Owned by who follows the loop; `found` are cycles with their culprits, in order."""
+    """Owned by the follower of the loop; `found` are cycles with their culprits, in order."""
 
     def __init__(self, trace: Trace, kernel: KernelTrace) -> None:
         self.found: list[tuple[int, Culprit]] = []

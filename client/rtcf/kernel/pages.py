@@ -20,7 +20,7 @@ _PADDING, _EXTENDED, _STAMP = 29, 30, 31  # kinds of entries besides data
 _DELTA_BITS = 27
 _MISSED = 1 << 31  # of a page: events before it are lost
 _LENGTH = (1 << 20) - 1
-# States of a thread: what would go on (TASK_REPORT_MAX), and what waits for the kernel.
+# States of a thread: runnable (TASK_REPORT_MAX), and waiting for the kernel.
 _RUNNING, _PREEMPTED, _UNINTERRUPTIBLE = 0, 0x100, 2
 _SOFTIRQS = ("HI", "TIMER", "NET_TX", "NET_RX", "BLOCK", "IRQ_POLL", "TASKLET", "SCHED",
              "HRTIMER", "RCU")  # fmt: skip

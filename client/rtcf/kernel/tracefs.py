@@ -38,7 +38,7 @@ _MARK = "rtcfctl trace\n"
 
 
 class KernelTrace:
-    """What the kernel does on the CPU of a loop, while it is entered; its own thread reads it."""
+    """The kernel's events on the CPU of a loop, while it is entered; its thread reads them."""
 
     def __init__(self, thread: int, cpu: int | None) -> None:
         """`thread`: id of the loop's thread; `cpu`: the one that it is bound to, None: none."""
@@ -79,7 +79,7 @@ class KernelTrace:
         self._remove()
 
     def culprit(self, cycle: LateCycle) -> Culprit:
-        """Return what made a cycle late that is settled()."""
+        """Return the cause of a late cycle that is settled()."""
         with self._lock:
             pages = [each for each in self._pages if each.begin_ns <= cycle.end_ns]
         events: list[Event] = []

@@ -104,7 +104,7 @@ class Files(Closing):
             raise RtcfError(f"{self.paths[-1]}: {error.strerror}: {self._left()}") from None
 
     def _left(self) -> str:
-        """Say what is left of a file that the disk takes no more of; an empty one is removed."""
+        """Describe the file that the disk has no more room for; an empty one is removed."""
         path = self.paths[-1]
         with contextlib.suppress(OSError):
             self._file.close()
@@ -122,7 +122,7 @@ def _has_cycles(path: Path) -> bool:
                 for chunk in range(recording.chunks)
             )
     except OSError:
-        return True  # a disk that does not read tells nothing of what is there
+        return True  # it cannot be read, which says nothing about its content
     except (RtcfError, ValueError):
         return False
 

@@ -96,7 +96,7 @@ class Trace:
             self.cycles += 1
 
     def add_culprit(self, cycle: int, end_ns: int, words: str) -> None:
-        """Add what made a cycle late that ended then, on a track of the kernel."""
+        """Add the cause of a late cycle at its end, on a track of the kernel."""
         if "kernel" not in self._tracks:
             self._tracks["kernel"] = _KERNEL
             self._track(_KERNEL, "kernel: what made cycles late")

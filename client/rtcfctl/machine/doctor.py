@@ -59,7 +59,7 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> int:
 
 @dataclass(frozen=True)
 class _Answer:
-    """What rtcfd says, or why it says nothing."""
+    """The answer of rtcfd, or the reason for none."""
 
     runner: runner_pb2.RunnerStatus | None = None  # the one that is meant
     every: Sequence[runner_pb2.RunnerStatus] = ()
@@ -101,7 +101,7 @@ def _of_rtcfd(found: _Answer) -> list[Finding]:
     """Say what rtcfd itself says."""
     if found.trouble is not None:
         text = str(found.trouble)
-        if found.keeps_silent:  # the line says what is missing
+        if found.keeps_silent:  # the line names the missing rights
             return [Finding("rtcfd", Grade.UNKNOWN, text, "the right to observe")]
         return [Finding("rtcfd", Grade.BAD, text, "it serves", "systemctl start rtcfd")]
     assert found.runner is not None

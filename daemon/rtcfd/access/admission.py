@@ -138,7 +138,7 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
 
     @contextlib.contextmanager
     def _noted(self, method: str, request: Any, context: Any, peer: Peer) -> Iterator[list[str]]:
-        """Log what came of a change, with what of it was refused: that goes into the list."""
+        """Log the result of a change; its refused parts go into the list."""
         but: list[str] = []
         if needed(method) <= Level.OBSERVE:
             yield but
@@ -166,7 +166,7 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
 
 
 def _refused(response: Any) -> list[str]:
-    """Return what of a change the answer says was refused, a line each."""
+    """Return the refused parts of a change by its answer, a line each."""
     result = getattr(response, "result", None)
     return [str(line) for line in getattr(result, "refused", ())]
 

@@ -52,7 +52,7 @@ def check(
 
 
 def _problem(value: graph_pb2.ParameterValue, declared: graph_pb2.ParameterInfo) -> str:
-    """Return what is wrong with a value; empty: nothing."""
+    """Return the error of a value; empty: none."""
     kind, wanted = value.WhichOneof("kind"), declared.default_value.WhichOneof("kind")
     if kind != wanted:
         given = "nothing" if kind is None else _KINDS[kind]

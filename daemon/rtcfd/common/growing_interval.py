@@ -1,4 +1,4 @@
-"""Says when to repeat what is said again and again: seldom, and more seldom.
+"""Spaces repeated messages out in growing intervals.
 
 On rtcfd's one thread.
 """

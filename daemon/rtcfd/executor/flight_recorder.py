@@ -66,7 +66,7 @@ class FlightRecorder:
 
     def __init__(self, pid: int, descriptor: int) -> None:
         """Open a recorder by its number in the executor; raises OSError or ValueError."""
-        # Kept open: what is noted of a crash comes behind what is mapped.
+        # Kept open: the notes of a crash come behind the mapped page.
         self._file = os.open(f"/proc/{pid}/fd/{descriptor}", os.O_RDONLY | os.O_CLOEXEC)
         try:
             self._memory = mmap.mmap(self._file, 0, prot=mmap.PROT_READ)

@@ -113,7 +113,7 @@ def _where(frame: _Frame) -> str:
 
 
 async def _lines(tool: str, file: str, frames: list[_Frame], folders: Aside) -> list[str]:
-    """Return what addr2line says of some places in one file; nothing of what it does not know."""
+    """Return addr2line's answer for some places in one file; empty where it knows none."""
     try:
         addresses = await folders.run(
             lambda: [_linked(Path(file), each.offset) for each in frames], _READ_TIMEOUT_S
@@ -167,7 +167,7 @@ async def _run(command: list[str]) -> str:
 
 
 def _linked(file: Path, offset: int) -> int:
-    """Return the address, as it was linked, of what stands at an offset in an ELF file of 64 bits.
+    """Return the linked address of an offset in an ELF file of 64 bits.
 
     Raises OSError, ValueError, struct.error.
     """

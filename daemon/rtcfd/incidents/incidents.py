@@ -47,7 +47,7 @@ class Incidents:
         self._folder = folder
         self._limits = limits
         self._threads = ThreadPoolExecutor(1, "rtcfd-incidents")
-        # Of their own: who looks at what is kept does not wait for what is being written.
+        # Of their own: lists and reads do not wait for a file that is being written.
         self._readers = ThreadPoolExecutor(2, "rtcfd-incident-list")
         # Of its own: frames are written anew while they wait for the file of another incident.
         self._copier = ThreadPoolExecutor(1, "rtcfd-frames")
@@ -195,7 +195,7 @@ def _tidy(folder: Path, most: int, newest: Path) -> None:
 
 
 def _all(folder: Path) -> list[incidents_pb2.Incident]:
-    """Return what there is in the order in which it was kept, whatever the clock said."""
+    """Return all of them in the order of their sequence, even if the clock has jumped."""
     found = []
     for each in folder.glob("*" + _SUFFIX):
         with contextlib.suppress(OSError):  # removed since, or not ours to read

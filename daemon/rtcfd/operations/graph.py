@@ -199,7 +199,7 @@ async def release(
 
 
 async def _require_faulted(runner: RunnerCore, names: list[str]) -> None:
-    """Refuse to release what is in the loop and sound."""
+    """Refuse to release a sound component of the loop."""
     listed = await runner.ask(wire.Request(list_components=wire.ListComponents()))
     faulted = {
         str(each.full_name)

@@ -116,7 +116,7 @@ async def follow_ros(runner: RunnerCore, changed: Mapping[str, set[str]]) -> Non
 
 
 def note_unanswered(runner: RunnerCore) -> None:
-    """Note what an executor was asked to set when it died: it may have died of it."""
+    """Note the `set` under way when an executor died: it may be the cause."""
     asked, runner.asked_parameters = runner.asked_parameters, []
     for each in asked:
         note(runner, each.component, each.settings, each.before, each.acting, UNANSWERED)

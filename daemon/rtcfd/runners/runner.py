@@ -160,7 +160,7 @@ class Runner(RunnerCore):
         )
         self.happened(control_pb2.Event.KIND_EXECUTOR_FAULT, died, verdict.culprit)
         if (trace := executor.trace()) is not None:
-            # Not an operation of ours: no removal waits for it.
+            # Not an operation of this runner: its removal does not wait for it.
             self.shared.keeping.in_background(
                 "finding the source lines of a crash", name_source(self, trace, verdict)
             )
@@ -282,7 +282,7 @@ class Runner(RunnerCore):
         self.log.warning(
             "loop stopped at its executor by %s (uid %d, pid %d)", who, stop.uid, stop.pid
         )
-        await self.save()  # what goes wrong shows in the status
+        await self.save()  # errors show in the status
 
     def parameters_changed(self, changed: wire.ParametersChanged) -> None:
         """A peer on ROS has changed parameters of a component."""

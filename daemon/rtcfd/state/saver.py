@@ -20,7 +20,7 @@ class Saver:
     """Saves `desired`, the newest state last."""
 
     def __init__(self, desired: Desired, disk: Disk, log: Log) -> None:
-        self.problem = ""  # why what is on disk is not what is desired
+        self.problem = ""  # why the disk has an older state
         self._desired = desired
         self._disk = disk
         self._log = log
@@ -30,7 +30,7 @@ class Saver:
         self._forgotten = False
 
     def begin(self) -> "asyncio.Task[str]":
-        """Save what is desired, without waiting; the task returns what went wrong, if anything."""
+        """Save the desired state, without waiting; the task returns the error, or nothing."""
         if self._next is None:
             self._next = self._last = self._disk.in_turn(self._desired.runner, self._write)
         return self._next
@@ -45,7 +45,7 @@ class Saver:
         return [problem] if (problem := saving.result()) else []
 
     async def forget(self) -> None:
-        """Take it off the disk, for good; what is saved after that is not."""
+        """Remove it from the disk, for good; later saves do nothing."""
         self._forgotten = True
         self._last = self._disk.in_turn(self._desired.runner, self._remove)
         if not await self._in_time(self._last, PATIENCE_S):
@@ -59,7 +59,7 @@ class Saver:
     async def _in_time(self, task: "asyncio.Task[str]", timeout_s: float) -> bool:
         done, _ = await asyncio.wait({task}, timeout=timeout_s)
         if not done and (self._forgotten or not self._desired.running):
-            # Whoever starts loops after the next start of rtcfd is to know of it.
+            # The next rtcfd is to know of it before it starts loops.
             self._noting = asyncio.create_task(self._disk.note_stop(self._desired.runner))
             await asyncio.wait({self._noting}, timeout=PATIENCE_S)
         return bool(done)

@@ -256,7 +256,7 @@ class Store:
         return note is not None and os.path.lexists(note)
 
     def forget_stop(self, runner: str) -> None:
-        """Remove the note of a stop, once the state folder has what came after it."""
+        """Remove the note of a stop, once the state folder has a later state."""
         note = self._note(runner)
         if note is not None:
             with contextlib.suppress(OSError):

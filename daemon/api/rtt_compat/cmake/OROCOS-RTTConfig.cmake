@@ -1,6 +1,6 @@
 # find_package(OROCOS-RTT) of packages that were written for RTCF 2021: OROCOS' variables, with
 # rtcf's headers of the same names behind them. UseOROCOS-RTT.cmake has the macros.
-# Before a package of the workspace is taken for rtcf.
+# Rejects a package of the workspace that hides rtcf.
 include(${CMAKE_CURRENT_LIST_DIR}/../rtcf/rtcf-workspace.cmake)
 find_package(rtcf REQUIRED CONFIG)
 get_filename_component(OROCOS-RTT_USE_FILE_PATH ${CMAKE_CURRENT_LIST_DIR} ABSOLUTE)
