@@ -32,13 +32,25 @@ def trace(daemon: Daemon, *words: str | Path) -> list[str]:
     return [program, "--socket", str(daemon.socket), "trace", *map(str, words)]
 
 
+# The inode number of the first PID namespace (linux/proc_ns.h).
+IN_CONTAINER = os.stat("/proc/self/ns/pid").st_ino != 0xEFFFFFFC
+
+
 @pytest.fixture
-def mounted() -> tuple[str, ...]:
+def tracefs() -> tuple[str, ...]:
     """Give a command before which tracefs is mounted."""
     done = subprocess.run([*MOUNTED, "true"], capture_output=True, text=True)
     if done.returncode != 0:
         pytest.skip(f"tracefs cannot be mounted here: {done.stderr.strip()}")
     return MOUNTED
+
+
+@pytest.fixture
+def mounted(tracefs: tuple[str, ...]) -> tuple[str, ...]:
+    """Give the same where processes have the kernel's numbers."""
+    if IN_CONTAINER:
+        pytest.skip("this is a container")
+    return tracefs
 
 
 def test_a_thread_above_the_loop_is_named(
@@ -106,6 +118,21 @@ def test_nothing_is_left_in_the_kernel(
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "rtcf-" not in done.stdout.partition("t.json: ")[2].partition("\n")[2]
+
+
+def test_a_container_is_refused_in_a_line(
+    running: Daemon, tmp_path: Path, tracefs: tuple[str, ...]
+) -> None:
+    command = trace(running, "-o", tmp_path / "t.json", "--kernel", "--cycles", "100")
+    done = subprocess.run(
+        [*tracefs, "unshare", "--pid", "--fork", "--mount-proc", *command],
+        capture_output=True, text=True, env=clean_environment(),
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert done.stderr.splitlines() == [
+        "rtcfctl: trace --kernel: this is a container, where processes have other numbers than the "
+        "kernel's: run it on the machine itself"
+    ]
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="is about what root lacks")
