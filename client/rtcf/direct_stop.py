@@ -111,16 +111,16 @@ def where_rtcfd_does_not(
 
 
 def _after_a_death(asked: "Future[control_pb2.ChangeResult]") -> control_pb2.ChangeResult:
-    """Return what to say of a loop that has ended with its executor: that says no more, and rtcfd
-    knows of what it died, if it answers at all."""
+    """Return the result of a stop whose executor died: rtcfd knows the cause of death, if it
+    answers at all."""
     why = "which died"
     try:
         return asked.result(_VERDICT_S)
     except (TimeoutError, DaemonUnreachableError):
         pass
     except RefusedError as error:
-        # It was told before the death that the loop does not end. What did not become safe is no
-        # stop, though.
+        # rtcfd gave this answer before the death. A loop that did not become safe has not stopped,
+        # though.
         early = error.reason == "LOOP_STUCK" or error.code == "RESOURCE_EXHAUSTED"
         if not early or ".safe()" in str(error):
             raise

@@ -52,6 +52,13 @@ def begin(client: rtcf.Client) -> None:
     wait_for(lambda: iteration(client) > 10, "cycles")
 
 
+def stop_by_command(daemon: Daemon, *options: str, out: str = "stopped") -> str:
+    """Stop by rtcfctl, which has to report success; return its standard error."""
+    done = daemon.ctl("stop", *options)
+    assert (done.returncode, done.stdout) == (0, f"{out}\n"), done.stderr
+    return done.stderr
+
+
 def mark(daemon: Daemon) -> Path:
     """Return the file by which the loop would be resumed."""
     return daemon.folder / "state" / "rt_runner.running"
@@ -63,9 +70,7 @@ def test_a_frozen_daemon_holds_up_no_stop_and_is_right_when_it_lives_again(
     begin(client)
     assert mark(daemon).exists()
     with stopped(daemon.pid):
-        done = daemon.ctl("stop")
-        assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
-        assert "at its executor, as rtcfd does not answer within 0.5 s" in done.stderr
+        assert "at its executor, as rtcfd does not answer within 0.5 s" in stop_by_command(daemon)
         # Disk says so, whatever becomes of rtcfd now.
         assert not mark(daemon).exists()
     assert not runs(client)
@@ -110,8 +115,7 @@ def test_a_dead_daemon_holds_up_no_stop_and_the_next_one_resumes_nothing(
     begin(client)
     executor = client.get_status("rt_runner").runners[0].pid
     daemon.end(signal.SIGKILL)
-    done = daemon.ctl("stop", "--all")
-    assert (done.returncode, done.stdout) == (0, "rt_runner stopped\n"), done.stderr
+    stop_by_command(daemon, "--all", out="rt_runner stopped")
     # Also without the executor, which knows of the stop.
     os.kill(executor, signal.SIGKILL)
     daemon.start()
@@ -152,8 +156,7 @@ def test_clients_that_fill_all_slots_hold_up_no_stop(tmp_path: Path) -> None:
                 other.close()
                 break
             others.append(other)
-        done = daemon.ctl("stop")
-        assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
+        stop_by_command(daemon)
     finally:
         for other in others:
             other.close()
@@ -233,8 +236,7 @@ def test_a_disk_without_a_free_byte_holds_up_no_stop(small_disk: Path) -> None:
             # Nor where nobody but the executor can stop it.
             begin(client)
             with stopped(daemon.pid):
-                done = daemon.ctl("stop")
-                assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
+                stop_by_command(daemon)
                 assert not mark(daemon).exists()
             wait_for(lambda: not runs(client), "rtcfd to know")
         # What is on disk says that it runs, as there was no room to say otherwise.
@@ -279,9 +281,7 @@ def test_a_disk_that_hangs_holds_up_no_stop_and_is_right_when_it_answers(
             # Nor does it hold up a start, or the stop after that.
             assert NOT_YET in client.start().notes
             assert runs(client)
-            done = daemon.ctl("stop")
-            assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
-            assert NOT_YET in done.stderr
+            assert NOT_YET in stop_by_command(daemon)
             assert not runs(client)
             assert client.get_status("rt_runner").runners[0].status == NOT_YET
         wait_for(lambda: not client.get_status("rt_runner").runners[0].status, "the disk")
@@ -302,14 +302,12 @@ def test_an_executor_stops_again_and_again_whatever_its_disk_does(
             for _ in range(2):
                 with stopped(daemon.pid):
                     for _ in range(2):
-                        done = daemon.ctl("stop")
-                        assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
-                        assert NOT_YET in done.stderr
+                        assert NOT_YET in stop_by_command(daemon)
                 wait_for(lambda: not runs(client), "rtcfd to know")
                 begin(client)
-            done = daemon.ctl("stop", "--all")
-            assert (done.returncode, done.stdout) == (0, "rt_runner stopped\n"), done.stderr
-            assert f"rt_runner: {NOT_YET}" in done.stderr
+            assert f"rt_runner: {NOT_YET}" in stop_by_command(
+                daemon, "--all", out="rt_runner stopped"
+            )
             assert not runs(client)
         wait_for(lambda: not mark(daemon).exists(), "the disk")
 
@@ -339,9 +337,7 @@ def test_a_read_only_disk_is_told_of_by_the_executor_that_stops(
         remount = ["mount", "-o", "remount,ro", str(hanging_disk.folder)]
         subprocess.run(remount, check=True, capture_output=True)
         with stopped(daemon.pid):
-            done = daemon.ctl("stop")
-            assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
-            assert "not saved: Read-only file system" in done.stderr
+            assert "not saved: Read-only file system" in stop_by_command(daemon)
         wait_for(lambda: not runs(client), "rtcfd to know")
 
 

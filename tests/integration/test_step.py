@@ -1,9 +1,11 @@
 """Stepping: cycles without real time, on a simulated clock, with the same values every time."""
 
+import contextlib
 import itertools
 import re
 import signal
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import fig_1
@@ -139,10 +141,9 @@ def test_a_step_that_was_stopped_says_how_far_it_came(daemon: Daemon, client: rt
     assert ended.splitlines()[-1] == "rtcfctl: step ended early: the loop was stopped"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_a_step_whose_caller_leaves_pauses(
-    daemon: Daemon, client: rtcf.Client, number: signal.Signals
-) -> None:
+@contextlib.contextmanager
+def endless_step(daemon: Daemon, client: rtcf.Client) -> Iterator["subprocess.Popen[bytes]"]:
+    """Give the caller of a step that has begun, and wait for its end."""
     client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
     with subprocess.Popen(
         [BUILD_TREE / "bin" / "rtcfctl", "step", str(10**15)],
@@ -153,6 +154,14 @@ def test_a_step_whose_caller_leaves_pauses(
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     ) as caller:
         wait_for(lambda: iteration(client) > 1000, "cycles")
+        yield caller
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_step_whose_caller_leaves_pauses(
+    daemon: Daemon, client: rtcf.Client, number: signal.Signals
+) -> None:
+    with endless_step(daemon, client) as caller:
         caller.send_signal(number)
     # A change has its turn, and no cycle runs any more.
     client.load(rtcf.component("rtcf_test", "Counter", name="other"))
@@ -165,14 +174,7 @@ def test_a_step_whose_caller_leaves_pauses(
 
 
 def test_a_step_of_a_daemon_that_dies_pauses(daemon: Daemon, client: rtcf.Client) -> None:
-    client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
-    with subprocess.Popen(
-        [BUILD_TREE / "bin" / "rtcfctl", "step", str(10**15)],
-        env=daemon.environment(),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    ):
-        wait_for(lambda: iteration(client) > 1000, "cycles")
+    with endless_step(daemon, client):
         daemon.end(signal.SIGKILL)
     daemon.start()
     with rtcf.Client(daemon.socket) as again:

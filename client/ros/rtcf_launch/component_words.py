@@ -41,8 +41,8 @@ class Words:
         return cls(package, type_name, first)
 
     def joined(self, values: dict[str, Any]) -> "Words":
-        """Return them with what ~rt_package, ~rt_type and ~is_first say, which are taken out of
-        `values`.  Raises Ending for what is said twice, or not at all."""
+        """Return them with ~rt_package, ~rt_type (taken out of `values`) and ~is_first.  Raises
+        Ending for a word that is given twice, or not at all."""
         package, type_name = self.package, self.type
         given = Parameters(values)
         named = [name for name in _NAMES if given.has(name)]
@@ -62,5 +62,5 @@ class Words:
             )
         for name in named:
             del values[name]
-        # A class in a namespace is registered by its last name, whatever RTCF 2021 called it.
+        # RTCF 2021 named namespaces, too; classes are registered by their last name.
         return Words(package, type_name.rpartition("::")[2], self.first)

@@ -18,7 +18,7 @@ from rtcf.v1 import control_pb2, graph_pb2
 from rtcf_launch import arguments, component_parameters
 from rtcf_launch.codes import Code, Ending
 from rtcf_launch.component_words import Words
-from rtcf_launch.inbox import Asked, Inbox, Lost, MasterBack
+from rtcf_launch.inbox import Asked, Inbox, Lost
 from rtcf_launch.master import Master, MasterSilent
 from rtcf_launch.rendezvous import Meeting
 from rtcf_launch.ros_node import RosNode, wait_until_gone
@@ -122,7 +122,7 @@ class LauncherNode:
             self._screen.set_level,
         )
         before = self._ros_node.register()
-        self._ros_node.stay_registered(self._inbox.master_back)
+        self._ros_node.stay_registered(lambda: None)
         if before and not wait_until_gone(before, self._inbox.pause, _PREDECESSOR_S):
             raise Ending(
                 Code.DONE if self._inbox.asked else Code.REFUSED,
@@ -240,8 +240,6 @@ class LauncherNode:
                 if deadline is None:
                     self._tenancy.end()
                     deadline = time.monotonic() + _END_S
-                continue
-            if isinstance(event, MasterBack):
                 continue
             if isinstance(event, Lost):
                 if deadline is not None:

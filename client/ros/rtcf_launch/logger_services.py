@@ -1,5 +1,5 @@
 """The services get_loggers and set_logger_level of a node, in TCPROS, so that rqt_logger_level can
-ask it as any other.  The level holds for what the node prints."""
+ask it as any other.  The level holds for the node's own output."""
 
 import contextlib
 import socket

@@ -71,7 +71,6 @@ class RosNode:
         self._ending = threading.Event()
         self._uri = f"http://{host}:{self._server.server_address[1]}/"
         self._service_uri = f"rosrpc://{host}:{self._services.port}"
-        self._registered: list[str] = []
         for call, answer in self._calls().items():
             self._server.register_function(answer, call)
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
@@ -90,12 +89,11 @@ class RosNode:
     def _register(self) -> None:
         for service in self._services.names:
             self._master.register_service(service, self._service_uri, self._uri)
-        self._registered = list(self._services.names)
 
     def _stay_registered(self, back: Callable[[], None]) -> None:
         while not self._ending.wait(_LOOK_S):
             try:
-                if self._master.node_uri(self._name):
+                if self._master.node_uri(self._name) or self._ending.is_set():
                     continue
                 self._register()
             except MasterSilent:
@@ -106,7 +104,7 @@ class RosNode:
         """Take all back, by a master object whose calls are short."""
         self._ending.set()
         try:
-            for service in self._registered:
+            for service in self._services.names:
                 master.unregister_service(service, self._service_uri)
         except MasterSilent:
             pass

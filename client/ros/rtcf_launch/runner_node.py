@@ -299,7 +299,7 @@ class RunnerNode:
             self._start()
 
     def _say_what_is_missing(self) -> None:
-        """Warn once a launch that the loop is not real-time, whoever started it."""
+        """Warn once a launch that the loop is not real-time, also of a loop that ran before."""
         assert self._client is not None
         with contextlib.suppress(rtcf.RtcfError):
             for runner in self._client.get_status(self._runner).runners:

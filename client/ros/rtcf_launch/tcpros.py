@@ -53,7 +53,7 @@ def exactly(connection: socket.socket, size: int) -> bytes:
 
 
 def block(connection: socket.socket, largest: int = _LARGEST_CALL) -> bytes:
-    """Return what follows its size.  Raises ValueError if that is larger than `largest` bytes."""
+    """Return a block, which follows its size.  Raises ValueError beyond `largest` bytes."""
     (size,) = struct.unpack("<I", exactly(connection, 4))
     if size > largest:
         raise ValueError(f"{size} bytes are more than the {largest} of any call")

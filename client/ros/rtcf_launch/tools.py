@@ -1,5 +1,5 @@
 """The rosrun tools component_list, component_info, component_order, connection_list and
-connection_info: what RTCF 2021's print, by a runner's ROS service and so from any machine; with
+connection_info: the output of RTCF 2021's, by a runner's ROS service and so from any machine; with
 --table or -o rtcfctl's views of a runner of this machine, wherever its rtcfd is."""
 
 import argparse

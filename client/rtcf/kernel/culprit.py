@@ -237,7 +237,7 @@ class _State:
                 self.nested.append(event)
             case Leave(key=key) if any(each.key == key for each in self.nested):
                 while self.nested.pop().key != key:
-                    pass  # whose end is missing
+                    pass  # its end is missing
             case Fault(time_ns=time_ns) if self.current == self.thread:
                 self.fault_ns = time_ns
             case Lost():

@@ -28,7 +28,7 @@ class LateCycles:
         self._waiting.append((cycle, end_ns, late))
 
     def ask(self) -> None:
-        """Find the culprits of those whose events are there."""
+        """Find the culprits of the cycles with complete events."""
         while self._waiting and self._kernel.settled(self._waiting[0][2]):
             cycle, end_ns, late = self._waiting.popleft()
             culprit = self._kernel.culprit(late)

@@ -1,4 +1,4 @@
-"""The kernel's tracer, by tracefs: an instance of our own, whose pages a thread takes in time.
+"""The kernel's tracer, by tracefs: an instance of our own; a thread reads its pages in time.
 
 See Documentation/trace/ftrace.rst of the kernel.  Other users of the tracer are not disturbed.
 """
@@ -91,7 +91,7 @@ class KernelTrace:
     def _since_last_turn(self, pages: list[Page], cycle: LateCycle) -> list[Event]:
         """Return the events of a CPU, from the loop's turn before a deadline on."""
         events: list[Event] = []
-        # Of CPUs that it does not run on only who wakes it counts.
+        # Of other CPUs than the loop's only the wake-ups of its thread count.
         back_ns = 0 if self._cpu not in (None, pages[0].cpu) else _LONGEST_BACK_NS
         for page in reversed(pages):
             found = self._events(page)
@@ -164,6 +164,7 @@ class KernelTrace:
                 "kernel's: run it on the machine itself"
             )
         self._pages.clear()
+        self._kept = 0
 
     def _write(self, file: str, text: str) -> None:
         (self._folder / file).write_text(text)
@@ -211,7 +212,7 @@ def _root() -> Path:
 
 @contextlib.contextmanager
 def _told(root: Path) -> Iterator[None]:
-    """Name the file of an OSError, and what to do."""
+    """Name the file of an OSError, and the remedy."""
     try:
         yield
     except PermissionError:
@@ -227,7 +228,7 @@ def _told(root: Path) -> Iterator[None]:
 
 
 def _remove_left(instances: Path) -> None:
-    """Remove instances whose rtcfctl was killed."""
+    """Remove the instances of killed rtcfctl processes."""
     for folder in instances.glob("rtcf-*"):
         number = folder.name.removeprefix("rtcf-")
         if number.isdecimal() and not Path(f"/proc/{number}").exists():

@@ -9,7 +9,6 @@ from rtcf_shared.errors import RtcfError
 
 from rtcf.closing import Closing
 from rtcf.recording.mcap_writer import McapWriter
-from rtcf.recording.reader import read_recording
 from rtcf.recording.recorder import Recorder
 from rtcf.streams.ports import PortBatch
 
@@ -115,6 +114,8 @@ class Files(Closing):
 
 
 def _has_cycles(path: Path) -> bool:
+    from rtcf.recording.reader import read_recording  # for a full disk alone
+
     try:
         with read_recording(path) as recording:
             return any(

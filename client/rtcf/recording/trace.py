@@ -61,7 +61,7 @@ class Trace:
         self._file.close()
 
     def add_cycles(self, batch: PortBatch, on_late: OnLate | None = None) -> None:
-        """Add cycles in order: when each began, what it took, whether it was late.
+        """Add cycles in order: beginning, duration and lateness of each.
 
         `on_late` gets the number of each late one, its deadline, its beginning, its end, and by
         how much it was late, ns."""

@@ -53,8 +53,8 @@ def run(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     output.line(f"made {folder}/:")
     for path in sorted(made):
         output.line(f"- {path}")
-    needs = "rtcf-python and python3-pytest" if args.python else "librtcf-dev and libgtest-dev"
-    output.line(f"build and test it (apt install {needs.replace(' and', '')}):")
+    needs = "rtcf-python python3-pytest" if args.python else "librtcf-dev libgtest-dev"
+    output.line(f"build and test it (apt install {needs}):")
     output.line(f"  cd {folder}")
     output.line("  cmake -S . -B build && cmake --build build")
     output.line("  ctest --test-dir build")

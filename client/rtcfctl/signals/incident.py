@@ -8,7 +8,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
@@ -110,7 +109,7 @@ def export(client: rtcf.Client, args: argparse.Namespace, output: Output) -> Non
         output.data({"incident": incident.name, "file": str(to)})
 
 
-@contextmanager
+@contextlib.contextmanager
 def _received(client: rtcf.Client, name: str) -> Iterator[tuple[incidents_pb2.Incident, IO[bytes]]]:
     """Give an incident and its file, as a temporary one."""
     with contextlib.ExitStack() as stack:
@@ -139,7 +138,7 @@ def _told(incident: incidents_pb2.Incident, recording: "rtcf.Recording") -> dict
     about = recording.metadata.get("incident", {})
     cycles = recording.cycles
     cycle = int(about.get("cycle", 0))
-    # The loop may have gone on: the faulting cycle is what is looked at.
+    # Ends at the faulting cycle, as the loop may have gone on.
     end = _end(cycles, cycle)
     last = slice(max(end - _CYCLES, 0), end)
     component = about.get("component", "")

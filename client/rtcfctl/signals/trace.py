@@ -6,11 +6,9 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import rtcf
-from rtcf.kernel.late_cycles import LateCycles
-from rtcf.kernel.tracefs import KernelTrace
 from rtcf.recording.trace import Trace
 from rtcf.streams.numbered import Place
 from rtcf.streams.ports import PortStream
@@ -21,6 +19,9 @@ from rtcfctl.signals.ending import ended_by_signals
 from rtcfctl.signals.idle_loop import say_if_ended, say_if_idle
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import counted, whole
+
+if TYPE_CHECKING:
+    from rtcf.kernel.late_cycles import LateCycles
 
 _EVERY_S = 0.5  # of what is asked for beside the cycles
 _FAULT_S = 10.0  # from the end of the cycles until rtcfd knows of what
@@ -61,12 +62,11 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
             try:
                 # Refused where there is nothing to see.
                 with (
-                    _kernel(status, args) as kernel,  # before the first cycle
+                    _kernel(trace, status, args) as late,  # before the first cycle
                     client.watch_ports((), runner) as stream,
                     ended_by_signals(stream),
                 ):
                     say_if_idle(client, runner, output)
-                    late = LateCycles(trace, kernel) if kernel is not None else None
                     error = _follow(client, stream, trace, late, args, output)
                     if late is not None:
                         late.finish()
@@ -85,8 +85,8 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 @contextlib.contextmanager
 def _kernel(
-    status: runner_pb2.RunnerStatus, args: argparse.Namespace
-) -> Iterator[KernelTrace | None]:
+    trace: Trace, status: runner_pb2.RunnerStatus, args: argparse.Namespace
+) -> "Iterator[LateCycles | None]":
     """Trace the kernel meanwhile, if that is asked for."""
     if not args.kernel:
         yield None
@@ -98,8 +98,11 @@ def _kernel(
     if not status.realtime_tid:
         raise ValueError(f"--kernel: the loop of {status.runner} does not run: start it first")
     cpu = status.loop_cpu if status.HasField("loop_cpu") else None
+    from rtcf.kernel.late_cycles import LateCycles
+    from rtcf.kernel.tracefs import KernelTrace
+
     with KernelTrace(status.realtime_tid, cpu) as kernel:
-        yield kernel
+        yield LateCycles(trace, kernel)
 
 
 class _Beside:
@@ -131,7 +134,7 @@ def _follow(
     client: rtcf.Client,
     stream: PortStream,
     trace: Trace,
-    late: LateCycles | None,
+    late: "LateCycles | None",
     args: argparse.Namespace,
     output: Output,
 ) -> rtcf.RtcfError | None:
@@ -159,7 +162,7 @@ def _follow_cycles(
     stream: PortStream,
     beside: _Beside,
     trace: Trace,
-    late: LateCycles | None,
+    late: "LateCycles | None",
     args: argparse.Namespace,
     output: Output,
 ) -> None:
@@ -179,7 +182,9 @@ def _follow_cycles(
             due = time.monotonic() + _EVERY_S
 
 
-def _tell(trace: Trace, late: LateCycles | None, args: argparse.Namespace, output: Output) -> None:
+def _tell(
+    trace: Trace, late: "LateCycles | None", args: argparse.Namespace, output: Output
+) -> None:
     if not output.for_people:
         told: dict[str, Any] = {
             "file": str(args.file), "cycles": trace.cycles, "late": trace.late,

@@ -55,14 +55,14 @@ struct BridgeSettings {
     bool enabled = true;
     std::string master_uri;  ///< empty: of the environment
     std::string hostname;    ///< by which peers reach us; empty: of the environment
-    /// Of what is not a port: cycles and services; at the start of the node its name. Empty: the
+    /// Of cycles and services, and at the start of the node its name; not of ports. Empty: the
     /// node's own name.
     std::string name_space;
-    std::uint32_t queue = 1000;    ///< messages kept for a slow subscriber
-    std::string latch;             ///< outputs whose last value late subscribers get; an expression
-    std::uint32_t decimation = 1;  ///< each n-th value of an output is published,
-    std::string decimate = ".*";   ///< if its name matches this expression
-    std::string stamped;           ///< scalar outputs that go with the cycle's time
+    std::uint32_t queue = 1000;                  ///< messages kept for a slow subscriber
+    std::string latch;                           ///< outputs that are latched; an expression
+    std::uint32_t decimation = 1;                ///< each n-th value of an output is published,
+    std::string decimate = ".*";                 ///< if its name matches this expression
+    std::string stamped;                         ///< scalar outputs that go with the cycle's time
     std::uint32_t largest_message = 256 * 1024;  ///< of a type of variable size, bytes
     Right peers = Right::Observe;                ///< what peers may do, who are strangers
     bool refuse_out_of_range = false;  ///< what peers ask for; else it is brought into the range

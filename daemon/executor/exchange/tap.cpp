@@ -55,7 +55,7 @@ void Tap::push(std::int64_t stamp_ns) noexcept RTCF_NONBLOCKING {
     if (length == 0) {
         length = type_.length(*source_);
         if (length > largest_) {
-            countOne(too_large_);
+            too_large_.add(1);
             return;
         }
     }
@@ -66,7 +66,7 @@ void Tap::push(std::int64_t stamp_ns) noexcept RTCF_NONBLOCKING {
     const std::size_t to_end = mask_ + 1 - offset;
     const std::size_t skipped = record > to_end ? to_end : 0;
     if (record + skipped > free) {
-        countOne(dropped_);
+        dropped_.add(1);
         return;
     }
     if (skipped != 0) {
@@ -90,14 +90,14 @@ bool Tap::build(const std::uint8_t* value) {
     try {
         const std::uint32_t length = type_.length(*value_);
         if (length > largest_) {
-            countOne(too_large_);
+            too_large_.add(1);
             return false;
         }
         message_.resize(length);
         type_.serialize(*value_, message_.data(), length);
         return true;
     } catch (...) {
-        countOne(unbuilt_);
+        unbuilt_.add(1);
         return false;
     }
 }

@@ -2,8 +2,8 @@
 /// A tap copies an output's values out of the loop: the real-time thread
 /// serialises each new value into a byte ring, one other thread takes them
 /// out. A value that does not fit is dropped and counted, never waited for.
-/// Of a type whose message has to be built first (TypeInfo::builds_message) the ring has the values
-/// as they lie in memory, and the thread that takes them builds the messages.
+/// If a type has to build its message (TypeInfo::builds_message), the ring has the values as they
+/// lie in memory, and the consumer builds the messages.
 #pragma once
 
 #include <atomic>
@@ -15,6 +15,7 @@
 
 #include "rtcf/port_type.hpp"
 #include "rtcf/realtime.hpp"
+#include "statistics/counter.hpp"
 
 namespace rtcf::executor {
 
@@ -55,17 +56,15 @@ class Tap {
 
     /// Gives the oldest message to `use(const std::uint8_t* bytes, std::uint32_t size, std::int64_t
     /// stamp_ns)` and removes it; without a call if no message can be made of it. The bytes are
-    /// valid during the call. Not by the producer; of two who come at once, one finds nothing.
+    /// valid during the call. Not by the producer; of two concurrent calls one finds nothing.
     /// @return false if the ring is empty
     template <typename Use>
     bool pop(Use&& use);
 
     /// Values lost as they were larger than allowed. Any thread.
-    std::uint64_t tooLarge() const noexcept { return too_large_.load(std::memory_order_relaxed); }
+    std::uint64_t tooLarge() const noexcept { return too_large_.value(); }
     /// Values lost because the ring was full, or as their conversion threw. Any thread.
-    std::uint64_t dropped() const noexcept {
-        return dropped_.load(std::memory_order_relaxed) + unbuilt_.load(std::memory_order_relaxed);
-    }
+    std::uint64_t dropped() const noexcept { return dropped_.value() + unbuilt_.value(); }
 
    private:
     // A record is a length, a stamp and the bytes, each padded to kAlign. kSkip for a length: the
@@ -81,9 +80,6 @@ class Tap {
     static std::size_t valueBytes(const TypeInfo& type);
     // Makes the message of a value that lies in the ring. Consumer. @return whether there is one
     bool build(const std::uint8_t* value);
-    static void countOne(std::atomic<std::uint64_t>& counter) noexcept RTCF_NONBLOCKING {
-        counter.store(counter.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-    }
     std::uint32_t lengthAt(std::size_t offset) const noexcept;
     std::int64_t stampAt(std::size_t offset) const noexcept;
 
@@ -103,9 +99,9 @@ class Tap {
     // The consumer's, of a type that builds messages: a value, and its message.
     std::shared_ptr<SlotHeader> value_;
     std::vector<std::uint8_t> message_;
-    std::atomic<std::uint64_t> dropped_{0};
-    std::atomic<std::uint64_t> unbuilt_{0};
-    std::atomic<std::uint64_t> too_large_{0};  // by whoever makes the messages
+    Counter dropped_;
+    Counter unbuilt_;
+    Counter too_large_;  // by the thread that makes the messages
 };
 
 template <typename Use>

@@ -38,7 +38,7 @@ const void* placeOf(const void* context) {
 #endif
 }
 
-// What called it, too: a look at the stack, which may be spoilt. A fault in here ends the process
+// Notes the callers, too: reads the stack, which may be corrupt. A fault in here ends the process
 // at once, as its signal is blocked; all that is needed is noted by then.
 void noteTrace(FlightRecorder& recorder, const void* context) {
     constexpr int kOurs = 2;  // this and the handler, above the kernel's frame
@@ -48,15 +48,15 @@ void noteTrace(FlightRecorder& recorder, const void* context) {
     auto* const end = frames.begin() + count;
     auto* begin = std::find(frames.begin(), end, place);
     if (begin == end) {
-        // It is not on its stack: a call of what is no function.
+        // It is not on its stack: a call through a bad pointer.
         begin = frames.begin() + std::min(count, kOurs);
         *begin = const_cast<void*>(place);  // NOLINT(cppcoreguidelines-pro-type-const-cast)
     }
     recorder.noteTrace(&*begin, std::max<std::size_t>(static_cast<std::size_t>(end - begin), 1));
 }
 
-// Only what signal-safety(7) and the kernel allow: atomics and system calls; and backtrace(), which
-// takes no lock and no memory once it has been called.
+// Async-signal-safe (signal-safety(7)): atomics and system calls; and backtrace(), which takes no
+// lock and no memory after its first call.
 void handle(int signal, siginfo_t* info, void* context) {
     const int error = errno;
     FlightRecorder* recorder = the_recorder.load();

@@ -134,7 +134,7 @@ void FlightRecorder::noteTrace(const void* const* frames, std::size_t count) con
         const auto place = kFrames + static_cast<off_t>(i * sizeof frame);
         if (::pwrite(fd_, &frame, sizeof frame, place) != sizeof frame) return;
     }
-    // At last: what is counted is there.
+    // Last, so that all counted frames are written.
     const std::uint64_t counted = count;
     [[maybe_unused]] const ssize_t done =
         ::pwrite(fd_, &counted, sizeof counted, static_cast<off_t>(sizeof(Page)));

@@ -65,7 +65,7 @@ class FrameRing {
         base_end_ = end_.load(std::memory_order_relaxed);
     }
     /// Gives a source the value that it had after the last frame or setBase(). @param value where
-    /// a source lies; what is none stays as it is
+    /// a source lies; other addresses are left alone
     void putBack(void* value) const noexcept RTCF_NONBLOCKING;
     void commit(const CycleRecord& cycle, bool last_of_loop) noexcept RTCF_NONBLOCKING {
         const auto put = [frame = writing_](Head place, std::uint64_t value) {

@@ -229,7 +229,7 @@ void Instance::start() {
     callHook(Hook::Start, [this] {
         if (!component_->start()) return false;
         // Its first values are there for those that run before it. Checked ones wait for the cycle,
-        // which reports what is not finite.
+        // which reports values that are not finite.
         for (OutputBase* output : component_->stagedOutputs())
             if (!output->checked()) output->commit();
         return true;

@@ -19,7 +19,7 @@ ImageValue valueFrom(const Capture::Value& value) {
 
 // Values are copied in the cycle.
 void requireCopied(const TypeInfo& type) {
-    if (type.flat || !type.builds_message) return;
+    if (!allocatesMessage(type)) return;
     throw Refusal(
         RefusalKind::FailedPrecondition,
         fmt::format("there is no snapshot of values of {}: they have memory of their own, "

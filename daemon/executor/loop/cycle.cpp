@@ -74,7 +74,7 @@ void Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     std::int64_t before = begin;
     if (exchanges_ || boundary_.waiting()) {
         before = exchange(begin, time_ns);
-        if (before == kAbandoned) return;  // nobody knows what components would read
+        if (before == kAbandoned) return;  // the values of inputs are undefined
     }
     const Schedule& schedule = *schedule_;
     setTimes(time_ns);
@@ -120,7 +120,7 @@ void Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
 [[gnu::noinline]] std::int64_t Cycle::exchange(std::int64_t begin_ticks,
                                                std::int64_t time_ns) noexcept {
     if (boundary_.waiting()) {
-        // What has passed since the last cycle is known, whatever the period is from now on.
+        // Elapsed time is measured in the period before a change of it.
         const std::int64_t elapsed = clock_.elapsed_ns;
         atBoundary(time_ns);
         clock_.elapsed_ns = elapsed;
@@ -192,8 +192,7 @@ bool Cycle::due(const Step& step) const noexcept RTCF_NONBLOCKING {
     return true;
 }
 
-// Lets readers see what a component has written to outputs that are kept from them until then.
-// @throws what a copy throws
+// Publishes a component's staged outputs. @throws any exception of a copy
 void Cycle::commit(Component& component, ComponentFigures& figures, OnBadOutput may) {
     for (OutputBase* output : component.stagedOutputs()) {
         if (output->commit()) continue;
@@ -248,7 +247,7 @@ void Cycle::makeSafe(Component& component, ComponentFigures& figures, OnBadOutpu
     }
 }
 
-// Nobody sees what a component has half written: neither the readers, nor itself in safe().
+// Half-written values are visible neither to readers, nor to the component itself in safe().
 void Cycle::putBack(Component& component) noexcept {
     for (OutputBase* output : component.outputs()) {
         if (!output->staged()) {
@@ -263,8 +262,7 @@ void Cycle::putBack(Component& component) noexcept {
     }
 }
 
-// The value is that of the last frame. How often it had been written by then, and when, is known by
-// those who took note of it.
+// The value is that of the last frame; sequence and time are recovered from the readers' notes.
 void Cycle::putBack(OutputBase& output) noexcept {
     SlotHeader& slot = *output.slot();
     if (frames_ != nullptr) frames_->putBack(valueOf(output.type(), slot));
@@ -352,7 +350,8 @@ void Cycle::apply(Adoption& adoption) noexcept {
     figures_.adoption.add(readCycleCounter() - begin);
 }
 
-// Connections, and the hooks of what comes and goes, at the time of the cycle that begins here.
+// Rewires connections and calls the hooks of new and leaving components, at the time of the cycle
+// that begins here.
 void Cycle::changeComponents(Adoption& adoption) noexcept {
     const std::int64_t time = clock_.time_ns;
     const std::int64_t stamp = clock_.stamp_ns;
@@ -471,7 +470,7 @@ void Cycle::blame(std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept R
             bump(step.figures->overruns);
             return;
         }
-        // All of them in time: what comes after them was not.
+        // All components were in time: the overrun is of the frames or the exchange.
         if (frames_ != nullptr && (!exchanges_ || given_ticks_ <= limit_ticks)) {
             figures_.frame_overruns.add(1);
             return;

@@ -67,8 +67,8 @@ class Cycle {
     /// @{
     const Schedule& schedule() const noexcept { return *schedule_; }
     bool faulted() const noexcept { return fault_.kind != LoopFault::Kind::None; }
-    /// Does what waits for a boundary, between cycles. @param time_ns of the cycle that it begins:
-    /// what hooks see that run at the boundary
+    /// Performs pending boundary work, between cycles. @param time_ns of the cycle that it begins,
+    /// and of hooks that run at the boundary
     void atBoundary(std::int64_t time_ns) noexcept {
         if (!boundary_.waiting()) return;
         boundary_time_ns_ = time_ns;

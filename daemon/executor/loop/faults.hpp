@@ -26,7 +26,7 @@ struct LoopFault {
         nullptr;  ///< the culprit, if it is one component; for comparison only
     std::array<char, 240> component_name{};  ///< its full name, as it may be gone when this is read
     std::uint64_t iteration = 0;
-    std::array<char, 240> text{};  ///< what the exception said, or which output it is
+    std::array<char, 240> text{};  ///< text of the exception, or name of the output
 };
 
 /// What failed in a component while the loop goes on.
@@ -40,10 +40,9 @@ class FirstFault {
    public:
     /// Keeps it if it is the first. Whoever runs cycles; real-time safe.
     void note(std::uint64_t iteration, const char* text) noexcept RTCF_NONBLOCKING {
-        // Acquired: whoever made room has read what was there.
+        // Acquire: pairs with rearm(), after which the previous fault has been read.
         if (state_.load(std::memory_order_acquire) != State::Empty) return;
         fault_.iteration = iteration;
-        fault_.text = {};
         std::strncpy(fault_.text.data(), text, fault_.text.size() - 1);
         state_.store(State::Noted, std::memory_order_release);
     }

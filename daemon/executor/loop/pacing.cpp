@@ -87,12 +87,10 @@ void Loop::followRealTime() noexcept {
         const Counting::Turn turn(cycle_.figures().counting);
         noteMissed(wake_up.missed);
         const std::int64_t begin = readCycleCounter();
-        cycle_.run(device != nullptr ? wake_up.wake_ns : wake_up.deadline_ns,
-                   wake_up.wake_ns - wake_up.deadline_ns);
-        // With a device the next cycle begins when that says so; what it then has missed is seen
-        // there.
-        const std::int64_t limit =
-            (device != nullptr ? wake_up.wake_ns : wake_up.deadline_ns) + cycle_.clock().period_ns;
+        const std::int64_t time = device != nullptr ? wake_up.wake_ns : wake_up.deadline_ns;
+        cycle_.run(time, wake_up.wake_ns - wake_up.deadline_ns);
+        // A device begins the next cycle itself; waitForSource() counts the beats that were missed.
+        const std::int64_t limit = time + cycle_.clock().period_ns;
         end = endOfCycle(wake_up, begin, limit);
         if (end >= limit) noteOverrun(wake_up, begin, end, behind);
         deadline = device != nullptr ? limit : nextDeadline(wake_up.deadline_ns, end);

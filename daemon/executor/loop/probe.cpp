@@ -6,13 +6,6 @@
 
 namespace rtcf::executor {
 
-namespace {
-
-// Values whose bytes are to be had by a message alone, which only another thread could build.
-bool isAllocated(const TypeInfo& type) { return !type.flat && type.builds_message; }
-
-}  // namespace
-
 std::size_t Probe::add(const InputBase& input) {
     items_.push_back(
         {&input, nullptr, &input.type(), {}, 0, 0, 0, false, std::vector<std::uint8_t>(kLargest)});
@@ -50,7 +43,7 @@ void Probe::take(Item& item, const LoopClock& clock) noexcept {
     if (item.input != nullptr) item.seen = item.input->seen();
     if (slot.sequence == 0) return;
     const TypeInfo& type = *item.type;
-    if (isAllocated(type)) return;
+    if (allocatesMessage(type)) return;
     item.length = type.flat ? static_cast<std::uint32_t>(type.size) : type.length(slot);
     item.copied = item.length <= item.bytes.size();
     if (!item.copied) return;
@@ -64,7 +57,7 @@ void Probe::take(Item& item, const LoopClock& clock) noexcept {
 Probe::Value Probe::value(std::size_t index) const {
     const Item& item = items_[index];
     Value value{item.header.sequence, item.seen, item.now_ns - item.header.time_ns, {}};
-    if (item.header.sequence != 0 && isAllocated(*item.type)) {
+    if (item.header.sequence != 0 && allocatesMessage(*item.type)) {
         value.text = "(not shown: its message would be allocated in the cycle)";
     } else if (item.copied) {
         const std::shared_ptr<SlotHeader> slot = item.type->make_slot(nullptr);

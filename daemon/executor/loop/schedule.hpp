@@ -6,7 +6,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "exchange/injector.hpp"
@@ -58,7 +57,7 @@ struct Latch {
     const SlotHeader* from;
     const Component* writer;
 
-    /// Real-time safe as TypeInfo::copy is. @throws what a copy throws
+    /// Real-time safe as TypeInfo::copy is. @throws any exception of a copy
     void copy() const {
         if (to->sequence != from->sequence) type->copy(*to, *from);
     }

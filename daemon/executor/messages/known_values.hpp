@@ -1,6 +1,6 @@
 /// @file
-/// Enumerators that are none. proto3 keeps any number in the place of an enumerator, and a switch
-/// takes it for whatever is left over: requests are looked at once, where they come in.
+/// Unknown enumerators. proto3 keeps any number in the place of an enumerator, and the last branch
+/// of a switch takes it: requests are checked once, on arrival.
 #pragma once
 
 #include <google/protobuf/message.h>

@@ -175,10 +175,10 @@ void requireOneWriter(const Graph& graph, const std::string& name, const Connect
 // A type of a component's own that is given no message stays inside the runner.
 bool onRos(const TypeInfo& type) { return *type.ros_type != '\0'; }
 
-// Whoever takes an output's values builds their messages of copies, as that allocates.
+// The consumer builds an output's messages from copies of its values, as that allocates.
 void requirePublishable(const Graph& graph, const std::string& name, const Writer& writer) {
     const TypeInfo& type = writer.output->type();
-    if (!type.builds_message || type.flat) return;
+    if (!allocatesMessage(type)) return;
     throw Refusal(
         RefusalKind::FailedPrecondition,
         fmt::format("{} cannot be published as {}: values of {} have memory of their own, and so "

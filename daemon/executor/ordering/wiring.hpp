@@ -56,8 +56,8 @@ struct Wiring {
 
 /// Connects and orders a graph. @param loading full name of a component that is not part of the
 /// running graph yet, for the advice how to break a loop; may be empty
-/// @throws Refusal for two types of one name, for two writers of one that is read, for what cannot
-/// be published, and for a loop
+/// @throws Refusal for two types of one name, for two writers of one that is read, for a type that
+/// cannot be published, and for a loop
 Wiring wire(const Graph& graph, const MappingFilter& filter, const std::string& loading);
 
 /// What the ports of some components, by their full names, make of the topics that is not refused

@@ -71,7 +71,7 @@ bool CpuClaim::take(int cpu, int place) {
     std::string file = folder_ + "/cpu-" + std::to_string(cpu);
     if (place > 0) file += "-" + std::to_string(place);
     for (int i = 0; i < kMostTries; ++i) {
-        // For nobody else to read: who reads a file can lock it.
+        // Not readable by others, as any reader of a file can lock it.
         const int fd = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
         if (fd < 0) return false;
         struct stat locked{};
@@ -80,7 +80,7 @@ bool CpuClaim::take(int cpu, int place) {
             ::close(fd);
             return false;
         }
-        // Who had it may have removed it between the two.
+        // Its last holder may have removed it between the two.
         if (::stat(file.c_str(), &named) == 0 && named.st_ino == locked.st_ino &&
             named.st_dev == locked.st_dev) {
             fd_ = fd;

@@ -4,7 +4,6 @@
 #include <string>
 #include <system_error>
 #include <utility>
-#include <vector>
 
 #include "realtime/cpu_claim.hpp"
 
@@ -24,15 +23,15 @@ cpu_set_t cpusWithout(int cpu) {
     return cpus;
 }
 
-std::vector<pid_t> threads() {
-    std::vector<pid_t> found;
+}  // namespace
+
+std::set<pid_t> processThreads() {
+    std::set<pid_t> found;
     std::error_code gone;  // one that ends meanwhile
     for (const auto& task : std::filesystem::directory_iterator("/proc/self/task", gone))
-        found.push_back(static_cast<pid_t>(std::stol(task.path().filename())));
+        found.insert(static_cast<pid_t>(std::stol(task.path().filename())));
     return found;
 }
-
-}  // namespace
 
 void OtherThreads::keepOff(int cpu, pid_t loop) {
     const cpu_set_t all = cpusWithout(-1);
@@ -56,7 +55,7 @@ void OtherThreads::move(const cpu_set_t& from, const cpu_set_t& to, pid_t loop) 
     bool moved = true;
     for (int pass = 0; moved && pass < kMostPasses; ++pass) {
         moved = false;
-        for (const pid_t thread : threads()) {
+        for (const pid_t thread : processThreads()) {
             if (thread == loop || pinned.count(thread) != 0) continue;
             cpu_set_t present;
             CPU_ZERO(&present);

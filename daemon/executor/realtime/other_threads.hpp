@@ -1,7 +1,7 @@
 /// @file
-/// The threads of this process beside a loop's: they keep off its CPU where there is another. What
-/// a component does with its own threads stands: one that has been pinned to other CPUs than those
-/// of the process stays where it is. Owned by the Loop; not real-time, graph thread.
+/// The threads of this process beside a loop's: they keep off its CPU where there is another.
+/// Threads that a component has pinned to other CPUs than those of the process stay there. Owned by
+/// the Loop; not real-time, graph thread.
 #pragma once
 
 #include <sched.h>
@@ -11,6 +11,9 @@
 #include <set>
 
 namespace rtcf::executor {
+
+/// The threads of this process.
+std::set<pid_t> processThreads();
 
 class OtherThreads {
    public:

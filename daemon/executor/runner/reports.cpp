@@ -55,8 +55,8 @@ void Runner::noteLoopFault() {
     }
 }
 
-// Components that failed while the loop went on: a component is taken out once, and what is not
-// finite is said again after a while.
+// Components that failed while the loop went on: a component is taken out once; values that are not
+// finite are reported again after a while.
 void Runner::noteComponentFaults() {
     told_not_finite_.rearm(monotonicNow());
     const std::uint64_t count = loop_.figures().faults.value();

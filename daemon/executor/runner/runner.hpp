@@ -340,7 +340,7 @@ class Runner final : private RunnerView {
     std::int64_t sizes_due_ns_ = 0;
     FrameMemory frame_memory_;
     Watches watches_;
-    std::shared_ptr<const FrameTable> frames_;  // that the loop fills; may be null
+    std::shared_ptr<const FrameTable> frames_;  // that the loop fills; null before the first
 
     // Published for queries.
     std::atomic<NumberedState> numbered_state_;

@@ -91,7 +91,7 @@ void Runner::publishFrames(std::shared_ptr<const FrameTable> frames) noexcept {
             const std::lock_guard<std::mutex> lock(published_mutex_);
             new_frames_.push_back(frames_);
         }
-        if (frames_ == nullptr || frames_->shortness.empty()) return;
+        if (frames_->shortness.empty()) return;
         const bool told = previous != nullptr && !previous->shortness.empty() &&
                           previous->ring->capacity() <= frames_->ring->capacity();
         if (!told) log_.write(LogLevel::Warn, {}, frames_->shortness);

@@ -73,7 +73,7 @@ class DirectStop {
     void accept();
     /// @return false if the client is to be let go
     bool attend(Client& client, bool readable);
-    /// Answers a client whose loop has ended, if there is an answer yet.
+    /// Answers a client after the end of the loop, if there is an answer yet.
     bool answerStopped(const Client& client) const;
     void stop(const Client& client);
 

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kPatience{300};  // with a disk, at the end
 
-// @return what went wrong. Works on a full disk, too.
+// @return the error, or empty. Works on a full disk, too.
 std::string unlinked(const std::string& path) {
     if (::unlink(path.c_str()) == 0 || errno == ENOENT || errno == ENOTDIR) return {};
     const int error = errno;

@@ -25,7 +25,7 @@ class ResumeMark {
         bool done = true;
         std::string problem;  ///< why the file is still there; of one that is done
     };
-    /// What came of the last remove(). Any thread.
+    /// The result of the last remove(). Any thread.
     Removal last() const;
 
    private:

@@ -59,8 +59,7 @@ bool watched(const Candidate& candidate, const Watches& watches) {
                        [&](const auto& watch) { return watch.second.matches(name); });
 }
 
-// Which are needed, and which of the others there is room for: what is watched first. In schedule
-// order.
+// Required candidates, and others while there is room, watched ones first. In schedule order.
 std::vector<Candidate> chosenOf(const Plan& plan, const FrameDemand& demand, FrameTable& table) {
     std::vector<Candidate> candidates = candidatesOf(plan);
     const bool all = demand.most_bytes != 0;

@@ -25,7 +25,7 @@ struct FrameTable {
     std::vector<std::string> notes;    ///< what is left out, a line each
     std::string shortness;             ///< if less than a second is kept: how much; else empty
     std::shared_ptr<FrameRing> ring;
-    Watches watches;    ///< whom it is for
+    Watches watches;    ///< its readers
     bool kept = false;  ///< for them or an incident; else the last frame alone counts, for the loop
 };
 
@@ -33,8 +33,8 @@ struct FrameTable {
 struct FrameDemand {
     const Watches& watches;
     double frequency_hz;  ///< of the loop; the ring holds about a second
-    /// Of states and staged outputs in each cycle, whoever watches; 0 = what is watched. The other
-    /// outputs are always there: the loop puts them back after an update() that throws.
+    /// Of states and staged outputs in each cycle, watched or not; 0 = watched ones alone. The
+    /// other outputs are always there: the loop puts them back after an update() that throws.
     std::size_t most_bytes;
     FrameMemory* memory;         ///< that outlives the process; may be null
     const FrameTable* previous;  ///< whose ring is kept if that copies the same; may be null

@@ -46,9 +46,9 @@ class Subjects {
     void end() { reconfiguring_.end(); }
     /// @}
 
-    /// Forgets what is closed and not wanted any more.
+    /// Forgets closed topics that are not wanted any more.
     void tidy() { publishing_.tidy(); }
-    /// Opens and closes until it is what is wanted. The node is up.
+    /// Opens and closes topics until they are as wanted. The node is up.
     Reconciled reconcile(MasterLink& link, const executor::BridgeSettings& settings);
     /// What can be done without a master.
     void reconcileWithoutMaster(MasterLink& link);

@@ -19,8 +19,8 @@ struct NodeName {
 /// @param daemon names the daemon among those of the host; empty: the system's
 NodeName nodeName(const std::string& host, const std::string& daemon, const std::string& runner);
 
-/// The name of a runner's node whose services have a namespace of their own, which a launch file's
-/// have: the namespace itself, so that ROS shows services, topics and loggers of one node.
+/// The name of a runner's node with a namespace for its services, as a launch file gives: the
+/// namespace itself, so that ROS shows services, topics and loggers of one node.
 /// @param name_space canonical; empty or "/": none
 /// @param otherwise if there is none
 NodeName nodeNameOf(const std::string& name_space, const NodeName& otherwise);

@@ -9,12 +9,12 @@
 #include <xmlrpcpp/XmlRpcException.h>
 
 #include <array>
-#include <filesystem>
 #include <fstream>
 #include <set>
 #include <stdexcept>
 #include <system_error>
 
+#include "realtime/other_threads.hpp"
 #include "ros/threads/quiet_thread.hpp"
 #include "ros/transport/reconnection.hpp"
 
@@ -42,23 +42,13 @@ namespace rtcf::ros1 {
 
 namespace {
 
-constexpr const char* kThreads = "/proc/self/task";
-
-std::set<int> threads() {
-    std::set<int> found;
-    std::error_code ignored;
-    for (const auto& entry : std::filesystem::directory_iterator(kThreads, ignored))
-        found.insert(std::stoi(entry.path().filename()));
-    return found;
-}
-
 // roscpp's own threads have the name of the one that starts them. It starts these, in this order.
-void nameThreads(const std::set<int>& before) {
+void nameThreads(const std::set<pid_t>& before) {
     const std::array<const char*, 3> names{"roscpp-poll", "roscpp-xmlrpc", "roscpp-queue"};
     std::size_t next = 0;
-    for (const int thread : threads()) {
+    for (const pid_t thread : executor::processThreads()) {
         if (before.count(thread) != 0 || next == names.size()) continue;
-        std::ofstream file(std::string(kThreads) + "/" + std::to_string(thread) + "/comm");
+        std::ofstream file("/proc/self/task/" + std::to_string(thread) + "/comm");
         file << names.at(next++);
     }
 }
@@ -100,7 +90,7 @@ void RoscppNode::start(const std::string& master_uri, const MasterAddress& addre
     if (!hostname.empty()) settings["__hostname"] = hostname;
     ros::init(settings, name_.base,
               ros::init_options::NoSigintHandler | ros::init_options::NoRosout);
-    const std::set<int> before = threads();
+    const std::set<pid_t> before = executor::processThreads();
     try {
         ros::start();
         nameThreads(before);

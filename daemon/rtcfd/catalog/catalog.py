@@ -110,21 +110,17 @@ class Catalog:
                 tuple(contents.others.get(type_name, ())),
                 tuple(found.parameters),
             )
-        if type_name in contents.hidden:
-            later = contents.hidden[type_name]
-            raise FailedPrecondition(
-                f"{package}/{type_name}: {contents.broken} does not load, and {later} of a later "
-                f"folder is not taken in its place: mend {contents.broken}, or remove it: "
-                + "; ".join(contents.problems),
-                errors_pb2.REASON_LIBRARY_REFUSED,
-                package=package,
-                type=type_name,
-            )
         if contents.problems:
+            later = contents.hidden.get(type_name)
+            what = (
+                f'no type "{type_name}" in package "{package}" (types: {listing(contents.types)}), '
+                "and not all of it loads"
+                if later is None
+                else f"{package}/{type_name}: {contents.broken} does not load, and {later} of a "
+                f"later folder is not taken in its place: mend {contents.broken}, or remove it"
+            )
             raise FailedPrecondition(
-                f'no type "{type_name}" in package "{package}" (types: '
-                f"{listing(contents.types)}), and not all of it loads: "
-                + "; ".join(contents.problems),
+                f"{what}: {'; '.join(contents.problems)}",
                 errors_pb2.REASON_LIBRARY_REFUSED,
                 package=package,
                 type=type_name,

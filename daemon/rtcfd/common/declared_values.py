@@ -1,7 +1,7 @@
 """Checks values against the declarations of parameters, where no executor has the component.
 
-As ParameterBase::check() of the component API does; what prepare() says to them is known when the
-component is loaded.
+As ParameterBase::check() of the component API does; errors of prepare() appear when the component
+is loaded.
 """
 
 import math
@@ -60,7 +60,7 @@ def _problem(value: graph_pb2.ParameterValue, declared: graph_pb2.ParameterInfo)
     plain = getattr(value, str(kind))
     if kind in ("int_value", "double_value"):
         if not math.isfinite(plain):
-            # No values to set, but for who takes back what it was declared with.
+            # Only the declared default may be infinite or NaN.
             return "" if same_value(value, declared.default_value) else "must be finite"
         if declared.HasField("minimum") and plain < declared.minimum:
             return f"= {plain:g} is below its minimum {declared.minimum:g} {declared.unit}".rstrip()

@@ -1,7 +1,7 @@
 """Enumerators that are none.
 
-proto3 keeps any number in the place of an enumerator, and each reader takes it for whatever is
-left over.  So what comes from outside is looked at once, where it comes in.
+proto3 keeps any number in the place of an enumerator, and a reader's last branch takes it.  So
+requests are checked once, on arrival.
 """
 
 from functools import cache
@@ -18,8 +18,7 @@ from rtcfd.common.refusals import InvalidArgument
 
 def check(message: Message) -> None:
     """Refuse a message with an enumerator that is not known, at any depth."""
-    for number in _to_look_at(message.DESCRIPTOR):
-        field = message.DESCRIPTOR.fields_by_number[number]
+    for field in _to_look_at(message.DESCRIPTOR):
         value: Any = getattr(message, field.name)
         repeated = field.label == FieldDescriptor.LABEL_REPEATED
         if field.enum_type is not None:
@@ -33,7 +32,7 @@ def check(message: Message) -> None:
 
 
 def check_value(enum_type: EnumDescriptor, name: str, value: object) -> None:
-    """Refuse a value that is no enumerator; `name` is what it is for."""
+    """Refuse a value that is no enumerator; `name` is its setting."""
     if value not in enum_type.values_by_number:
         raise InvalidArgument(
             f"{name} {value} is not known: choose of {listing(choices(enum_type))}",
@@ -43,10 +42,10 @@ def check_value(enum_type: EnumDescriptor, name: str, value: object) -> None:
 
 
 @cache
-def _to_look_at(message: Descriptor) -> tuple[int, ...]:
-    """Return the numbers of the fields that are enumerators, or may hold some."""
+def _to_look_at(message: Descriptor) -> tuple[FieldDescriptor, ...]:
+    """Return the fields that are enumerators, or may hold some."""
     return tuple(
-        field.number
+        field
         for field in message.fields
         if field.enum_type is not None or _holds(field.message_type, frozenset())
     )

@@ -171,7 +171,7 @@ class Executor:
 
     @property
     def frozen(self) -> str:
-        """Say that a signal or a debugger has stopped it, and what ends it; empty: none has."""
+        """Return a message with the remedy if a signal or a debugger has stopped it; else empty."""
         if not self._process.frozen:
             return ""
         return (
@@ -244,8 +244,8 @@ class Executor:
         """Stop the loop in order, then end the process, by force if it must be."""
         self.expected = True
         try:
-            if self.frozen:
-                raise Unavailable(self.frozen, errors_pb2.REASON_EXECUTOR_SILENT)
+            if frozen := self.frozen:
+                raise Unavailable(frozen, errors_pb2.REASON_EXECUTOR_SILENT)
             await self.request(wire.Request(stop=wire.Stop()), STOP_TIMEOUT_S)
             await self.request(wire.Request(exit=wire.Exit()), EXIT_TIMEOUT_S)
         except Refusal as refusal:

@@ -48,8 +48,8 @@ class _Frame:
 
 @dataclass(frozen=True)
 class Found:
-    """Frames of a crash, a line each, innermost first: function and source line, or what is known
-    instead; `place`: the first of a component, or else of all."""
+    """Frames of a crash, a line each, innermost first: function and source line, as far as known;
+    `place`: the first of a component, or else of all."""
 
     place: str = ""
     lines: tuple[str, ...] = ()
@@ -59,12 +59,12 @@ async def find(trace: Trace, libraries: Iterable[str], program: str, folders: As
     """Find the lines of a crash; raises Unavailable if a disk does not answer, TimeoutError.
 
     `libraries` are the files that components were loaded from, unless they have changed since;
-    `program` is the executor, whose own frames at the outer end are left out; `folders` reads them.
+    `program` is the executor: its own frames at the outer end are left out; `folders` reads them.
     """
     known = set(libraries)
     frames = _placed(trace, known)
     own = next((i for i, each in enumerate(frames) if each.file == program), len(frames))
-    # What crashed in the executor itself is told whole.
+    # A crash in the executor itself keeps all frames.
     frames = (frames[:own] or frames)[:_MOST_SHOWN]
     by_file: dict[str, list[_Frame]] = {}
     for frame in frames:
@@ -123,20 +123,16 @@ async def _lines(tool: str, file: str, frames: list[_Frame], folders: Aside) -> 
     # The line that was reached and those it was inlined into.
     command = [tool, "-C", "-f", "-i", "-p", "-s", "-e", file, *map(hex, addresses)]
     output = await _run(command)
+    found = (each for each in output.splitlines() if not each.startswith(" (inlined by) "))
     lines: list[str] = []
-    for line in output.splitlines():
-        if line.startswith(" (inlined by) "):
-            continue
-        place = _PLACE.fullmatch(line)
-        known = place is not None and not line.startswith("??")
-        frame = frames[len(lines)] if len(lines) < len(frames) else None
-        if known and place is not None:
+    for line, frame in zip(found, frames, strict=False):
+        if line.startswith("??"):
+            lines.append("")
+        elif place := _PLACE.fullmatch(line):
             lines.append(f"{place[1][:_LONGEST_FUNCTION]} at {place[2]}")
-        elif frame is not None and not line.startswith("??"):
+        else:
             function = line.partition(" at ")[0][:_LONGEST_FUNCTION]
             lines.append(f"{function} in {_where(frame)}")
-        else:
-            lines.append("")
     return lines
 
 

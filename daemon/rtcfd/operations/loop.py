@@ -103,8 +103,8 @@ async def _stop_at(
         patience_s = _FROZEN_S if executor.frozen else STOP_TIMEOUT_S
         return await _ask_to_stop(runner, progress, patience_s)
     except Unavailable as refusal:
-        if executor.frozen:
-            raise Unavailable(executor.frozen, errors_pb2.REASON_EXECUTOR_SILENT) from None
+        if frozen := executor.frozen:
+            raise Unavailable(frozen, errors_pb2.REASON_EXECUTOR_SILENT) from None
         if not executor.ended.is_set() or not executor.safe:
             raise
         return control_pb2.ChangeResult(notes=[f"the loop has ended with its executor: {refusal}"])

@@ -105,7 +105,7 @@ async def follow_ros(runner: RunnerCore, changed: Mapping[str, set[str]]) -> Non
         # Not what was told: more may have happened since.
         with contextlib.suppress(NotFound):  # gone since, and its parameters with it
             found = await _component(runner, component)
-            known = _last_values(runner, found)
+            known = _last_values(runner, found.full_name, found.parameters)
             settings = [
                 graph_pb2.ParameterSetting(name=each.name, value=each.value)
                 for each in found.parameters
@@ -177,41 +177,37 @@ async def _set(
     if acting is not None and acting.tuning is not None:
         _require_tuning(runner, name, settings, before, acting)
     if name in runner.left_out:
-        return await _set_left_out(runner, name, settings, before, acting, takes_back)
-    request = control_pb2.SetParametersRequest(component=name, parameters=settings)
-    asked = Asked(name, settings, before, acting)
-    runner.asked_parameters.append(asked)
-    try:
-        result = (await runner.ask(wire.Request(set_parameters=request), progress)).change
-    finally:
-        if asked in runner.asked_parameters:
-            runner.asked_parameters.remove(asked)
+        result = await _check_left_out(runner, name, settings)
+    else:
+        result = await _ask(runner, Asked(name, settings, before, acting), progress)
     runner.desired.set_parameters(name, settings)
     note(runner, name, settings, before, acting, "undo" if takes_back else "set", "", takes_back)
     result.notes.extend(await runner.save())
     return result
 
 
-async def _set_left_out(
-    runner: RunnerCore,
-    name: str,
-    settings: list[graph_pb2.ParameterSetting],
-    before: Mapping[str, graph_pb2.ParameterValue],
-    acting: Caller | None,
-    takes_back: int,
+async def _ask(runner: RunnerCore, asked: Asked, progress: Progress) -> control_pb2.ChangeResult:
+    request = control_pb2.SetParametersRequest(component=asked.component, parameters=asked.settings)
+    runner.asked_parameters.append(asked)
+    try:
+        return (await runner.ask(wire.Request(set_parameters=request), progress)).change
+    finally:
+        if asked in runner.asked_parameters:
+            runner.asked_parameters.remove(asked)
+
+
+async def _check_left_out(
+    runner: RunnerCore, name: str, settings: list[graph_pb2.ParameterSetting]
 ) -> control_pb2.ChangeResult:
-    """Change parameters that a component begins with when it is loaded again."""
+    """Check parameters that a component begins with when it is loaded again."""
     declared = {each.name: each for each in await _declared(runner, name)}
     for each in settings:
         declared_values.check(name, each, declared)
-    runner.desired.set_parameters(name, settings)
-    note(runner, name, settings, before, acting, "undo" if takes_back else "set", "", takes_back)
     result = control_pb2.ChangeResult(component=name)
     result.notes.append(
         f"{name} is left out of the loop: `rtcfctl -r {runner.name} release {name}` loads it with "
         "this"
     )
-    result.notes.extend(await runner.save())
     return result
 
 
@@ -279,19 +275,17 @@ async def _declared(runner: RunnerCore, name: str) -> list[graph_pb2.ParameterIn
 
 async def _values(runner: RunnerCore, name: str) -> dict[str, graph_pb2.ParameterValue]:
     if name in runner.left_out:
-        values = {each.name: each.default_value for each in await _declared(runner, name)}
-        given = runner.desired.components[name].parameters
-        return values | {each.name: each.value for each in given}
+        return _last_values(runner, name, await _declared(runner, name))
     found = await _component(runner, name)
     return {each.name: each.value for each in found.parameters}
 
 
 def _last_values(
-    runner: RunnerCore, found: graph_pb2.ComponentInfo
+    runner: RunnerCore, name: str, declared: Iterable[graph_pb2.ParameterInfo]
 ) -> dict[str, graph_pb2.ParameterValue]:
-    """Return the values that parameters had as far as rtcfd was told."""
-    values = {each.name: each.default_value for each in found.parameters}
-    spec = runner.desired.components.get(found.full_name)
+    """Return the values that a component's parameters had as far as rtcfd was told."""
+    values = {each.name: each.default_value for each in declared}
+    spec = runner.desired.components.get(name)
     if spec is not None:
         values.update({each.name: each.value for each in spec.parameters})
     return values

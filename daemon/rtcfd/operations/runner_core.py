@@ -65,7 +65,7 @@ class Surroundings:
     )
     rules: wire.AccessRules = field(default_factory=wire.AccessRules)  # for executors
     name_of: Callable[[int], Awaitable[str]] = _number  # of a user, for people
-    # Threads of their own: a stop must get to disk whatever else hangs.
+    # In threads of its own.
     folders: Aside = field(default_factory=lambda: Aside("folders of components"))
 
 

@@ -96,7 +96,7 @@ async def replay(
 
 
 def _require_whole(runner: RunnerCore, request: control_pb2.StartRequest) -> None:
-    """Refuse to run cycles without a component whose absence nobody has agreed to."""
+    """Refuse to run cycles without a component, unless the request allows its absence."""
     without = {absolute(name) for name in request.without}
     if unknown := sorted(without - runner.left_out.keys()):
         raise NotFound(

@@ -67,7 +67,6 @@ class Leases:
         self._alarm = alarm
         self._outboxes: dict[str, Outbox] = {}  # by component; of holders that are there
         self._told: set[str] = set()  # notes on the loads of this launch
-        self._unseen: set[str] = set()  # components whose holder shows nothing but warnings
         self._loading: set[str] = set()
         self._losing: set[str] = set()  # their holders have died, and it is being seen to
         self._leaving: dict[str, asyncio.Task[None]] = {}
@@ -111,7 +110,7 @@ class Leases:
                 request.run_id, request.on_lost or control_pb2.ON_LEASE_LOST_STOP, request.holder
             )
             self._outboxes[name] = outbox
-            self._note_screen(name, request)
+            outbox.unseen = request.unseen
             self._loading.add(name)
             await runner.save()
             try:
@@ -132,7 +131,7 @@ class Leases:
                 raise
             finally:
                 self._loading.discard(name)
-            runner.log.info("%s loaded (%s) for %s", name, what, request.holder or "a lease")
+            runner.log.info("%s loaded (%s) for %s", name, what, holder)
             if outbox.gone:  # it was never seen: no reason to stop the loop
                 self._leave(name)
             return result
@@ -171,7 +170,7 @@ class Leases:
                 component=name,
             )
         self._outboxes[name] = outbox
-        self._note_screen(name, request)
+        outbox.unseen = request.unseen
         self._runner.log.info("%s: its holder is back", name)
         return control_pb2.ChangeResult(component=name)
 
@@ -208,10 +207,7 @@ class Leases:
             return False
         outbox.log(record)
         warns = record.level >= control_pb2.LogRecord.LEVEL_WARN
-        return warns or record.component not in self._unseen
-
-    def _note_screen(self, name: str, request: control_pb2.OpenLease) -> None:
-        (self._unseen.add if request.unseen else self._unseen.discard)(name)
+        return warns or not outbox.unseen
 
     def failed(self, component: str, reason: str) -> None:
         """Tell a holder that its component has failed; the component leaves."""

@@ -21,6 +21,7 @@ class Outbox:
 
     def __init__(self, response: Any) -> None:
         self.gone = False  # nobody reads it any more
+        self.unseen = False  # its reader shows warnings alone
         self._response = response
         self._messages: deque[Any] = deque()
         self._report: control_pb2.HoldReport | None = None

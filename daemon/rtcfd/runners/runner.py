@@ -222,8 +222,7 @@ class Runner(RunnerCore):
             file=record.file,
             line=record.line,
         )
-        shown = bool(record.component) and self.leases.take_log(copy)
-        if not shown and self.hold_outbox is not None:
+        if not self.leases.take_log(copy) and self.hold_outbox is not None:
             self.hold_outbox.log(copy)
 
     def alarm(self, text: str) -> None:

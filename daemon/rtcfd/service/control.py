@@ -99,7 +99,7 @@ class Control(Looking):
 
     @changing
     def Stop(self, request: control_pb2.StopRequest) -> Any:
-        """Stop the loop; who names none hears of others that run on."""
+        """Stop the loop; a caller that names none is told of the others that still run."""
         runner = self._runners.get(request.runner)
 
         async def work(progress: Progress) -> control_pb2.ChangeResult:

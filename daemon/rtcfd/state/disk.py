@@ -1,7 +1,7 @@
 """The threads that write the state folder; owned by the shared state of all runners.
 
-A disk may hang for good.  The event loop never waits for one: work is a task, and whoever asked
-for it decides how long to wait.
+A disk may hang for good.  The event loop never waits for one: work is a task, and the caller
+decides how long to wait.
 """
 
 import asyncio

@@ -42,7 +42,7 @@ def lock(folder: Path) -> None:
 
 
 def _holder(descriptor: int) -> str:
-    """Return the process that has locked what is open, if the kernel tells (see proc_locks(5))."""
+    """Return the process that has locked the open file, if the kernel tells (see proc_locks(5))."""
     inode = f":{os.fstat(descriptor).st_ino}"
     try:
         lines = Path("/proc/locks").read_text().splitlines()

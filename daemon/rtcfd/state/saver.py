@@ -1,7 +1,7 @@
 """Brings the desired state of one runner to disk; owned by its RunnerCore.
 
-On rtcfd's one thread; the disk is written by others.  Whoever saves waits PATIENCE_S at most: a
-disk that hangs is told of, and written once it answers.  Several saves that wait become one.
+On rtcfd's one thread; the disk is written by others.  A save waits PATIENCE_S at most: a
+hanging disk is reported, and written once it answers.  Several saves that wait become one.
 """
 
 import asyncio

@@ -92,6 +92,17 @@ noise = st.lists(
 )
 
 
+def begun() -> tuple[Timeline, int]:
+    """Return the beginning of a cycle on an idle CPU, and its deadline."""
+    line = Timeline()
+    line.idle()
+    line.run(PERIOD_NS)
+    deadline = line.now
+    line.wake()
+    line.loop(runnable=True)
+    return line, deadline
+
+
 def disturb(line: Timeline, disturbances: list[tuple[str, str, int]]) -> None:
     """Let short things happen in the loop's time."""
     for place, (kind, name, ns) in enumerate(disturbances):
@@ -268,12 +279,7 @@ def test_a_cycle_that_waits_for_the_one_before_blames_that() -> None:
 
 
 def test_many_threads_of_one_name_are_named_together() -> None:
-    line = Timeline()
-    line.idle()
-    line.run(PERIOD_NS)
-    deadline = line.now
-    line.wake()
-    line.loop(runnable=True)
+    line, deadline = begun()
     for pid in range(200, 210):
         line.thread("stress-ng-cpu", 150 * US, pid)
     line.run(10 * US)
@@ -312,12 +318,7 @@ def test_of_any_events_a_culprit_takes_no_longer_than_the_cycle(
 
 @given(st.integers(0, 2), st.integers(0, 2))
 def test_where_events_are_lost_nobody_is_blamed(before: int, behind: int) -> None:
-    line = Timeline()
-    line.idle()
-    line.run(PERIOD_NS)
-    deadline = line.now
-    line.wake()
-    line.loop(runnable=True)
+    line, deadline = begun()
     for _ in range(before):
         line.thread("other", 100 * US)
     line.events.append(Lost(line.now, CPU))

@@ -10,7 +10,16 @@
 #include "ros/roscpp/node_name.hpp"
 #include "ros_fixture.hpp"
 
-class RosNodeTest : public RosFixture {};
+class RosNodeTest : public RosFixture {
+   protected:
+    // For topics whose names match `latch`.
+    rtcf::executor::BridgeSettings latched(const std::string& latch) const {
+        rtcf::executor::BridgeSettings settings;
+        settings.master_uri = masterUri();
+        settings.latch = latch;
+        return settings;
+    }
+};
 
 // Until then the resolver below has no answer.
 std::atomic<bool> resolver_answers{false};
@@ -269,9 +278,7 @@ TEST_F(RosNodeTest, KeepsLatchedValuesWhenItGoesAndComes) {
     startMaster();
     Source source("/out");
     startNode();
-    rtcf::executor::BridgeSettings settings;
-    settings.master_uri = masterUri();
-    settings.latch = "/out";
+    rtcf::executor::BridgeSettings settings = latched("/out");
     rosNode().configure(settings);
     serve({&source}, {});
     ASSERT_TRUE(eventually([&] { return rosNode().status().publications == 1; }));
@@ -292,9 +299,7 @@ TEST_F(RosNodeTest, KeepsLatchedValuesWhenItGoesAndComes) {
 TEST_F(RosNodeTest, KeepsTheOnlyValueOfALatchedTopic) {
     startMaster();
     startNode();
-    rtcf::executor::BridgeSettings settings;
-    settings.master_uri = masterUri();
-    settings.latch = "/out.*";
+    rtcf::executor::BridgeSettings settings = latched("/out.*");
     rosNode().configure(settings);
     ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
     for (int i = 0; i < 5; ++i) {
@@ -311,9 +316,7 @@ TEST_F(RosNodeTest, OfALatchedTopicSurvivesAChangeOfItsSettings) {
     startMaster();
     Source source("/out");
     startNode();
-    rtcf::executor::BridgeSettings settings;
-    settings.master_uri = masterUri();
-    settings.latch = "/out";
+    rtcf::executor::BridgeSettings settings = latched("/out");
     rosNode().configure(settings);
     serve({&source}, {});
     ASSERT_TRUE(eventually([&] { return rosNode().status().publications == 1; }));

@@ -1,6 +1,6 @@
 /// @file
-/// Whether a value holds no NaN and no infinity: numbers, Eigen types, any ROS message, whose
-/// fields are visited by roscpp's own serializer, structs that name their fields (as in
+/// Whether a value holds no NaN and no infinity: numbers, Eigen types, any ROS message
+/// (roscpp's own serializer visits its fields), structs that name their fields (as in
 /// state_type.hpp), and sequences of these. Outputs of other types cannot be declared Finite.
 #pragma once
 
@@ -105,7 +105,7 @@ bool isFinite(const T& value) noexcept {
         const_cast<T&>(value).fields(visitor);  // the visitor only looks at them
         return visitor.finite;
     } else {
-        return true;  // without floating-point numbers, or not declared Finite (kIsCheckable)
+        return true;  // without floating-point numbers, or not declared Finite (IsCheckable)
     }
 }
 
@@ -113,6 +113,14 @@ template <typename Field>
 void FiniteFields::operator()(const char* /*name*/, const Field& field) noexcept {
     if (finite) finite = isFinite(field);
 }
+
+/// A sequence whose items isFinite() visits one by one.
+template <typename T>
+constexpr bool kHasItems =
+    IsSequence<T>::value && !HasAllFinite<T>::value && !ros::message_traits::IsMessage<T>::value &&
+    !std::is_same_v<T, std::string>;
+template <typename T>
+using ItemOf = std::decay_t<decltype(*std::declval<const T&>().begin())>;
 
 /// Whether isFinite() looks at all numbers of a type; of a struct requireCheckable() looks at its
 /// fields.
@@ -124,10 +132,7 @@ struct IsCheckable
                          std::is_same_v<T, std::string> || std::is_same_v<T, ros::Time> ||
                          std::is_same_v<T, ros::Duration> || NamesFields<T>::value> {};
 template <typename T>
-struct IsCheckable<T, std::enable_if_t<IsSequence<T>::value && !HasAllFinite<T>::value &&
-                                       !ros::message_traits::IsMessage<T>::value &&
-                                       !std::is_same_v<T, std::string>>>
-    : IsCheckable<std::decay_t<decltype(*std::declval<const T&>().begin())>> {};
+struct IsCheckable<T, std::enable_if_t<kHasItems<T>>> : IsCheckable<ItemOf<T>> {};
 
 template <typename T>
 void requireCheckable();
@@ -145,9 +150,8 @@ void requireCheckable() {
     static_assert(IsCheckable<T>::value,
                   "rtcf::Finite cannot look into this type: name its fields by a member "
                   "`template <typename Visit> void fields(Visit&& visit)`, see state_type.hpp");
-    if constexpr (IsSequence<T>::value && !HasAllFinite<T>::value &&
-                  !ros::message_traits::IsMessage<T>::value && !std::is_same_v<T, std::string>) {
-        (void)&requireCheckable<std::decay_t<decltype(*std::declval<const T&>().begin())>>;
+    if constexpr (kHasItems<T>) {
+        (void)&requireCheckable<ItemOf<T>>;
     } else if constexpr (NamesFields<T>::value) {
         // Compiled, and never called.
         (void)static_cast<void (*)(T&)>([](T& value) { value.fields(CheckableFields{}); });

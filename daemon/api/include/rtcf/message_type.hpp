@@ -90,7 +90,7 @@ class CopyVisitor {
 
    private:
     void add(const std::uint8_t* field, std::uint32_t bytes) {
-        // A serializer of one's own may compute what it writes.
+        // A custom serializer may write computed values.
         known_ = known_ && !std::less<>()(field, object_) &&
                  !std::less<>()(object_ + size_, field + bytes);
         if (!known_) return;
@@ -151,7 +151,7 @@ struct PortType<T, std::enable_if_t<ros::message_traits::IsMessage<T>::value>> {
 /// The base of a PortType that travels on ROS as `Message`. `Conversion` has
 /// `name()`, `toMessage(const T&, Message&)` and `fromMessage(const Message&, T&)`, and may have
 /// `static std::vector<ByteCopy> copies()`, if copying these bytes into a default-constructed
-/// message does what toMessage() does.
+/// message is equivalent to toMessage().
 template <typename T, typename Message, typename Conversion>
 struct MappedPortType {
     using Wire = PortType<Message>;

@@ -113,11 +113,10 @@ class InputBase {
     }
     /// @}
 
-    /// Its component.
-    Component& owner() const noexcept RTCF_NONBLOCKING { return *identity_->owner; }
-
    protected:
     ~InputBase() = default;
+
+    Component& owner() const noexcept RTCF_NONBLOCKING { return *identity_->owner; }
 
     void setQueue(QueueBase* queue) noexcept { identity_->queue = queue; }
 
@@ -216,7 +215,7 @@ class OutputBase {
     }
     /// Lets readers see what was written; if it is declared Finite, only a finite value. After
     /// update(); real-time safe as TypeInfo::copy is. @return false if it is not
-    /// @throws what a copy throws; readers have the value before then, or this one
+    /// @throws any exception of a copy; readers then have the previous value, or this one
     bool commit() {
         Rest& rest = *rest_;
         if (rest.staged->sequence == rest.examined) return true;
@@ -234,7 +233,7 @@ class OutputBase {
     /// What was written since the last commit() is never seen. Real-time safe.
     void discard() noexcept RTCF_NONBLOCKING { rest_->examined = rest_->staged->sequence; }
     /// As discard(), and the component has the last value that readers saw. Real-time safe as
-    /// TypeInfo::copy is. @throws what a copy throws
+    /// TypeInfo::copy is. @throws any exception of a copy
     void takeBack() {
         discard();
         type().copy(*rest_->staged, *rest_->slot);

@@ -89,6 +89,12 @@ struct TypeInfo {
 /// True if values of the two types may share a connection.
 bool sameType(const TypeInfo& a, const TypeInfo& b) noexcept;
 
+/// True if a value of the type has memory of its own, and its message, too: only a copy can be
+/// turned into a message, outside the cycle.
+inline bool allocatesMessage(const TypeInfo& type) noexcept RTCF_NONBLOCKING {
+    return type.builds_message && !type.flat;
+}
+
 /// Where a slot's value lies. Real-time safe.
 inline const std::uint8_t* valueOf(const TypeInfo& type, const SlotHeader& slot) noexcept
     RTCF_NONBLOCKING {
@@ -198,7 +204,7 @@ ByteCopies copiesOf() {
     }
 }
 
-/// What frees no memory has none of its own.
+/// A type that frees no memory owns none.
 template <typename T>
 constexpr bool kIsFlat = PortType<T>::kFixedSize || std::is_trivially_destructible_v<T>;
 

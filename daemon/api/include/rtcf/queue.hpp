@@ -43,8 +43,7 @@ class QueueBase : public InputBase {
 
     /// @name For the executor; real-time safe as TypeInfo::copy is
     /// @{
-    /// Takes what its source has written since it was last looked at. What there is no memory for
-    /// counts as dropped.
+    /// Takes the source's value if it is new. A value that finds no memory counts as dropped.
     void receive() noexcept {
         if (readStatus() != DataStatus::New) return;
         SlotHeader* const to = claim();

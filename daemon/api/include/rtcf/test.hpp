@@ -223,7 +223,7 @@ class Bench {
         if (passed) return;
         throw std::runtime_error(std::string(hook) + " failed: " + component_->failure());
     }
-    /// Lets pass what was written to outputs that are checked.
+    /// Publishes the values of checked outputs.
     void commit() {
         for (OutputBase* output : component_->stagedOutputs()) {
             StagedWrites& writes = staged_writes_[output];

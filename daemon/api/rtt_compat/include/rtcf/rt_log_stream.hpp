@@ -1,5 +1,5 @@
 /// @file
-/// What RtcfExtension::rtLogStream() returns.
+/// The stream of RtcfExtension::rtLogStream().
 #pragma once
 
 #include <ros/console.h>
@@ -25,8 +25,8 @@ inline const LogSite& logSite(LogLevel level) {
     return kSites.at(static_cast<std::size_t>(level) - 1);
 }
 
-/// A text in the making, logged when the statement ends. Real-time safe as far as what is written
-/// to it is.
+/// A text in the making, logged when the statement ends. Real-time safe as far as its
+/// operands are.
 class LogStream {
    public:
     /// @param component null: nothing is logged
@@ -45,7 +45,7 @@ class LogStream {
         if (component_ != nullptr) stream_ << value;
         return *this;
     }
-    // A record is a line: what would end one or flush it has nothing to do.
+    // A record is a line: std::endl and std::flush do nothing.
     LogStream& operator<<(std::ostream& (*)(std::ostream&)) noexcept { return *this; }
 
    private:

@@ -68,7 +68,7 @@ class RtcfExtension {
     }
     /// @}
 
-    /// For tests that construct a component by themselves: what it logs goes to rosconsole, under
+    /// For tests that construct a component by themselves: its log goes to rosconsole, under
     /// `ros.rtcf.<name>`. Does nothing in a loop, which has a log. Not real-time safe.
     /// @throws std::logic_error of a class that is no RTT::TaskContext
     void configureTestLogger() {

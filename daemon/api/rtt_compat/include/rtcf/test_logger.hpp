@@ -4,7 +4,6 @@
 
 #include <ros/console.h>
 
-#include <cstdint>
 #include <mutex>
 #include <string>
 
@@ -16,7 +15,7 @@ namespace rtcf::rtt_compat {
 /// rosconsole at once. Owned by the component's RtcfExtension. Not real-time safe.
 class TestLogger final : public LogSink {
    public:
-    /// @param component of whom no loop knows; outlives this
+    /// @param component one without a loop; outlives this
     TestLogger(Component& component, const std::string& name) {
         context_.full_name = "/" + name;
         context_.name = name;

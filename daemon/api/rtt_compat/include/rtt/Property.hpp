@@ -26,7 +26,7 @@ enum ExecutionThread { OwnThread, ClientThread };
 
 namespace base {
 
-/// What a component does with any of its properties.
+/// The interface of a component to its properties.
 class PropertyBase : public Described {
    public:
     virtual ~PropertyBase() = default;

@@ -102,7 +102,7 @@ class DataFlowInterface {
 
 class TaskContext;
 
-/// What provides() returns: a component has one service, itself.
+/// The result of provides(): a component has one service, itself.
 class Service : public Described {
    public:
     explicit Service(TaskContext* owner) noexcept : owner_(owner) {}
