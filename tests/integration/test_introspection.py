@@ -40,7 +40,8 @@ def _with_ros(master_uri: str, whitelist: str) -> str:
 
 
 def _node(client: rtcf.Client) -> str:
-    """Return what the loop's health is reported of."""
+    """Return the name of the registered node, under which the loop's health is reported."""
+    wait_for(lambda: client.get_status("rt_runner").runners[0].ros.connected, "the ROS node")
     return str(client.get_status("rt_runner").runners[0].ros.node).removeprefix("/")
 
 
