@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING
 
 import rtcf
@@ -99,14 +100,28 @@ def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None)
             return _run(args, output)
         finally:
             if minds:
+                signal.setitimer(signal.ITIMER_REAL, 0.0)
                 signal.signal(signal.SIGINT, signal.SIG_DFL)
     except KeyboardInterrupt:
         return _fail("interrupted; a change that had begun goes on", REFUSED)
 
 
-def _interrupt(number: int, _: object) -> None:
-    """Take Ctrl-C once: the next one ends us at once, whatever we are doing then."""
-    signal.signal(number, signal.SIG_DFL)
+# Python's import system, by whatever name its frames have.
+_IMPORTS = [sys.modules[name] for name in ("_frozen_importlib", "_frozen_importlib_external")]
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    """Take Ctrl-C once: the next one ends us at once, whatever we are doing then.
+
+    An import is finished first: an exception there is lost, or taken for a module that is missing.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    while frame is not None:
+        if any(frame.f_globals is vars(each) for each in _IMPORTS):
+            signal.signal(signal.SIGALRM, _interrupt)
+            signal.setitimer(signal.ITIMER_REAL, 0.02)
+            return
+        frame = frame.f_back
     raise KeyboardInterrupt
 
 

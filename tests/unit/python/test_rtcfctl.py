@@ -182,6 +182,39 @@ def test_ctrl_c_while_it_ends_ends_it_without_a_trace(tmp_path: Path, when: str)
     assert "Traceback" not in done.stderr and "KeyboardInterrupt" not in done.stderr
 
 
+def test_ctrl_c_in_an_import_waits_for_its_end(tmp_path: Path) -> None:
+    """What is raised there is lost, or said to be a module that is missing."""
+    command = str(BUILD_TREE / "bin" / "rtcfctl")
+    program = (
+        "import os, runpy, signal, sys\n"
+        f"sys.path.insert(0, {str(BUILD_TREE / 'python')!r})\n"
+        "class Finder:\n"
+        "    def find_spec(self, name, path, target=None):\n"
+        "        if name != 'wave':\n"
+        "            return\n"
+        "        try:\n"
+        "            os.kill(os.getpid(), signal.SIGINT)\n"
+        "            for each in range(1000): pass\n"
+        "        except KeyboardInterrupt:\n"
+        "            raise ImportError('lost')\n"
+        "sys.meta_path.insert(0, Finder())\n"
+        "import rtcf\n"
+        "class Client(rtcf.Client):\n"
+        "    def __enter__(self):\n"
+        "        import wave\n"
+        "        return super().__enter__()\n"
+        "rtcf.Client = Client\n"
+        f"sys.argv = [{command!r}, '--socket', {str(tmp_path / 'none')!r}, 'status']\n"
+        f"runpy.run_path({command!r}, run_name='__main__')\n"
+    )
+    done = subprocess.run(
+        [*MINDS_CTRL_C, sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert "lost" not in done.stderr and "Traceback" not in done.stderr, done.stderr
+    assert done.stderr.startswith("rtcfctl: ")
+    assert done.returncode in (1, 3)  # interrupted, or too late for that: no daemon is there
+
+
 def test_options_become_settings_and_nothing_else() -> None:
     line = "runner set --cpu -1 --spin 5 --overrun catch_up --no-lock-memory --whitelist a"
     args = parser().parse_args(line.split())
