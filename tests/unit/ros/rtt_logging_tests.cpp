@@ -53,6 +53,25 @@ TEST(RttLogging, AComponentOfATestLogsToRosconsole) {
                               "1 a text", "2 force 3 N", "3 by stream 0.001", "1 7 joints"}));
 }
 
+TEST(RttLogging, ComponentsOfATestLogEachToTheirOwnLogger) {
+    std::vector<std::string> loggers;
+    rtcf::executor::Log log([&loggers](rtcf::executor::LogEntry&& entry) {
+        if (loggers.empty() || loggers.back() != entry.logger) loggers.push_back(entry.logger);
+    });
+    const rtcf::ros1::ConsoleBackend backend(log);
+    Tested one("one");
+    Tested other("other");
+    one.configureTestLogger();
+    other.configureTestLogger();
+    one.say();
+    other.say();
+    one.say();
+    log.drain();
+    const std::vector<std::string> last(loggers.end() - std::min<std::ptrdiff_t>(3, loggers.size()),
+                                        loggers.end());
+    EXPECT_EQ(last, (std::vector<std::string>{"ros.rtcf.one", "ros.rtcf.other", "ros.rtcf.one"}));
+}
+
 TEST(RttLogging, ALoggersLevelIsSetForTheLoop) {
     const std::string logger = std::string(NAME_PREFIX) + "./arm/H1";
     EXPECT_FALSE(RtRosconsoleLogging::setLoggerLevel(logger, ros::console::levels::Debug));

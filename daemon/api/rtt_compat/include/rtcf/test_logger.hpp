@@ -4,6 +4,7 @@
 
 #include <ros/console.h>
 
+#include <map>
 #include <mutex>
 #include <string>
 
@@ -38,10 +39,27 @@ class TestLogger final : public LogSink {
         const auto level =
             static_cast<ros::console::Level>(static_cast<int>(record->site->level) - 1);
         mutex_.unlock();
-        ROS_LOG(level, "ros.rtcf." + context_.name, "%s", text.c_str());
+        const ros::console::LogLocation location = locationOf("ros.rtcf." + context_.name, level);
+        if (!location.logger_enabled_) return;
+        ros::console::print(nullptr, location.logger_, level, __FILE__, __LINE__, __func__, "%s",
+                            text.c_str());
     }
 
    private:
+    // As ROS_LOG has it, but one for each logger. rosconsole keeps their addresses for good.
+    static ros::console::LogLocation locationOf(const std::string& logger,
+                                                ros::console::Level level) {
+        ROSCONSOLE_AUTOINIT;
+        static std::mutex mutex;
+        static auto& locations = *new std::map<std::string, ros::console::LogLocation>;
+        const std::lock_guard<std::mutex> lock(mutex);
+        ros::console::LogLocation& location = locations[logger];
+        if (!location.initialized_) ros::console::initializeLogLocation(&location, logger, level);
+        ros::console::setLogLocationLevel(&location, level);
+        ros::console::checkLogLocationEnabled(&location);
+        return location;
+    }
+
     LoopClock clock_;
     ComponentContext context_;
     std::mutex mutex_;  // from claim() to commit()
