@@ -1,5 +1,7 @@
 #include "realtime/other_threads.hpp"
 
+#include <unistd.h>
+
 #include <filesystem>
 #include <string>
 #include <system_error>
@@ -23,6 +25,14 @@ cpu_set_t cpusWithout(int cpu) {
     return cpus;
 }
 
+// Empty if there is no such thread.
+cpu_set_t cpusOf(pid_t thread) {
+    cpu_set_t cpus;
+    CPU_ZERO(&cpus);
+    sched_getaffinity(thread, sizeof cpus, &cpus);
+    return cpus;
+}
+
 }  // namespace
 
 std::set<pid_t> processThreads() {
@@ -34,36 +44,40 @@ std::set<pid_t> processThreads() {
 }
 
 void OtherThreads::keepOff(int cpu, pid_t loop) {
-    const cpu_set_t all = cpusWithout(-1);
     const cpu_set_t others = cpusWithout(cpu);
     if (CPU_COUNT(&others) == 0) return;
-    move(narrowed_.value_or(all), others, loop);
-    narrowed_ = others;
+    move(others, loop);
+    narrowed_ = true;
 }
 
 void OtherThreads::release() {
     if (!narrowed_) return;
-    move(*narrowed_, cpusWithout(-1), 0);
-    narrowed_.reset();
+    move(cpusWithout(-1), 0);
+    narrowed_ = false;
     pinned_.clear();
 }
 
 // Whether a thread was pinned or has inherited its CPUs is not to be seen where they are the same.
-// So those that have others when threads are moved are known as pinned from then on.
-void OtherThreads::move(const cpu_set_t& from, const cpu_set_t& to, pid_t loop) {
+// So those that have others when threads are moved are known as pinned from then on. The main thread
+// runs no component, so its CPUs are those of every thread that is not pinned: the kernel takes away
+// those that go offline, or leave the process's cgroup (cpuset(7)).
+void OtherThreads::move(const cpu_set_t& to, pid_t loop) {
+    const pid_t main = getpid();
+    const cpu_set_t from = cpusOf(main);
+    if (sched_setaffinity(main, sizeof to, &to) != 0) return;  // none of them is online
+    const cpu_set_t moved_to = cpusOf(main);
     std::set<pid_t> pinned;
     bool moved = true;
     for (int pass = 0; moved && pass < kMostPasses; ++pass) {
         moved = false;
         for (const pid_t thread : processThreads()) {
-            if (thread == loop || pinned.count(thread) != 0) continue;
-            cpu_set_t present;
-            CPU_ZERO(&present);
-            if (sched_getaffinity(thread, sizeof present, &present) != 0) continue;  // it has ended
-            if (CPU_EQUAL(&present, &to) && pass > 0) continue;
+            if (thread == main || thread == loop || pinned.count(thread) != 0) continue;
+            const cpu_set_t present = cpusOf(thread);
+            if (CPU_COUNT(&present) == 0) continue;  // it has ended
+            if (CPU_EQUAL(&present, &moved_to) && pass > 0) continue;
             if (!CPU_EQUAL(&present, &from) || pinned_.count(thread) != 0) {
                 pinned.insert(thread);
-            } else if (!CPU_EQUAL(&from, &to)) {
+            } else if (!CPU_EQUAL(&from, &moved_to)) {
                 moved = sched_setaffinity(thread, sizeof to, &to) == 0 || moved;
             }
         }

@@ -7,7 +7,6 @@
 #include <sched.h>
 #include <sys/types.h>
 
-#include <optional>
 #include <set>
 
 namespace rtcf::executor {
@@ -28,10 +27,10 @@ class OtherThreads {
     void release();
 
    private:
-    void move(const cpu_set_t& from, const cpu_set_t& to, pid_t loop);
+    void move(const cpu_set_t& to, pid_t loop);
 
-    std::optional<cpu_set_t> narrowed_;  // where they are kept; unset = anywhere
-    std::set<pid_t> pinned_;             // threads that were not there when others were moved
+    bool narrowed_ = false;   // threads keep off a CPU
+    std::set<pid_t> pinned_;  // threads that were not there when others were moved
 };
 
 }  // namespace rtcf::executor

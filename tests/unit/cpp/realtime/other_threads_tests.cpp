@@ -103,6 +103,19 @@ TEST_F(OtherThreadsTest, KeepOffTheLoopsCpuAsLongAsItIsThere) {
     EXPECT_EQ(cpusOf(made_later.id), all);
 }
 
+// As the kernel takes a CPU that goes offline from all threads.
+TEST_F(OtherThreadsTest, OfAProcessThatHasLostACpuKeepOffToo) {
+    const Worker worker;
+    pin(::getpid(), last);
+    pin(worker.id, last);
+    others.keepOff(last, 0);
+    EXPECT_EQ(cpusOf(worker.id), without(last));
+    EXPECT_EQ(cpusOf(::getpid()), without(last));
+    others.release();
+    EXPECT_EQ(cpusOf(worker.id), all);
+    EXPECT_EQ(cpusOf(::getpid()), all);
+}
+
 TEST_F(OtherThreadsTest, ThatAComponentHasPinnedStayWhereTheyAre) {
     const Worker to_the_loops([this] { pin(0, last); });
     const Worker to_another([this] { pin(0, first); });
