@@ -69,12 +69,12 @@ void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles) {
     active_ = true;
 }
 
-void Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NONBLOCKING {
+bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NONBLOCKING {
     const std::int64_t begin = readCycleCounter();
     std::int64_t before = begin;
     if (exchanges_ || boundary_.waiting()) {
         before = exchange(begin, time_ns);
-        if (before == kAbandoned) return;  // the values of inputs are undefined
+        if (before == kAbandoned) return false;  // the values of inputs are undefined
     }
     const Schedule& schedule = *schedule_;
     setTimes(time_ns);
@@ -113,6 +113,7 @@ void Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     if (frames != nullptr) frames->commit(cycle, false);
     clock_.iteration = iteration + 1;
     figures_.iteration.store(iteration + 1, std::memory_order_relaxed);
+    return true;
 }
 
 // What comes before the components' turns: a change, values from outside, those of the previous
@@ -238,12 +239,17 @@ void Cycle::makeSafe(Component& component, ComponentFigures& figures, OnBadOutpu
         const HookNote note(notes_, component, Hook::Safe);
         component.safe();
     }
-    try {
-        commit(component, figures, may);
-    } catch (...) {
-        // There is no memory to copy a value: its readers keep the one before.
+    const auto keepBefore = [&](const char* text) {
+        figures.faults.unsafe.note(clock_.iteration, text);
         figures.faults.count.add(1);
         figures_.faults.add(1);
+    };
+    try {
+        commit(component, figures, may);
+    } catch (const std::exception& error) {
+        keepBefore(error.what());
+    } catch (...) {
+        keepBefore("an exception of unknown type");
     }
 }
 
@@ -308,6 +314,7 @@ bool Cycle::copyLatches() noexcept {
 // In schedule order, so that a driver's safe() reads what the controller's has written.
 void Cycle::makeSafe(std::int64_t time_ns) noexcept {
     if (!active_) return;
+    active_ = false;  // from here on a fault ends nothing
     setTimes(time_ns);
     notes_.setIteration(clock_.iteration);
     feed();
@@ -322,7 +329,6 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
         frames_->take();
         frames_->commit({clock_.iteration, clock_.stamp_ns, 0, 0}, true);
     }
-    active_ = false;
 }
 
 void Cycle::apply(Adoption& adoption) noexcept {

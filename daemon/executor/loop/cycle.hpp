@@ -79,8 +79,8 @@ class Cycle {
     /// Copies what the next cycle depends on.
     void capture(Capture& capture) noexcept;
     /// One cycle, in a turn of the figures. @param time_ns of the loop @param latency_ns of its
-    /// wake-up
-    void run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NONBLOCKING;
+    /// wake-up @return false if the loop's fault came before any component ran
+    bool run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NONBLOCKING;
     /// The last cycle: safe() in place of update(). Once until the next begin().
     void makeSafe(std::int64_t time_ns) noexcept;
     /// Takes the newest values from outside.

@@ -71,12 +71,14 @@ class FirstFault {
 struct ComponentFaults {
     FirstFault not_finite;  ///< an output that was held; its name is the text
     FirstFault taken_out;   ///< an optional component that threw
+    FirstFault unsafe;      ///< a value of safe() that could not be copied for its readers
     Counter count;          ///< of all, those that are not kept included
 
     /// While no cycle runs.
     void clear() noexcept {
         not_finite.clear();
         taken_out.clear();
+        unsafe.clear();
         count.reset();
     }
 };

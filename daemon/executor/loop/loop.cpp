@@ -89,21 +89,25 @@ RealtimeProblems Loop::start(const LoopSettings& settings, std::uint64_t stops_k
     }
 
     thread_locals_.emplace();
-    running_.store(true, std::memory_order_release);
-    joinable_.store(true, std::memory_order_release);
-    const RealtimeSettings realtime = placed(settings.realtime, problems);
-    const RealtimeAttributes attributes(realtime);
-    if (const int error = pthread_create(&thread_, attributes.get(), &Loop::threadMain, this);
-        error != 0) {
+    try {
+        const RealtimeSettings realtime = placed(settings.realtime, problems);
+        const RealtimeAttributes attributes(realtime);
+        running_.store(true, std::memory_order_release);
+        joinable_.store(true, std::memory_order_release);
+        const int error = pthread_create(&thread_, attributes.get(), &Loop::threadMain, this);
+        if (error != 0) {
+            throw Refusal(RefusalKind::NoRealtime,
+                          fmt::format("no real-time thread: {} (CPU {}, priority {})",
+                                      std::strerror(error), realtime.cpu, realtime.priority));
+        }
+    } catch (...) {
         cycle_.abandon();
         running_.store(false, std::memory_order_release);
         joinable_.store(false, std::memory_order_release);
         thread_locals_.reset();
         idle_guard_.reset();
         leaveCpu();
-        throw Refusal(RefusalKind::NoRealtime,
-                      fmt::format("no real-time thread: {} (CPU {}, priority {})",
-                                  std::strerror(error), realtime.cpu, realtime.priority));
+        throw;
     }
     return problems;
 }
@@ -177,6 +181,7 @@ RealtimeProblems Loop::retune(const LoopSettings& settings) {
     max_overruns_.store(settings.max_overruns, std::memory_order_relaxed);
     if (!joinable() || simulation_ != nullptr) return {};
     RealtimeProblems problems;
+    if (!idle_guard_->problem().empty()) problems.push_back({idle_guard_->problem(), false});
     const RealtimeSettings realtime = placed(settings.realtime, problems);
     for (RealtimeProblem& problem : applyToThread(thread_, realtime))
         problems.push_back(std::move(problem));

@@ -95,7 +95,7 @@ class Loop {
         max_overruns_.store(most, std::memory_order_relaxed);
     }
     /// New settings for a running loop (CPU, priority, spin, overrun policy); the period goes by
-    /// adopt().
+    /// adopt(). @return what its thread lacks for real time then, as start() returns it
     RealtimeProblems retune(const LoopSettings& settings);
     /// The file of a library that `library`, of dlopen(), is or links against, and of whose
     /// thread_local variables the thread that runs in real time has no memory; empty = none.

@@ -44,7 +44,7 @@ std::uint64_t Loop::step(std::uint64_t cycles, const std::atomic<bool>* given_up
     Log::setRealtimeThread(true);
     for (; done < cycles && goesOn() && wanted(); ++done) {
         const Counting::Turn turn(cycle_.figures().counting);
-        cycle_.run(nextStep(), 0);
+        if (!cycle_.run(nextStep(), 0)) break;
         // Also if a snapshot said otherwise, or the period has changed in it.
         cycle_.setElapsed(cycle_.clock().period_ns);
     }
@@ -88,7 +88,7 @@ void Loop::followRealTime() noexcept {
         noteMissed(wake_up.missed);
         const std::int64_t begin = readCycleCounter();
         const std::int64_t time = device != nullptr ? wake_up.wake_ns : wake_up.deadline_ns;
-        cycle_.run(time, wake_up.wake_ns - wake_up.deadline_ns);
+        if (!cycle_.run(time, wake_up.wake_ns - wake_up.deadline_ns)) break;
         // A device begins the next cycle itself; waitForSource() counts the beats that were missed.
         const std::int64_t limit = time + cycle_.clock().period_ns;
         end = endOfCycle(wake_up, begin, limit);

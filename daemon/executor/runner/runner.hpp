@@ -325,6 +325,7 @@ class Runner final : private RunnerView {
     std::size_t most_taps_ = SIZE_MAX;
     RunnerState state_ = RunnerState::Stopped;
     std::uint64_t job_stops_ = 0;  // Job::stops of the present one
+    RealtimeProblems memory_problems_;  // as found at the start of the present loop
     std::vector<std::string> degraded_;
     std::string status_;
     OverrunReport overrun_report_;

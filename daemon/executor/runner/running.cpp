@@ -11,9 +11,12 @@ namespace rtcf::executor {
 
 namespace {
 
-template <typename T>
-bool contains(const std::vector<T>& items, const T& item) {
-    return std::find(items.begin(), items.end(), item) != items.end();
+// Each once: the priority is looked at for the process and for its thread.
+void addTexts(RealtimeProblems problems, std::vector<std::string>& texts) {
+    for (RealtimeProblem& problem : problems) {
+        if (std::find(texts.begin(), texts.end(), problem.text) == texts.end())
+            texts.push_back(std::move(problem.text));
+    }
 }
 
 }  // namespace
@@ -33,8 +36,12 @@ void Runner::configure(RunnerSettings settings) {
     }
     tuned_spin_ns_ = -1;
     if (loop_.joinable()) {
-        for (const RealtimeProblem& problem : loop_.retune(loopSettings())) {
-            if (!contains(degraded_, problem.text)) degraded_.push_back(problem.text);
+        RealtimeProblems of_thread = loop_.retune(loopSettings());
+        if (loop_.inRealTime()) {
+            degraded_.clear();
+            addTexts(memory_problems_, degraded_);
+            addTexts(checkScheduling(settings_.loop.realtime), degraded_);
+            addTexts(std::move(of_thread), degraded_);
         }
         loop_.setMostOverruns(mostOverruns());
     }
@@ -53,8 +60,7 @@ ChangeOutcome Runner::start(const Progress& progress) {
         simulate(wantsSimulation(progress));
         progress("starting the loop");
         degraded_.clear();
-        for (RealtimeProblem& problem : lockAndStart())
-            degraded_.push_back(std::move(problem.text));
+        addTexts(lockAndStart(), degraded_);
         loop_.setMostOverruns(mostOverruns());
     } catch (...) {
         simulate(false);
@@ -84,7 +90,8 @@ RealtimeProblems Runner::lockAndStart() {
     LoopSettings settings = settings_.loop;
     settings.max_overruns = 0;  // until all is known that is missing
     if (simulated_) return loop_.start(settings, job_stops_);
-    RealtimeProblems problems = lockMemory(settings_.loop.realtime);
+    memory_problems_ = lockMemory(settings_.loop.realtime);
+    RealtimeProblems problems = memory_problems_;
     for (RealtimeProblem& problem : checkScheduling(settings_.loop.realtime))
         problems.push_back(std::move(problem));
     for (const RealtimeProblem& problem : problems) {

@@ -84,6 +84,27 @@ class VectorSource final : public rtcf::Component {
     void update() override { out.write(Eigen::Vector3d::Ones()); }
 };
 
+// Writes before the first cycle, and to a value that it found in configure().
+class Herald final : public rtcf::Component {
+    rtcf::Output<std_msgs::Float64> announced{this, "announced"};
+    rtcf::Output<std_msgs::Float64> counted{this, "counted"};
+
+    bool configure() override {
+        count_ = &counted.value().data;
+        return true;
+    }
+    bool start() override {
+        announced.value().data = 7.0;
+        announced.publish();
+        return true;
+    }
+    void update() override {
+        *count_ += 1.0;
+        counted.publish();
+    }
+    double* count_ = nullptr;
+};
+
 // Logs in every hook.
 class Chatter final : public rtcf::Component {
     rtcf::Parameter<bool> refuses{this, "refuses", false};
@@ -117,5 +138,6 @@ RTCF_COMPONENT(Ticker, "Writes in each n-th cycle")
 RTCF_COMPONENT(Spinner, "Takes time")
 RTCF_COMPONENT(Talker, "Writes values of variable size")
 RTCF_COMPONENT(VectorSource, "Writes an Eigen vector")
+RTCF_COMPONENT(Herald, "Writes before the first cycle")
 RTCF_COMPONENT(Chatter, "Logs in every hook")
 RTCF_COMPONENT(Allocator, "Allocates in update()")

@@ -48,6 +48,10 @@ class Touchy final : public rtcf::Component {
         out.value().number += gain;
         out.publish();
     }
+    void safe() noexcept override {
+        out.value().number = 0.0;
+        out.publish();
+    }
 };
 
 }  // namespace

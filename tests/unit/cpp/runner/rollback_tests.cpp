@@ -143,9 +143,44 @@ TEST_F(Rollback, NoMemoryForAnOptionalComponentsValueTakesItOut) {
                    event.message.find("std::bad_alloc; taken out") != std::string::npos;
         });
     }));
+    EXPECT_TRUE(eventually([this] {
+        const auto all = events();
+        return std::any_of(all.begin(), all.end(), [](const RunnerEvent& event) {
+            return event.message.find("no copy of a value of safe(): std::bad_alloc; readers keep "
+                                      "the value before") != std::string::npos;
+        });
+    }));
     journal().copies_throw = false;
     EXPECT_TRUE(runs());
     stop();
+}
+
+// Who reads late has a copy, which is made before the components' turns.
+TEST_F(Rollback, ACycleThatLacksMemoryBeforeItsComponentsIsNotCounted) {
+    WantedComponent writer = wanted("Touchy", "A");
+    WantedComponent reader = wanted("Touchy", "B");
+    reader.definition.remaps = {{"in", "A_out"}, {"out", "B_out"}};
+    reader.definition.breaks = {"in"};
+    apply({writer, reader});
+    EXPECT_EQ(step(3).cycles, 3U);
+    journal().copies_throw = true;
+    EXPECT_EQ(step(3).cycles, 0U);
+    journal().copies_throw = false;
+    EXPECT_EQ(iteration(), 3U);
+    EXPECT_EQ(state(), RunnerState::Faulted);
+}
+
+TEST_F(Rollback, NoMemoryInTheLastCycleIsNoFaultOfAStop) {
+    WantedComponent writer = wanted("Touchy", "A");
+    WantedComponent reader = wanted("Touchy", "B");
+    reader.definition.remaps = {{"in", "A_out"}, {"out", "B_out"}};
+    reader.definition.breaks = {"in"};
+    apply({writer, reader});
+    EXPECT_EQ(step(3).cycles, 3U);
+    journal().copies_throw = true;
+    stop();
+    journal().copies_throw = false;
+    EXPECT_EQ(state(), RunnerState::Stopped);
 }
 
 TEST_F(Rollback, NoExceptionInAChangeByRosEndsTheProcess) {

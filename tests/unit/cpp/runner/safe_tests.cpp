@@ -397,5 +397,25 @@ TEST_F(Safe, ExampleOfTheDocumentationCommandsZero) {
     EXPECT_EQ(applied(), 0.0);
 }
 
+// Readers of an optional component's outputs see a copy.
+class FirstValues : public RunnerFixture, public ::testing::WithParamInterface<bool> {};
+
+TEST_P(FirstValues, OfStartAreReadInTheFirstCycle) {
+    ComponentDefinition herald = definition("Herald", "H");
+    herald.optional = GetParam();
+    load(herald);
+    ComponentDefinition relay = definition("Relay", "R");
+    relay.remaps = {{"in", "announced"}};
+    load(relay);
+    step(1);
+    EXPECT_EQ(value("/H", "announced"), 7.0);
+    EXPECT_EQ(value("/H", "counted"), 1.0);
+    EXPECT_EQ(value("/R", "out"), 8.0);
+    step(2);
+    EXPECT_EQ(value("/H", "counted"), 3.0) << "by a reference from configure()";
+}
+
+INSTANTIATE_TEST_SUITE_P(Safe, FirstValues, ::testing::Bool());
+
 }  // namespace
 }  // namespace rtcf::test

@@ -22,7 +22,7 @@ ComponentDefinition definition(const std::string& type, const std::string& name)
     return result;
 }
 
-RunnerFixture::RunnerFixture()
+RunnerFixture::RunnerFixture(std::string cpu_claims)
     : log_([this](LogEntry&& entry) {
           const std::lock_guard<std::mutex> lock(mutex_);
           logged_.push_back(std::move(entry));
@@ -35,7 +35,7 @@ RunnerFixture::RunnerFixture()
             const std::lock_guard<std::mutex> lock(mutex_);
             events_.push_back(event);
         },
-        std::make_unique<BridgeKeeper>(bridge_), recorder_);
+        std::make_unique<BridgeKeeper>(bridge_), recorder_, std::move(cpu_claims));
     configure([](RunnerSettings& settings) {
         settings.loop.realtime.lock_memory = false;
         settings.loop.realtime.heap_bytes = 0;

@@ -64,7 +64,8 @@ class Pending {
 
 class RunnerFixture : public ::testing::Test {
    protected:
-    RunnerFixture();
+    /// @param cpu_claims folder of the claims of CPUs; empty = other loops are not known of
+    explicit RunnerFixture(std::string cpu_claims = {});
     ~RunnerFixture() override;
 
     /// Runs `work` on the graph thread. @throws what it throws

@@ -1,0 +1,48 @@
+// What a loop lacks for real time on the CPU that it has.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "realtime/cpu_claim.hpp"
+#include "support/runner_fixture.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace rtcf::test {
+namespace {
+
+// Before the fixture, which works with it.
+class ClaimsFolder {
+   protected:
+    TemporaryFolder temporary_;
+    const std::string folder_ = temporary_.path("");
+};
+
+class Placement : protected ClaimsFolder, public RunnerFixture {
+   protected:
+    Placement() : RunnerFixture(folder_) {}
+    bool lacks(const std::string& text) {
+        const std::vector<std::string> degraded = runner().picture().degraded;
+        return std::any_of(degraded.begin(), degraded.end(), [&](const std::string& each) {
+            return each.find(text) != std::string::npos;
+        });
+    }
+};
+
+TEST_F(Placement, ThatIsMendedWhileTheLoopRunsIsNotLackedAnyMore) {
+    if (executor::processCpus().size() < 2) GTEST_SKIP() << "one CPU";
+    const int shared = executor::processCpus().back();
+    const executor::CpuClaim other(shared, folder_);
+    configure([&](RunnerSettings& settings) { settings.loop.realtime.cpu = shared; });
+    load(definition("Ticker", "A"));
+    start();
+    EXPECT_TRUE(lacks("has another loop"));
+    configure([](RunnerSettings& settings) {
+        settings.loop.realtime.cpu = executor::processCpus().front();
+    });
+    EXPECT_FALSE(lacks("has another loop"));
+    EXPECT_TRUE(lacks("memory is not locked")) << "as it was at the start";
+    EXPECT_TRUE(runs());
+}
+
+}  // namespace
+}  // namespace rtcf::test
