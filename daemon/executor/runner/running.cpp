@@ -159,6 +159,7 @@ void Runner::loopEnded() {
 }
 
 void Runner::startAll(const Progress& progress) {
+    told_not_finite_ = {};
     std::vector<Instance*> started;
     try {
         for (const std::size_t index : plan_->wiring.order) {

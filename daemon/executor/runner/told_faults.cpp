@@ -26,8 +26,7 @@ std::uint64_t ToldFaults::told(const std::shared_ptr<ComponentFigures>& of, std:
     silence.until_ns = now_ns + silence.length_ns;
     silence.over = false;
     const std::uint64_t before = std::exchange(silence.count, count);
-    // Fewer: another loop has begun.
-    return is_new || count < before ? 0 : count - before;
+    return is_new ? 0 : count - before;
 }
 
 void ToldFaults::rearm(std::int64_t now_ns) {

@@ -173,6 +173,30 @@ TEST_F(Fault, NoFaultIsLostInAFloodOfOthers) {
     EXPECT_EQ(state(), RunnerState::Running);
 }
 
+TEST_F(Fault, OfALoopBeforeAreNotCounted) {
+    ComponentDefinition flooding = definition("Controller", "N");
+    flooding.parameters = {{"nan_from", std::int64_t{0}}};
+    load(flooding);
+    const auto told = [this] {
+        std::vector<std::string> found;
+        for (const RunnerEvent& event : events()) {
+            if (event.message.find("is not finite") != std::string::npos)
+                found.push_back(event.message);
+        }
+        return found;
+    };
+    start();
+    ASSERT_TRUE(eventually([&] { return told().size() == 1; }));
+    stop();
+    // More of them than the first loop had, before the graph thread takes the first.
+    onGraphThread([this] {
+        runner().start([](const std::string&) {});
+        return eventually([this] { return iteration() > 400; });
+    });
+    ASSERT_TRUE(eventually([&] { return told().size() == 2; }));
+    EXPECT_EQ(told()[1].find("since this was told before"), std::string::npos) << told()[1];
+}
+
 TEST_F(Fault, LongExceptionTextIsCut) {
     // The text of Recorder is short; the culprit's name makes the message long.
     const std::string name = "B" + std::string(230, 'b');
