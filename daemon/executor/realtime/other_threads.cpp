@@ -58,9 +58,9 @@ void OtherThreads::release() {
 }
 
 // Whether a thread was pinned or has inherited its CPUs is not to be seen where they are the same.
-// So those that have others when threads are moved are known as pinned from then on. The main thread
-// runs no component, so its CPUs are those of every thread that is not pinned: the kernel takes away
-// those that go offline, or leave the process's cgroup (cpuset(7)).
+// So those that have others when threads are moved are known as pinned from then on. The main
+// thread runs no component, so its CPUs are those of every thread that is not pinned: the kernel
+// takes away those that go offline, or leave the process's cgroup (cpuset(7)).
 void OtherThreads::move(const cpu_set_t& to, pid_t loop) {
     const pid_t main = getpid();
     const cpu_set_t from = cpusOf(main);

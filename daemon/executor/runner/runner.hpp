@@ -324,7 +324,7 @@ class Runner final : private RunnerView {
     std::set<std::string> written_;  // mapped names with inputs that writeInput() feeds
     std::size_t most_taps_ = SIZE_MAX;
     RunnerState state_ = RunnerState::Stopped;
-    std::uint64_t job_stops_ = 0;  // Job::stops of the present one
+    std::uint64_t job_stops_ = 0;       // Job::stops of the present one
     RealtimeProblems memory_problems_;  // as found at the start of the present loop
     std::vector<std::string> degraded_;
     std::string status_;

@@ -67,8 +67,8 @@ TEST(RttLogging, ComponentsOfATestLogEachToTheirOwnLogger) {
     other.say();
     one.say();
     log.drain();
-    const std::vector<std::string> last(loggers.end() - std::min<std::ptrdiff_t>(3, loggers.size()),
-                                        loggers.end());
+    ASSERT_GE(loggers.size(), 3U);
+    const std::vector<std::string> last(loggers.end() - 3, loggers.end());
     EXPECT_EQ(last, (std::vector<std::string>{"ros.rtcf.one", "ros.rtcf.other", "ros.rtcf.one"}));
 }
 

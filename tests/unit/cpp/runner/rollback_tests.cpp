@@ -146,8 +146,9 @@ TEST_F(Rollback, NoMemoryForAnOptionalComponentsValueTakesItOut) {
     EXPECT_TRUE(eventually([this] {
         const auto all = events();
         return std::any_of(all.begin(), all.end(), [](const RunnerEvent& event) {
-            return event.message.find("no copy of a value of safe(): std::bad_alloc; readers keep "
-                                      "the value before") != std::string::npos;
+            return event.message.find(
+                       "no copy of a value of safe(): std::bad_alloc; readers keep "
+                       "the value before") != std::string::npos;
         });
     }));
     journal().copies_throw = false;
