@@ -115,9 +115,7 @@ def test_a_bag_has_the_messages_with_their_stamps(running: Daemon, recorded: Pat
         for name in ("/wave/phase", "/wave/wave", "/wave/above", "/mimo/out1"):
             found = [(time.to_nsec(), message.data) for _, message, time in bag.read_messages(name)]
             column = recording.read(name.replace("/", ".").replace(".", "/", 1))
-            assert found == list(
-                zip(column.stamps_ns.tolist(), column.values.tolist(), strict=True)
-            ), name
+            assert found == list(zip(column.stamps_ns, column.values, strict=True)), name
         cycles = [each.message.iteration for each in bag.read_messages("/rt_runner/cycles")]
         assert cycles == recording.cycles.tolist()
 
@@ -204,7 +202,8 @@ def test_a_recording_of_somebody_else_has_no_lines(running: Daemon, tmp_path: Pa
 def test_without_rosbag_it_is_said_what_to_install(
     recorded: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(sys.modules, "rosbag", None)  # type: ignore[misc]
+    modules: Any = sys.modules
+    monkeypatch.setitem(modules, "rosbag", None)
     with (
         rtcf.read_recording(recorded) as recording,
         pytest.raises(

@@ -1,17 +1,21 @@
 """`rtcfctl metrics` and `rtcfctl stats --plot`: figures for Prometheus, and as a picture."""
 
+import importlib
 import socket
 import subprocess
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 import rtcf
 from daemon_process import Daemon, wait_for
-from prometheus_client.parser import text_string_to_metric_families
 from values import iteration
+
+# Untyped, in some releases.
+_PARSER: Any = importlib.import_module("prometheus_client.parser")
 
 Samples = dict[tuple[str, frozenset[tuple[str, str]]], float]
 
@@ -20,7 +24,7 @@ def samples(text: str) -> Samples:
     """Read what an independent reader of the format reads."""
     return {
         (sample.name, frozenset(sample.labels.items())): sample.value
-        for family in text_string_to_metric_families(text)  # type: ignore[no-untyped-call]
+        for family in _PARSER.text_string_to_metric_families(text)
         for sample in family.samples
     }
 

@@ -257,7 +257,7 @@ def _cycles(*files: Path) -> list[int]:
     found: list[int] = []
     for file in files:
         with rtcf.read_recording(file) as recording:
-            found += recording.cycles.tolist()
+            found += [int(cycle) for cycle in recording.cycles]
     return found
 
 

@@ -8,6 +8,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from rtcf_shared.arrays import as_list
 from rtcf_shared.whole_file import whole_file
 
 from rtcf.recording import bags
@@ -58,8 +59,8 @@ def _write_csv(recording: Recording, file: BinaryIO) -> Iterator[int]:
     writer.writerow(head)
     for chunk in range(recording.chunks):
         first, *others = (recording.read_cycles(name, chunk) for name in _CYCLE)
-        columns = [first.values.tolist(), first.stamps_ns.tolist()]
-        columns += [other.values.tolist() for other in others]
+        columns = [as_list(first.values), as_list(first.stamps_ns)]
+        columns += [as_list(other.values) for other in others]
         for name in recording.signals:
             columns += _cells(recording.read(name, chunk=chunk), first)
         writer.writerows(zip(*columns, strict=True))
@@ -77,9 +78,9 @@ def _cells(column: RecordedColumn, cycles: RecordedColumn) -> list[list[Any]]:
     if np.array_equal(column.cycles, cycles.values):
         return shown
     # A number alone may come again, after the loop was started anew.
-    keys = zip(cycles.values.tolist(), cycles.stamps_ns.tolist(), strict=True)
+    keys = zip(as_list(cycles.values), as_list(cycles.stamps_ns), strict=True)
     line = {key: number for number, key in enumerate(keys)}
-    keys = zip(column.cycles.tolist(), column.stamps_ns.tolist(), strict=True)
+    keys = zip(as_list(column.cycles), as_list(column.stamps_ns), strict=True)
     lines = [line.get(key) for key in keys]
     aligned = []
     for cells in shown:
@@ -94,8 +95,8 @@ def _cells(column: RecordedColumn, cycles: RecordedColumn) -> list[list[Any]]:
 def _shown(values: "NDArray[Any]") -> list[Any]:
     """Return numbers as the shortest text that is read as the same number; truth as 0 and 1."""
     if values.dtype == bool:
-        return values.astype(int).tolist()  # type: ignore[no-any-return]
-    return (values.astype(str) if values.dtype.itemsize == 4 else values).tolist()  # type: ignore[no-any-return]
+        return as_list(values.astype(int))
+    return as_list(values.astype(str) if values.dtype.itemsize == 4 else values)
 
 
 def _write_bag(recording: Recording, file: BinaryIO) -> Iterator[int]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rtcf_shared.arrays import as_list
 from rtcf_shared.errors import RtcfError
 
 from rtcf.closing import Closing
@@ -161,7 +162,7 @@ class Recording(Closing):
         with self._whole_only():
             for number in self._chunks[chunk].offsets:
                 topic = self._channels[number]
-                index = self._index(self._chunks[chunk], number).tolist()
+                index = as_list(self._index(self._chunks[chunk], number))
                 found += [(time, at, topic) for time, at in index]
             found.sort(key=lambda each: each[:2])
             records = self._records(chunk)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import rtcf_shared.spec
+from rtcf_shared.arrays import as_list
 from rtcf_shared.errors import RtcfError
 from rtcf_shared.graph_reader import Graph, read_graphs
 from rtcf_shared.naming import listing, suggestion
@@ -196,7 +197,7 @@ class Bench(Closing):
             masked = np.zeros(steps, bool)
             for column in fields.values():
                 masked |= _MASKED.getmaskarray(column).reshape(steps, -1).any(axis=1)
-            for cycle in np.flatnonzero(~masked).tolist():
+            for cycle in as_list(np.flatnonzero(~masked)):
                 # A bit early: no rounding puts it off to the next cycle.
                 time_ns = self._at(cycle) - self._period_ns // 2
                 found[cycle].append(
@@ -215,7 +216,8 @@ class Bench(Closing):
             cycles, data = by_topic.setdefault(each.topic, ([], []))
             cycles.append(round((each.time_ns - _START_NS) / self._period_ns))
             data.append(each.data)
-        written, columns = {}, {}
+        written: dict[str, npt.NDArray[np.bool_]] = {}
+        columns: dict[str, npt.NDArray[np.generic]] = {}
         for name, topic in self._ports(graph_pb2.DIRECTION_OUTPUT).items():
             written[name] = np.zeros(steps, bool)
             if topic not in by_topic:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +19,7 @@ class Response(Mapping[str, npt.NDArray[np.generic]]):
 
     def __init__(
         self,
-        time: npt.NDArray[np.float64],
+        time: npt.NDArray[np.floating[Any]],
         written: dict[str, npt.NDArray[np.bool_]],
         columns: dict[str, npt.NDArray[np.generic]],
     ) -> None:

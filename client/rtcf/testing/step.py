@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -62,7 +63,9 @@ def step_response(
     )
 
 
-def _first(time: npt.NDArray[np.float64], share: npt.NDArray[np.float64], level: float) -> float:
+def _first(
+    time: npt.NDArray[np.float64], share: npt.NDArray[np.floating[Any]], level: float
+) -> float:
     """When `share` reaches `level` first, between two samples by a straight line."""
     after = int(np.argmax(share >= level))
     if after == 0:

@@ -13,6 +13,7 @@ from typing import IO, Any
 
 import rtcf
 from rtcf.v1 import incidents_pb2
+from rtcf_shared.arrays import as_list
 from rtcf_shared.whole_file import whole_file
 
 from rtcfctl.terminal.output import Output
@@ -168,9 +169,9 @@ def _told(incident: incidents_pb2.Incident, recording: "rtcf.Recording") -> dict
         "last_cycles": [
             {"cycle": int(cycle), "duration_us": duration / 1e3, "latency_us": latency / 1e3}
             for cycle, duration, latency in zip(
-                cycles[last].tolist(),
-                recording.durations_ns[last].tolist(),
-                recording.latencies_ns[last].tolist(),
+                as_list(cycles[last]),
+                as_list(recording.durations_ns[last]),
+                as_list(recording.latencies_ns[last]),
                 strict=True,
             )
         ],

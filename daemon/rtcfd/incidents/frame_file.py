@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import ports_pb2
+from rtcf_shared.arrays import as_list
 
 from rtcfd.incidents import frame_layout
 
@@ -92,7 +93,7 @@ class Ring:
         """Return all cycles, as a stream would tell: each batch without a gap."""
         cycles, last = self.cycles, self.last_of_loop
         gaps = (np.diff(cycles) != 1) | last[:-1]
-        ends: list[int] = (np.flatnonzero(gaps) + 1).tolist()
+        ends: list[int] = as_list(np.flatnonzero(gaps) + 1)
         bounds = [0, *ends, len(cycles)]
         return [self._batch(*pair) for pair in itertools.pairwise(bounds)]
 
@@ -101,9 +102,9 @@ class Ring:
         return ports_pb2.PortBatch(
             first_cycle=int(self.cycles[begin]) if end > begin else 0,
             last_of_loop=bool(end > begin and self.last_of_loop[end - 1]),
-            stamps_ns=self.stamps_ns[part].tolist(),
-            latencies_ns=self.latencies_ns[part].tolist(),
-            durations_ns=self.durations_ns[part].tolist(),
+            stamps_ns=as_list(self.stamps_ns[part]),
+            latencies_ns=as_list(self.latencies_ns[part]),
+            durations_ns=as_list(self.durations_ns[part]),
             values=[
                 self._values(value, part)
                 for value in self.layout.values

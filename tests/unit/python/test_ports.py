@@ -13,6 +13,7 @@ from rtcf.recording.mcap_writer import McapWriter
 from rtcf.recording.recorder import Recorder
 from rtcf.streams.ports import PortBatch, PortSchema, schema_of
 from rtcf.v1 import ports_pb2
+from rtcf_shared.arrays import as_list
 from rtcfctl.signals import echo
 from rtcfctl.terminal.output import Output
 
@@ -65,17 +66,17 @@ def test_arrays_of_bytes_are_read_byte_by_byte(tmp_path: Path) -> None:
     for type_name, expected in cases:
         data = (expected.swapaxes(1, 2) if expected.ndim == 3 else expected).tobytes()
         told = batch(schema(state(type_name, len(data) // 2)), 0, data)
-        assert told["/c.s"].tolist() == expected.tolist(), type_name
+        assert as_list(told["/c.s"]) == expected.tolist(), type_name
         with recorded(tmp_path / "x.mcap", told) as recording:
-            assert recording["/c.s"].tolist() == expected.reshape(2, -1).tolist(), type_name
+            assert as_list(recording["/c.s"]) == expected.reshape(2, -1).tolist(), type_name
 
 
 def test_a_matrix_that_lies_row_by_row_is_not_transposed(tmp_path: Path) -> None:
     expected = np.arange(12, dtype="u1").reshape(2, 2, 3)
     told = batch(schema(state("uint8[2x3,RowMajor]", 6)), 0, expected.tobytes())
-    assert told["/c.s"].tolist() == expected.tolist()
+    assert as_list(told["/c.s"]) == expected.tolist()
     with recorded(tmp_path / "x.mcap", told) as recording:
-        assert recording["/c.s"].tolist() == expected.reshape(2, -1).tolist()
+        assert as_list(recording["/c.s"]) == expected.reshape(2, -1).tolist()
 
 
 def test_an_output_and_a_state_of_one_name_are_both_there(tmp_path: Path) -> None:
@@ -85,11 +86,11 @@ def test_an_output_and_a_state_of_one_name_are_both_there(tmp_path: Path) -> Non
             np.array([1.0, 2.0] if column is made else [3.0, 4.0]).tobytes() for column in columns
         ]
         told = batch(schema(*columns), 0, *values)
-        assert told["/c.s"].tolist() == [1.0, 2.0]
-        assert told["/c.s[state]"].tolist() == [3.0, 4.0]
+        assert as_list(told["/c.s"]) == [1.0, 2.0]
+        assert as_list(told["/c.s[state]"]) == [3.0, 4.0]
         with recorded(tmp_path / "x.mcap", told) as recording:
-            assert recording["/c.s"].tolist() == [1.0, 2.0]
-            assert recording["/c.s[state]"].tolist() == [3.0, 4.0]
+            assert as_list(recording["/c.s"]) == [1.0, 2.0]
+            assert as_list(recording["/c.s[state]"]) == [3.0, 4.0]
 
 
 def test_numbers_of_cycles_are_whole_however_long_a_loop_runs(tmp_path: Path) -> None:

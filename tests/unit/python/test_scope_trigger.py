@@ -41,9 +41,10 @@ def test_it_hits_the_same_cycles_however_they_come(kind: str) -> None:
     whole = Search(trigger).hits(values).tolist()
     assert whole
     for size in (1, 7, 64):
-        search, found = Search(trigger), []
+        search = Search(trigger)
+        found: list[int] = []
         for at in range(0, len(values), size):
-            found += (search.hits(values[at : at + size]) + at).tolist()
+            found += [int(hit) + at for hit in search.hits(values[at : at + size])]
         assert found == whole
 
 
@@ -52,9 +53,10 @@ def test_a_condition_hits_where_it_becomes_true(size: int) -> None:
     trigger = parse(_BASE | {"kind": "condition", "condition": "a.x > 1 and not b.y"})
     assert trigger.signals == ["/a.x", "/b.y"]
     x, y = np.array([2.0, 2, 0, 2, 2, 2, _NAN, 2]), np.array([0.0, 0, 0, 0, 1, 0, 0, 0])
-    search, found = Search(trigger), []
+    search = Search(trigger)
+    found: list[int] = []
     for at in range(0, len(x), size):
-        found += (search.hits(x[at : at + size], y[at : at + size]) + at).tolist()
+        found += [int(hit) + at for hit in search.hits(x[at : at + size], y[at : at + size])]
     # Not in the first cycle: nobody knows whether it was true before.
     assert found == [3, 5, 7]
 
