@@ -162,9 +162,10 @@ def test_loops_come_back_but_for_what_has_to_be_built_anew(
     assert "2.5" in said
     assert _status(service, "idle") == ("stopped", 1)
 
-    assert _status(service, "arm") == ("running", 1)
-    why = [line for line in service.ctl("-r", "arm", "status").stdout.splitlines()
-           if "left out" in line]  # fmt: skip
+    assert _status(service, "arm") == ("faulted", 1)
+    said = service.ctl("-r", "arm", "status").stdout
+    assert "not resumed: runner arm: left out of its loop: /offset (" in said
+    why = [line for line in said.splitlines() if "is left out: " in line]
     assert len(why) == 1
     assert "offset is left out: " in why[0]
     assert "was built for component ABI" in why[0]
@@ -174,4 +175,5 @@ def test_loops_come_back_but_for_what_has_to_be_built_anew(
 
     older.shell(_BUILD + "cmake --install /srv/build")
     service.ctl("-r", "arm", "release", "offset")
+    service.ctl("-r", "arm", "start")
     assert _status(service, "arm") == ("running", 2)

@@ -5,15 +5,15 @@ Functions on a RunnerCore; each runs in a turn of it, except recover().
 """
 
 import time
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+from rtcf.v1 import control_pb2, errors_pb2, graph_pb2, runner_pb2
 from rtcf_shared.graph_writer import live_spec
 from rtcf_shared.naming import listing
 
 from rtcfd.catalog.catalog import loads
-from rtcfd.common.refusals import InvalidArgument, Refusal
+from rtcfd.common.refusals import FailedPrecondition, InvalidArgument, Refusal
 from rtcfd.operations.loop import start_in_turn
 from rtcfd.operations.runner_core import RunnerCore
 from rtcfd.recovery.follow import follow_components, follow_settings
@@ -32,6 +32,7 @@ async def bring_up(runner: RunnerCore, only_left_over: bool = False, boot: bool 
     """Adopt the executor that is there, or start one (unless `only_left_over`), and load the
     components; held, or at `boot` as `on_boot` says.  Tell whether there is one."""
     asked, stopped_at_ns = runner.loop.stops, runner.loop.stopped_at_ns
+    agreed = set(runner.left_out) if runner.loop.wanted else set()
     adopted = await runner.take_executor(only_left_over)
     if adopted is None:
         return False
@@ -47,7 +48,7 @@ async def bring_up(runner: RunnerCore, only_left_over: bool = False, boot: bool 
     else:
         await _restore(runner)
     if boot:
-        await _start_at_boot(runner, asked)
+        await _start_at_boot(runner, asked, agreed)
     runner.tell()
     return True
 
@@ -130,8 +131,11 @@ async def _restore(runner: RunnerCore) -> None:
         await runner.save()
 
 
-async def _start_at_boot(runner: RunnerCore, asked: int) -> None:
-    """At the start of rtcfd: start a loop that is to run, as `on_boot` says."""
+async def _start_at_boot(runner: RunnerCore, asked: int, agreed: set[str]) -> None:
+    """At the start of rtcfd: start a loop that is to run, as `on_boot` says.
+
+    `agreed`: the components that it ran without before.
+    """
     if runner.loop.running or not runner.up:
         return
     on_boot = runner.settings().on_boot
@@ -140,6 +144,7 @@ async def _start_at_boot(runner: RunnerCore, asked: int) -> None:
     ):
         word = "resumed" if runner.loop.wanted else "started"
         try:
+            require_whole(runner, agreed)
             await start_in_turn(runner, asked)
             runner.log.info("loop %s", word)
             return
@@ -169,7 +174,7 @@ async def recover(runner: RunnerCore, verdict: Verdict, crashes: Crashes, troubl
         if not runner.up:
             return  # that one died too: its own recovery follows
         not_resumed = ""
-        missing = [name for name in missing_components(runner) if name not in agreed]
+        missing = _missing(runner, agreed)
         if runner.loop.wanted and missing:
             not_resumed = f"; not resumed: left out of its loop: {listing(missing)}"
             runner.loop.want(False)
@@ -190,13 +195,28 @@ async def recover(runner: RunnerCore, verdict: Verdict, crashes: Crashes, troubl
             _give_up(runner, f"{trouble}; not recovered: {refusal}")
 
 
-def missing_components(runner: RunnerCore) -> list[str]:
-    """Return the components that are left out and not optional."""
+def require_whole(runner: RunnerCore, agreed: Container[str]) -> None:
+    """Refuse to run cycles without a component that is neither optional nor `agreed` on."""
+    missing = _missing(runner, agreed)
+    if not missing:
+        return
+    first = missing[0]
+    words = " ".join(f"--without {name}" for name in missing)
+    raise FailedPrecondition(
+        f"runner {runner.name}: left out of its loop: {listing(missing)} ({first}: "
+        f"{runner.left_out[first]}): `rtcfctl -r {runner.name} release {first}` loads it again, "
+        f"`rtcfctl -r {runner.name} start {words}` goes on without",
+        errors_pb2.REASON_COMPONENT_LEFT_OUT,
+        component=first,
+    )
+
+
+def _missing(runner: RunnerCore, agreed: Container[str]) -> list[str]:
     components = runner.desired.components
     return [
         name
         for name in sorted(runner.left_out)
-        if name in components and not components[name].optional
+        if name in components and not components[name].optional and name not in agreed
     ]
 
 

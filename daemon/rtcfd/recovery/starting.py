@@ -13,11 +13,11 @@ from rtcf.v1 import control_pb2, errors_pb2
 from rtcf_shared.naming import listing
 
 from rtcfd.common.names import absolute
-from rtcfd.common.refusals import FailedPrecondition, NotFound, Refusal
+from rtcfd.common.refusals import NotFound, Refusal
 from rtcfd.executor.link import Progress
 from rtcfd.operations.loop import asked_now, require_no_stop, start_in_turn
 from rtcfd.operations.runner_core import RunnerCore
-from rtcfd.recovery.bring_up import bring_up, missing_components
+from rtcfd.recovery.bring_up import bring_up, require_whole
 
 
 async def start(
@@ -31,7 +31,7 @@ async def start(
         require_no_stop(runner, asked)
         await _need_executor(runner, progress)
         if not runner.loop.running:
-            _require_whole(runner, request)
+            _require_complete(runner, request)
         result = await start_in_turn(runner, asked, progress)
         runner.log.info("loop started")
         for name, reason in sorted(runner.left_out.items()):
@@ -95,7 +95,7 @@ async def replay(
     return await runner.change("a replay", work, timeout_s=None, runs_cycles=True)
 
 
-def _require_whole(runner: RunnerCore, request: control_pb2.StartRequest) -> None:
+def _require_complete(runner: RunnerCore, request: control_pb2.StartRequest) -> None:
     """Refuse to run cycles without a component, unless the request allows its absence."""
     without = {absolute(name) for name in request.without}
     if unknown := sorted(without - runner.left_out.keys()):
@@ -106,18 +106,8 @@ def _require_whole(runner: RunnerCore, request: control_pb2.StartRequest) -> Non
             errors_pb2.REASON_COMPONENT_NOT_LEFT_OUT,
             component=unknown[0],
         )
-    missing = [name for name in missing_components(runner) if name not in without]
-    if not missing or request.partial:
-        return
-    first = missing[0]
-    words = " ".join(f"--without {name}" for name in missing)
-    raise FailedPrecondition(
-        f"runner {runner.name}: left out of its loop: {listing(missing)} ({first}: "
-        f"{runner.left_out[first]}): `rtcfctl -r {runner.name} release {first}` loads it again, "
-        f"`rtcfctl -r {runner.name} start {words}` goes on without",
-        errors_pb2.REASON_COMPONENT_LEFT_OUT,
-        component=first,
-    )
+    if not request.partial:
+        require_whole(runner, without)
 
 
 async def _need_executor(runner: RunnerCore, progress: Progress) -> None:

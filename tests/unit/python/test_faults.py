@@ -188,6 +188,14 @@ def test_many_crashes_hold_the_loop_and_then_end_the_attempts(
     assert running.get_order() == ["/bad", "/good"]
 
 
+def restart_both(daemon: DaemonUnderTest) -> None:
+    """Start rtcfd again after it and its executor were killed."""
+    pid = daemon.executor_pid()
+    daemon.end(signal.SIGKILL)
+    wait_for(lambda: not is_alive(pid), "the end of the executor")
+    daemon.start()
+
+
 @pytest.mark.parametrize(
     ("policy", "stopped", "expected"),
     [
@@ -209,12 +217,28 @@ def test_a_loop_after_a_restart_of_both(
     running.set_runner(runner_pb2.RunnerSettings(on_boot=policy))
     if stopped:
         running.stop()
-    pid = daemon.executor_pid()
-    daemon.end(signal.SIGKILL)
-    wait_for(lambda: not is_alive(pid), "the end of the executor")
-    daemon.start()
+    restart_both(daemon)
     with daemon.client() as again:
         assert state(again).state == expected
+
+
+def test_a_loop_is_not_started_at_boot_without_a_component_unless_it_ran_without_it(
+    daemon: DaemonUnderTest, running: rtcf.Client
+) -> None:
+    daemon.package("gone", types={"Gone": "fine"})
+    running.load(rtcf.component("gone", "Gone"))
+    running.set_runner(runner_pb2.RunnerSettings(on_boot=runner_pb2.ON_BOOT_RESUME))
+    (daemon.packages / "gone" / "main.so").unlink()
+    restart_both(daemon)
+    with daemon.client() as again:
+        status = state(again)
+        assert status.state == runner_pb2.RUNNER_STATE_FAULTED
+        assert "not resumed: runner rt_runner: left out of its loop: /Gone (" in status.status
+        assert "`rtcfctl -r rt_runner start --without /Gone` goes on without" in status.status
+        again.start(without=["Gone"])
+    restart_both(daemon)
+    with daemon.client() as again:
+        assert state(again).state == runner_pb2.RUNNER_STATE_RUNNING
 
 
 def test_a_flight_recorder_is_read_through_proc_and_after_its_end() -> None:
