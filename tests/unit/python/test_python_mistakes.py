@@ -61,6 +61,17 @@ IN_UPDATE = {
     "print": ("print(self.n)", "printing calls the system"),
     "undeclared attribute": ("self.sum = 1.0", "is not declared"),
     "undefined name": ("self.n = sum_of", "sum_of is not defined"),
+    "variable without a value": (
+        "if self.on:\n            a = 1.0\n        self.y.write(a)",
+        "a has no value on every way here",
+    ),
+    "variable of a loop": (
+        "for i in range(self.n):\n            a = 1.0\n        self.y.write(a)",
+        "a has no value on every way here",
+    ),
+    "range of a float": ("for i in range(self.kp):\n            self.n += i", "range of a float"),
+    "result as an argument": ("np.add(self.z, 1.0, self.z)", "add has an argument too many"),
+    "function of an array": ("a = round(self.z)", "int of a vector"),
     "parameter set": ("self.kp = 2.0", "a parameter is set from outside"),
     "input set": ("self.u = 2.0", "is an Input"),
     "port as value": ("self.y.write(self.u)", "is an Input"),

@@ -1,13 +1,15 @@
 """The helpers as numba compiles them. Imported only where something is compiled."""
 
 import functools
+import math
+import operator
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numba import types
 from numba.core.errors import TypingError
-from numba.extending import overload
+from numba.extending import overload, register_jitable
 from numba.np.numpy_support import as_dtype
 
 from rtcf_compile.rewriting import helpers
@@ -23,12 +25,12 @@ def _compiled_as(helper: Callable[..., Any]) -> Callable[[Callable[..., Any]], N
         choose.__annotations__ = {}
 
         @functools.wraps(choose)
-        def plain(*types_of: Any, **named: Any) -> Any:
+        def typed(*types_of: Any, **named: Any) -> Any:
             implementation = choose(*types_of, **named)
             implementation.__annotations__ = {}
             return implementation
 
-        overload(helper, jit_options=_OPTIONS)(plain)
+        overload(helper, jit_options=_OPTIONS)(typed)
 
     return register
 
@@ -124,44 +126,253 @@ def _assign(target: Any, value: Any) -> Any:
     if isinstance(new, types.Float) and not isinstance(target.dtype, types.Float):
         raise TypingError(f"RTCF:elements of {target.dtype} are set to {new}:round them first")
     if isinstance(value, types.Number | types.Boolean):
-        if target.ndim == 1:
-
-            def fill(target: Any, value: Any) -> None:
-                for i in range(target.shape[0]):
-                    target[i] = value
-
-            return fill
-
-        def fill_all(target: Any, value: Any) -> None:
-            for i in range(target.shape[0]):
-                for j in range(target.shape[1]):
-                    target[i, j] = value
-
-        return fill_all
+        return _filling(target.ndim)
     if isinstance(value, types.UniTuple | types.Tuple) and target.ndim == 1:
         return lambda target, value: helpers.rtcf_assign(target, np.array(value))
-    if not isinstance(value, types.Array) or value.ndim != target.ndim:
+    if not isinstance(value, types.Array) or value.ndim > target.ndim:
         raise TypingError(
             f"RTCF:{_words(target)} is set to {_words(value)}:it takes an array of its shape"
         )
-    if target.ndim == 1:
+    copying = _copying(target.ndim, value.ndim)
 
-        def vector(target: Any, value: Any) -> None:
-            if target.shape[0] != value.shape[0]:
-                raise ValueError("an array is set to one of another shape")
+    def assign(target: Any, value: Any) -> None:
+        if _shares(target, value):
+            copying(target, value.copy())
+        else:
+            copying(target, value)
+
+    return assign
+
+
+def _filling(dimensions: int) -> Any:
+    if dimensions == 1:
+
+        def fill(target: Any, value: Any) -> None:
             for i in range(target.shape[0]):
-                target[i] = value[i]
+                target[i] = value
 
-        return vector
+        return fill
 
-    def matrix(target: Any, value: Any) -> None:
-        if target.shape[0] != value.shape[0] or target.shape[1] != value.shape[1]:
+    def fill_all(target: Any, value: Any) -> None:
+        for i in range(target.shape[0]):
+            for j in range(target.shape[1]):
+                target[i, j] = value
+
+    return fill_all
+
+
+def _copying(of_target: int, of_value: int) -> Any:
+    """Return what copies elements in order, as NumPy broadcasts them."""
+
+    def vector(target: Any, value: Any) -> None:
+        step = 0 if value.shape[0] == 1 else 1
+        if step and target.shape[0] != value.shape[0]:
+            raise ValueError("an array is set to one of another shape")
+        for i in range(target.shape[0]):
+            target[i] = value[i * step]
+
+    def rows(target: Any, value: Any) -> None:
+        step = 0 if value.shape[0] == 1 else 1
+        if step and target.shape[1] != value.shape[0]:
             raise ValueError("an array is set to one of another shape")
         for i in range(target.shape[0]):
             for j in range(target.shape[1]):
-                target[i, j] = value[i, j]
+                target[i, j] = value[j * step]
 
-    return matrix
+    def matrix(target: Any, value: Any) -> None:
+        down = 0 if value.shape[0] == 1 else 1
+        along = 0 if value.shape[1] == 1 else 1
+        if (down and target.shape[0] != value.shape[0]) or (
+            along and target.shape[1] != value.shape[1]
+        ):
+            raise ValueError("an array is set to one of another shape")
+        for i in range(target.shape[0]):
+            for j in range(target.shape[1]):
+                target[i, j] = value[i * down, j * along]
+
+    chosen = {(1, 1): vector, (2, 1): rows, (2, 2): matrix}[of_target, of_value]
+    return _plain(chosen)
+
+
+def _plain(function: Any) -> Any:
+    """Return a function that compiled ones call, compiled as they are."""
+    function.__annotations__ = {}
+    return register_jitable(**_OPTIONS)(function)
+
+
+@_plain
+def _ends(array: Any) -> Any:
+    """Return the addresses of an array's first and last byte, for what is not empty."""
+    low = high = np.int64(array.ctypes.data)
+    for dimension in range(array.ndim):
+        span = (array.shape[dimension] - 1) * array.strides[dimension]
+        if span < 0:
+            low += span
+        else:
+            high += span
+    return low, high + array.itemsize - 1
+
+
+@_plain
+def _shares(target: Any, value: Any) -> Any:
+    """Tell whether elements of a value may lie where the target's do, at other places."""
+    if target.size == 0 or value.size == 0:
+        return False
+    if _same_places(target, value):
+        return False
+    low, high = _ends(target)
+    first, last = _ends(value)
+    return low <= last and first <= high
+
+
+def _same_places(target: Any, value: Any) -> Any:
+    raise NotImplementedError
+
+
+@_compiled_as(_same_places)
+def _has_same_places(target: Any, value: Any) -> Any:
+    if target.ndim != value.ndim or target.dtype != value.dtype:
+        return lambda target, value: False
+    return lambda target, value: (
+        target.ctypes.data == value.ctypes.data
+        and target.strides == value.strides
+        and target.shape == value.shape
+    )
+
+
+def _changing(helper: Any, operation: Any) -> None:
+    """Register `target += value` for one operation."""
+
+    @_compiled_as(helper)
+    def _change(target: Any, value: Any) -> Any:
+        if not isinstance(target, types.Array):
+            return lambda target, value: operation(target, value)
+
+        def change(target: Any, value: Any) -> Any:
+            helpers.rtcf_assign(target, operation(target, value))
+            return target
+
+        return change
+
+
+for _node, _helper in helpers.IN_PLACE.items():
+    _changing(_helper, getattr(operator, _helper.__name__.removeprefix("rtcf_in_place_")))
+
+
+def _checking(helper: Any, function: Any) -> None:
+    """Register a function of one number: as CPython has it, what gives a NaN of a number is outside
+    its domain, and what gives infinity of a finite one too, unless it only grows so large.
+    """
+    name, grows = function.__name__, function in (math.exp, math.expm1, math.sinh, math.cosh)
+    if function is math.log2:  # which numba does not know
+        function = types.ExternalFunction("log2", types.float64(types.float64))
+
+    @_compiled_as(helper)
+    def _check(value: Any) -> Any:
+        if not isinstance(value, types.Number | types.Boolean):
+            raise TypingError(f"RTCF:math.{name} of {_words(value)}:it takes a number; arrays: np")
+
+        def checked(value: Any) -> Any:
+            result = function(float(value))
+            if math.isnan(result) and not math.isnan(value):
+                raise ValueError("math domain error")
+            if math.isinf(result) and not math.isinf(value):
+                if grows:
+                    raise OverflowError("math range error")
+                raise ValueError("math domain error")
+            return result
+
+        return checked
+
+
+for _function, _helper in helpers.MATH.items():
+    _checking(_helper, _function)
+
+
+@_compiled_as(helpers.rtcf_math_fmod)
+def _fmod(x: Any, y: Any) -> Any:
+    def fmod(x: Any, y: Any) -> Any:
+        result = np.fmod(float(x), float(y))
+        if math.isnan(result) and not (math.isnan(x) or math.isnan(y)):
+            raise ValueError("math domain error")
+        return result
+
+    return fmod
+
+
+@_compiled_as(helpers.rtcf_pow)
+def _pow(base: Any, exponent: Any) -> Any:
+    numbers = types.Number | types.Boolean
+    if not isinstance(base, numbers) or not isinstance(exponent, numbers):
+        return lambda base, exponent: base**exponent
+    if not isinstance(base, types.Float) and not isinstance(exponent, types.Float):
+
+        def whole(base: Any, exponent: Any) -> Any:
+            if exponent < 0:
+                raise ValueError("an int to a negative power: make it a float")
+            return base**exponent
+
+        return whole
+
+    def power(base: Any, exponent: Any) -> Any:
+        x, y = float(base), float(exponent)
+        finite = math.isfinite(x) and math.isfinite(y)
+        if finite and x == 0.0 and y < 0.0:
+            raise ZeroDivisionError("0.0 to a negative power")
+        if finite and x < 0.0 and y != np.floor(y):
+            raise ValueError("a negative number to a fractional power")
+        result = x**y
+        if finite and math.isinf(result):
+            raise OverflowError("a power is too large")
+        return result
+
+    return power
+
+
+@_compiled_as(helpers.rtcf_math_pow)
+def _math_pow(base: Any, exponent: Any) -> Any:
+    return lambda base, exponent: helpers.rtcf_pow(float(base), float(exponent))
+
+
+@_compiled_as(helpers.rtcf_to_int)
+def _to_int(value: Any) -> Any:
+    if isinstance(value, types.Integer):
+        return lambda value: value
+    if not isinstance(value, types.Float | types.Boolean):
+        raise TypingError(f"RTCF:int of {_words(value)}:it takes a number")
+
+    def to_int(value: Any) -> Any:
+        if math.isnan(value):
+            raise ValueError("cannot convert float NaN to integer")
+        if not -9223372036854775808.0 <= value < 9223372036854775808.0:
+            raise OverflowError("does not fit int64")
+        return int(value)
+
+    return to_int
+
+
+@_compiled_as(helpers.rtcf_floor)
+def _floor(value: Any) -> Any:
+    return lambda value: helpers.rtcf_to_int(np.floor(value))
+
+
+@_compiled_as(helpers.rtcf_ceil)
+def _ceil(value: Any) -> Any:
+    return lambda value: helpers.rtcf_to_int(np.ceil(value))
+
+
+@_compiled_as(helpers.rtcf_round)
+def _round(value: Any) -> Any:
+    if isinstance(value, types.Integer | types.Boolean):
+        return lambda value: helpers.rtcf_to_int(value)
+    return lambda value: helpers.rtcf_to_int(np.rint(value))
+
+
+@_compiled_as(helpers.rtcf_index)
+def _index(value: Any) -> Any:
+    if isinstance(value, types.Integer | types.Boolean):
+        return lambda value: value
+    raise TypingError(f"RTCF:range of {_words(value)}:make it an int: int(…)")
 
 
 @_compiled_as(helpers.rtcf_front)

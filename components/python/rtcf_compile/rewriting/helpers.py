@@ -5,11 +5,17 @@ interpreter, its overload is compiled. Neither calls BLAS or LAPACK, whose sums 
 machine and which allocate; np.where of numba from 0.57 on makes lists of shapes.
 """
 
+import ast
+import builtins
+import math
+import operator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 Array = np.ndarray[Any, Any]
+_WHOLE = (int, np.integer)
 
 
 def rtcf_matmul(a: Any, b: Any) -> Any:
@@ -30,13 +36,113 @@ def rtcf_matmul(a: Any, b: Any) -> Any:
 
 
 def rtcf_assign(target: Any, value: Any) -> None:
-    """Set all elements of an array, from one of the same shape or a number."""
+    """Set all elements of an array, from a number or an array that NumPy broadcasts to its shape.
+    The two may share memory.
+    """
     new = np.asarray(value)
-    if new.shape not in (target.shape, ()):
-        raise ValueError(f"an array of shape {target.shape} is set to one of shape {new.shape}")
     if new.dtype.kind == "f" and target.dtype.kind != "f":
         raise TypeError(f"elements are {target.dtype.name}, not {new.dtype.name}")
     target[...] = new
+
+
+def _in_place(operation: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    def change(target: Any, value: Any) -> Any:
+        """Return what `target += value` leaves in target: an array is changed in place."""
+        if not isinstance(target, np.ndarray):
+            return operation(target, value)
+        rtcf_assign(target, operation(target, value))
+        return target
+
+    change.__name__ = f"rtcf_in_place_{operation.__name__}"
+    return change
+
+
+# `x += y` of a variable, by the operator's node.
+IN_PLACE: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    node: _in_place(operation)
+    for node, operation in {
+        ast.Add: operator.add,
+        ast.Sub: operator.sub,
+        ast.Mult: operator.mul,
+        ast.Div: operator.truediv,
+        ast.FloorDiv: operator.floordiv,
+        ast.Mod: operator.mod,
+    }.items()
+}
+
+
+def _checked(function: Callable[[float], float]) -> Callable[[Any], float]:
+    def checked(value: Any) -> float:
+        return function(value)
+
+    checked.__name__ = f"rtcf_math_{function.__name__}"
+    checked.__doc__ = f"Return math.{function.__name__}(value), which raises where it has no value."
+    return checked
+
+
+# Functions of one number that raise ValueError outside their domain and OverflowError beyond the
+# largest float. What the C library gives there, NaN and infinity, is no value to Python.
+MATH: dict[Callable[..., Any], Callable[[Any], float]] = {
+    each: _checked(each)
+    for each in (
+        *(math.sqrt, math.exp, math.expm1, math.log, math.log1p, math.log2, math.log10),
+        *(math.sin, math.cos, math.tan, math.asin, math.acos, math.atan),
+        *(math.sinh, math.cosh, math.tanh, math.asinh, math.acosh, math.atanh),
+    )
+}
+
+
+def rtcf_math_fmod(x: Any, y: Any) -> float:
+    """Return math.fmod(x, y), which raises where it has no value."""
+    return math.fmod(x, y)
+
+
+def rtcf_pow(base: Any, exponent: Any) -> Any:
+    """Return base ** exponent; raises where that is no float, or no int of two ints."""
+    if isinstance(base, np.ndarray) or isinstance(exponent, np.ndarray):
+        return base**exponent
+    if isinstance(base, _WHOLE) and isinstance(exponent, _WHOLE):
+        if exponent < 0:
+            raise ValueError("an int to a negative power: make it a float")
+        return base**exponent
+    base, exponent = float(base), float(exponent)
+    finite = math.isfinite(base) and math.isfinite(exponent)
+    if finite and base < 0.0 and not exponent.is_integer():
+        raise ValueError("a negative number to a fractional power")
+    return base**exponent
+
+
+def rtcf_math_pow(base: Any, exponent: Any) -> Any:
+    """Return math.pow(base, exponent), which raises where it has no value."""
+    return rtcf_pow(float(base), float(exponent))
+
+
+def rtcf_to_int(value: Any) -> Any:
+    """Return int(value): towards 0. Raises where that is no int64."""
+    whole = int(value)
+    if not -(2**63) <= whole < 2**63:
+        raise OverflowError("does not fit int64")
+    return whole
+
+
+def rtcf_floor(value: Any) -> Any:
+    """Return math.floor(value). Raises where that is no int64."""
+    return rtcf_to_int(math.floor(value))
+
+
+def rtcf_ceil(value: Any) -> Any:
+    """Return math.ceil(value). Raises where that is no int64."""
+    return rtcf_to_int(math.ceil(value))
+
+
+def rtcf_round(value: Any) -> Any:
+    """Return round(value): halves to the even one. Raises where that is no int64."""
+    return rtcf_to_int(round(float(value)) if isinstance(value, float) else round(value))
+
+
+def rtcf_index(value: Any) -> Any:
+    """Return an argument of range(), which is an int."""
+    return operator.index(value)
 
 
 def rtcf_float(value: Any) -> Any:
@@ -127,19 +233,29 @@ def rtcf_cholesky(a: Any) -> Any:
     return result
 
 
-INSTEAD = {
+# By identity: functions of several modules are equal, or not to be hashed.
+INSTEAD: dict[Callable[..., Any], Callable[..., Any]] = {
     np.linalg.solve: rtcf_solve,
     np.linalg.inv: rtcf_inv,
     np.linalg.cholesky: rtcf_cholesky,
     np.dot: rtcf_matmul,
     np.matmul: rtcf_matmul,
     np.where: rtcf_where,
+    math.fmod: rtcf_math_fmod,
+    math.pow: rtcf_math_pow,
+    math.floor: rtcf_floor,
+    math.ceil: rtcf_ceil,
+    math.trunc: rtcf_to_int,
+    builtins.int: rtcf_to_int,
+    builtins.pow: rtcf_pow,
+    **MATH,
 }
 BY_NAME = {
     each.__name__: each
     for each in (
         *(rtcf_matmul, rtcf_assign, rtcf_float, rtcf_int, rtcf_bool),
-        *(rtcf_front, rtcf_age, rtcf_after),
+        *(rtcf_front, rtcf_age, rtcf_after, rtcf_pow, rtcf_round, rtcf_index),
+        *IN_PLACE.values(),
         *INSTEAD.values(),
     )
 }

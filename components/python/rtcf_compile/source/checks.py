@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rtcf_compile.source.assigned import check_assigned
 from rtcf_compile.source.mistake import Mistake, at
 from rtcf_compile.source.modules import Source
 
@@ -120,6 +121,7 @@ def check(source: Source) -> None:
             raise at(file, node.test, "a loop without end", "bound it: for _ in range(…)")
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod) and _is_text(node.left):
             raise at(file, node, *_REFUSED[ast.JoinedStr])
+    check_assigned(source)
 
 
 def resolve(node: ast.AST, source: Source) -> Any:

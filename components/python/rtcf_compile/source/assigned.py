@@ -1,0 +1,220 @@
+"""Variables that have a value wherever they are used: Python raises UnboundLocalError where one has
+none, compiled code would go on with whatever is there.
+"""
+
+import ast
+from collections.abc import Sequence
+
+from rtcf_compile.source.mistake import at
+from rtcf_compile.source.modules import Source
+
+# Variables that have a value at a place; None: the place is never reached.
+_Known = frozenset[str] | None
+
+
+def check_assigned(source: Source) -> None:
+    """Raise Mistake at the first use of a variable that has no value on some way there."""
+    _Flow(source).function()
+
+
+def _both(one: _Known, other: _Known) -> _Known:
+    """Return what is known where two ways meet."""
+    if one is None or other is None:
+        return other if one is None else one
+    return one & other
+
+
+class _Flow:
+    """Follows a function's statements in the order of their execution."""
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self._variables = set(source.function.__code__.co_varnames)
+        # Of the loops around the present statement: known at break, and at continue.
+        self._breaks: list[_Known] = []
+        self._continues: list[_Known] = []
+
+    def function(self) -> None:
+        """Follow all of it."""
+        tree = self._source.tree
+        arguments = (*tree.args.posonlyargs, *tree.args.args, *tree.args.kwonlyargs)
+        self._block(tree.body, frozenset(each.arg for each in arguments))
+
+    def _block(self, body: Sequence[ast.stmt], known: _Known) -> _Known:
+        for statement in body:
+            if known is None:
+                return None  # nothing after it runs
+            known = self._statement(statement, known)
+        return known
+
+    def _statement(self, node: ast.stmt, known: frozenset[str]) -> _Known:
+        if isinstance(node, ast.Assign):
+            known = self._used(node.value, known)
+            for target in node.targets:
+                known = self._target(target, known)
+            return known
+        if isinstance(node, ast.AugAssign):
+            known = self._used(node.value, self._used(_read(node.target), known))
+            return self._target(node.target, known)
+        if isinstance(node, ast.AnnAssign):
+            if node.value is None:
+                return known
+            return self._target(node.target, self._used(node.value, known))
+        if isinstance(node, ast.If):
+            return self._if(node, known)
+        if isinstance(node, ast.For):
+            return self._for(node, known)
+        if isinstance(node, ast.While):
+            return self._while(node, known)
+        if isinstance(node, ast.Match):
+            return self._match(node, known)
+        if isinstance(node, ast.Break):
+            self._breaks[-1] = _both(self._breaks[-1], known)
+            return None
+        if isinstance(node, ast.Continue):
+            self._continues[-1] = _both(self._continues[-1], known)
+            return None
+        for each in ast.iter_child_nodes(node):
+            if isinstance(each, ast.expr):
+                known = self._used(each, known)
+        if isinstance(node, ast.Return | ast.Raise) or _is_fault(node):
+            return None
+        return known
+
+    def _if(self, node: ast.If, known: frozenset[str]) -> _Known:
+        known = self._used(node.test, known)
+        then, other = (_constant(node.test) is not False, _constant(node.test) is not True)
+        return _both(
+            self._block(node.body, known) if then else None,
+            self._block(node.orelse, known) if other else None,
+        )
+
+    def _for(self, node: ast.For, known: frozenset[str]) -> _Known:
+        known = self._used(node.iter, known)
+        end, left = self._loop(node, self._target(node.target, known))
+        # It has run once where that is known; else what it sets may have no value.
+        ended = end if _runs(node.iter) else _both(known, end)
+        return _both(self._block(node.orelse, ended) if ended is not None else None, left)
+
+    def _while(self, node: ast.While, known: frozenset[str]) -> _Known:
+        known = self._used(node.test, known)
+        end, left = self._loop(node, known)
+        if _constant(node.test) is True:
+            return left
+        ended = _both(known, end)
+        return _both(self._block(node.orelse, ended) if ended is not None else None, left)
+
+    def _loop(self, node: ast.For | ast.While, known: frozenset[str]) -> tuple[_Known, _Known]:
+        """Return what is known when the body has run once, and where it is left by break."""
+        self._breaks.append(None)
+        self._continues.append(None)
+        end = self._block(node.body, known)
+        return _both(end, self._continues.pop()), self._breaks.pop()
+
+    def _match(self, node: ast.Match, known: frozenset[str]) -> _Known:
+        known = self._used(node.subject, known)
+        result: _Known = None
+        for case in node.cases:
+            bound = {each.name for each in ast.walk(case.pattern)
+                     if isinstance(each, ast.MatchAs | ast.MatchStar) and each.name}  # fmt: skip
+            inside: frozenset[str] = known | bound
+            if case.guard is not None:
+                inside = self._used(case.guard, inside)
+            result = _both(result, self._block(case.body, inside))
+            if case.guard is None and _matches_all(case.pattern):
+                return result
+        return _both(result, known)
+
+    def _target(self, node: ast.expr, known: frozenset[str]) -> frozenset[str]:
+        if isinstance(node, ast.Name):
+            return known | {node.id}
+        if isinstance(node, ast.Tuple | ast.List):
+            for each in node.elts:
+                known = self._target(each, known)
+            return known
+        if isinstance(node, ast.Starred):
+            return self._target(node.value, known)
+        for each in ast.iter_child_nodes(node):
+            if isinstance(each, ast.expr):
+                known = self._used(each, known)
+        return known
+
+    def _used(self, node: ast.expr, known: frozenset[str]) -> frozenset[str]:
+        """Look at the variables of an expression; return what is known after it."""
+        if isinstance(node, ast.Name):
+            if isinstance(node.ctx, ast.Load) and node.id in self._variables - known:
+                raise at(
+                    self._source.file,
+                    node,
+                    f"{node.id} has no value on every way here",
+                    f"set {node.id} before, where all ways come by",
+                )
+            return known
+        if isinstance(node, ast.NamedExpr):
+            return self._used(node.value, known) | {node.target.id}
+        if isinstance(node, ast.BoolOp):
+            first = self._used(node.values[0], known)
+            after = first
+            for each in node.values[1:]:
+                after = self._used(each, after)
+            return first  # the others may not have been reached
+        if isinstance(node, ast.IfExp):
+            known = self._used(node.test, known)
+            then, other = self._used(node.body, known), self._used(node.orelse, known)
+            return then & other
+        for each in ast.iter_child_nodes(node):
+            if isinstance(each, ast.keyword):
+                each = each.value
+            if isinstance(each, ast.expr):
+                known = self._used(each, known)
+        return known
+
+
+def _read(target: ast.expr) -> ast.expr:
+    """Return a target as what `x += 1` reads of it."""
+    if isinstance(target, ast.Name):
+        return ast.copy_location(ast.Name(target.id, ast.Load()), target)
+    return target
+
+
+def _constant(test: ast.expr) -> bool | None:
+    return bool(test.value) if isinstance(test, ast.Constant) else None
+
+
+def _runs(iterated: ast.expr) -> bool:
+    """Tell whether a loop over it is known to run once at least: range(3), (1, 2), range(1, 4)."""
+    if isinstance(iterated, ast.Tuple):
+        return bool(iterated.elts)
+    if not isinstance(iterated, ast.Call) or not isinstance(iterated.func, ast.Name):
+        return False
+    numbers = [_whole(each) for each in iterated.args]
+    if iterated.func.id != "range" or None in numbers or not 1 <= len(numbers) <= 3:
+        return False
+    try:
+        return len(range(*(each for each in numbers if each is not None))) > 0
+    except ValueError:
+        return False
+
+
+def _whole(node: ast.expr) -> int | None:
+    try:
+        value = ast.literal_eval(node)
+    except (ValueError, TypeError):
+        return None
+    return value if type(value) is int else None
+
+
+def _matches_all(pattern: ast.pattern) -> bool:
+    if isinstance(pattern, ast.MatchOr):
+        return any(_matches_all(each) for each in pattern.patterns)
+    return isinstance(pattern, ast.MatchAs) and pattern.pattern is None
+
+
+def _is_fault(node: ast.stmt) -> bool:
+    """`self.fault("…")` ends the hook."""
+    call = node.value if isinstance(node, ast.Expr) else None
+    return (
+        isinstance(call, ast.Call)
+        and isinstance(call.func, ast.Attribute)
+        and call.func.attr == "fault"
+    )

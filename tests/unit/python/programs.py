@@ -1,0 +1,356 @@
+"""Random programs for a component in Python: assignments, slices, views, broadcasting, products of
+matrices and control flow on a state of two vectors, two matrices, numbers, a bool and an enum.
+"""
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+
+HEAD = """\
+import enum
+import math
+
+import numpy as np
+from rtcf.component import Component, Input, State
+
+
+class Mode(enum.IntEnum):
+    OFF = 0
+    RUN = 1
+    HOLD = 2
+
+
+def blend(p, q, share):
+    return share * p + (1.0 - share) * q
+
+
+class Programs(Component):
+    which: Input[np.int64]
+    vectors: Input[np.float64, (2, 6)]
+    matrices: Input[np.float64, (6, 3)]
+    numbers: Input[np.float64, 2]
+    count: Input[np.int64]
+    a: State[np.float64, 6]
+    b: State[np.float64, 6]
+    m: State[np.float64, (3, 3)]
+    k: State[np.float64, (3, 3)]
+    x: State[float]
+    y: State[float]
+    n: State[int]
+    flag: State[bool]
+    mode: State[Mode]
+
+    def update(self):
+        self.a[:] = self.vectors.value[0]
+        self.b[:] = self.vectors.value[1]
+        self.m[:] = self.matrices.value[:3]
+        self.k[:] = self.matrices.value[3:]
+        self.x = self.numbers.value[0]
+        self.y = self.numbers.value[1]
+        self.n = self.count.value % 7
+        self.flag = self.x > self.y
+        self.mode = Mode.RUN
+        which = self.which.value % {count}
+"""
+_VECTORS = ("self.a", "self.b")
+_MATRICES = ("self.m", "self.k")
+_LONG, _SIDE = 6, 3
+
+
+@dataclass
+class _Scope:
+    """Names that a place in a program may use."""
+
+    views: dict[str, int]  # variables that are vectors, and their sizes
+    indices: dict[str, int]  # variables of loops, and the first number that they never are
+    numbers: list[str]
+
+
+class Program:
+    """One program, drawn by a generator of random numbers."""
+
+    def __init__(self, draw: random.Random) -> None:
+        """Draw it."""
+        self._draw = draw
+        self._names = 0
+        self.lines = self._block(_Scope({}, {}, []), draw.randint(1, 5), 0)
+
+    def _name(self) -> str:
+        self._names += 1
+        return f"v{self._names}"
+
+    def _block(self, scope: _Scope, count: int, depth: int) -> list[str]:
+        scope = _Scope(dict(scope.views), dict(scope.indices), list(scope.numbers))
+        lines: list[str] = []
+        for _ in range(count):
+            lines += self._statement(scope, depth)
+        return lines
+
+    def _statement(self, scope: _Scope, depth: int) -> list[str]:
+        simple: list[Callable[[_Scope], list[str]]] = [
+            self._set_slice, self._set_slice, self._change_slice, self._set_matrix, self._set_row,
+            self._set_element, self._set_number, self._change_number, self._view, self._change_view,
+            self._variable, self._set_whole, self._set_mode,
+        ]  # fmt: skip
+        if depth < 2 and self._draw.random() < 0.3:
+            return self._draw.choice([self._if, self._for, self._while])(scope, depth)
+        return self._draw.choice(simple)(scope)
+
+    def _set_slice(self, scope: _Scope) -> list[str]:
+        target, size = self._part(scope)
+        value = self._vector(scope, size, 2) if self._draw.random() < 0.9 else self._float(scope, 2)
+        return [f"{target} = {value}"]
+
+    def _change_slice(self, scope: _Scope) -> list[str]:
+        target, size = self._part(scope)
+        value = self._vector(scope, size, 2) if self._draw.random() < 0.8 else self._float(scope, 1)
+        return [f"{target} {self._operator()}= {value}"]
+
+    def _set_matrix(self, scope: _Scope) -> list[str]:
+        target = self._draw.choice(_MATRICES)
+        how = self._draw.choice(["[:]", "", "[:, :]", " "])
+        if how == " ":
+            return [f"{target} {self._draw.choice('+-*')}= {self._matrix(scope, 2)}"]
+        return [f"{target}{how} = {self._matrix(scope, 2)}"]
+
+    def _set_row(self, scope: _Scope) -> list[str]:
+        place = self._draw.choice(["[{i}]", "[{i}, :]", "[:, {i}]", "[1:, {i}]", "[::-1, {i}]"])
+        target = self._draw.choice(_MATRICES) + place.format(i=self._index(scope, _SIDE))
+        size = 2 if "1:," in place else _SIDE
+        change = self._draw.choice(["", "", "+", "-", "*"])
+        return [f"{target} {change}= {self._vector(scope, size, 2)}"]
+
+    def _set_element(self, scope: _Scope) -> list[str]:
+        change = self._draw.choice(["", "", "+", "-", "*"])
+        if self._draw.random() < 0.5:
+            target = f"{self._draw.choice(_VECTORS)}[{self._index(scope, _LONG)}]"
+        else:
+            places = f"{self._index(scope, _SIDE)}, {self._index(scope, _SIDE)}"
+            target = f"{self._draw.choice(_MATRICES)}[{places}]"
+        return [f"{target} {change}= {self._float(scope, 2)}"]
+
+    def _set_number(self, scope: _Scope) -> list[str]:
+        return [f"self.{self._draw.choice('xy')} = {self._float(scope, 3)}"]
+
+    def _change_number(self, scope: _Scope) -> list[str]:
+        name = self._draw.choice(["self.x", "self.y", *scope.numbers])
+        return [f"{name} {self._draw.choice('+-*')}= {self._float(scope, 2)}"]
+
+    def _set_whole(self, scope: _Scope) -> list[str]:
+        if self._draw.random() < 0.5:
+            return [f"self.flag = {self._bool(scope, 2)}"]
+        return [f"self.n = {self._int(scope, 2)}"]
+
+    def _set_mode(self, scope: _Scope) -> list[str]:
+        modes = [f"Mode.{each}" for each in ("OFF", "RUN", "HOLD")]
+        one, other = self._draw.sample(modes, 2)
+        return [f"self.mode = {one} if {self._bool(scope, 1)} else {other}"]
+
+    def _variable(self, scope: _Scope) -> list[str]:
+        name, value = self._name(), self._float(scope, 2)
+        scope.numbers.append(name)
+        return [f"{name} = {value}"]
+
+    def _view(self, scope: _Scope) -> list[str]:
+        target, size = self._part(scope)
+        name = self._name()
+        scope.views[name] = size
+        return [f"{name} = {target}"]
+
+    def _change_view(self, scope: _Scope) -> list[str]:
+        if not scope.views:
+            return self._view(scope)
+        name, size = self._draw.choice(sorted(scope.views.items()))
+        value = self._vector(scope, size, 2)
+        how = self._draw.choice([f"{name}[:] =", f"{name} {self._operator()}="])
+        return [f"{how} {value}"]
+
+    def _if(self, scope: _Scope, depth: int) -> list[str]:
+        lines = [f"if {self._bool(scope, 2)}:", *self._inside(scope, depth)]
+        if self._draw.random() < 0.3:
+            lines += [f"elif {self._bool(scope, 2)}:", *self._inside(scope, depth)]
+        if self._draw.random() < 0.5:
+            lines += ["else:", *self._inside(scope, depth)]
+        return lines
+
+    def _for(self, scope: _Scope, depth: int) -> list[str]:
+        index, end = self._name(), self._draw.randint(1, 4)
+        inner = _Scope(dict(scope.views), {**scope.indices, index: end}, list(scope.numbers))
+        lines = [f"for {index} in range({end}):", *self._inside(inner, depth)]
+        if self._draw.random() < 0.2:
+            way = self._draw.choice(["break", "continue"])
+            lines += [f"    if {self._bool(inner, 1)}:", f"        {way}"]
+            lines += self._inside(inner, depth)
+        return lines
+
+    def _while(self, scope: _Scope, depth: int) -> list[str]:
+        turns = self._name()
+        inside = self._inside(scope, depth)
+        return [
+            f"{turns} = 0",
+            f"while {turns} < {self._draw.randint(1, 3)} and {self._bool(scope, 1)}:",
+            *inside,
+            f"    {turns} += 1",
+        ]
+
+    def _inside(self, scope: _Scope, depth: int) -> list[str]:
+        return [f"    {line}" for line in self._block(scope, self._draw.randint(1, 2), depth + 1)]
+
+    def _operator(self) -> str:
+        return self._draw.choice(["+", "-", "*", "+", "-", "*", "/"])
+
+    def _part(self, scope: _Scope) -> tuple[str, int]:
+        """Return a part of a vector of the state, or of a view, and its size."""
+        views = sorted(scope.views.items())
+        if views and self._draw.random() < 0.3:
+            name, long = self._draw.choice(views)
+        else:
+            name, long = self._draw.choice(_VECTORS), _LONG
+        begin, end = sorted((self._draw.randint(0, long), self._draw.randint(0, long)))
+        step = self._draw.choice([1, 1, 1, 2, -1])
+        text = f"{begin or ''}:{end if end < long else ''}"
+        if step == 2:
+            text = f"{begin or ''}:{end if end < long else ''}:2"
+        size = len(range(begin, end, abs(step)))
+        if size == 0:
+            return f"{name}[:]", long
+        if step == -1:
+            return f"{name}[{text}][::-1]" if begin or end < long else f"{name}[::-1]", size
+        return f"{name}[{text}]", size
+
+    def _vector(self, scope: _Scope, size: int, depth: int) -> str:
+        draw = self._draw.random()
+        if depth == 0 or draw < 0.35:
+            return self._vector_leaf(scope, size)
+        if draw < 0.65:
+            one, other = self._vector(scope, size, depth - 1), self._vector(scope, size, depth - 1)
+            return f"({one} {self._draw.choice('+-*')} {other})"
+        if draw < 0.8:
+            one, other = self._vector(scope, size, depth - 1), self._float(scope, depth - 1)
+            if self._draw.random() < 0.5:
+                one, other = other, one
+            return f"({one} {self._draw.choice('+-*')} {other})"
+        if draw < 0.85:
+            return f"np.abs({self._vector(scope, size, depth - 1)})"
+        if draw < 0.9:
+            return f"-{self._vector(scope, size, depth - 1)}"
+        if draw < 0.95:
+            parts = [self._vector(scope, size, depth - 1) for _ in range(4)]
+            return f"np.where({parts[0]} > {parts[1]}, {parts[2]}, {parts[3]})"
+        if size == _SIDE:
+            one, other = self._matrix(scope, depth - 1), self._vector(scope, size, depth - 1)
+            return self._draw.choice([f"({one} @ {other})", f"({other} @ {one})"])
+        return f"blend({self._vector(scope, size, 0)}, {self._vector(scope, size, 0)}, 0.25)"
+
+    def _vector_leaf(self, scope: _Scope, size: int) -> str:
+        leaves = []
+        for name, long in [*((each, _LONG) for each in _VECTORS), *sorted(scope.views.items())]:
+            if long >= size:
+                begin = self._draw.randint(0, long - size)
+                leaves.append(f"{name}[{begin}:{begin + size}]")
+                leaves.append(f"{name}[{begin}:{begin + size}][::-1]")
+            if size and long >= 2 * size - 1:
+                begin = self._draw.randint(0, long - 2 * size + 1)
+                leaves.append(f"{name}[{begin}:{begin + 2 * size - 1}:2]")
+            if long == size:
+                leaves += [name, f"{name}.copy()"]
+        if size == _SIDE:
+            index = self._index(scope, _SIDE)
+            for name in _MATRICES:
+                leaves += [f"{name}[{index}]", f"{name}[:, {index}]", f"{name}.T[{index}, ::-1]"]
+        if not leaves:
+            return f"np.zeros({size})"
+        return self._draw.choice(leaves)
+
+    def _matrix(self, scope: _Scope, depth: int) -> str:
+        draw = self._draw.random()
+        if depth == 0 or draw < 0.4:
+            name = self._draw.choice(_MATRICES)
+            return name + self._draw.choice(["", ".T", "[::-1]", "[:, ::-1]", "[::-1, ::-1].T"])
+        if draw < 0.6:
+            one, other = self._matrix(scope, depth - 1), self._matrix(scope, depth - 1)
+            return f"({one} {self._draw.choice('+-*')} {other})"
+        if draw < 0.75:
+            one, other = self._matrix(scope, depth - 1), self._vector(scope, _SIDE, depth - 1)
+            return f"({one} {self._draw.choice('+-*')} {other})"
+        if draw < 0.85:
+            return f"({self._matrix(scope, depth - 1)} * {self._float(scope, depth - 1)})"
+        return f"({self._matrix(scope, depth - 1)} @ {self._matrix(scope, depth - 1)})"
+
+    def _float(self, scope: _Scope, depth: int) -> str:
+        draw = self._draw.random()
+        if depth == 0 or draw < 0.4:
+            return self._draw.choice(
+                [
+                    *("self.x", "self.y", *scope.numbers, f"{self._draw.uniform(-4, 4):.2f}"),
+                    f"{self._draw.choice(_VECTORS)}[{self._index(scope, _LONG)}]",
+                    f"self.m[{self._index(scope, _SIDE)}, {self._index(scope, _SIDE)}]",
+                ]
+            )
+        if draw < 0.65:
+            one, other = self._float(scope, depth - 1), self._float(scope, depth - 1)
+            return f"({one} {self._draw.choice('+-*')} {other})"
+        if draw < 0.75:
+            name = self._draw.choice(["sin", "cos", "tanh", "sqrt", "log", "atan", "acos", "exp"])
+            return f"math.{name}({self._float(scope, depth - 1)})"
+        if draw < 0.8:
+            one, other = self._float(scope, depth - 1), self._float(scope, depth - 1)
+            return f"{self._draw.choice(['min', 'max'])}({one}, {other})"
+        if draw < 0.85:
+            one, other = self._float(scope, depth - 1), self._float(scope, depth - 1)
+            return f"({one} if {self._bool(scope, depth - 1)} else {other})"
+        if draw < 0.9:
+            power = self._draw.choice(["2", "3", "0.5", "-1", "1.5"])
+            return f"({self._float(scope, depth - 1)}) ** {power}"
+        if draw < 0.95:
+            return f"abs({self._float(scope, depth - 1)})"
+        return f"float({self._int(scope, depth - 1)})"
+
+    def _int(self, scope: _Scope, depth: int) -> str:
+        draw = self._draw.random()
+        if depth == 0 or draw < 0.4:
+            return self._draw.choice(["self.n", str(self._draw.randint(-5, 5)), *scope.indices])
+        if draw < 0.6:
+            one, other = self._int(scope, depth - 1), self._int(scope, depth - 1)
+            return f"({one} {self._draw.choice(['+', '-', '*'])} {other})"
+        if draw < 0.7:
+            return f"({self._int(scope, depth - 1)} {self._draw.choice(['//', '%'])} {self._draw.choice([2, 3, -3])})"
+        if draw < 0.8:
+            name = self._draw.choice(["int", "round", "math.floor", "math.ceil"])
+            return f"{name}({self._float(scope, depth - 1)})"
+        if draw < 0.9:
+            return f"abs({self._int(scope, depth - 1)})"
+        return f"({self._int(scope, 0)} if {self._bool(scope, depth - 1)} else {self._int(scope, 0)})"
+
+    def _bool(self, scope: _Scope, depth: int) -> str:
+        draw = self._draw.random()
+        if depth == 0 or draw < 0.3:
+            # Of two constants numba makes an int.
+            name = self._draw.choice(["self.x", "self.y", *scope.numbers])
+            compared = f"{name} {self._draw.choice(['<', '>', '<=', '=='])} {self._float(scope, 0)}"
+            mode = f"self.mode == Mode.{self._draw.choice(['OFF', 'RUN', 'HOLD'])}"
+            return f"({self._draw.choice(['self.flag', compared, compared, mode])})"
+        if draw < 0.5:
+            parts = [self._float(scope, depth - 1) for _ in range(2)]
+            return f"({parts[0]} < self.x <= {parts[1]})"
+        if draw < 0.8:
+            one, other = self._bool(scope, depth - 1), self._bool(scope, depth - 1)
+            return f"({one} {self._draw.choice(['and', 'or'])} {other})"
+        if draw < 0.9:
+            return f"(not {self._bool(scope, depth - 1)})"
+        return f"(self.n {self._draw.choice(['<', '==', '>='])} {self._int(scope, depth - 1)})"
+
+    def _index(self, scope: _Scope, end: int) -> str:
+        known = [name for name, above in scope.indices.items() if above <= end]
+        return self._draw.choice([str(self._draw.randint(-end, end - 1)), *known])
+
+
+def module(programs: dict[int, Program]) -> str:
+    """Return a module with one component, which runs one of these programs in each cycle."""
+    lines = HEAD.format(count=max(programs) + 1).splitlines()
+    for number in programs:
+        lines += [f"        if which == {number}:", f"            self.program_{number}()"]
+    for number, program in programs.items():
+        lines += ["", f"    def program_{number}(self):"]
+        lines += [f"        {line}" for line in program.lines]
+    return "\n".join([*lines, ""])

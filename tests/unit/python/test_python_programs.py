@@ -1,0 +1,45 @@
+"""Random programs do compiled what they do in the interpreter, bit by bit but for the last places
+of functions of the C library and NumPy's own.
+"""
+
+import os
+import random
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rtcf_compile.comparison import verify
+from rtcf_compile.machine_code import lowering
+from rtcf_compile.source import modules
+
+from unit.python.programs import Program, module
+
+TOGETHER = 25  # programs of one component
+TIMES = 12  # that each runs, on average
+
+
+def same(seed: int, folder: Path) -> None:
+    """Compile the programs of a seed and run them both ways."""
+    draw = random.Random(seed)
+    file = folder / f"programs_{seed}.py"
+    file.write_text(module({number: Program(draw) for number in range(TOGETHER)}))
+    (cls,) = modules.components(modules.load(file))
+    found = verify.compare(cls, lowering.compile_component(cls), TOGETHER * TIMES, seed)
+    assert found.cycles == TOGETHER * TIMES
+    assert found.differences == [], f"seed {seed}: {found}"
+
+
+@settings(max_examples=4)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_programs_do_compiled_what_they_do_in_the_interpreter(
+    tmp_path_factory: pytest.TempPathFactory, seed: int
+) -> None:
+    same(seed, tmp_path_factory.mktemp("programs"))
+
+
+@pytest.mark.long
+def test_a_hundred_thousand_programs(tmp_path: Path) -> None:
+    begin = int(os.environ.get("RTCF_SEED", "26"))
+    for seed in range(begin, begin + 100_000 // TOGETHER):
+        same(seed, tmp_path)
