@@ -58,6 +58,7 @@ ALLOWED = {
     *(f"{name}f" for name in _MATHEMATICS),
     *("memcpy", "memmove", "memset", "bcmp", "memcmp"),
 }
+_HEAP = {"aligned_alloc", "free"}
 _MEANING = {
     "numba_gil_ensure": "the interpreter",
     "NRT_": "memory that grows",
@@ -72,13 +73,14 @@ _MEANING = {
 }
 
 
-def check(module: Any, compiled: Any, hooks: Any) -> None:
+def check(module: Any, compiled: Any, hooks: Any, realtime: bool) -> None:
     """Raise Mistake if a module refers to what it must not."""
+    allowed = ALLOWED if realtime else ALLOWED | _HEAP
     for function in module.functions:
         name = function.name
         if not function.is_declaration or name.startswith("llvm."):
             continue
-        if name in ALLOWED or name.startswith(f"rtcf_log_{compiled.description.name}_"):
+        if name in allowed or name.startswith(f"rtcf_log_{compiled.description.name}_"):
             continue
         if not _is_called(module, name):
             continue

@@ -38,8 +38,8 @@ _NRT_COUNTS = re.compile(
 )
 _COUNTS = "declare void @NRT_incref(i8*)\ndeclare void @NRT_decref(i8*)\n"
 _OPTIONS = {"boundscheck": True, "error_model": "python"}
-# What runs in the real-time thread, and beside it: each has an arena of its own.
-_THREADS = (("update", "safe"), ("prepare", "start"))
+# What runs in the real-time thread, and beside it.
+_REALTIME, _BESIDE = ("update", "safe"), ("prepare", "start")
 ARENA = 64 * 1024
 
 
@@ -77,12 +77,12 @@ def compile_component(cls: type[Component], arena_bytes: int = ARENA) -> Compile
         functions.used,
         functions.lines,
     )
-    for thread in _THREADS:
+    for thread, allocator in ((_REALTIME, arena.arena(arena_bytes)), (_BESIDE, arena.heap())):
         inner = {hook: _inner(hooks[hook], record) for hook in thread if hook in hooks}
         if inner:
-            module = _linked(result, inner, arena_bytes)
+            module = _linked(result, inner, allocator)
             result.raises |= raises_in(str(module), functions.file())
-            gate.check(module, result, inner)
+            gate.check(module, result, inner, realtime=thread is _REALTIME)
             result.objects.append(backend.machine().emit_object(module))
     trial.run(cls, functions.file())
     return result
@@ -105,9 +105,9 @@ def _inner(function: FunctionType, record: Any) -> tuple[str, str]:
     return result.fndesc.mangled_name, result.library.get_llvm_str()
 
 
-def _linked(compiled: Compiled, inner: dict[str, tuple[str, str]], arena_bytes: int) -> Any:
+def _linked(compiled: Compiled, inner: dict[str, tuple[str, str]], allocator: str) -> Any:
     """Return one module with the entries of these hooks, and nothing that they do not need."""
-    parts, base = [], arena.assembly(arena_bytes)
+    parts, base = [], allocator
     for hook, (name, text) in inner.items():
         record, exception = backend.taken(text, name)
         base += arena.entry(compiled.symbol(hook), name, record, exception)
