@@ -1,12 +1,15 @@
 """`rtcf-compile`: a library of components of Python sources."""
 
 import argparse
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-DONE, REFUSED, USAGE = range(3)
+DONE, REFUSED, USAGE, DIFFERENT = range(4)
+
+_AMOUNT = re.compile(r"0*[1-9]\d{0,11}|(?=[\d.]*[1-9])\d{1,9}(\.\d{1,9})?s")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -14,22 +17,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="rtcf-compile",
         description="Makes a library of components of Python sources; it needs no Python to run.",
-        epilog="Exit codes: 0 done, 1 refused, 2 usage.",
+        epilog="Exit codes: 0 done, 1 refused, 2 usage, 3 not what the interpreter does.",
     )
     parser.add_argument("sources", metavar="SOURCE", nargs="+", type=Path)
     parser.add_argument("-o", dest="output", metavar="LIB", type=Path, help="the library to write")
     parser.add_argument(
         "--verify",
-        metavar="CYCLES",
+        metavar="CYCLES|SECONDSs",
         nargs="?",
-        const=10_000,
-        type=int,
-        help="compare with the interpreter for that many cycles (default: 10000)",
+        const="10000",
+        help="compare with the interpreter for so many cycles, or for so much processor time: 1s "
+        "(default: 10000)",
     )
     parser.add_argument("--seed", metavar="N", type=int, default=1, help="of --verify's inputs")
     args = parser.parse_args(arguments)
     if args.output is None and args.verify is None:
         parser.error("say what to do with it: -o LIB, --verify")
+    if args.verify is not None and not _AMOUNT.fullmatch(args.verify):
+        parser.error(f"--verify {args.verify}: cycles, as 10000, or seconds, as 1s")
     from rtcf.component import DeclarationError
 
     from rtcf_compile.source.mistake import Mistake
@@ -42,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         compiled = [lowering.compile_component(each) for each in classes]
         if args.verify is not None and not _verified(classes, compiled, args):
-            return REFUSED
+            return DIFFERENT
         if args.output is not None:
             build.library(compiled, args.output)
     except (Mistake, DeclarationError) as error:
@@ -52,14 +57,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _verified(classes: list[type], compiled: list[Any], args: argparse.Namespace) -> bool:
-    from rtcf_compile.comparison import verify
+    from rtcf_compile.comparison import watched
 
-    good = True
-    for cls, machine_code in zip(classes, compiled, strict=True):
-        found = verify.compare(cls, machine_code, args.verify, args.seed)
-        print(found)
-        good = good and not found.differences
-    return good
+    amount = watched.Amount.parse(args.verify)
+    found = watched.compare_all(classes, compiled, amount, args.seed)
+    for each in found:
+        print(each)
+    problem = next((each.problem for each in found if each.problem), "")
+    if problem:
+        print(f"rtcf-compile: {' '.join(problem.split())}", file=sys.stderr)
+    return not problem
 
 
 def _classes(files: list[Path]) -> list[type]:

@@ -1,11 +1,16 @@
 """Compiled components do what the interpreter does, to the last places; what does not is found."""
 
+import os
+import re
+import signal
+import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from rtcf_compile import main
-from rtcf_compile.comparison import verify
+from rtcf_compile.comparison import inside, verify, watched
 from rtcf_compile.machine_code import lowering
 from rtcf_compile.source import modules as source
 
@@ -50,29 +55,165 @@ def test_they_agree_over_a_million_cycles(
     assert compared(name, compiled, 1_000_000).differences == []
 
 
-DIFFERENT = """\
+COMPONENT = """\
 import numpy as np
-from rtcf.component import Component, Input, Output
+from rtcf.component import Component, Input, Output, Parameter
 
 
-class Sums(Component):
-    a: Input[np.float64, 64]
-    out: Output[float]
+class {name}(Component):
+    a: Input[{a}]
+    gain: Parameter[float] = Parameter(1.0, min=0.5, max=2.0)
+    out: Output[{out}]
+
+{body}
+"""
+# Python's ints have no bound, those of the loop 64 bits.
+OVERFLOW = "    def update(self):\n        self.out.write(self.a.value * 10**9 * 10**9 // 10**18)"
+# Python goes on to 2**64, which is 0 in 64 bits.
+ENDLESS_COMPILED = """\
+    def update(self):
+        x = self.a.value * 0 + 2**32
+        while x * x < 2**62:
+            x = x * 2
+        self.out.write(x)
+"""
+WRAP = """\
+    def update(self):
+        x = self.a.value
+        while x > np.pi:
+            x -= 2 * np.pi
+        self.out.write(x)
+"""
+ENDLESS_PREPARE = """\
+    def prepare(self):
+        x = self.gain
+        while x != 3.0:
+            x += 0.5
 
     def update(self):
-        self.out.write(np.sum(self.a.value))
+        self.out.write(self.gain)
 """
+SUM = "    def update(self):\n        self.out.write(np.sum(self.a.value))"
 
 
-def test_a_difference_is_told_with_the_cycle_and_both_values(
+def written(folder: Path, body: str, a: str = "float", out: str = "", name: str = "Tried") -> str:
+    """Write a component; return its file."""
+    file = folder / f"{name.lower()}.py"
+    file.write_text(COMPONENT.format(name=name, a=a, out=out or a, body=body.rstrip()))
+    return str(file)
+
+
+@pytest.mark.parametrize("amount", ["1000", "0.2s"])
+def test_a_difference_is_told_with_hook_cycle_member_and_both_values(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], amount: str
+) -> None:
+    library = tmp_path / "lib" / "tried.so"
+    file = written(tmp_path, OVERFLOW, "int")
+    assert main.main([file, "--verify", amount, "-o", str(library)]) == main.DIFFERENT
+    said = capsys.readouterr()
+    assert re.fullmatch(
+        r"rtcf-compile: \S*tried\.py: Tried: update, cycle \d+: out is -?\d+ compiled, "
+        r"-?\d+ in the interpreter\n",
+        said.err,
+    )
+    assert "DIFFER; update, cycle" in said.out
+    assert not library.exists()
+
+
+def test_an_element_that_differs_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    file = tmp_path / "sums.py"
-    file.write_text(DIFFERENT)
-    assert main.main([str(file), "--verify", "1000"]) == 1
-    said = capsys.readouterr().out
-    assert "DIFFER; cycle" in said
-    assert "in the interpreter" in said and "compiled (" in said
+    body = """\
+    def update(self):
+        pair = np.zeros(2, np.int64)
+        pair[1] = self.a.value * 10**9 * 10**9 // 10**18
+        self.out.write(pair)
+"""
+    file = written(tmp_path, body, "int", "np.int64, 2")
+    assert main.main([file, "--verify", "100"]) == main.DIFFERENT
+    assert "out[1] is " in capsys.readouterr().err
+
+
+def test_other_rounding_of_a_sum_is_no_difference(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main.main([written(tmp_path, SUM, "np.float64, 64", "float"), "--verify", "1000"]) == 0
+    assert re.search(r"1000 cycles, .*[1-9]\d* farther by rounding: the same", str(
+        capsys.readouterr().out))  # fmt: skip
+
+
+def test_an_error_larger_than_rounding_is_a_difference() -> None:
+    nearby = [np.float64(1.0) + each for each in (1e-16, -2e-16)]
+    assert verify._is_rounding(np.float64(1.0 + 2e-15), np.float64(1.0), nearby)
+    assert not verify._is_rounding(np.float64(1.0 + 1e-14), np.float64(1.0), nearby)
+    assert not verify._is_rounding(np.float64("nan"), np.float64(1.0), nearby)
+    assert not verify._is_rounding(np.float64(2.0), np.float64(1.0), [])
+
+
+@pytest.mark.parametrize(
+    ("body", "kind", "said"),
+    [
+        (
+            WRAP,
+            "float",
+            r":12: `while x > np\.pi:`: Tried: update, cycle \d+: it did not end within 2 s of "
+            r"processor time in the interpreter with a = \S+: bound its loops: .*",
+        ),
+        (
+            ENDLESS_PREPARE,
+            "float",
+            r":12: `while x != 3\.0:`: Tried: prepare, cycle \d+: it did not end within 2 s of "
+            r"processor time in the interpreter: bound its loops: .*",
+        ),
+        (
+            ENDLESS_COMPILED,
+            "int",
+            r":?.*: Tried: update, cycle 0: it did not end within 2 s of processor time compiled: "
+            r"bound its loops: .*",
+        ),
+    ],
+    ids=["interpreter", "prepare", "compiled"],
+)
+def test_a_hook_that_does_not_end_is_told_with_its_loop(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], body: str, kind: str, said: str
+) -> None:
+    assert main.main([written(tmp_path, body, kind), "--verify", "1000"]) == main.DIFFERENT
+    assert re.fullmatch(rf"rtcf-compile: \S*tried\.py{said}\n", capsys.readouterr().err)
+
+
+def test_a_loop_without_end_does_not_hold_up_compiling(tmp_path: Path) -> None:
+    # It runs some cycles in the interpreter, too.
+    (tried,) = source.components(source.load(Path(written(tmp_path, ENDLESS_PREPARE))))
+    assert lowering.compile_component(tried).hooks == ["prepare", "update"]
+
+
+def test_seconds_are_of_processor_time_and_least_cycles_come_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = 5.0
+    monkeypatch.setattr(time, "process_time", lambda: now)
+    enough = watched.Amount.parse("1s").enough(components=2)
+    assert not enough(10**9)
+    now = 5.5
+    assert enough(50) and not enough(49)
+
+
+@pytest.mark.parametrize("amount", ["0", "-3", "1.5", "0s", "0.0s", "s", "1m", "1e9"])
+def test_an_amount_that_is_none_is_refused(capsys: pytest.CaptureFixture[str], amount: str) -> None:
+    with pytest.raises(SystemExit):
+        main.main(["none.py", f"--verify={amount}"])
+    said = f"--verify {amount}: cycles, as 10000, or seconds, as 1s"
+    assert said in capsys.readouterr().err
+
+
+def test_the_death_of_compiled_code_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def die(self: inside.Inside, hook: str, record: Any) -> None:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    monkeypatch.setattr(inside.Inside, "call", die)
+    ramp = lowering.compile_component(CLASSES["Ramp"])
+    (found,) = watched.compare_all([CLASSES["Ramp"]], [ramp], watched.Amount(cycles=10))
+    assert found.differences == ["update, cycle 0: SIGKILL compiled, none in the interpreter"]
 
 
 def test_a_distance_counts_representable_numbers() -> None:

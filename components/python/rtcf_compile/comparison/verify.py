@@ -2,14 +2,18 @@
 
 Inputs are drawn from a seed, values at the bounds among them. After each cycle the state goes on
 from the interpreter's, so that a difference is of one cycle and does not add up. In the interpreter
-`@` and np.linalg are the helpers, which sum in the same order.
+`@` and np.linalg are the helpers, which sum in the same order. Other functions of NumPy may round
+otherwise than the loop's: a difference as large as one in the last place of what the hook reads
+makes is none.
 """
 
 import ast
 import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from types import FunctionType
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from rtcf.component import Component
@@ -22,9 +26,14 @@ from rtcf_compile.machine_code.lowering import Compiled
 from rtcf_compile.rewriting import helpers
 from rtcf_compile.rewriting.functions import made
 from rtcf_compile.rewriting.products import Products
+from rtcf_compile.source.mistake import display, source_line
 from rtcf_compile.source.modules import is_own, read
+from rtcf_compile.source.processor_time import HOOK_S, TimeLimitError, loop_line
 
 LARGEST_ULP = 4
+MOST_DIFFERENCES = 10
+# A difference in the last place of what is read, tried so often, explains one so much larger.
+_TRIES, _ROUNDING = 8, 16.0
 _ANEW = 200  # cycles from one start to the next
 _EDGES = (0.0, -0.0, 1.0, -1.0, 1e-300, -1e-300, 1e-3, 1e3, 1e12, -1e12, 1e300, np.inf, np.nan)
 # Python raises where IEEE 754 goes on to infinity or NaN.
@@ -39,100 +48,263 @@ class Comparison:
     cycles: int = 0
     raised: int = 0
     pythons_own: int = 0
+    rounded: int = 0
     largest_ulp: int = 0
     differences: list[str] = field(default_factory=list)
+    problem: str = ""  # the first difference, with its file
 
     def __str__(self) -> str:
         """Return the one line."""
         more = f", {self.raised} raised in both" if self.raised else ""
+        if self.rounded:
+            more += f", {self.rounded} farther by rounding"
         if self.pythons_own:
             more += f", {self.pythons_own} not compared: Python's own overflow"
         first = f"; {self.differences[0]}" if self.differences else ""
         verdict = f"{len(self.differences)} DIFFER{first}" if self.differences else "the same"
         return f"{self.name}: {self.cycles} cycles, {self.largest_ulp} ulp{more}: {verdict}"
 
+    def differ(self, what: str, file: str, line: int = 0) -> None:
+        """Note a difference."""
+        self.differences.append(what)
+        if not self.problem:
+            place = (
+                f"{display(file)}:{line}: `{source_line(file, line)}`" if line else display(file)
+            )
+            self.problem = f"{place}: {self.name}: {what}"
+
+    def endless(self, hook: str, cycle: int, where: str, file: str, line: int) -> None:
+        """Note a hook that takes too long."""
+        what = f"{hook}, cycle {cycle}: it did not end within {HOOK_S:g} s of processor time"
+        what += f" {where}: bound its loops: for _ in range(…)"
+        self.differ(what, file, line)
+
+
+class Bounds(Protocol):
+    """Keeps hooks from running for ever."""
+
+    def record(self, dtype: Any) -> Any:
+        """Return the memory of the record that compiled code works on."""
+
+    def python(self) -> Any:
+        """Bound a hook in the interpreter: raises TimeLimitError."""
+
+    def machine_code(self, hook: int, cycle: int) -> Any:
+        """Bound a compiled hook, by its place in `hooks`."""
+
+
+class _Unbounded:
+    def record(self, dtype: Any) -> Any:
+        return np.zeros((), dtype)
+
+    @contextmanager
+    def python(self) -> Iterator[None]:
+        yield
+
+    @contextmanager
+    def machine_code(self, hook: int, cycle: int) -> Iterator[None]:
+        yield
+
 
 def compare(
-    cls: type[Component], compiled: Compiled, cycles: int, seed: int = 1, edges: float = 0.05
+    cls: type[Component],
+    compiled: Compiled,
+    cycles: int,
+    seed: int = 1,
+    edges: float = 0.05,
+    bounds: Bounds | None = None,
+    enough: Callable[[int], bool] | None = None,
 ) -> Comparison:
-    """Run both for that many cycles; `edges` is the share of inputs that are special values."""
-    draw = np.random.default_rng(seed)
-    result = Comparison(cls.__name__)
-    inside = Inside(compiled)
-    component: Any = _interpreted(cls)()
-    description = compiled.description
-    fresh = component._record.copy()
-    writes = [f"{each.name}__written" for each in description.of(Output)]
-    record = fresh.copy()
-    inputs: list[_Inputs | _Messages] = []
+    """Run both for that many cycles, or until so many are `enough`; `edges` is the share of inputs
+    that are special values."""
+    running = _Comparing(cls, compiled, bounds or _Unbounded())
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
-        for cycle in range(cycles):
-            if cycle % _ANEW == 0:
+        with suppress(_EndError):
+            running.run(enough or (lambda done: done >= cycles), np.random.default_rng(seed), edges)
+    return running.result
+
+
+class _EndError(Exception):
+    """Nothing is left to compare."""
+
+
+class _Comparing:
+    """A comparison under way."""
+
+    def __init__(self, cls: type[Component], compiled: Compiled, bounds: Bounds) -> None:
+        self.result = Comparison(cls.__name__)
+        self._cls, self._compiled, self._bounds = cls, compiled, bounds
+        self._inside = Inside(compiled)
+        self._cycle = 0
+        self._mine = bounds.record(compiled.description.record)
+        self._draw = np.random.default_rng(1)  # of its own, so that inputs are the same
+
+    def run(self, enough: Callable[[int], bool], draw: Any, edges: float) -> None:
+        """Run hooks in the order of a loop's."""
+        self._component: Any = self._made()
+        hooks, result = self._compiled.hooks, self.result
+        description = self._compiled.description
+        fresh = self._component._record.copy()
+        self._record = record = fresh.copy()
+        writes = [f"{each.name}__written" for each in description.of(Output)]
+        inputs: list[_Inputs | _Messages] = []
+        while len(result.differences) < MOST_DIFFERENCES and not enough(self._cycle):
+            if self._cycle % _ANEW == 0:
                 record[...] = fresh
-                if cycle:
+                if self._cycle:
                     _parameters(record, description.of(Parameter), draw)
-                if "prepare" in compiled.hooks:
-                    _both(result, inside, component, record, "prepare", cycle)
-                if "start" in compiled.hooks:
-                    _both(result, inside, component, record, "start", cycle)
+                for hook in ("prepare", "start"):
+                    if hook in hooks:
+                        self._both(hook)
                 # Every other time without special values: one NaN stays in a filter's state.
-                share = edges if cycle // _ANEW % 2 else 0.0
+                share = edges if self._cycle // _ANEW % 2 else 0.0
                 inputs = [_Inputs(each, draw, share) for each in description.of(Input)]
                 inputs += [_Messages(each, draw, share) for each in description.of(Queue)]
             for each in inputs:
-                each.put(record, cycle % _ANEW)
+                each.put(record, self._cycle % _ANEW)
             for name in writes:
                 record[name] = False
-            _both(result, inside, component, record, "update", cycle)
+            self._both("update")
             record["_iteration"] += 1
             record["_time"] += record["_period"]
-            result.cycles += 1
-            if len(result.differences) >= 10:
-                break
-        if "safe" in compiled.hooks:
-            _both(result, inside, component, record, "safe", cycles)
-    return result
+            self._cycle += 1
+            result.cycles = self._cycle
+        if "safe" in hooks:
+            self._both("safe")
 
+    def _made(self) -> Any:
+        """Return the component in the interpreter."""
+        cls = _interpreted(self._cls)
+        try:
+            with self._bounds.python():
+                return cls()
+        except TimeLimitError as error:
+            self._endless("prepare", error)
+        except Exception:
+            # Its prepare() takes no defaults: the load says so.
+            self.result.raised += 1
+        raise _EndError
 
-def _both(
-    result: Comparison, inside: Inside, component: Any, record: Any, hook: str, cycle: int
-) -> None:
-    """Run a hook both ways on copies of the record, and take the interpreter's over."""
-    mine = np.empty_like(record)
-    _bytes(mine)[:] = _bytes(record)
-    said = inside.call(hook, mine)
-    _bytes(component._record)[:] = _bytes(record)
-    error = _raised(component, hook)
-    if isinstance(error, _PYTHONS_OWN) and said is None:
-        result.pythons_own += 1
-        return
-    if said is not None and error is None and "division by zero" in said:
-        # Elements of an array are NumPy's numbers to the interpreter, which divide to infinity.
-        component._record[...] = record
-        with np.errstate(divide="raise", invalid="raise"):
-            error = _raised(component, hook)
-    if (said is None) != (error is None):
-        what = f"{type(error).__name__}: {error}" if error else "no fault"
-        result.differences.append(
-            f"cycle {cycle} {hook}: {what} in the interpreter, {said or 'no fault'} compiled"
-        )
-        return
-    if said is not None:
-        result.raised += 1
-        return
-    theirs = component._record
-    mine["_line"] = theirs["_line"] = record["_line"]
-    if not np.array_equal(_bytes(mine), _bytes(theirs)):
+    def _both(self, hook: str) -> None:
+        """Run a hook both ways on copies of the record, and take the interpreter's over."""
+        result, record, mine, component = self.result, self._record, self._mine, self._component
+        _bytes(component._record)[:] = _bytes(record)
+        error = self._raised(hook)
+        _bytes(mine)[:] = _bytes(record)
+        with self._bounds.machine_code(self._compiled.hooks.index(hook), self._cycle):
+            said = self._inside.call(hook, mine)
+        if isinstance(error, _PYTHONS_OWN) and said is None:
+            result.pythons_own += 1
+            return
+        if said is not None and error is None and "division by zero" in said:
+            # Elements of an array are NumPy's numbers to the interpreter, which divide to infinity.
+            component._record[...] = record
+            with np.errstate(divide="raise", invalid="raise"):
+                error = self._raised(hook)
+        if (said is None) != (error is None):
+            what = f"{type(error).__name__}: {error}" if error else "no fault"
+            self._differ(hook, f"{said or 'no fault'} compiled, {what} in the interpreter")
+            return
+        if said is not None:
+            result.raised += 1
+            return
+        theirs = component._record
+        mine["_line"] = theirs["_line"] = record["_line"]
+        if not np.array_equal(_bytes(mine), _bytes(theirs)):
+            self._compare(hook, mine, theirs.copy())
+            theirs = component._record
+        _bytes(record)[:] = _bytes(theirs)
+
+    def _compare(self, hook: str, mine: Any, theirs: Any) -> None:
+        """Compare all members; leave the interpreter's record as it is."""
+        result = self.result
+        nearby: list[Any] = []
         for name in mine.dtype.names:
             far = ulp(mine[name], theirs[name])
             result.largest_ulp = max(result.largest_ulp, far if far <= LARGEST_ULP else 0)
-            if far > LARGEST_ULP:
-                result.differences.append(
-                    f"cycle {cycle} {hook}: {name} is {theirs[name]} in the interpreter, "
-                    f"{mine[name]} compiled ({far} ulp)"
-                )
-    _bytes(record)[:] = _bytes(theirs)
+            if far <= LARGEST_ULP:
+                continue
+            nearby = nearby or self._nearby(hook)
+            if _is_rounding(mine[name], theirs[name], [each[name] for each in nearby]):
+                result.rounded += 1
+                continue
+            element, ours, pythons = _farthest(mine[name], theirs[name])
+            distance = f" ({far} ulp)" if far < 2**62 else ""
+            self._differ(
+                hook,
+                f"{name.replace('__', '.')}{element} is {ours} compiled, {pythons} in the "
+                f"interpreter{distance}",
+            )
+        _bytes(self._component._record)[:] = _bytes(theirs)
+
+    def _nearby(self, hook: str) -> list[Any]:
+        """Return what the interpreter makes of values a last place apart from those of the hook."""
+        found = []
+        theirs = self._component._record
+        for _ in range(_TRIES):
+            _bytes(theirs)[:] = _bytes(self._record)
+            for name in theirs.dtype.names:
+                if theirs[name].dtype.kind == "f" and not name.startswith("_"):
+                    towards = self._draw.choice((-np.inf, np.inf), theirs[name].shape)
+                    towards = towards.astype(theirs[name].dtype)
+                    theirs[name] = np.nextafter(theirs[name], towards)
+            if self._raised(hook) is None:
+                found.append(theirs.copy())
+        return found
+
+    def _raised(self, hook: str) -> Exception | None:
+        try:
+            with self._bounds.python():
+                getattr(self._component, hook)()
+        except TimeLimitError as error:
+            self._endless(hook, error)
+            raise _EndError from None
+        except Exception as error:
+            return error
+        return None
+
+    def _differ(self, hook: str, what: str) -> None:
+        self.result.differ(f"{hook}, cycle {self._cycle}: {what}", self._compiled.file)
+
+    def _endless(self, hook: str, error: BaseException) -> None:
+        file = self._compiled.file
+        where = "in the interpreter"
+        self.result.endless(
+            hook, self._cycle, where + self._read(hook), file, loop_line(error, file)
+        )
+
+    def _read(self, hook: str) -> str:
+        """Return which values a hook has of the inputs, as far as they are single ones."""
+        inputs = [
+            each.name
+            for each in self._compiled.description.of(Input)
+            if not each.message and not each.type.shape
+        ]
+        if hook not in ("update", "safe") or not inputs:
+            return ""
+        return " with " + ", ".join(f"{each} = {self._record[each]:g}" for each in inputs[:3])
+
+
+def _is_rounding(mine: Any, theirs: Any, nearby: list[Any]) -> bool:
+    """Tell whether values are apart by no more than a last place of what they depend on makes."""
+    if not nearby:
+        return False
+    ours, pythons = np.asarray(mine, np.float64), np.asarray(theirs, np.float64)
+    others = np.asarray(nearby, np.float64)
+    if not all(np.isfinite(each).all() for each in (ours, pythons, others)):
+        return False
+    spread = np.abs(others - pythons).max(axis=0)
+    return bool((np.abs(ours - pythons) <= _ROUNDING * spread).all())
+
+
+def _farthest(mine: Any, theirs: Any) -> tuple[str, Any, Any]:
+    """Return the element that differs most, as `[1, 2]`, and its values."""
+    if not np.shape(mine):
+        return "", mine, theirs
+    far = [ulp(a, b) for a, b in zip(np.ravel(mine), np.ravel(theirs), strict=True)]
+    place = tuple(map(int, np.unravel_index(int(np.argmax(far)), np.shape(mine))))
+    return f"[{', '.join(map(str, place))}]", mine[place], theirs[place]
 
 
 def _bytes(record: Any) -> Any:
@@ -157,14 +329,6 @@ def ulp(a: Any, b: Any) -> int:
         p, q = (each if each >= 0 else least - each for each in numbers)
         far = max(far, abs(p - q))
     return far
-
-
-def _raised(component: Any, hook: str) -> Exception | None:
-    try:
-        getattr(component, hook)()
-    except Exception as error:
-        return error
-    return None
 
 
 class _Inputs:

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 from rtcf.component import Component
-from rtcf.component.declaration import Input, Member, Queue, describe
+from rtcf.component.declaration import Description, Input, Member, Queue, describe
 from rtcf.component.value_type import ValueType
 
 from rtcf_compile.source.mistake import Mistake
+from rtcf_compile.source.processor_time import HOOK_S, TimeLimitError, limited
 
 _CYCLES = 20
 _SHAPES = re.compile(r"matmul|broadcast|shape|dimension|size \d", re.IGNORECASE)
@@ -21,19 +22,14 @@ _SHAPES = re.compile(r"matmul|broadcast|shape|dimension|size \d", re.IGNORECASE)
 def run(cls: type[Component], file: str) -> None:
     """Run some cycles with values drawn from a fixed seed; raise Mistake if shapes do not fit."""
     draw = np.random.default_rng(1)
-    component: Any = cls()
     about = describe(cls)
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         try:
-            component.start()
-            for cycle in range(_CYCLES):
-                for member in about.of(Input):
-                    _draw(component._record, member, draw, cycle)
-                for member in about.of(Queue):
-                    getattr(component, member.name).put(_value(member.type, draw, cycle))
-                component.cycle()
-            component.safe()
+            with limited(HOOK_S):
+                _cycles(cls(), about, draw)
+        except TimeLimitError:
+            pass  # the comparison says where
         except Exception as error:
             # What a component raises of its own is for the loop to see.
             text = " ".join(str(error).split())
@@ -41,6 +37,17 @@ def run(cls: type[Component], file: str) -> None:
                 if "matmul" in text:
                     text = "@ of shapes that do not fit"
                 raise Mistake(file, _line(error, file), text, "make the shapes fit") from None
+
+
+def _cycles(component: Any, about: Description, draw: Any) -> None:
+    component.start()
+    for cycle in range(_CYCLES):
+        for member in about.of(Input):
+            _draw(component._record, member, draw, cycle)
+        for member in about.of(Queue):
+            getattr(component, member.name).put(_value(member.type, draw, cycle))
+        component.cycle()
+    component.safe()
 
 
 def _draw(record: Any, member: Member, draw: Any, cycle: int) -> None:

@@ -1,0 +1,171 @@
+"""The comparison in a process of its own, which ends also where compiled code does not.
+
+Python code is interrupted by a timer's signal. Compiled code is not: there the process ends by
+another timer, or by a crash, and what it was about to do stands in memory that it shares with us.
+"""
+
+import mmap
+import os
+import pickle
+import signal
+import time
+import traceback
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, BinaryIO
+
+import numpy as np
+from rtcf.component import Component
+
+from rtcf_compile.comparison.verify import Comparison, compare
+from rtcf_compile.machine_code.lowering import Compiled
+from rtcf_compile.source.mistake import Mistake
+from rtcf_compile.source.processor_time import HOOK_S, enclosing_loop, limited
+
+_LEAST_CYCLES = 50
+_HEADER = 4096  # bytes before the record
+_COMPONENT, _HOOK, _CYCLE, _COMPILED = range(4)
+
+
+@dataclass(frozen=True)
+class Amount:
+    """How much is compared: cycles of each component, or seconds of processor time of all."""
+
+    cycles: int = 0
+    seconds: float = 0.0
+
+    @classmethod
+    def parse(cls, text: str) -> "Amount":
+        """Read `10000`, or `1s`."""
+        return cls(seconds=float(text[:-1])) if text.endswith("s") else cls(cycles=int(text))
+
+    def enough(self, components: int) -> Callable[[int], bool]:
+        """Return what tells, of one of so many components, whether its cycles are enough; its
+        time begins now."""
+        if self.cycles:
+            return lambda done: done >= self.cycles
+        until = time.process_time() + self.seconds / components
+        return lambda done: done >= _LEAST_CYCLES and time.process_time() >= until
+
+
+def compare_all(
+    classes: Sequence[type[Component]], compiled: Sequence[Compiled], amount: Amount, seed: int = 1
+) -> list[Comparison]:
+    """Compare each class with its machine code; raise Mistake where that cannot begin."""
+    size = _HEADER + max(each.description.record.itemsize for each in compiled)
+    with mmap.mmap(-1, size) as shared:
+        readable, writable = os.pipe()
+        with warnings.catch_warnings():
+            # Of NumPy's threads, which mind a fork.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            child = os.fork()
+        if child == 0:
+            os.close(readable)
+            with open(writable, "wb") as results:
+                _work(classes, compiled, amount, seed, _Notes(shared), results)
+        os.close(writable)
+        found: list[Comparison] = []
+        try:
+            with open(readable, "rb") as results:
+                while (result := _next(results)) is not None:
+                    if isinstance(result, Mistake):
+                        raise result
+                    found.append(result)
+        finally:
+            status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        if len(found) < len(compiled):
+            found.append(_end(compiled[len(found)], status, shared))
+        return found
+
+
+class _Notes:
+    """Of what is about to run, in shared memory."""
+
+    def __init__(self, shared: mmap.mmap) -> None:
+        self._shared = shared
+        self._numbers: Any = np.ndarray(4, np.int64, shared)
+
+    def record(self, dtype: Any) -> Any:
+        """Return the memory of the record that compiled code works on."""
+        return np.ndarray((), dtype, self._shared, _HEADER)
+
+    def begin(self, component: int) -> None:
+        """Note which component is compared from now on."""
+        self._numbers[_COMPONENT] = component
+
+    @contextmanager
+    def python(self) -> Iterator[None]:
+        """Bound a hook in the interpreter: raises TimeLimitError."""
+        with limited(HOOK_S):
+            yield
+
+    @contextmanager
+    def machine_code(self, hook: int, cycle: int) -> Iterator[None]:
+        """Bound a compiled hook: this process ends."""
+        self._numbers[_HOOK], self._numbers[_CYCLE] = hook, cycle
+        self._numbers[_COMPILED] = True
+        signal.setitimer(signal.ITIMER_PROF, HOOK_S)
+        yield
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        self._numbers[_COMPILED] = False
+
+
+def _work(
+    classes: Sequence[type[Component]],
+    compiled: Sequence[Compiled],
+    amount: Amount,
+    seed: int,
+    notes: _Notes,
+    results: BinaryIO,
+) -> None:
+    """Be the child."""
+    status = 1
+    try:
+        signal.signal(signal.SIGPROF, signal.SIG_DFL)
+        for number, (cls, machine_code) in enumerate(zip(classes, compiled, strict=True)):
+            notes.begin(number)
+            enough = amount.enough(len(compiled))
+            found = compare(cls, machine_code, amount.cycles, seed, bounds=notes, enough=enough)
+            pickle.dump(vars(found), results)
+            results.flush()
+        status = 0
+    except Mistake as mistake:
+        parts = (mistake.file, mistake.line, mistake.what, mistake.way_out, mistake.text)
+        pickle.dump(parts, results)
+        results.flush()
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        os._exit(status)
+
+
+def _next(results: BinaryIO) -> Comparison | Mistake | None:
+    try:
+        read = pickle.load(results)
+    except EOFError:
+        return None
+    return Comparison(**read) if isinstance(read, dict) else Mistake(*read)
+
+
+def _end(compiled: Compiled, status: int, shared: mmap.mmap) -> Comparison:
+    """Return what is known of a comparison that has ended before its time."""
+    numbers: Any = np.ndarray(4, np.int64, shared)
+    hook, cycle, in_machine_code = (int(numbers[each]) for each in (_HOOK, _CYCLE, _COMPILED))
+    record: Any = np.ndarray((), compiled.description.record, shared, _HEADER)
+    line = int(record["_line"]) if in_machine_code else 0
+    del numbers, record  # memory that is mapped is not closed
+    result = Comparison(compiled.description.name)
+    result.cycles = cycle
+    name = compiled.hooks[hook]
+    if not in_machine_code:
+        result.differ(f"the comparison ended with status {status}", compiled.file)
+    elif status == -signal.SIGPROF:
+        result.endless(name, cycle, "compiled", compiled.file, enclosing_loop(compiled.file, line))
+    else:
+        what = signal.Signals(-status).name if status < 0 else f"status {status}"
+        result.differ(
+            f"{name}, cycle {cycle}: {what} compiled, none in the interpreter", compiled.file, line
+        )
+    return result

@@ -1,0 +1,65 @@
+"""A bound on the processor time of Python code, by a timer's signal.
+
+Processor time, not time of day: a busy machine changes no result.
+"""
+
+import ast
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+
+HOOK_S = 2.0  # of a hook: thousands of times what a cycle has
+
+
+class TimeLimitError(BaseException):
+    """The time is over. No Exception, so that nobody takes it for one of a component."""
+
+
+@contextmanager
+def limited(seconds: float) -> Iterator[None]:
+    """Raise TimeLimitError where Python code takes longer. Only in the main thread, where Python
+    runs handlers of signals; elsewhere there is no limit."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGVTALRM, _over)
+    signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, before)
+
+
+def loop_line(error: BaseException, file: str) -> int:
+    """Return the line of the loop in which a file's code was interrupted; 0 if it was in none."""
+    line, trace = 0, error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename == file:
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    return enclosing_loop(file, line)
+
+
+def enclosing_loop(file: str, line: int) -> int:
+    """Return the line of the innermost `while`, else the outermost `for`, around a line; else the
+    line itself."""
+    try:
+        tree = ast.parse(Path(file).read_bytes())
+    except (OSError, SyntaxError, ValueError):
+        return line
+    around = [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.While | ast.For) and node.lineno <= line <= (node.end_lineno or 0)
+    ]
+    loops = sorted(around, key=lambda node: node.lineno)
+    endless = [node for node in loops if isinstance(node, ast.While)]
+    return (endless[-1:] or loops)[0].lineno if loops else line
+
+
+def _over(number: int, frame: FrameType | None) -> None:
+    raise TimeLimitError
