@@ -21,7 +21,8 @@ from rtcf.component.declaration import (
     State,
     describe,
 )
-from rtcf.component.message_view import MessageView, checked, put
+from rtcf.component.message_view import MessageView, checked, named, put
+from rtcf.component.value_type import ValueType
 
 
 class Fault(Exception):
@@ -33,6 +34,10 @@ class _Value:
 
     def __init__(self, record: Any, member: Member) -> None:
         self._record, self._member = record, member
+
+    @property
+    def type(self) -> ValueType:
+        return self._member.type
 
     def get(self) -> Any:
         if self._member.message:
@@ -94,7 +99,7 @@ class InputPort:
 
     def put(self, value: Any) -> None:
         """For tests: write it as another component would."""
-        if not self._value.put(value):
+        if not self._value.put(named(value, self._value.type, self._name)):
             return
         self._record[f"{self._name}__new"] = self._record[f"{self._name}__valid"] = True
         self._record[f"{self._name}__connected"] = True
@@ -153,7 +158,8 @@ class QueuePort:
             self._record[f"{name}__dropped"] += 1
             return
         place = (self._record[f"{name}__oldest"] + self._record[f"{name}__count"]) % size
-        self._record[name][place] = checked(value, self._member.type, self._member.name)
+        value = named(value, self._member.type, name)
+        self._record[name][place] = checked(value, self._member.type, name)
         self._record[f"{name}__times"][place] = self._record["_time"]
         self._record[f"{name}__count"] += 1
 
@@ -161,8 +167,10 @@ class QueuePort:
 class OutputPort:
     """An output as the interpreter sees it."""
 
-    def __init__(self, record: Any, member: Member) -> None:
+    def __init__(self, record: Any, member: Member, kept: Any = None) -> None:
+        """`kept`: a record with what readers have where that is not the component's own value."""
         self._value, self._record, self._name = _Value(record, member), record, member.name
+        self._seen = self._value if kept is None else _Value(kept, member)
 
     def write(self, value: Any) -> None:
         """Write a value; it is seen when the hook has ended."""
@@ -175,8 +183,9 @@ class OutputPort:
 
     @property
     def value(self) -> Any:
-        """Return the value that was written last."""
-        return self._value.get()
+        """Return the value that was written last; after a cycle that of readers, which is the last
+        finite one of an output that is declared finite."""
+        return self._seen.get()
 
     @property
     def written(self) -> bool:
@@ -196,7 +205,8 @@ class _Attribute(MemberAttribute):
         if self._member.kind is Input:
             return InputPort(component._record, self._member)
         if self._member.kind is Output:
-            return OutputPort(component._record, self._member)
+            kept = component._kept if self._member.name in component._not_finite else None
+            return OutputPort(component._record, self._member, kept)
         if self._member.kind is Queue:
             return QueuePort(component._record, self._member)
         return _Value(component._record, self._member).get()
@@ -214,6 +224,10 @@ class Component:
     """Base class of components in Python."""
 
     _record: Any
+    _finite: list[Member]
+    _kept: Any  # a record with finite values of these outputs
+    _not_finite: set[str]  # names of those that readers have from there
+    log: list[tuple[str, str]]
 
     def __init_subclass__(cls, **options: Any) -> None:
         """Keep what was declared beside the names that instances use."""
@@ -235,9 +249,14 @@ class Component:
         for name in parameters:
             if name not in {member.name for member in description.of(Parameter)}:
                 raise TypeError(f"{type(self).__name__} has no parameter {name!r}")
-            _Value(record, description.members[name]).set(parameters[name])
+            member = description.members[name]
+            _Value(record, member).set(named(parameters[name], member.type, name))
         record["_period"], record["_dt"], record["_frequency"] = 1_000_000, 1e-3, 1e3
         object.__setattr__(self, "_record", record)
+        finite = [each for each in description.of(Output) if each.options.get("finite")]
+        object.__setattr__(self, "_finite", finite)
+        object.__setattr__(self, "_kept", record.copy())
+        object.__setattr__(self, "_not_finite", set())
         object.__setattr__(self, "log", [])
         self.prepare()
 
@@ -273,12 +292,31 @@ class Component:
         for name in record.dtype.names:
             if name.endswith("__written"):
                 record[name] = False
+        self._not_finite.clear()
         self.update()
+        self._keep_finite()
         record["_iteration"] += 1
         record["_time"] += record["_period"]
         for name in record.dtype.names:
             if name.endswith("__new"):
                 record[name] = False
+
+    def _keep_finite(self) -> None:
+        """Let readers have the last finite value of outputs that are declared so."""
+        for member in self._finite:
+            name = member.name
+            fields = [name + leaf.field for leaf in member.leaves]
+            values = [self._record[each] for each in fields]
+            written = self._record[f"{name}__written"]
+            if not all(np.isfinite(each).all() for each in values):
+                self._not_finite.add(name)
+                if written:
+                    text = f"output {name} is not finite: readers keep its last value"
+                    self.log.append(("error", text))
+                    self._record[f"{name}__written"] = False
+            elif written:
+                for each, value in zip(fields, values, strict=True):
+                    self._kept[each] = value
 
 
 def _time(name: str) -> property:

@@ -71,6 +71,17 @@ def put(record: Any, port: str, message: MessageType, given: Any) -> bool:
     return True
 
 
+def named(value: Any, kind: ValueType, name: str) -> Any:
+    """Return a value from outside; an enum's may be given by name, as to `rtcfctl set`."""
+    if kind.enumeration is None:
+        return value
+    known = ", ".join(each.name for each in kind.enumeration)
+    try:
+        return kind.enumeration[value] if isinstance(value, str) else kind.enumeration(value)
+    except (KeyError, ValueError):
+        raise ValueError(f"{name} is {value!r}, which is none of {known}") from None
+
+
 def checked(value: Any, kind: ValueType, name: str) -> Any:
     """Return a value that fits a type; raise what Python would."""
     new = np.asarray(value)

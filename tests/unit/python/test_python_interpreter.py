@@ -1,5 +1,6 @@
 """Components in Python as the interpreter runs them, and the examples of their documentation."""
 
+import math
 import re
 import subprocess
 import sys
@@ -23,6 +24,7 @@ FILTERS = {
     each.__name__: each
     for each in components(load(TREE / "tests" / "components" / "python" / "filters.py"))
 }
+CHECKED: Any = load(TREE / "tests" / "components" / "python" / "checked.py")
 ARM: Any = next(
     each
     for each in components(load(TREE / "tests" / "components" / "python" / "messages.py"))
@@ -146,6 +148,48 @@ def test_what_a_message_has_not_is_refused() -> None:
         arm.command.value.header.seq = 0.5
     with pytest.raises(TypeError, match="set .value"):
         arm.tip.write(1.0)
+
+
+def test_readers_of_a_finite_output_keep_its_last_finite_value() -> None:
+    guarded: Any = CHECKED.Guarded()
+    for given in (2.0, math.nan):
+        guarded.u.put(given)
+        guarded.cycle()
+    assert (guarded.y.value, list(guarded.pair.value)) == (2.0, [2.0, -2.0])
+    assert not guarded.y.written and not guarded.pair.written
+    # The component has its own.
+    assert math.isnan(guarded.last) and math.isnan(guarded.unchecked.value)
+    said = "output {} is not finite: readers keep its last value"
+    assert guarded.log == [("error", said.format("y")), ("error", said.format("pair"))]
+    guarded.quiet = True
+    guarded.cycle()
+    assert guarded.y.value == 2.0 and len(guarded.log) == 2, "nothing was written"
+    guarded.quiet = False
+    guarded.u.put(3.0)
+    guarded.cycle()
+    assert (guarded.y.value, guarded.y.written) == (3.0, True)
+    # What it wrote the cycle before.
+    assert math.isnan(guarded.before)
+
+
+def test_nothing_finite_was_ever_written() -> None:
+    guarded: Any = CHECKED.Guarded()
+    guarded.u.put(math.inf)
+    guarded.cycle()
+    assert (guarded.y.value, guarded.y.written) == (0.0, False)
+
+
+def test_an_enum_is_given_by_name_too() -> None:
+    switched: Any = CHECKED.Switched(mode="RUN")
+    assert switched.mode is CHECKED.Mode.RUN
+    switched.wanted.put("IDLE")
+    switched.queued.put("RUN")
+    assert switched.wanted.value is CHECKED.Mode.IDLE
+    assert switched.queued.front == CHECKED.Mode.RUN
+    with pytest.raises(ValueError, match="mode is 'run', which is none of IDLE, RUN"):
+        CHECKED.Switched(mode="run")
+    with pytest.raises(ValueError, match="wanted is 7, which is none of IDLE, RUN"):
+        switched.wanted.put(7)
 
 
 def test_a_fault_is_an_exception() -> None:
