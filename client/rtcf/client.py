@@ -199,17 +199,20 @@ class Client(Incidents):
         on_progress: OnProgress | None = None,
         *,
         reset_parameters: bool = False,
+        given_before: graph_pb2.ComponentSpec | None = None,
     ) -> control_pb2.ChangeResult:
         """Put a new component in the place of an old one; what is empty in it is the old one's.
 
         So are parameters that it does not name, as the result's `kept` and `notes` tell; with
-        `reset_parameters` they begin with their defaults.
+        `reset_parameters` they begin with their defaults.  With `given_before`, what the old one
+        was loaded as, only those stay that were tuned since.
         """
         request = control_pb2.ReplaceRequest(
             runner=runner,
             component=component,
             replacement=replacement,
             reset_parameters=reset_parameters,
+            given_before=given_before,
         )
         return self._changed(self._stub.Replace, request, on_progress)
 
@@ -222,11 +225,14 @@ class Client(Incidents):
         on_progress: OnProgress | None = None,
         *,
         rebuilt: bool = False,
+        given_before: Iterable[graph_pb2.ComponentSpec] = (),
     ) -> control_pb2.ChangeResult:
         """Make the graph what `components` say, all at one cycle boundary.
 
         With `rebuilt`, components whose library has changed since they were loaded are
-        replaced, too.  The result's `differences` tell what was changed, or would be.
+        replaced, too.  With `given_before`, what the last call said, parameters that were tuned
+        since stay where they fit and `components` say nothing new.  The result's `differences`
+        tell what was changed, or would be.
         """
         request = control_pb2.ApplyRequest(
             runner=runner,
@@ -234,6 +240,7 @@ class Client(Incidents):
             settings=settings,
             dry_run=dry_run,
             rebuilt=rebuilt,
+            given_before=several("given_before", given_before),
         )
         return self._changed(self._stub.Apply, request, on_progress)
 

@@ -18,7 +18,7 @@ from rtcfd.common import runner_settings
 from rtcfd.common.names import absolute, check_graph, full_name
 from rtcfd.common.refusals import InvalidArgument, NoMaster, NotFound, Refusal
 from rtcfd.executor.link import Progress
-from rtcfd.operations import parameters
+from rtcfd.operations import parameters, tuned
 from rtcfd.operations.runner_core import RunnerCore
 from rtcfd.state.desired import replacement
 
@@ -114,7 +114,8 @@ async def unload(
 async def replace(
     runner: RunnerCore, request: control_pb2.ReplaceRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
-    """Put a new component in the place of an old one; parameters stay unless they are named."""
+    """Put a new component in the place of an old one; parameters stay unless they are named; with
+    `given_before` those that were tuned since."""
     old, given = absolute(request.component), request.replacement
     before = runner.desired.components.get(old)
     package = given.package or (before.package if before else "")
@@ -124,9 +125,13 @@ async def replace(
 
     async def work() -> control_pb2.ChangeResult:
         spec = replacement(runner.desired.components.get(old), given)
+        kept = None
+        if request.HasField("given_before"):
+            kept = await tuned.keep(runner, old, spec, request.given_before)
+        reset = request.reset_parameters or kept is not None
         if old in runner.left_out:  # the executor does not have it
             load = library.load(spec)
-            if not request.reset_parameters:
+            if not reset:
                 load.inherited.extend(runner.desired.components[old].parameters)
             asked = wire.Request(load=load)
         else:
@@ -135,7 +140,7 @@ async def replace(
                 replacement=spec,
                 library=library.path,
                 owner=library.owner,
-                reset_parameters=request.reset_parameters,
+                reset_parameters=reset,
             )
             asked = wire.Request(replace=change)
         result = (await runner.ask(asked, progress)).change
@@ -149,7 +154,11 @@ async def replace(
         runner.happened(
             _Event.KIND_GRAPH, f"{old} replaced by {result.component} ({what})", result.component
         )
-        parameters.note(runner, result.component, set_now, values, acting, "replace")
+        if kept is None:
+            parameters.note(runner, result.component, set_now, values, acting, "replace")
+        else:
+            kept.note(runner, result.component, acting, "replace")
+            kept.tell(result)
         return await _saved(runner, result)
 
     what = f"{package}/{type_name}"
@@ -223,11 +232,15 @@ async def apply(
     runner_settings.check(request.settings)
     runner.limits.check_components(len(request.components))
     acting = caller.current()
+    specs = list(request.components)
 
     async def work() -> control_pb2.ChangeResult:
         before = runner.settings()
         changes = runner_settings.differences(before, request.settings)
-        apply = wire.Apply(components=await loads(runner.catalog, request.components), dry_run=True)
+        kept: dict[str, tuned.Tuned] = {}
+        if request.given_before:
+            kept = await tuned.keep_all(runner, specs, request.given_before)
+        apply = wire.Apply(components=await loads(runner.catalog, specs), dry_run=True)
         rebuilt = await runner.code.changed()
         for load in apply.components:
             load.anew = request.rebuilt and full_name(load.component) in rebuilt
@@ -249,6 +262,11 @@ async def apply(
         for text in changes:
             kind = control_pb2.Difference.KIND_SETTINGS
             result.differences.append(control_pb2.Difference(kind=kind, detail=text))
+        for name, each in kept.items():
+            result.notes.extend(each.notes)
+            if each.kept:
+                words = ", ".join(f"{one.name} = {parameters.word(one.value)}" for one in each.kept)
+                result.notes.append(f"{name} keeps {words}, set since")
         stale = sorted({full_name(each) for each in request.components} & rebuilt.keys())
         if stale and not request.rebuilt:
             result.notes.append(
@@ -257,8 +275,10 @@ async def apply(
             )
         if request.dry_run:
             return result
-        _note_parameters(runner, request.components, acting)
-        runner.desired.become(request.components)
+        _note_parameters(runner, (each for each in specs if full_name(each) not in kept), acting)
+        for name, each in kept.items():
+            each.note(runner, name, acting, "apply")
+        runner.desired.become(specs)
         runner.left_out.clear()
         runner.desired.choose(request.settings)
         count, differed = len(request.components), len(result.differences)

@@ -61,7 +61,7 @@ async def undo(
         now = await _values(runner, name)
         settings = [_taken_back(runner, each, now) for each in last]
         result = await _set(runner, name, settings, acting, progress, last[0].number)
-        words = ", ".join(f"{each.name} = {_word(each.value)}" for each in settings)
+        words = ", ".join(f"{each.name} = {word(each.value)}" for each in settings)
         result.notes.append(f"{words}, as before {last[0].who} changed it")
         return result
 
@@ -104,7 +104,7 @@ async def follow_ros(runner: RunnerCore, changed: Mapping[str, set[str]]) -> Non
     for component, names in changed.items():
         # Not what was told: more may have happened since.
         with contextlib.suppress(NotFound):  # gone since, and its parameters with it
-            found = await _component(runner, component)
+            found = await live_component(runner, component)
             known = _last_values(runner, found.full_name, found.parameters)
             settings = [
                 graph_pb2.ParameterSetting(name=each.name, value=each.value)
@@ -148,7 +148,7 @@ def note(
     )
     if quiet:
         return
-    words = ", ".join(f"{each.name} = {_word(each.value)}" for each in settings)
+    words = ", ".join(f"{each.name} = {word(each.value)}" for each in settings)
     what = "taken back" if takes_back else "set"
     if how == UNANSWERED:
         what = "set (the executor died before its answer)"
@@ -227,8 +227,8 @@ def _taken_back(
     found = now.get(change.parameter)
     if found is None or not same_value(found, change.value):
         raise FailedPrecondition(
-            f"{name} is {'no more' if found is None else _word(found)}, not "
-            f"{_word(change.value)} as {change.who} changed it to: it was changed otherwise since; "
+            f"{name} is {'no more' if found is None else word(found)}, not "
+            f"{word(change.value)} as {change.who} changed it to: it was changed otherwise since; "
             f"`rtcfctl -r {runner.name} set` sets another value",
             errors_pb2.REASON_NOTHING_TO_UNDO,
             component=change.component,
@@ -261,10 +261,17 @@ def _require_tuning(
     } | tuned
 
 
-async def _component(runner: RunnerCore, name: str) -> graph_pb2.ComponentInfo:
+async def live_component(runner: RunnerCore, name: str) -> graph_pb2.ComponentInfo:
+    """Return one component as its executor has it."""
     query = wire.Request(get_component=control_pb2.GetComponentRequest(component=name))
     found: graph_pb2.ComponentInfo = (await runner.ask(query)).component
     return found
+
+
+async def live_components(runner: RunnerCore) -> dict[str, graph_pb2.ComponentInfo]:
+    """Return all components as the executor has them, by full name."""
+    listed = await runner.ask(wire.Request(list_components=wire.ListComponents()))
+    return {str(each.full_name): each for each in listed.components.components}
 
 
 async def _declared(runner: RunnerCore, name: str) -> list[graph_pb2.ParameterInfo]:
@@ -276,7 +283,7 @@ async def _declared(runner: RunnerCore, name: str) -> list[graph_pb2.ParameterIn
 async def _values(runner: RunnerCore, name: str) -> dict[str, graph_pb2.ParameterValue]:
     if name in runner.left_out:
         return _last_values(runner, name, await _declared(runner, name))
-    found = await _component(runner, name)
+    found = await live_component(runner, name)
     return {each.name: each.value for each in found.parameters}
 
 
@@ -302,5 +309,6 @@ def _plain(value: graph_pb2.ParameterValue) -> object:
     return None if kind is None else getattr(value, kind)
 
 
-def _word(value: graph_pb2.ParameterValue) -> str:
+def word(value: graph_pb2.ParameterValue) -> str:
+    """Return a value as a word of a line."""
     return f"{_plain(value)}"[:_LONGEST_WORD]

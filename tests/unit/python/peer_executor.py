@@ -274,6 +274,7 @@ class Peer:
                 result.change.differences.append(kinds(kind=kinds.KIND_UNLOAD, component=name))
         if not request.dry_run:
             self.components = wanted
+            self.live = {}
             result.change.order[:] = sorted(wanted)
         return result
 
@@ -294,6 +295,7 @@ class Peer:
         spec = request.replacement
         await self.behave(request.library, spec, id_)
         del self.components[request.component]
+        self.live.pop(request.component, None)
         name = f"{spec.ns.rstrip('/')}/{spec.name}"
         self.components[name] = spec
         return self.changed(name)
