@@ -68,7 +68,7 @@ class {name}(Component):
 {body}
 """
 # Python's ints have no bound, those of the loop 64 bits.
-OVERFLOW = "    def update(self):\n        self.out.write(self.a.value * 10**9 * 10**9 // 10**18)"
+OVERFLOW = "    def update(self):\n        self.out.write(self.a.value * 10**18 % 7)"
 # Python goes on to 2**64, which is 0 in 64 bits.
 ENDLESS_COMPILED = """\
     def update(self):
@@ -126,7 +126,7 @@ def test_an_element_that_differs_is_named(
     body = """\
     def update(self):
         pair = np.zeros(2, np.int64)
-        pair[1] = self.a.value * 10**9 * 10**9 // 10**18
+        pair[1] = self.a.value * 10**18 % 7
         self.out.write(pair)
 """
     file = written(tmp_path, body, "int", "np.int64, 2")

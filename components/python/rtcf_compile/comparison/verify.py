@@ -401,6 +401,8 @@ def _parameters(record: Any, parameters: list[Member], draw: Any) -> None:
         low, high = (member.options.get(each) for each in ("min", "max"))
         if member.type.is_bool:
             record[member.name] = draw.random() < 0.5
+        elif member.type.enumeration:
+            record[member.name] = draw.choice([int(each) for each in member.type.enumeration])
         elif low is not None and high is not None and member.type.is_float:
             record[member.name] = draw.uniform(low, high, member.type.shape)
         elif low is not None and high is not None:
