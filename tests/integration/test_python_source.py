@@ -54,6 +54,172 @@ class Counts(Component):
 """
 
 
+# Python's ints have no bound, those of the loop 64 bits.
+OVERFLOW = "1 + self.count * 10**18 % 7"
+TUNED = """\
+from rtcf.component import Component, Output, Parameter
+
+
+class Tuned(Component):
+    kp: Parameter[float] = Parameter({kp}, min=0.0, max={most})
+    ki: Parameter[float] = Parameter({ki})
+    out: Output[float]
+
+    def update(self):
+        self.out.write(self.kp + self.ki)
+"""
+
+
+class Watching:
+    """`rtcfctl load --watch`, and what it says."""
+
+    def __init__(self, daemon: Daemon, *words: str) -> None:
+        self._said = daemon.folder / "said"
+        with self._said.open("wb") as to:
+            self._process = subprocess.Popen(
+                [str(BUILD_TREE / "bin" / "rtcfctl"), "load", *words, "--watch"],
+                env=daemon.environment(),
+                stdout=to,
+                stderr=to,
+            )
+
+    def __enter__(self) -> "Watching":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.terminate()
+        self._process.wait(60)
+
+    @property
+    def said(self) -> str:
+        return self._said.read_text()
+
+    def wait_for(self, text: str, times: int = 1) -> None:
+        wait_for(lambda: self.said.count(text) >= times, text, COMPILE_DEADLINE_S)
+
+
+def _parameters(client: rtcf.Client, component: str = "Tuned") -> dict[str, object]:
+    found = client.get_component(component).parameters
+    return {each.name: getattr(each.value, each.value.WhichOneof("kind")) for each in found}
+
+
+def _history(client: rtcf.Client) -> list[tuple[str, str, object]]:
+    return [
+        (each.how, each.parameter, getattr(each.value, each.value.WhichOneof("kind")))
+        for each in client.get_history("Tuned")
+    ]
+
+
+def test_what_was_tuned_stays_when_a_source_is_saved(
+    tmp_path: Path, daemon: Daemon, client: rtcf.Client
+) -> None:
+    source = tmp_path / "tuned.py"
+    source.write_text(TUNED.format(kp=1.0, most=100.0, ki=0.25))
+    with Watching(daemon, str(source), "Tuned", "--param", "ki:=0.5") as watching:
+        watching.wait_for("loaded /Tuned")
+        assert _parameters(client) == {"kp": 1.0, "ki": 0.5}
+        assert daemon.ctl("set", "Tuned", "kp:=50").returncode == 0
+        # Another default of what was tuned, or given, changes nothing.
+        source.write_text(TUNED.format(kp=2.0, most=90.0, ki=0.75))
+        watching.wait_for("replaced /Tuned")
+        assert f"replaced /Tuned by {source} as it is now, which keeps kp 50\n" in watching.said
+        assert _parameters(client) == {"kp": 50.0, "ki": 0.5}
+        history = [("load", "ki", 0.5), ("set", "kp", 50.0)]
+        assert _history(client) == history, "a save sets nothing"
+        assert daemon.ctl("undo", "Tuned").returncode == 0
+        assert _parameters(client)["kp"] == 1.0
+        assert daemon.ctl("set", "Tuned", "kp:=50", "ki:=3").returncode == 0
+        history += [("undo", "kp", 1.0), ("set", "kp", 50.0), ("set", "ki", 3.0)]
+        source.write_text(TUNED.format(kp=3.0, most=9.0, ki=0.75))
+        watching.wait_for("replaced /Tuned", 2)
+        note = "rtcfctl: note: /Tuned: kp = 50.0 does not fit: 0 to 9; it is 3.0 now\n"
+        assert watching.said.count(note) == 1
+        assert _parameters(client) == {"kp": 3.0, "ki": 3.0}
+        history += [("replace", "kp", 3.0)]
+        assert _history(client) == history
+        # Nobody has tuned it by now: its default counts.
+        source.write_text(TUNED.format(kp=4.0, most=9.0, ki=1.0))
+        watching.wait_for("replaced /Tuned", 3)
+        assert _parameters(client)["kp"] == 4.0
+        assert _history(client)[: len(history)] == history
+
+
+def test_code_that_differs_from_the_interpreter_is_refused_unless_asked_for(
+    tmp_path: Path, daemon: Daemon, client: rtcf.Client
+) -> None:
+    source = tmp_path / "counts.py"
+    source.write_text(COUNTS.replace("STEP", OVERFLOW))
+    for _ in range(2):
+        done = daemon.ctl("load", str(source), "Counts")
+        assert done.returncode == 1
+        assert re.fullmatch(
+            rf"rtcfctl: {source}: Counts: update, cycle \d+: \w+ is -?\d+ compiled, -?\d+ in "
+            rf"the interpreter; `rtcf-compile {source} --verify` shows more, --no-verify takes it "
+            rf"as it is\n",
+            done.stderr,
+        ), done.stderr
+        # The library of --no-verify is no reason to trust it.
+        assert daemon.ctl("load", str(source), "Counts", "--no-verify").returncode == 0
+        client.unload(["Counts"])
+
+
+def test_a_source_that_differs_when_it_is_saved_leaves_the_loop_as_it_is(
+    tmp_path: Path, daemon: Daemon, client: rtcf.Client
+) -> None:
+    source = tmp_path / "counts.py"
+    source.write_text(COUNTS.replace("STEP", "1"))
+    with Watching(daemon, str(source), "Counts") as watching:
+        watching.wait_for("loaded /Counts")
+        client.step(10)
+        source.write_text(COUNTS.replace("STEP", OVERFLOW))
+        watching.wait_for("--no-verify takes it as it is")
+        client.step(10)
+        assert _states(client) == {"count": "20"}
+        endless = "1\n        while self.count > 0:\n            self.count += 1"
+        source.write_text(COUNTS.replace("STEP", endless))
+        watching.wait_for(
+            f"rtcfctl: {source}:10: `while self.count > 0:`: Counts: update, cycle 0: it did not "
+            "end within 2 s"
+        )
+        source.write_text(COUNTS.replace("STEP", "1000"))
+        watching.wait_for("replaced /Counts")
+        client.step(1)
+        assert _states(client) == {"count": "1020"}
+
+
+@pytest.fixture
+def calls(tmp_path: Path, own_cache: Path) -> Path:
+    """Give a file with the calls of a compiler, which is that of the build tree `tmp_path`."""
+    file = tmp_path / "calls"
+    compiler = tmp_path / "bin" / "rtcf-compile"
+    compiler.parent.mkdir()
+    compiler.write_text(
+        f'#!/bin/sh\necho "$@" >> {file}\nfor library; do :; done\n'
+        'case $* in *-o*) mkdir -p "${library%/*}"; touch "$library";; esac\n'
+    )
+    compiler.chmod(0o755)
+    return file
+
+
+def test_a_library_is_verified_once(tmp_path: Path, calls: Path) -> None:
+    source = tmp_path / "counts.py"
+    source.write_text(COUNTS)
+
+    def called(verify: bool) -> list[str]:
+        before = calls.read_text().splitlines() if calls.exists() else []
+        python_source.compiled(str(source), tmp_path, lambda line: None, verify)
+        lines = calls.read_text().splitlines()[len(before) :]
+        return [re.sub(r"\S+/", "", line) for line in lines]
+
+    assert called(verify=False) == ["counts.py -o counts.so"]
+    assert called(verify=False) == []
+    assert called(verify=True) == ["counts.py --verify 1s"], "as it is there already"
+    assert called(verify=True) == called(verify=False) == []
+    source.write_text(COUNTS + "\n")
+    assert called(verify=True) == ["counts.py --verify 1s -o counts.so"]
+    assert called(verify=True) == called(verify=False) == []
+
+
 def test_a_source_is_loaded_swapped_when_it_is_saved_and_kept(
     own_cache: Path, tmp_path: Path, daemon: Daemon, client: rtcf.Client
 ) -> None:

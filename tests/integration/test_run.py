@@ -112,6 +112,33 @@ def test_a_graph_file_runs_until_ctrl_c_and_is_applied_again_when_it_is_saved(
     assert loop.said.count("rtcfctl: graph.yaml:") == 1, "said once"
 
 
+def test_what_was_tuned_stays_when_a_graph_file_is_saved(tmp_path: Path) -> None:
+    def values() -> dict[str, float]:
+        found = client.get_component("wave").parameters
+        return {each.name: each.value.double_value for each in found}
+
+    file = tmp_path / "graph.yaml"
+    file.write_text(GRAPH.format(amplitude=1.5))
+    with running(tmp_path, "graph.yaml") as loop:
+        loop.wait_for("running; Ctrl-C ends it")
+        with rtcf.Client(loop.socket) as client:
+            tuned = [rtcf.parse_parameter(each) for each in ("amplitude:=3.5", "rate:=7")]
+            client.set_parameters("wave", tuned)
+            before = client.get_history("wave")
+            file.write_text("# saved\n" + GRAPH.format(amplitude=1.5))
+            loop.wait_for("swapped in: graph.yaml")
+            assert "/wave keeps amplitude = 3.5, rate = 7.0, set since" in loop.said
+            assert (values()["amplitude"], values()["rate"]) == (3.5, 7.0)
+            assert client.get_history("wave") == before, "a save sets nothing"
+            # What the file says now counts.
+            file.write_text(GRAPH.format(amplitude=2.5))
+            wait_for(lambda: values()["amplitude"] == 2.5, "the file's value", _DEADLINE_S)
+            assert values()["rate"] == 7.0
+            (last,) = client.get_history("wave")[len(before) :]
+            assert (last.how, last.parameter) == ("apply", "amplitude")
+            assert (last.before.double_value, last.value.double_value) == (3.5, 2.5)
+
+
 def test_a_rebuilt_library_is_swapped_in(tmp_path: Path) -> None:
     # Of a package that is nowhere else.
     library = tmp_path / "build" / "lib" / "rtcf" / "my_waves" / "my_waves.so"
@@ -152,6 +179,31 @@ def test_a_python_source_is_compiled_and_swapped_in_when_it_is_saved(tmp_path: P
             with client.watch_ports(["/Counts.out"]) as stream:
                 values = next(iter(stream))["/Counts.out"]
     assert (values[1:] < values[:-1]).all()
+
+
+def test_a_python_source_that_differs_from_the_interpreter_is_not_run(tmp_path: Path) -> None:
+    source = tmp_path / "counts.py"
+    differs = "1 + self.count * 10**18 % 7"
+    source.write_text(COUNTS.format(step=differs))
+    with running(tmp_path, "counts.py", "Counts") as loop:
+        assert loop.process.wait() == 1
+        assert "--no-verify takes it as it is" in loop.said
+    with running(tmp_path, "counts.py", "Counts", "--no-verify") as loop:
+        loop.wait_for("running; Ctrl-C ends it")
+
+
+def test_a_python_source_that_differs_when_it_is_saved_leaves_the_loop_as_it_is(
+    tmp_path: Path,
+) -> None:
+    source = tmp_path / "counts.py"
+    source.write_text(COUNTS.format(step=1))
+    with running(tmp_path, "counts.py", "Counts") as loop:
+        loop.wait_for("running; Ctrl-C ends it")
+        source.write_text(COUNTS.format(step="1 + self.count * 10**18 % 7"))
+        loop.wait_for("--no-verify takes it as it is")
+        source.write_text(COUNTS.format(step=-1))
+        loop.wait_for("swapped in: counts.py")
+    assert loop.said.count("--no-verify takes it as it is") == 1, "said once"
 
 
 def test_a_loop_may_be_left_stopped(tmp_path: Path) -> None:

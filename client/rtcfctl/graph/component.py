@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import rtcf
-from rtcf.v1 import graph_pb2
+from rtcf.v1 import control_pb2, graph_pb2
 
 from rtcfctl.graph import python_source
 from rtcfctl.terminal import words
@@ -94,12 +94,13 @@ def watch(
             continue
         try:
             spec = _spec(args, output)
-            result = client.replace(name, spec, args.runner, output.progress)
+            # What the command line gives is the same each time; what was tuned since stays.
+            result = client.replace(name, spec, args.runner, output.progress, given_before=spec)
         except (rtcf.RefusedError, python_source.NotCompiledError) as error:
             # What runs goes on; the next time may be better.
             output.line(f"rtcfctl: {error}", to=sys.stderr)
         else:
-            output.changed(f"replaced {name} by {args.package} as it is now", result)
+            output.changed(f"replaced {name} by {args.package} as it is now{_kept(result)}", result)
             sys.stdout.flush()
 
 
@@ -131,11 +132,12 @@ def replace(client: rtcf.Client, args: argparse.Namespace, output: Output) -> No
         output.progress,
         reset_parameters=args.reset_parameters,
     )
+    output.changed(f"replaced {args.old} by {result.component}{_kept(result)}", result)
+
+
+def _kept(result: control_pb2.ChangeResult) -> str:
     kept = ", ".join(f"{each.name} {words.value(each.value)}" for each in result.kept)
-    output.changed(
-        f"replaced {args.old} by {result.component}{f', which keeps {kept}' if kept else ''}",
-        result,
-    )
+    return f", which keeps {kept}" if kept else ""
 
 
 def release(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
@@ -263,6 +265,7 @@ def _component_options(to: argparse.ArgumentParser, needed: bool = True) -> None
         "package", metavar="PKG", help="a package, or FILE.py, which is compiled", **maybe
     )
     to.add_argument("type", metavar="COMPONENT", help="a component type of the package", **maybe)
+    python_source.add_option(to)
     to.add_argument("--name", default="", help="its name (default: the type's)")
     to.add_argument("--ns", default="", help="its namespace (default: /)")
     to.add_argument("--remap", action="append", default=[], metavar="FROM:=TO")
@@ -299,7 +302,9 @@ def _component_options(to: argparse.ArgumentParser, needed: bool = True) -> None
 def _spec(args: argparse.Namespace, output: Output) -> graph_pb2.ComponentSpec:
     package = args.package
     if python_source.is_one(package):
-        package = python_source.compiled(package, args.build_tree, output.progress)
+        package = python_source.compiled(
+            package, args.build_tree, output.progress, not args.no_verify
+        )
     return rtcf.component(
         package,
         args.type,

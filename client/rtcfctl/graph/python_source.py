@@ -1,5 +1,8 @@
-"""A Python source in the place of a package: compiled, and kept for the next time."""
+"""A Python source in the place of a package: compiled, compared with the interpreter, and kept for
+the next time.
+"""
 
+import argparse
 import hashlib
 import importlib.util
 import platform
@@ -14,6 +17,9 @@ import rtcf
 from rtcf_shared.folders import compiled_folder
 
 _LOOK_S = 0.2
+_VERIFY = "1s"  # of processor time
+_DIFFERENT = 3  # exit status of rtcf-compile
+_VERIFIED = " verified"
 
 
 class NotCompiledError(rtcf.RtcfError):
@@ -25,8 +31,22 @@ def is_one(package: str) -> bool:
     return package.endswith(".py")
 
 
-def compiled(source: str, build_tree: Path | None, progress: Callable[[str], None]) -> str:
-    """Return the package of a source, which private daemons find; compile it if it is new."""
+def add_option(to: argparse.ArgumentParser) -> None:
+    """Add --no-verify."""
+    to.add_argument(
+        "--no-verify",
+        action="store_true",
+        help="of a Python source: do not compare the machine code with the interpreter",
+    )
+
+
+def compiled(
+    source: str, build_tree: Path | None, progress: Callable[[str], None], verify: bool = True
+) -> str:
+    """Return the package of a source, which private daemons find; compile it if it is new.
+
+    With `verify`, the machine code of each source is compared with the interpreter once.
+    """
     file = Path(source).resolve()
     if not file.is_file():
         raise NotCompiledError(f"{source}: no such file")
@@ -36,22 +56,25 @@ def compiled(source: str, build_tree: Path | None, progress: Callable[[str], Non
     # Beside the package, not in it: only libraries belong there.
     known = compiled_folder() / f".{package}"
     print_of_it = fingerprint(file)
-    if library.is_file() and known.is_file() and known.read_text() == print_of_it:
+    kept = known.read_text() if library.is_file() and known.is_file() else ""
+    if kept == print_of_it + _VERIFIED or (kept == print_of_it and not verify):
         return package
     progress(f"compiling {source}")
+    options = ["--verify", _VERIFY] if verify else []
+    if kept != print_of_it:
+        options += ["-o", str(library)]
     done = subprocess.run(
-        [_compiler(build_tree), source, "-o", str(library)],
-        capture_output=True,
-        text=True,
-        check=False,
+        [_compiler(build_tree), source, *options], capture_output=True, text=True, check=False
     )
     if done.returncode != 0:
         said = done.stderr.strip() or f"rtcf-compile ended with status {done.returncode}"
+        if done.returncode == _DIFFERENT:
+            said += f"; `rtcf-compile {source} --verify` shows more, --no-verify takes it as it is"
         raise NotCompiledError(said.removeprefix("rtcf-compile: "))
     # rtcfd takes libraries only where others cannot write, whatever our umask is.
     for each in (library, library.parent, library.parents[1]):
         each.chmod(0o755)
-    known.write_text(print_of_it)
+    known.write_text(print_of_it + (_VERIFIED if verify else ""))
     return package
 
 

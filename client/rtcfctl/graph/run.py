@@ -33,6 +33,7 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
         help=f"where libraries are (default: {', '.join(BUILT)} here, those that there are)",
     )  # fmt: skip
     run.add_argument("--no-start", action="store_true", help="leave the loop stopped")
+    python_source.add_option(run)
     run.set_defaults(run=show)
 
 
@@ -73,6 +74,11 @@ def _say(line: str) -> None:
     print(line, flush=True)
 
 
+def _full_name(spec: graph_pb2.ComponentSpec) -> str:
+    parts = [part for part in spec.ns.split("/") if part]
+    return "/" + "/".join([*parts, spec.name or spec.type])
+
+
 class _Work:
     """What is run, and whether it is another by now."""
 
@@ -81,12 +87,16 @@ class _Work:
         self._output = output
         self._last = self._content()
         self._refused = ""
+        # What the file said when it was applied, by runner and full name.
+        self._given: dict[str, dict[str, graph_pb2.ComponentSpec]] = {}
 
     def read(self) -> list[rtcf.Graph]:
         """Return what the file says now; raises RtcfError."""
         file = self._args.file
         if self._args.type:
-            package = python_source.compiled(file, self._args.build_tree, self._output.progress)
+            package = python_source.compiled(
+                file, self._args.build_tree, self._output.progress, not self._args.no_verify
+            )
             spec = rtcf.component(package, self._args.type)
             return [rtcf.Graph(self._args.runner or DEFAULT_RUNNER, components=[spec])]
         graphs = rtcf.read_graphs(*files.read(file))
@@ -104,7 +114,9 @@ class _Work:
             result = client.apply(
                 graph.components, graph.runner, graph.settings,
                 on_progress=self._output.progress, rebuilt=True,
+                given_before=self._given.get(graph.runner, {}).values(),
             )  # fmt: skip
+            self._given[graph.runner] = {_full_name(each): each for each in graph.components}
             self._output.notes(result.notes)
             names.append(graph.runner)
         return names
@@ -122,15 +134,20 @@ class _Work:
             if content != self._last:
                 self.apply(client, self.read())
             elif rebuilt:
-                # One by one: what was tuned since the file was applied stays.
+                # One by one: what was loaded besides stays.
                 for runner, name in rebuilt:
-                    client.replace(name, graph_pb2.ComponentSpec(), runner, self._output.progress)
+                    given = self._given.get(runner, {}).get(name)
+                    result = client.replace(
+                        name, given or graph_pb2.ComponentSpec(), runner, self._output.progress,
+                        given_before=given,
+                    )  # fmt: skip
+                    self._output.notes(result.notes)
             else:
                 return
         except (rtcf.RefusedError, rtcf.GraphFileError, python_source.NotCompiledError) as error:
             # A library or a file that is just being written may be whole at the next look.
             said = f"{content!r} {error}"
-            if said == self._refused:
+            if said == self._refused or isinstance(error, python_source.NotCompiledError):
                 self._last = content
                 print(f"rtcfctl: {error}", file=sys.stderr)
             self._refused = said

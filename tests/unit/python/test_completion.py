@@ -39,6 +39,8 @@ def offered(daemon: DaemonUnderTest) -> DaemonUnderTest:
         ("load demo Fine --remap ", ["in1:=", "out1:="]),
         ("load demo Fine --break ", ["in1"]),
         ("load demo --param ", [""]),
+        ("load observer.py --no", ["--no-verify"]),
+        ("run observer.py Observer --no", ["--no-start", "--no-verify"]),
         ("load demo Nothing --param ", [""]),
         ("set alpha ", ["kp:="]),
         ("history al", ["alpha"]),
