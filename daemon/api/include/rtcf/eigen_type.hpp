@@ -87,6 +87,45 @@ struct MultiArray<float> {
     static constexpr const char* scalar = "float";
 };
 
+/// A matrix on the wire, before its elements: two labelled dimensions, an offset of 0, and the
+/// number of elements.
+class MatrixHead {
+   public:
+    // dim count, two dims of (label length, label, size, stride), offset, data count
+    static constexpr std::uint32_t kSize = 4 + 2 * (4 + 4 + 4 + 4) + 4 + 4;
+
+    /// Real-time safe.
+    static void write(ros::serialization::OStream& stream, std::uint32_t rows,
+                      std::uint32_t columns) {
+        stream.next(std::uint32_t{2});
+        dimension(stream, "rows", rows, rows * columns);
+        dimension(stream, "cols", columns, columns);
+        stream.next(std::uint32_t{0});
+        stream.next(rows * columns);
+    }
+
+   private:
+    static constexpr std::uint32_t kLabelLength = 4;  // "rows", "cols"
+
+    static void dimension(ros::serialization::OStream& stream, const char* label,
+                          std::uint32_t size, std::uint32_t stride) {
+        stream.next(kLabelLength);
+        std::memcpy(stream.advance(kLabelLength), label, kLabelLength);
+        stream.next(size);
+        stream.next(stride);
+    }
+};
+
+/// The elements of a message, row by row. @throws std::length_error if it has not as many
+template <typename Message>
+const auto* matrixElements(const Message& message, std::size_t count) {
+    const std::size_t offset = message.layout.data_offset;
+    if (message.data.size() < offset || message.data.size() - offset != count) {
+        throw std::length_error("matrix of another size");
+    }
+    return message.data.data() + offset;
+}
+
 }  // namespace detail
 
 template <>
@@ -126,11 +165,7 @@ struct PortType<Eigen::Matrix<Scalar, Rows, Cols, Options, MaxRows, MaxCols>,
     static std::uint32_t length(const T&) { return kHead + sizeof(Scalar) * Rows * Cols; }
     static void serialize(const T& value, std::uint8_t* to, std::uint32_t size) {
         ros::serialization::OStream stream(to, size);
-        stream.next(std::uint32_t{2});
-        dimension(stream, "rows", Rows, Rows * Cols);
-        dimension(stream, "cols", Cols, Cols);
-        stream.next(std::uint32_t{0});
-        stream.next(static_cast<std::uint32_t>(Rows * Cols));
+        detail::MatrixHead::write(stream, Rows, Cols);
         for (int row = 0; row < Rows; ++row) {
             for (int col = 0; col < Cols; ++col) stream.next(value(row, col));
         }
@@ -138,14 +173,9 @@ struct PortType<Eigen::Matrix<Scalar, Rows, Cols, Options, MaxRows, MaxCols>,
     static void deserialize(T& value, const std::uint8_t* from, std::uint32_t size) {
         Message message;
         PortType<Message>::deserialize(message, from, size);
-        const std::size_t offset = message.layout.data_offset;
-        if (message.data.size() < offset || message.data.size() - offset != Rows * Cols) {
-            throw std::length_error("matrix of another size");
-        }
+        const Scalar* element = detail::matrixElements(message, std::size_t{Rows} * Cols);
         for (int row = 0; row < Rows; ++row) {
-            for (int col = 0; col < Cols; ++col) {
-                value(row, col) = message.data[offset + static_cast<std::size_t>(row * Cols + col)];
-            }
+            for (int col = 0; col < Cols; ++col) value(row, col) = *element++;
         }
     }
     static std::string print(const T& value) {
@@ -183,18 +213,7 @@ struct PortType<Eigen::Matrix<Scalar, Rows, Cols, Options, MaxRows, MaxCols>,
     // Another type, as readers take values from the writer's memory; a vector is the same either
     // way.
     static constexpr bool kTransposed = (Options & Eigen::RowMajor) != 0 && Rows > 1 && Cols > 1;
-    static constexpr std::uint32_t kLabelLength = 4;  // "rows", "cols"
-    // Before the data: dim count, two dims of (label length, label, size, stride), offset, data
-    // count.
-    static constexpr std::uint32_t kHead = 4 + 2 * (4 + kLabelLength + 4 + 4) + 4 + 4;
-
-    static void dimension(ros::serialization::OStream& stream, const char* label, int size,
-                          int stride) {
-        stream.next(kLabelLength);
-        std::memcpy(stream.advance(kLabelLength), label, kLabelLength);
-        stream.next(static_cast<std::uint32_t>(size));
-        stream.next(static_cast<std::uint32_t>(stride));
-    }
+    static constexpr std::uint32_t kHead = detail::MatrixHead::kSize;
 };
 
 }  // namespace rtcf
