@@ -280,7 +280,13 @@ def test_a_library_of_another_debian_counts_as_of_another_source(
     assert python_source.fingerprint(source) != ours
 
 
-@pytest.mark.parametrize("changed", ["main.py", "library/shim.py", "library/runtime.hpp"])
+@pytest.mark.parametrize(
+    "changed",
+    [
+        *("main.py", "library/tables.py", "library/tables.hpp"),
+        "../../lib/librtcf_python.a",
+    ],
+)
 def test_a_library_of_another_compiler_counts_as_of_another_source(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: str
 ) -> None:
@@ -295,6 +301,7 @@ def test_a_library_of_another_compiler_counts_as_of_another_source(
     source = tmp_path / "counts.py"
     source.write_text(COUNTS)
     before = python_source.fingerprint(source)
+    (compiler / changed).parent.mkdir(exist_ok=True)
     with (compiler / changed).open("a") as file:
         file.write("\n")
     assert python_source.fingerprint(source) != before

@@ -9,6 +9,7 @@ import platform
 import re
 import shutil
 import subprocess
+import sysconfig
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -95,7 +96,9 @@ def _changes(file: Path, last: str) -> Iterator[bool]:
 
 
 def fingerprint(source: Path) -> str:
-    """Return what a library of it depends on, as a hash: files beside it, and the compiler's."""
+    """Return what a library of it depends on, as a hash: files beside it, the compiler's, and the
+    runtime that is in each library.
+    """
     # Libraries that it needs have other names in another release of Debian.
     digest = hashlib.sha256(f"{rtcf.__version__} {_release()}\n".encode())
     compiler = importlib.util.find_spec("rtcf_compile")
@@ -103,6 +106,7 @@ def fingerprint(source: Path) -> str:
     if compiler is not None and compiler.origin is not None:
         folder = Path(compiler.origin).parent
         files += sorted(each for each in folder.rglob("*") if each.suffix in (".py", ".hpp"))
+        digest.update(f"{_runtime(folder)}\n".encode())
     for file in files:
         try:
             content = file.read_bytes()
@@ -110,6 +114,18 @@ def fingerprint(source: Path) -> str:
             continue  # just being saved
         digest.update(f"{file.name} {len(content)}\n".encode() + content)
     return digest.hexdigest()
+
+
+def _runtime(compiler: Path) -> str:
+    """Return what distinguishes the runtime beside a compiler: of a build tree, or installed."""
+    triplet = sysconfig.get_config_var("MULTIARCH") or ""
+    for folder in (compiler.parents[1] / "lib", Path("/usr/lib") / triplet):
+        try:
+            found = (folder / "librtcf_python.a").stat()
+        except OSError:
+            continue
+        return f"{found.st_size} {found.st_mtime_ns}"
+    return ""
 
 
 def _compiler(build_tree: Path | None) -> str:

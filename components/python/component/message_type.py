@@ -52,6 +52,7 @@ class MessageType:
     leaves: tuple[Leaf, ...]
     texts: tuple[tuple[str, ...], ...]
     others: tuple[tuple[str, ...], ...]
+    md5: str = ""
 
     @property
     def cpp(self) -> str:
@@ -89,7 +90,7 @@ def message_type(cls: Any, size: int | None) -> MessageType:
         raise DeclarationError(f"{cls._type} has no array of variable size: declare no size")
     if sum(each.type.count for each in leaves) > _LARGEST:
         raise DeclarationError(f"{cls._type} has more than {_LARGEST} elements: declare fewer")
-    return MessageType(cls._type, tuple(leaves), tuple(texts), tuple(others))
+    return MessageType(cls._type, tuple(leaves), tuple(texts), tuple(others), cls._md5sum)
 
 
 def _collect(

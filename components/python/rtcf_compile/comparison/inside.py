@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from rtcf_compile.library.build import compiler
+from rtcf_compile.library.toolchain import compiler
 from rtcf_compile.machine_code.lowering import Compiled
 from rtcf_compile.machine_code.raises import hash_of
 from rtcf_compile.source.mistake import Mistake

@@ -1,1 +1,1 @@
-"""From an object file to a library of components, by a C++ shim around it."""
+"""From object files to a library of components: tables, adapters of messages, and the runtime."""

@@ -1,103 +1,159 @@
-"""The part of the C++ source that takes ROS messages apart and fills them, as hooks use them."""
+"""Adapters of ROS messages: for each type an object file that g++ makes once, whatever a component
+declares. It is kept in the user's cache, beside the compiled components.
+"""
 
-from collections.abc import Callable
-from typing import Any
+import hashlib
+import os
+import subprocess
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
 
-from rtcf.component.declaration import Description, Input, Member, Output
-from rtcf.component.message_type import Leaf, MessageType
+from rtcf.component.message_type import MessageType
+from rtcf_shared.folders import compiled_folder
+
+from rtcf_compile.library import toolchain
+from rtcf_compile.source.mistake import Mistake
+
+_CPP = {"bool": "Bool", "float32": "Float", "float64": "Double"}
+_FLAGS = (
+    *("-std=c++17", "-O2", "-g1", "-DNDEBUG", "-fPIC", "-fvisibility=hidden", "-w"),
+    *("-fvisibility-inlines-hidden", "-fno-gnu-unique"),
+)
 
 
-def includes(about: Description) -> list[str]:
-    """Return the headers of the messages that ports carry."""
-    return sorted(
-        {f"#include <{each.message.name}.h>" for each in about.members.values() if each.message}
+@dataclass(frozen=True)
+class _Adapter:
+    """An adapter that is being compiled."""
+
+    message: MessageType
+    object_file: Path
+    part: Path
+    source: Path
+    process: "subprocess.Popen[str]"
+
+
+def symbol(message: MessageType) -> str:
+    """Return the name of a message's table."""
+    return f"rtcf_message_{message.name.replace('/', '__')}"
+
+
+def objects(messages: Iterable[MessageType], folder: Path) -> list[Path]:
+    """Return the adapters' object files, and compile those that are not kept.
+
+    `folder` is for what cannot be kept. Raise Mistake if a message has no C++ header, or another
+    one than its Python class.
+    """
+    by_name = {each.name: each for each in messages}
+    kept, missing = _folder(folder), []
+    files = []
+    for message in by_name.values():
+        file = kept / f"{message.name.replace('/', '-')}-{_key(message)}.o"
+        files.append(file)
+        if not _is_ours(file):
+            missing.append((message, file))
+    if missing:
+        names = ", ".join(each.name for each, _ in missing)
+        print(f"rtcf-compile: compiling {names} once", file=sys.stderr)
+    for adapter in [_compile(message, file, folder) for message, file in missing]:
+        _finish(adapter)
+    return files
+
+
+def _folder(other: Path) -> Path:
+    """Return the folder that keeps adapters."""
+    kept = compiled_folder() / ".messages"
+    try:
+        kept.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return other
+    return kept if os.access(kept, os.W_OK) else other
+
+
+def _is_ours(file: Path) -> bool:
+    """Tell whether it is there, and nobody else can have written it."""
+    try:
+        found = file.stat()
+    except OSError:
+        return False
+    return found.st_uid == os.getuid() and not found.st_mode & 0o022
+
+
+def _key(message: MessageType) -> str:
+    """Return what an adapter depends on, as a hash."""
+    header = toolchain.header(f"{message.name}.h")
+    found = f"{header} {header.stat().st_mtime_ns}" if header else ""
+    parts = (_source(message), found, *_command(), toolchain.identity())
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:24]
+
+
+def _command() -> list[str]:
+    here = Path(__file__).resolve().parent
+    return [*toolchain.compiler(), *_FLAGS, f"-I{here}", *toolchain.flags(), "-c"]
+
+
+def _compile(message: MessageType, file: Path, folder: Path) -> _Adapter:
+    """Begin to compile an adapter; it takes its place in one step, when it is whole."""
+    source = folder / f"{file.stem}.cpp"
+    source.write_text(_source(message), encoding="utf-8")
+    part = file.with_name(f".{file.name}.{os.getpid()}")
+    process = subprocess.Popen(
+        [*_command(), str(source), "-o", str(part)], stderr=subprocess.PIPE, text=True
+    )
+    return _Adapter(message, file, part, source, process)
+
+
+def _finish(adapter: _Adapter) -> None:
+    said = adapter.process.communicate()[1]
+    if adapter.process.returncode != 0:
+        adapter.part.unlink(missing_ok=True)
+        raise _mistake(adapter.message, said)
+    adapter.part.chmod(0o644)
+    adapter.part.replace(adapter.object_file)
+
+
+def _mistake(message: MessageType, said: str) -> Mistake:
+    package = message.name.partition("/")[0]
+    install = f"sudo apt install lib{package.replace('_', '-')}-dev, or build {package}"
+    if f"{message.name}.h: No such file" in said:
+        return Mistake(message.name, 0, "has no C++ header", install)
+    if "rtcf-compile: another definition" in said:
+        what = "the C++ header has another definition than the Python class"
+        return Mistake(message.name, 0, what, "build both of one message, and source its workspace")
+    return toolchain.mistake(message.name, said)
+
+
+def _source(message: MessageType) -> str:
+    """Return the adapter's source."""
+    fields = [
+        f"    RTCF_PYTHON_FIELD({'.'.join(each.path)}, {_scalar(each.type.scalar.name)}),"
+        for each in message.leaves
+    ]
+    fields += [f"    RTCF_PYTHON_FIELD({'.'.join(each)}, UInt8)," for each in message.texts]
+    table = f"const rtcf::python::MessageTable {symbol(message)}"
+    return "\n".join(
+        [
+            f"#include <{message.name}.h>",
+            "",
+            '#include "message_adapter.hpp"',
+            "",
+            f"using Message = {message.cpp};",
+            "using Sum = ros::message_traits::MD5Sum<Message>;",
+            f"static_assert(Sum::static_value1 == 0x{message.md5[:16]}ULL &&",
+            f"                  Sum::static_value2 == 0x{message.md5[16:]}ULL,",
+            '              "rtcf-compile: another definition");',
+            "constexpr rtcf::python::MessageField kFields[] = {",
+            *fields,
+            "    {}};",
+            'extern "C" {',
+            f"extern {table};",
+            f"{table}{{&rtcf::typeInfo<Message>, kFields}};",
+            "}",
+            "",
+        ]
     )
 
 
-def prepare(about: Description, text: Callable[[str], str], used: set[str]) -> list[str]:
-    """Return what gives outputs' messages their sizes and texts, for the constructor."""
-    lines = []
-    for member in about.of(Output):
-        message = member.message
-        if message is None:
-            continue
-        lines += ["        {", f"            {message.cpp} sample;"]
-        for leaf in _used(member, message, used):
-            if leaf.is_variable:
-                lines.append(f"            sample.{_path(leaf)}.resize({leaf.type.count});")
-        for path, given in (member.options.get("texts") or {}).items():
-            value = (
-                text(given)
-                if isinstance(given, str)
-                else f"{{{', '.join(text(e) for e in given)}}}"
-            )
-            lines.append(f"            sample.{path} = {value};")
-        lines += [f"            port_{member.name}.reserve(sample);", "        }"]
-    return lines
-
-
-def read(member: Member, text: Callable[[str], str], used: set[str]) -> list[str]:
-    """Return what brings an input's message into the record; one with too many elements is none."""
-    assert member.message is not None and member.kind is Input
-    name, record = member.name, f"record_.{member.name}"
-    leaves = _used(member, member.message, used)
-    largest = " && ".join(
-        f"message.{_path(each)}.size() <= {each.type.count}U" for each in leaves if each.is_variable
-    )
-    lines = [
-        "        {",
-        f"            const rtcf::DataStatus status = port_{name}.read();",
-        f"            [[maybe_unused]] const {member.message.cpp}& message = port_{name}.value();",
-        f"            const bool fits = {largest or 'true'};",
-        f"            {record}__new = fits && status == rtcf::DataStatus::New;",
-        "            if (fits && status != rtcf::DataStatus::None) {",
-        f"                {record}__valid = true;",
-        *(f"                {line}" for leaf in leaves for line in _loaded(record, leaf)),
-    ]
-    if f"{name}__age" in used:
-        lines.append(f"                {record}__age = port_{name}.age();")
-    lines += ["            } else if (!fits && status == rtcf::DataStatus::New) {"]
-    said = text(f"a message of {name} has more elements than declared, and is not taken")
-    lines += [f"                RTCF_WARN_THROTTLE(this, 1.0, {said});", "            }"]
-    if f"{name}__connected" in used:
-        lines.append(f"            {record}__connected = port_{name}.connected();")
-    return [*lines, "        }"]
-
-
-def write(member: Member, used: set[str]) -> list[str]:
-    """Return what fills an output's message from the record."""
-    assert member.message is not None
-    leaves = _used(member, member.message, used)
-    return [
-        f"            [[maybe_unused]] {member.message.cpp}& message = port_{member.name}.value();",
-        *(f"            {line}" for each in leaves for line in _stored(member, each)),
-    ]
-
-
-def _used(member: Member, message: MessageType, used: set[str]) -> list[Leaf]:
-    return [each for each in message.leaves if member.name + each.field in used]
-
-
-def _path(leaf: Leaf) -> str:
-    return ".".join(leaf.path)
-
-
-def _loaded(record: str, leaf: Leaf) -> list[Any]:
-    field, value = f"{record}{leaf.field}", f"message.{_path(leaf)}"
-    if leaf.is_time:
-        return [f"{field} = static_cast<std::int64_t>({value}.toNSec());"]
-    if not leaf.type.shape:
-        return [f"{field} = static_cast<{leaf.type.cpp}>({value});"]
-    lines = [f"std::copy({value}.begin(), {value}.end(), {field}.begin());"]
-    if leaf.is_variable:
-        lines.append(f"{record}{leaf.count} = static_cast<std::int64_t>({value}.size());")
-    return lines
-
-
-def _stored(member: Member, leaf: Leaf) -> list[str]:
-    field, value = f"record_.{member.name}{leaf.field}", f"message.{_path(leaf)}"
-    if leaf.is_time:
-        return [f"rtcf::python::setTime({value}, {field});"]
-    if not leaf.type.shape:
-        return [f"{value} = {field};"]
-    return [f"std::copy({field}.begin(), {field}.end(), {value}.begin());"]
+def _scalar(name: str) -> str:
+    return _CPP.get(name) or name.replace("uint", "UInt").replace("int", "Int")

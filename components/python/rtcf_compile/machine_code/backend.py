@@ -11,7 +11,7 @@ import llvmlite.binding as llvm
 import numba
 from numba import types
 
-_TYPED = llvm.llvm_version_info[0] < 15
+POINTERS_HAVE_TYPES = llvm.llvm_version_info[0] < 15
 _INLINED = 1000  # instructions
 _POINTER = re.compile(r"(?:i\d+|\[\d+ x i\d+\])\*+")
 _RECORD_AND_EXCEPTION = (
@@ -20,7 +20,7 @@ _RECORD_AND_EXCEPTION = (
 
 # Neither numba takes an array of bools in a record, for want of this alone.
 types.Boolean.bitwidth = 8
-if _TYPED:
+if POINTERS_HAVE_TYPES:
     llvm.initialize()
 llvm.initialize_native_target()
 llvm.initialize_native_asmprinter()
@@ -33,21 +33,21 @@ def parsed(assembly: str) -> Any:
 
 def pointers(assembly: str) -> str:
     """Return assembly of ours, whose pointers have types, as this LLVM reads it."""
-    return assembly if _TYPED else _POINTER.sub("ptr", assembly)
+    return assembly if POINTERS_HAVE_TYPES else _POINTER.sub("ptr", assembly)
 
 
 def taken(assembly: str, function: str) -> tuple[str, str]:
     """Return as what a function of numba's takes the record and the exception's place."""
-    form = _RECORD_AND_EXCEPTION if _TYPED else r"\(ptr [^,]*, ptr [^,]*, ptr "
+    form = _RECORD_AND_EXCEPTION if POINTERS_HAVE_TYPES else r"\(ptr [^,]*, ptr [^,]*, ptr "
     found = re.search(rf"^define [^\n]*@{re.escape(function)}{form}", assembly, re.M)
     if found is None:
         raise RuntimeError(f"numba {numba.__version__}: functions have a form not known here")
-    return (found["record"], f"{found['exception']}**") if _TYPED else ("ptr", "ptr")
+    return (found["record"], f"{found['exception']}**") if POINTERS_HAVE_TYPES else ("ptr", "ptr")
 
 
 def drop_unused(module: Any) -> None:
     """Drop what no external function needs."""
-    if _TYPED:
+    if POINTERS_HAVE_TYPES:
         passes = llvm.ModulePassManager()
         passes.add_global_dce_pass()
         passes.run(module)
@@ -59,7 +59,7 @@ def drop_unused(module: Any) -> None:
 
 def optimise(module: Any) -> None:
     """Make a module as fast as -O3 does, inlining more than that."""
-    if _TYPED:
+    if POINTERS_HAVE_TYPES:
         passes = llvm.ModulePassManager()
         builder = llvm.PassManagerBuilder()
         builder.opt_level = 3
@@ -74,6 +74,15 @@ def optimise(module: Any) -> None:
         builder = _builder()
         builder.getModulePassManager().run(module, builder)
     drop_unused(module)
+
+
+def emitted(assembly: str) -> bytes:
+    """Return the object file of an assembly that is only data and calls."""
+    module = parsed(assembly)
+    target = machine()
+    module.triple, module.data_layout = target.triple, str(target.target_data)
+    module.verify()
+    return bytes(target.emit_object(module))
 
 
 def machine() -> Any:

@@ -1,4 +1,4 @@
-"""The gate: compiled code may refer to mathematics, to moving memory, and to the shim's log calls.
+"""The gate: compiled code may refer to mathematics, to moving memory, and to log calls.
 
 Whatever else it would need at run time is refused, with the line that it comes from.
 """

@@ -5,16 +5,11 @@ emitted for any processor of the architecture: neither the interpreter nor numba
 left.
 """
 
-import os
 import re
 import warnings
 from dataclasses import dataclass, field
 from types import FunctionType
 from typing import Any
-
-# Read when numba is imported: code for this machine alone would not run on the robot's.
-os.environ["NUMBA_CPU_NAME"] = "generic"
-os.environ["NUMBA_CPU_FEATURES"] = ""
 
 import numba
 from numba.core import errors

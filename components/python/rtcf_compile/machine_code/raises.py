@@ -1,6 +1,6 @@
 """What compiled code may raise: constants that numba puts into the code, as pickled bytes.
 
-The shim finds by a hash of these bytes what was raised and where; nothing is unpickled there.
+The runtime finds by a hash of these bytes what was raised and where; nothing is unpickled there.
 """
 
 import pickle
@@ -48,7 +48,7 @@ def raises_in(assembly: str, file: str) -> dict[int, Raise]:
 
 
 def hash_of(data: bytes) -> int:
-    """Return FNV-1a of 64 bits, as the shim computes it."""
+    """Return FNV-1a of 64 bits, as the runtime computes it."""
     value = 0xCBF29CE484222325
     for byte in data:
         value = (value ^ byte) * 0x100000001B3 & 0xFFFFFFFFFFFFFFFF

@@ -1,4 +1,4 @@
-"""A log call in compiled code: a call of a C function of the shim, arguments as they are."""
+"""A log call in compiled code: a call of a function of the library, arguments as they are."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from numba.extending import intrinsic
 
 from rtcf_compile.rewriting.logs import Logs
 
-_CPP = {types.boolean: "bool", types.int64: "std::int64_t", types.float64: "double"}
+_SCALARS = {types.boolean: "bool", types.int64: "int64", types.float64: "float64"}
 _PRESENT: list[Logs] = []
 
 
@@ -45,7 +45,7 @@ def _typed(number: int, given: tuple[Any, ...]) -> tuple[Any, Any]:
             raise TypingError(
                 "RTCF:a log call stores numbers and bools, no arrays:log elements one by one"
             )
-    logs.calls[number].types = [_CPP[each] for each in passed]
+    logs.calls[number].types = [_SCALARS[each] for each in passed]
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         values = [arguments[0]]

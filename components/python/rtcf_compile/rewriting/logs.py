@@ -17,7 +17,7 @@ class LogCall:
     line: int
     function: str
     count: int
-    types: list[str] = field(default_factory=list)  # of C++; known when it has been compiled
+    types: list[str] = field(default_factory=list)  # scalars; known when it has been compiled
 
 
 class Logs:

@@ -1,0 +1,116 @@
+/// @file
+/// Ports of ROS messages, by the adapter of the message. In the cycle the numbers that hooks use go
+/// between the message and the component's record.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+
+#include "message_fields.hpp"
+#include "port_type.hpp"
+#include "value_ports.hpp"
+
+namespace rtcf::python {
+
+/// An input whose newest message counts.
+class MessageInput final : public InputBase {
+   public:
+    MessageInput(Component* owner, const InputTable& table, std::byte* record)
+        : InputBase(owner, table.name, table.message->type(), emptySlot(table.message->type())),
+          fields_(*table.message, table.leaves, table.leaf_count),
+          offset_(valueOffset(type())),
+          record_(record),
+          flags_(placeIn<bool>(record, table.flags)),
+          age_(placeIn<std::int64_t>(record, table.age)),
+          connected_(placeIn<bool>(record, table.connected)),
+          too_large_(table.too_large) {}
+
+    /// Brings the newest message into the record; one with too many elements is not taken.
+    /// Real-time safe.
+    void read() noexcept {
+        const DataStatus status = readStatus();
+        const void* const message = reinterpret_cast<const std::byte*>(current()) + offset_;
+        const bool fits = fields_.fit(message);
+        flags_[0] = fits && status == DataStatus::New;
+        if (fits && status != DataStatus::None) {
+            flags_[1] = true;
+            fields_.toRecord(record_, message);
+            if (age_ != nullptr) *age_ = age();
+        } else if (!fits && status == DataStatus::New) {
+            warn();
+        }
+        if (connected_ != nullptr) *connected_ = connected();
+    }
+
+   private:
+    // At most once a second.
+    void warn() noexcept {
+        const Component& component = owner();
+        if (component.logs(too_large_.level) &&
+            detail::logThrottle(next_warning_ns_, component.time(), kWarnPeriod))
+            detail::logCall(component.logSink(), component.fullName().c_str(), too_large_);
+    }
+
+    static constexpr std::int64_t kWarnPeriod = 1'000'000'000;
+
+    MessageFields fields_;
+    std::size_t offset_;
+    std::byte* record_;
+    bool* flags_;
+    std::int64_t* age_;
+    bool* connected_;
+    const LogSite& too_large_;  // in the library: records refer to it
+    std::atomic<std::int64_t> next_warning_ns_{std::numeric_limits<std::int64_t>::min()};
+};
+
+/// An output.
+class MessageOutput final : public OutputBase {
+   public:
+    MessageOutput(Component* owner, const OutputTable& table, std::byte* record)
+        : MessageOutput(owner, table, record, Finite()) {
+        reserve(table);
+    }
+
+    /// Publishes the record's message, if a hook has said so. Real-time safe.
+    void write() noexcept {
+        if (!*written_) return;
+        fields_.toMessage(reinterpret_cast<std::byte*>(raw_) + offset_, record_);
+        stampWrite();
+        *written_ = false;
+    }
+
+    /// Forgets what a hook has published. Real-time safe.
+    void discard() noexcept { *written_ = false; }
+
+   private:
+    MessageOutput(Component* owner, const OutputTable& table, std::byte* record,
+                  const Finite& finite)
+        : OutputBase(owner, table.name, table.unit, table.message->type(),
+                     table.finite != 0 ? &finite : nullptr),
+          fields_(*table.message, table.leaves, table.leaf_count),
+          offset_(valueOffset(type())),
+          record_(record),
+          written_(placeIn<bool>(record, table.written)) {}
+
+    /// Gives the message its sizes and constant texts, as rtcf::Output::reserve() does.
+    void reserve(const OutputTable& table) {
+        const std::shared_ptr<SlotHeader> sample = type().make_slot(nullptr);
+        void* const message = reinterpret_cast<std::byte*>(sample.get()) + offset_;
+        fields_.resize(message);
+        for (std::int64_t i = 0; i < table.text_count; ++i)
+            setText(message, *table.message, table.texts[i]);
+        type().copy(*raw_, *sample);
+        type().copy(*slot(), *sample);
+        if (!type().fixed_size) setSample(type().make_slot(sample.get()));
+    }
+
+    MessageFields fields_;
+    std::size_t offset_;
+    const std::byte* record_;
+    bool* written_;
+};
+
+}  // namespace rtcf::python

@@ -1,0 +1,71 @@
+/// @file
+/// A component written in Python: the ports, parameters and state that its table declares, around
+/// the machine code of its hooks, which works on the component's record.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "fixed_list.hpp"
+#include "message_ports.hpp"
+#include "settings.hpp"
+#include "tables.hpp"
+#include "value_ports.hpp"
+
+namespace rtcf::python {
+
+class PythonComponent final : public Component {
+   public:
+    /// @param table lives as long as the library
+    explicit PythonComponent(const ComponentTable& table);
+
+    bool prepare(const Values& proposed) override;
+    bool start() override;
+    void update() override;
+    void safe() noexcept override;
+
+   private:
+    /// Memory of its own, aligned as a cache line: what changes there is no member of this object.
+    class Record {
+       public:
+        explicit Record(const ComponentTable& table);
+        std::byte* bytes() noexcept { return bytes_.get(); }
+        RecordHead& head() noexcept { return *reinterpret_cast<RecordHead*>(bytes_.get()); }
+
+       private:
+        struct Free {
+            void operator()(std::byte* bytes) const noexcept;
+        };
+        std::unique_ptr<std::byte, Free> bytes_;
+    };
+
+    void reserve();
+    void declare();
+    void takeTime() noexcept;
+    void takeTimes() noexcept;
+    void readPorts() noexcept;
+    void readOthers() noexcept;
+    void writePorts() noexcept;
+    void writeOthers() noexcept;
+    void discardWrites() noexcept;
+    std::string said(const void* raised, std::int64_t noted) const;
+
+    const ComponentTable& table_;
+    HookFunction update_;
+    Record record_;
+    std::uint64_t times_;
+    FixedList<ValueInput> inputs_;
+    FixedList<ValueOutput> outputs_;
+    FixedList<MessageInput> message_inputs_;
+    FixedList<MessageOutput> message_outputs_;
+    FixedList<QueuePort> queues_;
+    FixedList<ParameterField> parameters_;
+    FixedList<DerivedField> derived_;
+    bool has_other_inputs_ = false;  // queues, inputs of messages
+    bool has_other_outputs_ = false;
+    std::unique_ptr<Record> proposed_;  // what prepare() works on; null without it
+};
+
+}  // namespace rtcf::python

@@ -1,0 +1,232 @@
+"""What rtcf-compile calls to make a library: no compiler for a component, one for a new message."""
+
+import re
+import subprocess
+import textwrap
+from pathlib import Path
+from typing import Any
+
+import pytest
+from daemon_under_test import BUILD_TREE
+from rtcf_compile.library import log_text, messages
+from rtcf_compile.rewriting.logs import LogCall
+from rtcf_compile.source.mistake import Mistake
+
+COMMAND = BUILD_TREE / "bin" / "rtcf-compile"
+DEADLINE_S = 600.0
+VALUES = """\
+import numpy as np
+from rtcf.component import Component, Derived, Input, Output, Parameter, Queue, State
+
+
+class Values(Component):
+    u: Input[np.float64, 2, 3]
+    goals: Queue[np.int64, 5] = Queue(size=4)
+    x: Output[np.float64, 3, 2] = Output(finite=True)
+    flags: Output[bool, 2]
+    gain: Parameter[np.float64, 2] = Parameter([1.0, 2.0], min=0.0)
+    twice: Derived[np.float64, 2]
+    sum: State[np.int32, 7]
+
+    def prepare(self):
+        self.twice = 2.0 * self.gain
+
+    def update(self):
+        self.info("{} and {:.3f}", self.goals.size, self.goals.size)
+        self.sum[0] += 1
+        self.x.write(self.twice[0] * self.u.value.T)
+"""
+RELAY = """\
+from rtcf.component import Component, Output
+from std_msgs.msg import Float32
+
+
+class {name}(Component):
+    out: Output[Float32]
+
+    def update(self):
+        self.out.value.data = 1.0
+        self.out.publish()
+"""
+
+
+class Cache:
+    """A user's cache, and a compiler that tells what it was called for."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._calls = folder / "calls"
+        self._compiler = folder / "c++"
+        self._compiler.write_text(f'#!/bin/sh\necho "$@" >>{self._calls}\nexec /usr/bin/g++ "$@"\n')
+        self._compiler.chmod(0o755)
+
+    def start(self, source: str, name: str = "source") -> "subprocess.Popen[str]":
+        """Begin to compile a source."""
+        file = self.folder / f"{name}.py"
+        file.write_text(source)
+        environment = {
+            "PATH": "/usr/bin:/bin",
+            "HOME": str(self.folder),
+            "XDG_CACHE_HOME": str(self.folder / "cache"),
+            "CXX": str(self._compiler),
+        }
+        return subprocess.Popen(
+            [str(COMMAND), str(file), "-o", str(self.folder / name / f"{name}.so")],
+            env=environment,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def compile(self, source: str, name: str = "source") -> str:
+        """Compile a source; return what was said."""
+        process = self.start(source, name)
+        said = process.communicate(timeout=DEADLINE_S)[1]
+        assert process.returncode == 0, said
+        return said
+
+    def compiled(self) -> list[str]:
+        """Return the C++ sources that were compiled since the last time."""
+        calls = self._calls.read_text()
+        self._calls.unlink()
+        return [Path(each).name for each in re.findall(r"\S+\.cpp", calls)]
+
+    def kept(self) -> list[Path]:
+        """Return what the cache has of messages."""
+        return sorted((self.folder / "cache/rtcf-components/.messages").iterdir())
+
+
+@pytest.fixture
+def cache(tmp_path: Path) -> Cache:
+    return Cache(tmp_path)
+
+
+def test_no_cpp_is_compiled_for_a_component(cache: Cache) -> None:
+    assert cache.compile(VALUES) == ""
+    assert cache.compiled() == []
+    needed = subprocess.run(
+        ["objdump", "-p", str(cache.folder / "source" / "source.so")],
+        capture_output=True, text=True, check=True,
+    ).stdout  # fmt: skip
+    libraries = set(re.findall(r"NEEDED\s+([a-z_]+)", needed))
+    assert libraries <= {
+        *("libc", "libfmt", "libgcc_s", "libm", "libroscpp_serialization", "librostime"),
+        "libstdc",
+    }
+
+
+def test_a_message_is_compiled_once_and_kept(cache: Cache) -> None:
+    said = cache.compile(RELAY.format(name="First"))
+    assert said == "rtcf-compile: compiling std_msgs/Float32 once\n"
+    assert len(cache.compiled()) == 1
+    (kept,) = cache.kept()
+    assert kept.name.startswith("std_msgs-Float32-")
+    assert cache.compile(RELAY.format(name="Second"), "second") == ""
+    assert cache.compiled() == []
+    assert cache.kept() == [kept]
+
+
+def test_what_others_may_have_written_is_compiled_again(cache: Cache) -> None:
+    cache.compile(RELAY.format(name="First"))
+    (kept,) = cache.kept()
+    kept.write_bytes(b"no object file")
+    kept.chmod(0o666)
+    assert "once" in cache.compile(RELAY.format(name="First"))
+    assert kept.read_bytes().startswith(b"\x7fELF") and kept.stat().st_mode & 0o777 == 0o644
+
+
+def test_two_compilers_may_need_a_message_at_once(cache: Cache) -> None:
+    both = [cache.start(RELAY.format(name=each), each) for each in ("One", "Other")]
+    for each in both:
+        said = each.communicate(timeout=DEADLINE_S)[1]
+        assert each.returncode == 0, said
+    assert len(cache.kept()) == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("Float32._type = 'std_msgs/Absent'", r"std_msgs/Absent: has no C\+\+ header: sudo apt "),
+        (
+            "Float32._md5sum = 32 * '0'",
+            r"std_msgs/Float32: the C\+\+ header has another ",
+        ),
+    ],
+)
+def test_a_message_without_its_header_is_refused(cache: Cache, change: str, said: str) -> None:
+    source = RELAY.format(name="Odd").replace("\n\n\nclass", f"\n\n{change}\n\n\nclass")
+    process = cache.start(source)
+    lines = process.communicate(timeout=DEADLINE_S)[1].splitlines()
+    assert process.returncode == 1
+    assert re.match(rf"rtcf-compile: {said}", lines[-1]), lines
+    assert cache.kept() == []
+
+
+def test_a_runtime_that_is_missing_is_named(
+    cache: Cache, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    from rtcf_compile.library import toolchain
+
+    monkeypatch.setenv("RTCF_PYTHON_RUNTIME", str(tmp_path / "absent.a"))
+    with pytest.raises(Mistake, match=r"absent\.a: is not there: sudo apt install librtcf-dev"):
+        toolchain.runtime()
+
+
+def test_code_is_for_any_processor_whatever_is_imported_first() -> None:
+    program = textwrap.dedent("""
+        import rtcf_compile.library.build
+        import numba
+
+        print(numba.config.CPU_NAME, repr(numba.config.CPU_FEATURES))
+    """)
+    done = subprocess.run(
+        ["/usr/bin/python3", "-c", program],
+        env={"PATH": "/usr/bin:/bin", "PYTHONPATH": str(BUILD_TREE / "python")},
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout == "generic ''\n"
+
+
+def test_a_message_s_name_is_a_symbol() -> None:
+    message: Any = type("Message", (), {"name": "sensor_msgs/JointState"})
+    assert messages.symbol(message) == "rtcf_message_sensor_msgs__JointState"
+
+
+def _call(text: str, *types: str) -> LogCall:
+    return LogCall("info", text, "x.py", 3, "update", len(types), list(types))
+
+
+@pytest.mark.parametrize(
+    ("text", "types", "stored"),
+    [
+        ("plain {{}}", (), []),
+        ("{} {:d} {:.3f}", ("bool", "int64", "float64"), ["bool", "int64", "float64"]),
+        ("{1} {0:>8.2e}", ("float64", "int64"), ["float64", "int64"]),
+        ("{:.1f} {:g}", ("int64", "bool"), ["float64", "float64"]),
+        ("{}", ("int64", "float64"), ["int64", "float64"]),
+    ],
+)
+def test_a_log_text_says_how_arguments_are_stored(
+    text: str, types: tuple[str, ...], stored: list[str]
+) -> None:
+    assert log_text.checked(_call(text, *types)) == (text, stored)
+
+
+@pytest.mark.parametrize(
+    ("text", "types", "said"),
+    [
+        ("{} {}", ("int64",), "has more places than arguments"),
+        ("{", (), r"Single '\{' encountered"),
+        ("{:d}", ("float64",), "does not show a float64"),
+        ("{:,}", ("int64",), r"\{:,\} is not shown"),
+        ("{!r}", ("int64",), "!r is not shown"),
+        ("{speed}", ("float64",), r"\{speed\} has a name"),
+        ("{} {0}", ("float64",), "in one text"),
+        ("{0} {0:.1f}", ("int64",), "as an int and as a float"),
+    ],
+)
+def test_a_log_text_that_cannot_be_made_is_refused(
+    text: str, types: tuple[str, ...], said: str
+) -> None:
+    with pytest.raises(Mistake, match=said) as raised:
+        log_text.checked(_call(text, *types))
+    assert str(raised.value).startswith("x.py:3: ")
