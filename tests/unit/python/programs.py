@@ -90,7 +90,7 @@ class Program:
         simple: list[Callable[[_Scope], list[str]]] = [
             self._set_slice, self._set_slice, self._change_slice, self._set_matrix, self._set_row,
             self._set_element, self._set_number, self._change_number, self._view, self._change_view,
-            self._variable, self._set_whole, self._set_mode,
+            self._variable, self._set_whole, self._set_mode, self._set_selected, self._set_any,
         ]  # fmt: skip
         if depth < 2 and self._draw.random() < 0.3:
             return self._draw.choice([self._if, self._for, self._while])(scope, depth)
@@ -128,6 +128,46 @@ class Program:
             places = f"{self._index(scope, _SIDE)}, {self._index(scope, _SIDE)}"
             target = f"{self._draw.choice(_MATRICES)}[{places}]"
         return [f"{target} {change}= {self._float(scope, 2)}"]
+
+    def _set_selected(self, scope: _Scope) -> list[str]:
+        """Set what a mask or an array of indices selects."""
+        change = self._draw.choice(["", "", "+", "*"])
+        if self._draw.random() < 0.3:
+            target = f"{self._draw.choice(_MATRICES)}[{self._matrix(scope, 0)} > {self._float(scope, 0)}]"
+            return [f"{target} {change}= {self._float(scope, 1)}"]
+        count, lines, places = self._draw.randint(1, 4), [], self._name()
+        taken = ", ".join(str(self._draw.randint(-_SIDE, _SIDE - 1)) for _ in range(count))
+        lines = [f"{places} = np.array(({taken},))"]
+        if self._draw.random() < 0.5:
+            target, value = f"{self._draw.choice(_VECTORS)}[{places}]", self._vector(scope, count, 1)
+        elif self._draw.random() < 0.5:
+            value = self._vector(scope, _SIDE, 1)
+            target = f"{self._draw.choice(_MATRICES)}[{places}]"
+        else:
+            value = self._vector(scope, count, 1)
+            place = self._draw.choice([":, {}", "{}, :", "1, {}", "{}, 2", "{}, {}"])
+            target = f"{self._draw.choice(_MATRICES)}[{place.format(places, places)}]"
+            value = value if place != "{}, :" else self._vector(scope, _SIDE, 1)
+        if self._draw.random() < 0.3:
+            return [*lines, f"{target} {change}= {self._float(scope, 1)}"]
+        if self._draw.random() < 0.2:
+            read = target.partition("[")[2]
+            return [*lines, f"{target} = {self._draw.choice(_MATRICES if self._is_matrix(target) else _VECTORS)}[{read}"]
+        return [*lines, f"{target} {change}= {value}"]
+
+    def _is_matrix(self, target: str) -> bool:
+        return target.startswith(_MATRICES)
+
+    def _set_any(self, scope: _Scope) -> list[str]:
+        """Set by an index whose type is not seen."""
+        index = self._name()
+        lines = [f"{index} = {self._int(scope, 1)}"]
+        if self._draw.random() < 0.5:
+            target, value = f"{self._draw.choice(_VECTORS)}[{index}]", self._float(scope, 1)
+        else:
+            target = f"{self._draw.choice(_MATRICES)}[{index} % {_SIDE}]"
+            value = self._vector(scope, _SIDE, 1)
+        return [*lines, f"{target} {self._draw.choice(['', '+', '*'])}= {value}"]
 
     def _set_number(self, scope: _Scope) -> list[str]:
         return [f"self.{self._draw.choice('xy')} = {self._float(scope, 3)}"]

@@ -18,8 +18,12 @@ from rtcf_compile.rewriting import helpers
 _OPTIONS = {"boundscheck": False, "error_model": "numpy"}
 
 
-def _compiled_as(helper: Callable[..., Any]) -> Callable[[Callable[..., Any]], None]:
-    """Register what chooses a helper's implementation by types; numba wants no annotations."""
+def _compiled_as(
+    helper: Callable[..., Any], checked: bool = False
+) -> Callable[[Callable[..., Any]], None]:
+    """Register what chooses a helper's implementation by types; numba wants no annotations.
+    `checked` are the indices that it uses.
+    """
 
     def register(choose: Callable[..., Any]) -> None:
         choose.__annotations__ = {}
@@ -30,7 +34,7 @@ def _compiled_as(helper: Callable[..., Any]) -> Callable[[Callable[..., Any]], N
             implementation.__annotations__ = {}
             return implementation
 
-        overload(helper, jit_options=_OPTIONS)(typed)
+        overload(helper, jit_options={**_OPTIONS, "boundscheck": checked})(typed)
 
     return register
 
@@ -216,9 +220,13 @@ def _ends(array: Any) -> Any:
 @_plain
 def _shares(target: Any, value: Any) -> Any:
     """Tell whether elements of a value may lie where the target's do, at other places."""
+    return not _same_places(target, value) and _overlaps(target, value)
+
+
+@_plain
+def _overlaps(target: Any, value: Any) -> Any:
+    """Tell whether elements of a value may lie where the target's do."""
     if target.size == 0 or value.size == 0:
-        return False
-    if _same_places(target, value):
         return False
     low, high = _ends(target)
     first, last = _ends(value)
@@ -238,6 +246,409 @@ def _has_same_places(target: Any, value: Any) -> Any:
         and target.strides == value.strides
         and target.shape == value.shape
     )
+
+
+@_compiled_as(helpers.rtcf_get, checked=True)
+def _get(base: Any, index: Any) -> Any:
+    if not isinstance(base, types.Array):
+        return lambda base, index: base[index]
+    kinds = _kinds(base, index)
+    if kinds in (("array",), ("array", "slice")):
+        if kinds == ("array", "slice"):
+            return lambda base, index: _gathered(base[:, index[1]], index[0])
+        return lambda base, index: _gathered(base, index)
+    if kinds == ("mask",):
+        return lambda base, index: _where_true(base, index)
+    if kinds == ("int", "array"):
+        return lambda base, index: _gathered(base[index[0]], index[1])
+    if kinds == ("array", "int"):
+        return lambda base, index: _gathered(base[:, index[1]], index[0])
+    if kinds == ("slice", "array"):
+
+        def columns(base: Any, index: Any) -> Any:
+            part = base[index[0]]
+            places = _places(index[1], base.shape[1])
+            result = np.empty((part.shape[0], places.shape[0]), base.dtype)
+            for i in range(part.shape[0]):
+                for k in range(places.shape[0]):
+                    result[i, k] = part[i, places[k]]
+            return result
+
+        return columns
+    if kinds == ("array", "array"):
+
+        def pairs(base: Any, index: Any) -> Any:
+            rows, columns = _places(index[0], base.shape[0]), _places(index[1], base.shape[1])
+            down, along = _steps(rows, columns)
+            result = np.empty(rows.shape[0] if down else columns.shape[0], base.dtype)
+            for k in range(result.shape[0]):
+                result[k] = base[rows[k * down], columns[k * along]]
+            return result
+
+        return pairs
+    return lambda base, index: base[index]
+
+
+@_compiled_as(helpers.rtcf_set, checked=True)
+def _set(base: Any, index: Any, value: Any) -> Any:
+    if not isinstance(base, types.Array):
+        raise TypingError(f"RTCF:elements of {_words(base)} are set:use an array")
+    if not base.mutable:
+        raise TypingError("RTCF:a constant of the module is set:declare a State, or copy it")
+    new = value.dtype if isinstance(value, types.Array) else value
+    if isinstance(new, types.Float) and not isinstance(base.dtype, types.Float):
+        raise TypingError(f"RTCF:elements of {base.dtype} are set to {new}:round them first")
+    kinds = _kinds(base, index)
+    if "array" in kinds or "mask" in kinds:
+        return _selected(kinds, value)
+    if "slice" in kinds or len(kinds) < base.ndim:
+        return lambda base, index, value: helpers.rtcf_assign(base[index], value)
+    if not isinstance(value, types.Number | types.Boolean):
+        raise TypingError(f"RTCF:an element is set to {_words(value)}:give it a number")
+
+    def element(base: Any, index: Any, value: Any) -> None:
+        base[index] = value
+
+    return element
+
+
+def _kinds(base: Any, index: Any) -> tuple[str, ...]:
+    """Return the kinds of the parts of an index: int, slice, array, or a mask of two dimensions."""
+    parts = index.types if isinstance(index, types.BaseTuple) else (index,)
+    kinds: list[str] = []
+    for each in parts:
+        if isinstance(each, types.Array):
+            if not isinstance(each.dtype, types.Integer | types.Boolean):
+                raise TypingError(f"RTCF:an index is {_words(each)}:use ints or bools")
+            whole = each.ndim == base.ndim == 2 and isinstance(each.dtype, types.Boolean)
+            kinds.append("array" if each.ndim == 1 else "mask" if whole else "")
+        elif isinstance(each, types.Integer):
+            kinds.append("int")
+        elif isinstance(each, types.SliceType | types.EllipsisType):
+            kinds.append("slice")
+        else:
+            kinds.append("")
+    several = len(kinds) > 1 and ("mask" in kinds or any(
+        isinstance(each, types.EllipsisType) for each in parts) and "array" in kinds)  # fmt: skip
+    if len(kinds) > base.ndim or "" in kinds or several:
+        given = ", ".join(_words(each) for each in parts)
+        raise TypingError(f"RTCF:{_words(base)} has no index {given}:use ints, slices and arrays")
+    return tuple(kinds)
+
+
+def _selected(kinds: tuple[str, ...], value: Any) -> Any:
+    """Return what sets what a mask or an array of numbers selects."""
+    if isinstance(value, types.BaseTuple):
+        return lambda base, index, value: helpers.rtcf_set(base, index, np.array(value))
+    if not isinstance(value, types.Array | types.Number | types.Boolean):
+        raise TypingError(f"RTCF:elements are set to {_words(value)}:give them numbers")
+    if kinds == ("array",):
+        return lambda base, index, value: _scatter(
+            base, _places(index, base.shape[0]), _apart(base, value)
+        )
+    if kinds == ("mask",):
+        return lambda base, index, value: _masked(base, index, _apart(base, value))
+    if kinds == ("int", "array"):
+        return lambda base, index, value: helpers.rtcf_set(base[index[0]], index[1], value)
+    if kinds in (("array", "int"), ("array", "slice")):
+        return lambda base, index, value: helpers.rtcf_set(base[:, index[1]], index[0], value)
+    if kinds == ("slice", "array"):
+        return lambda base, index, value: _scatter_columns(
+            base[index[0]], _places(index[1], base.shape[1]), _apart(base, value)
+        )
+    return lambda base, index, value: _scatter_pairs(
+        base,
+        _places(index[0], base.shape[0]),
+        _places(index[1], base.shape[1]),
+        _apart(base, value),
+    )
+
+
+def _gathered(base: Any, index: Any) -> Any:
+    raise NotImplementedError
+
+
+@_compiled_as(_gathered)
+def _gather(base: Any, index: Any) -> Any:
+    """Elements of a vector, or rows of a matrix."""
+    if base.ndim == 1:
+
+        def elements(base: Any, index: Any) -> Any:
+            places = _places(index, base.shape[0])
+            result = np.empty(places.shape[0], base.dtype)
+            for k in range(places.shape[0]):
+                result[k] = base[places[k]]
+            return result
+
+        return elements
+
+    def rows(base: Any, index: Any) -> Any:
+        places = _places(index, base.shape[0])
+        result = np.empty((places.shape[0], base.shape[1]), base.dtype)
+        for k in range(places.shape[0]):
+            for j in range(base.shape[1]):
+                result[k, j] = base[places[k], j]
+        return result
+
+    return rows
+
+
+@_plain
+def _where_true(base: Any, mask: Any) -> Any:
+    """Return the elements of a matrix where a mask of its shape is true, row by row."""
+    if mask.shape != base.shape:
+        raise IndexError("a mask has another shape than the array")
+    result = np.empty(_count(mask), base.dtype)
+    k = 0
+    for i in range(mask.shape[0]):
+        for j in range(mask.shape[1]):
+            if mask[i, j]:
+                result[k] = base[i, j]
+                k += 1
+    return result
+
+
+@_plain
+def _count(mask: Any) -> Any:
+    count = 0
+    for i in range(mask.shape[0]):
+        for j in range(mask.shape[1]):
+            if mask[i, j]:
+                count += 1
+    return count
+
+
+@_plain
+def _steps(rows: Any, columns: Any) -> Any:
+    """Return the steps in indices of two dimensions: 0 for one of a single element."""
+    down = 0 if rows.shape[0] == 1 else 1
+    along = 0 if columns.shape[0] == 1 else 1
+    if down and along and rows.shape[0] != columns.shape[0]:
+        raise IndexError("indices have different sizes")
+    return down, along
+
+
+def _places(index: Any, size: Any) -> Any:
+    raise NotImplementedError
+
+
+@_compiled_as(_places)
+def _places_of(index: Any, size: Any) -> Any:
+    """The places that an index selects, each within the size."""
+    if isinstance(index.dtype, types.Boolean):
+
+        def true_ones(index: Any, size: Any) -> Any:
+            if index.shape[0] != size:
+                raise IndexError("a mask has another size than the array")
+            count = 0
+            for i in range(size):
+                if index[i]:
+                    count += 1
+            places = np.empty(count, np.int64)
+            count = 0
+            for i in range(size):
+                if index[i]:
+                    places[count] = i
+                    count += 1
+            return places
+
+        return true_ones
+
+    def numbers(index: Any, size: Any) -> Any:
+        places = np.empty(index.shape[0], np.int64)
+        for k in range(index.shape[0]):
+            place = np.int64(index[k])
+            if place < 0:
+                place += size
+            if place < 0 or place >= size:
+                raise IndexError("index is out of bounds")
+            places[k] = place
+        return places
+
+    return numbers
+
+
+def _apart(base: Any, value: Any) -> Any:
+    raise NotImplementedError
+
+
+@_compiled_as(_apart)
+def _apart_from(base: Any, value: Any) -> Any:
+    """The value, copied if it may share memory with the base."""
+    if not isinstance(value, types.Array):
+        return lambda base, value: value
+    # A copy has its elements in order, which is another type to numba.
+    if value.layout != "C" or not value.mutable:
+        return lambda base, value: value.copy()
+    return lambda base, value: value.copy() if _overlaps(base, value) else value
+
+
+def _scatter(base: Any, places: Any, value: Any) -> Any:
+    raise NotImplementedError
+
+
+@_compiled_as(_scatter)
+def _scattered(base: Any, places: Any, value: Any) -> Any:
+    """Elements of a vector, or rows of a matrix."""
+    if not isinstance(value, types.Array):
+        if base.ndim == 1:
+
+            def fill(base: Any, places: Any, value: Any) -> None:
+                for k in range(places.shape[0]):
+                    base[places[k]] = value
+
+            return fill
+
+        def fill_rows(base: Any, places: Any, value: Any) -> None:
+            for k in range(places.shape[0]):
+                for j in range(base.shape[1]):
+                    base[places[k], j] = value
+
+        return fill_rows
+    if value.ndim > base.ndim:
+        raise TypingError(f"RTCF:parts of {_words(base)} are set to {_words(value)}:make them fit")
+    if base.ndim == 1:
+
+        def elements(base: Any, places: Any, value: Any) -> None:
+            step = _step(value, places.shape[0])
+            for k in range(places.shape[0]):
+                base[places[k]] = value[k * step]
+
+        return elements
+    if value.ndim == 1:
+
+        def same_rows(base: Any, places: Any, value: Any) -> None:
+            step = _step(value, base.shape[1])
+            for k in range(places.shape[0]):
+                for j in range(base.shape[1]):
+                    base[places[k], j] = value[j * step]
+
+        return same_rows
+
+    def rows(base: Any, places: Any, value: Any) -> None:
+        down = 0 if value.shape[0] == 1 else 1
+        along = 0 if value.shape[1] == 1 else 1
+        if (down and value.shape[0] != places.shape[0]) or (
+            along and value.shape[1] != base.shape[1]
+        ):
+            raise ValueError("rows of an array are set to an array of another shape")
+        for k in range(places.shape[0]):
+            for j in range(base.shape[1]):
+                base[places[k], j] = value[k * down, j * along]
+
+    return rows
+
+
+def _scatter_columns(base: Any, places: Any, value: Any) -> Any:
+    raise NotImplementedError
+
+
+@_compiled_as(_scatter_columns)
+def _scattered_columns(base: Any, places: Any, value: Any) -> Any:
+    if not isinstance(value, types.Array):
+
+        def fill(base: Any, places: Any, value: Any) -> None:
+            for i in range(base.shape[0]):
+                for k in range(places.shape[0]):
+                    base[i, places[k]] = value
+
+        return fill
+    if value.ndim == 1:
+
+        def same_columns(base: Any, places: Any, value: Any) -> None:
+            step = _step(value, places.shape[0])
+            for i in range(base.shape[0]):
+                for k in range(places.shape[0]):
+                    base[i, places[k]] = value[k * step]
+
+        return same_columns
+
+    def columns(base: Any, places: Any, value: Any) -> None:
+        down = 0 if value.shape[0] == 1 else 1
+        along = 0 if value.shape[1] == 1 else 1
+        if (down and value.shape[0] != base.shape[0]) or (
+            along and value.shape[1] != places.shape[0]
+        ):
+            raise ValueError("columns of an array are set to an array of another shape")
+        for i in range(base.shape[0]):
+            for k in range(places.shape[0]):
+                base[i, places[k]] = value[i * down, k * along]
+
+    return columns
+
+
+def _scatter_pairs(base: Any, rows: Any, columns: Any, value: Any) -> Any:
+    raise NotImplementedError
+
+
+@_compiled_as(_scatter_pairs)
+def _scattered_pairs(base: Any, rows: Any, columns: Any, value: Any) -> Any:
+    if isinstance(value, types.Array) and value.ndim > 1:
+        raise TypingError(f"RTCF:elements are set to {_words(value)}:give them a vector")
+
+    def pairs(base: Any, rows: Any, columns: Any, value: Any) -> None:
+        down, along = _steps(rows, columns)
+        count = rows.shape[0] if down else columns.shape[0]
+        step = _step(value, count)
+        for k in range(count):
+            base[rows[k * down], columns[k * along]] = _item(value, k * step)
+
+    return pairs
+
+
+def _masked(base: Any, mask: Any, value: Any) -> Any:
+    raise NotImplementedError
+
+
+@_compiled_as(_masked)
+def _set_where(base: Any, mask: Any, value: Any) -> Any:
+    """Elements of a matrix where a mask of its shape is true, row by row."""
+    if isinstance(value, types.Array) and value.ndim > 1:
+        raise TypingError(f"RTCF:elements are set to {_words(value)}:give them a vector")
+
+    def where(base: Any, mask: Any, value: Any) -> None:
+        if mask.shape != base.shape:
+            raise IndexError("a mask has another shape than the array")
+        step = _step(value, _count(mask))
+        k = 0
+        for i in range(mask.shape[0]):
+            for j in range(mask.shape[1]):
+                if mask[i, j]:
+                    base[i, j] = _item(value, k)
+                    k += step
+
+    return where
+
+
+def _step(value: Any, count: Any) -> Any:
+    raise NotImplementedError
+
+
+@_compiled_as(_step)
+def _step_of(value: Any, count: Any) -> Any:
+    """1 to take a value after the other, 0 to take the only one again and again."""
+    if not isinstance(value, types.Array):
+        return lambda value, count: 0
+
+    def step(value: Any, count: Any) -> Any:
+        if value.shape[0] == 1:
+            return 0
+        if value.shape[0] != count:
+            raise ValueError("parts of an array are set to another number of values")
+        return 1
+
+    return step
+
+
+def _item(value: Any, place: Any) -> Any:
+    raise NotImplementedError
+
+
+@_compiled_as(_item)
+def _item_of(value: Any, place: Any) -> Any:
+    if isinstance(value, types.Array):
+        return lambda value, place: value[place]
+    return lambda value, place: value
 
 
 def _changing(helper: Any, operation: Any) -> None:

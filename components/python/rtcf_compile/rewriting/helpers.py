@@ -45,6 +45,24 @@ def rtcf_assign(target: Any, value: Any) -> None:
     target[...] = new
 
 
+def rtcf_get(base: Any, index: Any) -> Any:
+    """Return base[index]: an element, a view, or a copy of what a mask or an array of numbers
+    selects.
+    """
+    return base[index]
+
+
+def rtcf_set(base: Any, index: Any, value: Any) -> None:
+    """Set what NumPy takes for base[index]: an element, a view, or what a mask or an array of
+    numbers selects. The arrays may share memory: NumPy copies the value in all cases but of an array
+    of numbers.
+    """
+    new = np.array(value)
+    if new.dtype.kind == "f" and base.dtype.kind != "f":
+        raise TypeError(f"elements are {base.dtype.name}, not {new.dtype.name}")
+    base[index] = new
+
+
 def _in_place(operation: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
     def change(target: Any, value: Any) -> Any:
         """Return what `target += value` leaves in target: an array is changed in place."""
@@ -253,7 +271,7 @@ INSTEAD: dict[Callable[..., Any], Callable[..., Any]] = {
 BY_NAME = {
     each.__name__: each
     for each in (
-        *(rtcf_matmul, rtcf_assign, rtcf_float, rtcf_int, rtcf_bool),
+        *(rtcf_matmul, rtcf_assign, rtcf_get, rtcf_set, rtcf_float, rtcf_int, rtcf_bool),
         *(rtcf_front, rtcf_age, rtcf_after, rtcf_pow, rtcf_round, rtcf_index),
         *IN_PLACE.values(),
         *INSTEAD.values(),

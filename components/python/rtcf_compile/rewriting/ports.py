@@ -6,7 +6,7 @@
 
 import ast
 
-from rtcf.component.declaration import PORTS, Description, Input, Member, Output
+from rtcf.component.declaration import PORTS, Description, Input, Member, Output, Queue
 from rtcf.component.message_type import MessageType
 from rtcf.component.value_type import ValueType
 
@@ -125,6 +125,14 @@ class Ports(Products):
         ]
         some = ast.Compare(count, [ast.Gt()], [ast.Constant(0)])
         return like(node, ast.If(some, steps, []))
+
+    def _known(self, base: ast.expr) -> tuple[int, bool]:
+        if not isinstance(base, ast.Attribute) or not self._is_self(base.value):
+            return 0, False
+        member = self._description.members.get(base.attr)
+        if member is None or member.message or member.kind is Queue:
+            return 0, False
+        return len(member.type.shape), member.type.is_float
 
     def _touch(self, node: ast.AST, name: str) -> None:
         """Note what prepare cannot know: all but parameters, what derives from them, constants."""
