@@ -12,6 +12,7 @@ from numba.core.errors import TypingError
 from numba.extending import overload, register_jitable
 from numba.np.numpy_support import as_dtype
 
+from rtcf_compile.machine_code.tile import tile
 from rtcf_compile.rewriting import helpers
 
 # numba takes an overload apart by its parameters' names and reads its returned function as source.
@@ -66,60 +67,137 @@ def _matmul(a: Any, b: Any) -> Any:
         raise TypingError(f"RTCF:@ of {_words(a)} and {_words(b)}:it takes arrays; use *")
     if not isinstance(a.dtype, types.Float) and not isinstance(b.dtype, types.Float):
         raise TypingError(f"RTCF:@ of {_words(a)} and {_words(b)}:one of them must be of floats")
-    if (a.ndim, b.ndim) == (2, 2):
-
-        def matrix(a: Any, b: Any) -> Any:
-            if a.shape[1] != b.shape[0]:
-                raise ValueError("@ of shapes that do not fit")
-            result = np.empty((a.shape[0], b.shape[1]))
-            for i in range(a.shape[0]):
-                for j in range(b.shape[1]):
-                    result[i, j] = 0.0
-                for k in range(a.shape[1]):
-                    factor = a[i, k]
-                    for j in range(b.shape[1]):
-                        result[i, j] += factor * b[k, j]
-            return result
-
-        return matrix
+    if (a.ndim, b.ndim) == (1, 1):
+        return _inner_product
+    if (a.dtype, b.dtype) != (types.float64, types.float64):
+        return _PLAIN_PRODUCTS[a.ndim, b.ndim]
     if (a.ndim, b.ndim) == (2, 1):
+        row = _row(_neighbours(a, "sum", "out"))
 
         def times_vector(a: Any, b: Any) -> Any:
-            if a.shape[1] != b.shape[0]:
+            rows, count = a.shape
+            if count != b.shape[0]:
                 raise ValueError("@ of shapes that do not fit")
-            result = np.empty(a.shape[0])
-            for i in range(a.shape[0]):
-                total = 0.0
-                for k in range(a.shape[1]):
-                    total += a[i, k] * b[k]
-                result[i] = total
+            result = np.empty(rows)
+            row(b, 0, b.strides[0], a, a.strides[1], a.strides[0], count, result, 0, rows)
             return result
 
         return times_vector
+    row = _row(_neighbours(b, "out", "sum"))
     if (a.ndim, b.ndim) == (1, 2):
 
         def vector_times(a: Any, b: Any) -> Any:
-            if a.shape[0] != b.shape[0]:
+            count, columns = b.shape
+            if a.shape[0] != count:
                 raise ValueError("@ of shapes that do not fit")
-            result = np.empty(b.shape[1])
-            for j in range(b.shape[1]):
-                total = 0.0
-                for k in range(a.shape[0]):
-                    total += a[k] * b[k, j]
-                result[j] = total
+            result = np.empty(columns)
+            row(a, 0, a.strides[0], b, b.strides[0], b.strides[1], count, result, 0, columns)
             return result
 
         return vector_times
 
-    def inner(a: Any, b: Any) -> Any:
-        if a.shape[0] != b.shape[0]:
+    def matrix(a: Any, b: Any) -> Any:
+        count, columns = b.shape
+        if a.shape[1] != count:
             raise ValueError("@ of shapes that do not fit")
-        total = 0.0
-        for k in range(a.shape[0]):
-            total += a[k] * b[k]
-        return total
+        result = np.empty((a.shape[0], columns))
+        down, across = b.strides
+        for i in range(a.shape[0]):
+            row(a, i * a.strides[0], a.strides[1], b, down, across, count, result,
+                8 * i * columns, columns)  # fmt: skip
+        return result
 
-    return inner
+    return matrix
+
+
+def _inner_product(a: Any, b: Any) -> Any:
+    if a.shape[0] != b.shape[0]:
+        raise ValueError("@ of shapes that do not fit")
+    total = 0.0
+    for k in range(a.shape[0]):
+        total += a[k] * b[k]
+    return total
+
+
+def _plain_times_vector(a: Any, b: Any) -> Any:
+    if a.shape[1] != b.shape[0]:
+        raise ValueError("@ of shapes that do not fit")
+    result = np.zeros(a.shape[0])
+    for i in range(a.shape[0]):
+        for k in range(a.shape[1]):
+            result[i] += a[i, k] * b[k]
+    return result
+
+
+def _plain_vector_times(a: Any, b: Any) -> Any:
+    if a.shape[0] != b.shape[0]:
+        raise ValueError("@ of shapes that do not fit")
+    result = np.zeros(b.shape[1])
+    for k in range(a.shape[0]):
+        for j in range(b.shape[1]):
+            result[j] += a[k] * b[k, j]
+    return result
+
+
+def _plain_matrix(a: Any, b: Any) -> Any:
+    if a.shape[1] != b.shape[0]:
+        raise ValueError("@ of shapes that do not fit")
+    result = np.zeros((a.shape[0], b.shape[1]))
+    for i in range(a.shape[0]):
+        for k in range(a.shape[1]):
+            for j in range(b.shape[1]):
+                result[i, j] += a[i, k] * b[k, j]
+    return result
+
+
+# Of other elements than float64 in either, by the dimensions of both.
+_PLAIN_PRODUCTS = {
+    (2, 1): _plain_times_vector,
+    (1, 2): _plain_vector_times,
+    (2, 2): _plain_matrix,
+}
+
+
+def _neighbours(matrix: Any, by_rows: str, by_columns: str) -> str:
+    """Return along what elements of a matrix are neighbours in memory, as tile() takes it."""
+    return {"C": by_rows, "F": by_columns}.get(matrix.layout, "unknown")
+
+
+@functools.cache
+def _row(along: str) -> Any:
+    """Return what computes a row of a product in tiles: as tile(), with the number of elements."""
+    if along == "unknown":
+        by_out, by_sum, apart = _row("out"), _row("sum"), _row("")
+
+        @_plain
+        def row_of_any(factors, first, step, matrix, down, across, count, out, place, width):  # type: ignore[no-untyped-def]
+            if across == 8:
+                by_out(factors, first, step, matrix, down, across, count, out, place, width)
+            elif down == 8:
+                by_sum(factors, first, step, matrix, down, across, count, out, place, width)
+            else:
+                apart(factors, first, step, matrix, down, across, count, out, place, width)
+
+        return row_of_any
+
+    eight, four, two, one = (tile(width, along) for width in (8, 4, 2, 1))
+
+    @_plain
+    def row(factors, first, step, matrix, down, across, count, out, place, width):  # type: ignore[no-untyped-def]
+        j = 0
+        while j + 8 <= width:
+            eight(factors, first, step, matrix, j * across, down, across, count, out, place + 8 * j)
+            j += 8
+        if j + 4 <= width:
+            four(factors, first, step, matrix, j * across, down, across, count, out, place + 8 * j)
+            j += 4
+        if j + 2 <= width:
+            two(factors, first, step, matrix, j * across, down, across, count, out, place + 8 * j)
+            j += 2
+        if j < width:
+            one(factors, first, step, matrix, j * across, down, across, count, out, place + 8 * j)
+
+    return row
 
 
 @_compiled_as(helpers.rtcf_assign)
