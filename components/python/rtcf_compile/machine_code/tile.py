@@ -15,8 +15,7 @@ from numba.extending import intrinsic
 
 _NUMBER = ir.DoubleType()
 _PAIR = ir.VectorType(_NUMBER, 2)
-_BYTE = ir.IntType(8)
-_SIZE = ir.IntType(64)
+_BYTE, _LANE, _SIZE = ir.IntType(8), ir.IntType(32), ir.IntType(64)
 
 
 def tile(width: int, along: str) -> Any:
@@ -46,8 +45,9 @@ def tile(width: int, along: str) -> Any:
 
             step, down, across, count = (arguments[each] for each in (2, 5, 6, 7))
             _Tile(
-                builder, width, along, begin(0), step, begin(3), down, across, count, begin(8)
-            ).emit()
+                builder, width, along, factors.layout == "C", begin(0), step, begin(3), down,
+                across, count, begin(8),
+            ).emit()  # fmt: skip
             return context.get_dummy_value()
 
         return signature, generate
@@ -61,10 +61,11 @@ class _Tile:
     """The instructions of one tile."""
 
     def __init__(
-        self, builder: Any, width: int, along: str, factors: Any, step: Any, matrix: Any,
-        down: Any, across: Any, count: Any, out: Any,
+        self, builder: Any, width: int, along: str, adjacent: bool, factors: Any, step: Any,
+        matrix: Any, down: Any, across: Any, count: Any, out: Any,
     ) -> None:  # fmt: skip
         self._builder, self._width, self._along = builder, width, along
+        self._adjacent = adjacent  # the factors are neighbours in memory
         self._factors, self._step, self._count, self._out = factors, step, count, out
         self._matrix, self._down, self._across = matrix, down, across
 
@@ -77,72 +78,63 @@ class _Tile:
         for place, kind in zip(sums, kinds, strict=True):
             builder.store(ir.Constant(kind, [0.0, 0.0] if kind is _PAIR else 0.0), place)
         if self._along == "sum":
-            # Two rows and two columns at a time.
-            even = builder.and_(self._count, ir.Constant(_SIZE, -2))
-            with cgutils.for_range_slice(
-                builder, ir.Constant(_SIZE, 0), even, ir.Constant(_SIZE, 2)
-            ) as (k, _):
+            even = builder.and_(self._count, _SIZE(-2))
+            with cgutils.for_range_slice(builder, _SIZE(0), even, _SIZE(2)) as (k, _):
                 self._two_steps(k, sums, pairs)
-            odd = builder.icmp_unsigned("!=", even, self._count)
-            with builder.if_then(odd):
+            with builder.if_then(builder.icmp_unsigned("!=", even, self._count)):
                 self._one_step(even, sums, pairs)
         else:
             with cgutils.for_range(builder, self._count) as loop:
                 self._one_step(loop.index, sums, pairs)
         for number, (place, kind) in enumerate(zip(sums, kinds, strict=True)):
             first = 2 * number if number < pairs else pairs + number
-            address = self._moved(self._out, ir.Constant(_SIZE, 8 * first))
+            address = self._moved(self._out, _SIZE(8 * first))
             builder.store(builder.load(place), self._pointer(address, kind), align=8)
 
     def _one_step(self, k: Any, sums: list[Any], pairs: int) -> None:
         """Add the products of one k."""
         builder = self._builder
-        factor = self._number(self._factor(k))
-        both = self._both(factor)
+        factor = self._load(self._factor(k), _NUMBER)
         for number, place in enumerate(sums):
-            if number < pairs:
-                value = self._pair(k, 2 * number)
-                self._add(place, builder.fmul(both, value))
-            else:
-                value = self._number(self._element(k, pairs + number))
+            if number >= pairs:
+                value = self._load(self._element(k, pairs + number), _NUMBER)
                 self._add(place, builder.fmul(factor, value))
+                continue
+            j = 2 * number
+            if self._along == "out":
+                value = self._load(self._element(k, j), _PAIR)
+            else:
+                value = self._pair(
+                    *(self._load(self._element(k, each), _NUMBER) for each in (j, j + 1))
+                )
+            self._add(place, builder.fmul(self._pair(factor, factor), value))
 
     def _two_steps(self, k: Any, sums: list[Any], pairs: int) -> None:
         """Add the products of k and k + 1, which are neighbours in the matrix."""
         builder = self._builder
-        following = builder.add(k, ir.Constant(_SIZE, 1))
-        factors = [self._number(self._factor(each)) for each in (k, following)]
-        both = [self._both(each) for each in factors]
+        both = self._two_factors(k)
         for number, place in enumerate(sums):
-            if number >= pairs:
-                for each, factor in zip((k, following), factors, strict=True):
-                    value = self._number(self._element(each, pairs + number))
-                    self._add(place, builder.fmul(factor, value))
-                continue
-            upper, lower = (
-                builder.load(self._pointer(self._element(k, 2 * number + row), _PAIR), align=8)
-                for row in (0, 1)
-            )
-            for column, factor in enumerate(both):
-                chosen = ir.Constant(ir.VectorType(ir.IntType(32), 2), [column, column + 2])
-                value = builder.shuffle_vector(upper, lower, chosen)
-                self._add(place, builder.fmul(factor, value))
+            rows = (2 * number, 2 * number + 1) if number < pairs else (pairs + number,)
+            products = [
+                builder.fmul(both, self._load(self._element(k, row), _PAIR)) for row in rows
+            ]
+            for step in (0, 1):
+                if number < pairs:
+                    chosen = ir.Constant(ir.VectorType(_LANE, 2), [step, step + 2])
+                    self._add(place, builder.shuffle_vector(*products, chosen))
+                else:
+                    self._add(place, builder.extract_element(products[0], _LANE(step)))
 
-    def _pair(self, k: Any, j: int) -> Any:
-        """Return elements j and j + 1 of one k."""
-        builder = self._builder
-        if self._along == "out":
-            return builder.load(self._pointer(self._element(k, j), _PAIR), align=8)
-        pair = ir.Constant(_PAIR, ir.Undefined)
-        for lane in (0, 1):
-            value = self._number(self._element(k, j + lane))
-            pair = builder.insert_element(pair, value, ir.Constant(ir.IntType(32), lane))
-        return pair
+    def _two_factors(self, k: Any) -> Any:
+        if self._adjacent:
+            return self._load(self._factor(k), _PAIR)
+        following = self._builder.add(k, _SIZE(1))
+        return self._pair(*(self._load(self._factor(each), _NUMBER) for each in (k, following)))
 
-    def _both(self, factor: Any) -> Any:
+    def _pair(self, first: Any, second: Any) -> Any:
         pair = ir.Constant(_PAIR, ir.Undefined)
-        for lane in (0, 1):
-            pair = self._builder.insert_element(pair, factor, ir.Constant(ir.IntType(32), lane))
+        for lane, value in enumerate((first, second)):
+            pair = self._builder.insert_element(pair, value, _LANE(lane))
         return pair
 
     def _add(self, place: Any, product: Any) -> None:
@@ -153,17 +145,13 @@ class _Tile:
 
     def _element(self, k: Any, j: int) -> Any:
         builder = self._builder
-        across = (
-            ir.Constant(_SIZE, 8 * j)
-            if self._along == "out"
-            else builder.mul(self._across, ir.Constant(_SIZE, j))
-        )
-        along_sum = self._along == "sum"
-        down = builder.mul(k, ir.Constant(_SIZE, 8) if along_sum else self._down)
-        return self._moved(self._matrix, builder.add(down, across))
+        across = _SIZE(8) if self._along == "out" else self._across
+        down = _SIZE(8) if self._along == "sum" else self._down
+        offset = builder.add(builder.mul(k, down), builder.mul(across, _SIZE(j)))
+        return self._moved(self._matrix, offset)
 
-    def _number(self, address: Any) -> Any:
-        return self._builder.load(self._pointer(address, _NUMBER), align=8)
+    def _load(self, address: Any, kind: Any) -> Any:
+        return self._builder.load(self._pointer(address, kind), align=8)
 
     def _pointer(self, address: Any, kind: Any) -> Any:
         return self._builder.bitcast(address, kind.as_pointer())
