@@ -1,5 +1,5 @@
-"""What compiled code calls instead of numba's allocator, as LLVM's assembly (pointers with types, see
-backend.py), linked into each object, so that it is inlined.
+"""What compiled code calls instead of numba's allocator, as LLVM's assembly (pointers with types,
+see backend.py), linked into each object, so that it is inlined.
 
 A block begins with what numba calls a MemInfo, eight words: references, destructor, two of ours
 (WORDS), data, size, allocator.
@@ -7,8 +7,8 @@ A block begins with what numba calls a MemInfo, eight words: references, destruc
 In the real-time thread blocks lie in an arena that is empty at the beginning of each hook. What is
 released is used again: at the top it goes back to the arena, elsewhere to a list of its size, of
 which there are four between a power of two and the next, so that a loop of any length makes its
-temporaries in the memory of its first turns. A block that finds no room is a MemoryError, never more
-memory. Each takes the same few instructions.
+temporaries in the memory of its first turns. A block that finds no room is a MemoryError, never
+more memory. Each takes the same few instructions. Most arrays are no blocks: see stack.py.
 
 Beside the loop blocks are malloc's; those that a fault leaves are released at the end of the hook.
 """
@@ -17,6 +17,9 @@ HEADER = 64
 _SMALLEST = 128  # bytes, with the header
 _LISTS = 40  # of blocks of 128 bytes to 128 KiB
 
+
+# What entries call, for as long as none of this is linked.
+DECLARATIONS = "declare void @rtcf_begin_hook()\ndeclare void @rtcf_end_hook()\n"
 
 _COUNTS = """
 define i8* @NRT_MemInfo_alloc_aligned(i64 %bytes, i32 %alignment) {
@@ -165,7 +168,7 @@ list:
   ret void
 }}
 
-define internal void @rtcf_begin_hook() {{
+define void @rtcf_begin_hook() {{
   %used = load i64, i64* @rtcf_arena_used
   %clean = icmp eq i64 %used, 0
   br i1 %clean, label %done, label %empty
@@ -177,7 +180,7 @@ done:
   ret void
 }}
 
-define internal void @rtcf_end_hook() {{
+define void @rtcf_end_hook() {{
   ret void
 }}
 {_COUNTS}"""
@@ -250,11 +253,11 @@ done:
   ret void
 }}
 
-define internal void @rtcf_begin_hook() {{
+define void @rtcf_begin_hook() {{
   ret void
 }}
 
-define internal void @rtcf_end_hook() {{
+define void @rtcf_end_hook() {{
   br label %look
 look:
   %block = load i8*, i8** @rtcf_blocks

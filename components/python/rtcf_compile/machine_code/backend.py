@@ -5,12 +5,19 @@ have none, and whose passes are put together in another way. Nothing else here k
 """
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
+from unittest import mock
 
 import llvmlite.binding as llvm
 import numba
 from numba import types
+from numba.core import codegen, cpu
+from numba.core.compiler_lock import global_compiler_lock
 
+# Options of functions that neither Python nor C calls by numba's ways.
+NO_WRAPPERS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 POINTERS_HAVE_TYPES = llvm.llvm_version_info[0] < 15
 _INLINED = 1000  # instructions
 _POINTER = re.compile(r"(?:i\d+|\[\d+ x i\d+\])\*+")
@@ -24,6 +31,33 @@ if POINTERS_HAVE_TYPES:
     llvm.initialize()
 llvm.initialize_native_target()
 llvm.initialize_native_asmprinter()
+
+
+@contextmanager
+def not_to_run() -> Iterator[None]:
+    """Have numba compile functions for their assembly alone: it makes no machine code of them in
+    this process, which takes longer than to optimise them. They cannot be called from Python.
+    """
+
+    def executable(context: Any, library: Any, description: Any, environment: Any) -> Any:
+        name = description.qualname.split(".")[-1]
+        module = description.lookup_module()
+        return cpu._dynfunc.make_function(module, name, "", 0, environment, (library,))
+
+    with (
+        mock.patch.object(cpu.CPUContext, "get_executable", executable),
+        mock.patch.object(codegen.JITCPUCodegen, "_add_module", lambda self, module: None),
+        mock.patch.object(codegen.JITCodeLibrary, "_finalize_specific", lambda self: None),
+    ):
+        yield
+
+
+def assembly_of(library: Any) -> str:
+    """Return the assembly of functions that numba has compiled, with what they call."""
+    with not_to_run(), global_compiler_lock:
+        library._ensure_finalized()
+    text: str = library.get_llvm_str()
+    return text
 
 
 def parsed(assembly: str) -> Any:
@@ -57,23 +91,31 @@ def drop_unused(module: Any) -> None:
         passes.run(module, _builder())
 
 
+def inline(module: Any) -> None:
+    """Put functions into those that call them and simplify, without making vectors."""
+    _run(module, vectors=False)
+
+
 def optimise(module: Any) -> None:
     """Make a module as fast as -O3 does, inlining more than that."""
+    _run(module, vectors=True)
+    drop_unused(module)
+
+
+def _run(module: Any, vectors: bool) -> None:
     if POINTERS_HAVE_TYPES:
         passes = llvm.ModulePassManager()
         builder = llvm.PassManagerBuilder()
         builder.opt_level = 3
-        builder.loop_vectorize = True
-        builder.slp_vectorize = True
+        builder.loop_vectorize = builder.slp_vectorize = vectors
         builder.inlining_threshold = _INLINED
         target = machine()  # the passes refer to it
         target.add_analysis_passes(passes)
         builder.populate(passes)
         passes.run(module)
     else:
-        builder = _builder()
-        builder.getModulePassManager().run(module, builder)
-    drop_unused(module)
+        passes_builder = _builder(vectors)
+        passes_builder.getModulePassManager().run(module, passes_builder)
 
 
 def emitted(assembly: str) -> bytes:
@@ -91,9 +133,8 @@ def machine() -> Any:
     return target.create_target_machine(cpu="generic", opt=3, reloc="pic", codemodel="default")
 
 
-def _builder() -> Any:
+def _builder(vectors: bool = True) -> Any:
     tuning = llvm.create_pipeline_tuning_options(speed_level=3)
-    tuning.loop_vectorization = True
-    tuning.slp_vectorization = True
+    tuning.loop_vectorization = tuning.slp_vectorization = vectors
     tuning.inlining_threshold = _INLINED
     return llvm.create_pass_builder(machine(), tuning)

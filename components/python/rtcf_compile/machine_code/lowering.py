@@ -17,7 +17,7 @@ from rtcf.component import Component, describe
 from rtcf.component.declaration import Description
 
 import rtcf_compile.machine_code.overloads  # noqa: F401, registers them
-from rtcf_compile.machine_code import arena, backend, explain, gate, trial
+from rtcf_compile.machine_code import arena, backend, explain, gate, stack, trial
 from rtcf_compile.machine_code.raises import Raise, raises_in
 from rtcf_compile.rewriting import log_calls
 from rtcf_compile.rewriting.functions import Functions
@@ -32,7 +32,7 @@ _NRT_COUNTS = re.compile(
     re.M | re.S,
 )
 _COUNTS = "declare void @NRT_incref(i8*)\ndeclare void @NRT_decref(i8*)\n"
-_OPTIONS = {"boundscheck": True, "error_model": "python"}
+_OPTIONS = {"boundscheck": True, "error_model": "python", **backend.NO_WRAPPERS}
 # What runs in the real-time thread, and beside it.
 _REALTIME, _BESIDE = ("update", "safe"), ("prepare", "start")
 ARENA = 64 * 1024
@@ -91,18 +91,19 @@ def _inner(function: FunctionType, record: Any) -> tuple[str, str]:
     """Return the name of the inner function and the assembly that has it."""
     dispatcher = _compiler(function)
     try:
-        dispatcher.compile((record,))
+        with backend.not_to_run():
+            dispatcher.compile((record,))
+            result = next(iter(dispatcher.overloads.values()))
     except Mistake:
         raise
     except Exception as error:  # numba's own, or what it fails by where it ought to have one
         raise explain.mistake(error, function) from None
-    result = next(iter(dispatcher.overloads.values()))
-    return result.fndesc.mangled_name, result.library.get_llvm_str()
+    return result.fndesc.mangled_name, backend.assembly_of(result.library)
 
 
 def _linked(compiled: Compiled, inner: dict[str, tuple[str, str]], allocator: str) -> Any:
     """Return one module with the entries of these hooks, and nothing that they do not need."""
-    parts, base = [], allocator
+    parts, base = [], arena.DECLARATIONS
     for hook, (name, text) in inner.items():
         record, exception = backend.taken(text, name)
         base += arena.entry(compiled.symbol(hook), name, record, exception)
@@ -111,10 +112,15 @@ def _linked(compiled: Compiled, inner: dict[str, tuple[str, str]], allocator: st
         part = backend.parsed(text)
         _keep(part, {name})
         parts.append(part)
+    symbols = {compiled.symbol(hook) for hook in inner}
     module = backend.parsed(backend.pointers(base))
     for part in parts:
         module.link_in(part)
-    _keep(module, {compiled.symbol(hook) for hook in inner})
+    _keep(module, symbols)
+    backend.inline(module)
+    module = backend.parsed(stack.promoted(str(module)))
+    module.link_in(backend.parsed(backend.pointers(allocator)))
+    _keep(module, symbols)
     backend.optimise(module)
     module.verify()
     return module

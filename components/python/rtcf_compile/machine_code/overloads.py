@@ -12,11 +12,12 @@ from numba.core.errors import TypingError
 from numba.extending import overload, register_jitable
 from numba.np.numpy_support import as_dtype
 
+from rtcf_compile.machine_code import backend
 from rtcf_compile.machine_code.tile import tile
 from rtcf_compile.rewriting import helpers
 
 # numba takes an overload apart by its parameters' names and reads its returned function as source.
-_OPTIONS = {"boundscheck": False, "error_model": "numpy"}
+_OPTIONS = {"boundscheck": False, "error_model": "numpy", **backend.NO_WRAPPERS}
 
 
 def _compiled_as(
