@@ -13,7 +13,8 @@ from numba.extending import overload, register_jitable
 from numba.np.numpy_support import as_dtype
 
 from rtcf_compile.machine_code import backend
-from rtcf_compile.machine_code.tile import tile
+from rtcf_compile.machine_code.sharing import overlaps, shares
+from rtcf_compile.machine_code.tile import ROWS
 from rtcf_compile.rewriting import helpers
 
 # numba takes an overload apart by its parameters' names and reads its returned function as source.
@@ -73,7 +74,7 @@ def _matmul(a: Any, b: Any) -> Any:
     if (a.dtype, b.dtype) != (types.float64, types.float64):
         return _PLAIN_PRODUCTS[a.ndim, b.ndim]
     if (a.ndim, b.ndim) == (2, 1):
-        row = _row(_neighbours(a, "sum", "out"))
+        row = _row(a, "sum", "out")
 
         def times_vector(a: Any, b: Any) -> Any:
             rows, count = a.shape
@@ -84,7 +85,7 @@ def _matmul(a: Any, b: Any) -> Any:
             return result
 
         return times_vector
-    row = _row(_neighbours(b, "out", "sum"))
+    row = _row(b, "out", "sum")
     if (a.ndim, b.ndim) == (1, 2):
 
         def vector_times(a: Any, b: Any) -> Any:
@@ -159,44 +160,26 @@ _PLAIN_PRODUCTS = {
 }
 
 
-def _neighbours(matrix: Any, by_rows: str, by_columns: str) -> str:
-    """Return along what elements of a matrix are neighbours in memory, as tile() takes it."""
-    return {"C": by_rows, "F": by_columns}.get(matrix.layout, "unknown")
+def _row(matrix: Any, by_rows: str, by_columns: str) -> Any:
+    """Return what computes a row of a product, by where a matrix's neighbours are."""
+    if matrix.layout == "A":
+        return _row_of_any()
+    return ROWS[by_rows if matrix.layout == "C" else by_columns]
 
 
 @functools.cache
-def _row(along: str) -> Any:
-    """Return what computes a row of a product in tiles: as tile(), with the number of elements."""
-    if along == "unknown":
-        by_out, by_sum, apart = _row("out"), _row("sum"), _row("")
-
-        @_plain
-        def row_of_any(factors, first, step, matrix, down, across, count, out, place, width):  # type: ignore[no-untyped-def]
-            if across == 8:
-                by_out(factors, first, step, matrix, down, across, count, out, place, width)
-            elif down == 8:
-                by_sum(factors, first, step, matrix, down, across, count, out, place, width)
-            else:
-                apart(factors, first, step, matrix, down, across, count, out, place, width)
-
-        return row_of_any
-
-    eight, four, two, one = (tile(width, along) for width in (8, 4, 2, 1))
+def _row_of_any() -> Any:
+    """Return the same for a matrix whose strides are known late: when all functions are inlined."""
+    along_out, along_sum, along_nothing = ROWS["out"], ROWS["sum"], ROWS[""]
 
     @_plain
     def row(factors, first, step, matrix, down, across, count, out, place, width):  # type: ignore[no-untyped-def]
-        j = 0
-        while j + 8 <= width:
-            eight(factors, first, step, matrix, j * across, down, across, count, out, place + 8 * j)
-            j += 8
-        if j + 4 <= width:
-            four(factors, first, step, matrix, j * across, down, across, count, out, place + 8 * j)
-            j += 4
-        if j + 2 <= width:
-            two(factors, first, step, matrix, j * across, down, across, count, out, place + 8 * j)
-            j += 2
-        if j < width:
-            one(factors, first, step, matrix, j * across, down, across, count, out, place + 8 * j)
+        if across == 8:
+            along_out(factors, first, step, matrix, down, across, count, out, place, width)
+        elif down == 8:
+            along_sum(factors, first, step, matrix, down, across, count, out, place, width)
+        else:
+            along_nothing(factors, first, step, matrix, down, across, count, out, place, width)
 
     return row
 
@@ -219,7 +202,7 @@ def _assign(target: Any, value: Any) -> Any:
     copying = _copying(target.ndim, value.ndim)
 
     def assign(target: Any, value: Any) -> None:
-        if _shares(target, value):
+        if shares(target, value):
             copying(target, value.copy())
         else:
             copying(target, value)
@@ -281,50 +264,6 @@ def _plain(function: Any) -> Any:
     """Return a function that compiled ones call, compiled as they are."""
     function.__annotations__ = {}
     return register_jitable(**_OPTIONS)(function)
-
-
-@_plain
-def _ends(array: Any) -> Any:
-    """Return the addresses of an array's first and last byte, for what is not empty."""
-    low = high = np.int64(array.ctypes.data)
-    for dimension in range(array.ndim):
-        span = (array.shape[dimension] - 1) * array.strides[dimension]
-        if span < 0:
-            low += span
-        else:
-            high += span
-    return low, high + array.itemsize - 1
-
-
-@_plain
-def _shares(target: Any, value: Any) -> Any:
-    """Tell whether elements of a value may lie where the target's do, at other places."""
-    return not _same_places(target, value) and _overlaps(target, value)
-
-
-@_plain
-def _overlaps(target: Any, value: Any) -> Any:
-    """Tell whether elements of a value may lie where the target's do."""
-    if target.size == 0 or value.size == 0:
-        return False
-    low, high = _ends(target)
-    first, last = _ends(value)
-    return low <= last and first <= high
-
-
-def _same_places(target: Any, value: Any) -> Any:
-    raise NotImplementedError
-
-
-@_compiled_as(_same_places)
-def _has_same_places(target: Any, value: Any) -> Any:
-    if target.ndim != value.ndim or target.dtype != value.dtype:
-        return lambda target, value: False
-    return lambda target, value: (
-        target.ctypes.data == value.ctypes.data
-        and target.strides == value.strides
-        and target.shape == value.shape
-    )
 
 
 @_compiled_as(helpers.rtcf_get, checked=True)
@@ -559,7 +498,7 @@ def _apart_from(base: Any, value: Any) -> Any:
     # A copy has its elements in order, which is another type to numba.
     if value.layout != "C" or not value.mutable:
         return lambda base, value: value.copy()
-    return lambda base, value: value.copy() if _overlaps(base, value) else value
+    return lambda base, value: value.copy() if overlaps(base, value) else value
 
 
 def _scatter(base: Any, places: Any, value: Any) -> Any:

@@ -15,46 +15,63 @@ from numba.extending import intrinsic
 
 _NUMBER = ir.DoubleType()
 _PAIR = ir.VectorType(_NUMBER, 2)
+_WIDEST = 8  # elements
 _BYTE, _LANE, _SIZE = ir.IntType(8), ir.IntType(32), ir.IntType(64)
 
 
-def tile(width: int, along: str) -> Any:
-    """Return a function that computes `width` elements of a row: (factors, its offset, its stride,
-    matrix, its offset, its two strides, number of products in a sum, out, its offset). Offsets and
-    strides are bytes.
-
-    `along` says where neighbours in memory are: "out", elements j and j + 1; "sum", elements k and
-    k + 1; "", neither.
-    """
-
+def _row_along(along: str) -> Any:
     def compute(
-        typing: Any, factors: Any, first: Any, step: Any, matrix: Any, corner: Any, down: Any,
-        across: Any, count: Any, out: Any, place: Any,
+        typing: Any, factors: Any, first: Any, step: Any, matrix: Any, down: Any, across: Any,
+        count: Any, out: Any, place: Any, width: Any,
     ) -> Any:  # fmt: skip
         whole = types.intp
         signature = types.void(
-            factors, whole, whole, matrix, whole, whole, whole, whole, out, whole
+            factors, whole, whole, matrix, whole, whole, whole, out, whole, whole
         )
 
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            def begin(array: int) -> Any:
+            def data(array: int) -> Any:
                 made = context.make_array(signature.args[array])
-                data = made(context, builder, arguments[array]).data
-                data = builder.bitcast(data, _BYTE.as_pointer())
-                return builder.gep(data, [arguments[array + 1]], inbounds=True)
+                address = made(context, builder, arguments[array]).data
+                return builder.bitcast(address, _BYTE.as_pointer())
 
-            step, down, across, count = (arguments[each] for each in (2, 5, 6, 7))
-            _Tile(
-                builder, width, along, factors.layout == "C", begin(0), step, begin(3), down,
-                across, count, begin(8),
-            ).emit()  # fmt: skip
+            first, step, down, across, count, place, width = (
+                arguments[each] for each in (1, 2, 4, 5, 6, 8, 9)
+            )
+            row = builder.gep(data(0), [first], inbounds=True)
+            matrix, out = data(3), builder.gep(data(7), [place], inbounds=True)
+
+            def emit(size: int, j: Any) -> None:
+                beside = _SIZE(8) if along == "out" else across
+                _Tile(
+                    builder, size, along, factors.layout == "C", row, step,
+                    builder.gep(matrix, [builder.mul(j, beside)], inbounds=True), down, across,
+                    count, builder.gep(out, [builder.mul(j, _SIZE(8))], inbounds=True),
+                ).emit()  # fmt: skip
+
+            whole_tiles = builder.and_(width, _SIZE(-_WIDEST))
+            with cgutils.for_range_slice(builder, _SIZE(0), whole_tiles, _SIZE(_WIDEST)) as (j, _):
+                emit(_WIDEST, j)
+            size = _WIDEST // 2
+            while size:
+                left = builder.and_(width, _SIZE(size))
+                with builder.if_then(builder.icmp_unsigned("!=", left, _SIZE(0))):
+                    emit(size, builder.and_(width, _SIZE(-2 * size)))
+                size //= 2
             return context.get_dummy_value()
 
         return signature, generate
 
     compute.__annotations__ = {}
-    compute.__name__ = f"tile_{width}_{along or 'apart'}"
+    compute.__name__ = f"row_along_{along or 'nothing'}"
     return intrinsic(compute)
+
+
+# Functions that compute a row of a product: (factors, its offset, its stride, matrix, its two
+# strides, number of products in a sum, out, its offset, number of elements). Offsets and strides
+# are bytes. By where neighbours in memory are: "out", elements j and j + 1 of the matrix; "sum",
+# elements k and k + 1; "", neither.
+ROWS = {along: _row_along(along) for along in ("out", "sum", "")}
 
 
 class _Tile:

@@ -1,0 +1,78 @@
+"""Whether two arrays share elements, as instructions that are constants for members of a record."""
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+_SIZE = ir.IntType(64)
+
+
+def _shares(typing: Any, target: Any, value: Any) -> Any:
+    comparable = target.ndim == value.ndim and target.dtype == value.dtype
+    return _compared(target, value, comparable)
+
+
+def _overlaps(typing: Any, target: Any, value: Any) -> Any:
+    return _compared(target, value, False)
+
+
+def _compared(target: Any, value: Any, but_same: bool) -> Any:
+    """Return numba's signature, and what generates the test; `but_same`: false if all elements lie
+    at the same places.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        one, other = (
+            context.make_array(kind)(context, builder, array)
+            for kind, array in zip(signature.args, arguments, strict=True)
+        )
+        # What lies in different blocks, or in a block and a record, has nothing in common.
+        owners = (builder.bitcast(each.meminfo, cgutils.voidptr_t) for each in (one, other))
+        conditions = [builder.icmp_unsigned("==", *owners)]
+        conditions += [builder.icmp_signed("!=", each.nitems, _SIZE(0)) for each in (one, other)]
+        begin, there = (builder.ptrtoint(each.data, _SIZE) for each in (one, other))
+        distance = builder.sub(there, begin)
+        low, high = _ends(context, builder, target, one)
+        first, last = _ends(context, builder, value, other)
+        conditions.append(builder.icmp_signed("<=", low, builder.add(distance, last)))
+        conditions.append(builder.icmp_signed("<=", builder.add(distance, first), high))
+        if but_same:
+            same = builder.icmp_signed("==", distance, _SIZE(0))
+            for name in ("strides", "shape"):
+                pairs = zip(*(_numbers(builder, each, name) for each in (one, other)), strict=True)
+                for pair in pairs:
+                    same = builder.and_(same, builder.icmp_signed("==", *pair))
+            conditions.append(builder.not_(same))
+        result = conditions[0]
+        for each in conditions[1:]:
+            result = builder.and_(result, each)
+        return result
+
+    return types.boolean(target, value), generate
+
+
+def _ends(context: Any, builder: Any, kind: Any, array: Any) -> tuple[Any, Any]:
+    """Return where the first and last byte of an array are, from its first element."""
+    item = context.get_abi_sizeof(context.get_data_type(kind.dtype))
+    low, high = _SIZE(0), _SIZE(item - 1)
+    strides, shape = _numbers(builder, array, "strides"), _numbers(builder, array, "shape")
+    for stride, size in zip(strides, shape, strict=True):
+        span = builder.mul(builder.sub(size, _SIZE(1)), stride)
+        backwards = builder.icmp_signed("<", span, _SIZE(0))
+        low = builder.add(low, builder.select(backwards, span, _SIZE(0)))
+        high = builder.add(high, builder.select(backwards, _SIZE(0), span))
+    return low, high
+
+
+def _numbers(builder: Any, array: Any, name: str) -> Any:
+    return cgutils.unpack_tuple(builder, getattr(array, name))
+
+
+_shares.__annotations__ = _overlaps.__annotations__ = {}
+# Tells whether elements of a value may lie where the target's do, at other places.
+shares: Any = intrinsic(_shares)
+# Tells whether elements of a value may lie where the target's do.
+overlaps: Any = intrinsic(_overlaps)
