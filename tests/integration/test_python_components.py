@@ -263,6 +263,22 @@ def test_what_start_raises_refuses_the_start(client: rtcf.Client, daemon: Daemon
         client.start()
 
 
+@pytest.mark.parametrize("component", ["Observer", "Gatherer", "Joints"])
+def test_a_check_finds_no_state_that_is_not_declared(folder: Path, component: str) -> None:
+    executor = BUILD_TREE / "bin" / "rtcf-executor"
+    library = folder / "py" / "controllers.so"
+    options = ["--package", "py", "--type", component, "--cycles", "500"]
+    done = subprocess.run(
+        [str(executor), "--check", str(library), *options],
+        env=clean_environment(),
+        capture_output=True,
+        text=True,
+        timeout=COMPILE_DEADLINE_S,
+        check=False,
+    )
+    assert done.returncode == 0 and "undeclared" not in done.stderr, done.stderr
+
+
 def test_the_loop_has_no_python_in_it(client: rtcf.Client, daemon: Daemon) -> None:
     _load_both(client)
     client.start()

@@ -23,19 +23,19 @@ std::size_t countOf(const TypeTable& type) noexcept {
 
 /// Eigen aligns a matrix to the largest power of two, within bounds, that its size is a multiple
 /// of.
-std::size_t alignmentOf(const TypeTable& type) {
+std::size_t alignmentOf(const TypeTable& type) noexcept {
     const std::size_t size = sizeOf(type);
     if (isMatrix(type)) {
-        constexpr std::size_t kSmallest = 16;
-        for (std::size_t most = EIGEN_MAX_STATIC_ALIGN_BYTES; most >= kSmallest; most /= 2)
-            if (size % most == 0) return most;
+        constexpr std::size_t kSmallest = 16, kLargest = EIGEN_MAX_STATIC_ALIGN_BYTES;
+        const std::size_t divisor = size & (~size + 1);
+        if (divisor >= kSmallest) return std::min(divisor, kLargest);
     }
-    return withScalar(type.scalar, [](auto scalar) { return alignof(decltype(scalar)); });
+    return sizeOf(type.scalar);
 }
 
-std::size_t valueOffset(const TypeTable& type) {
+std::size_t valueOffset(const TypeTable& type) noexcept {
     const std::size_t alignment = alignmentOf(type);
-    return (sizeof(SlotHeader) + alignment - 1) / alignment * alignment;
+    return (sizeof(SlotHeader) + alignment - 1) & ~(alignment - 1);
 }
 
 std::byte* valueOf(const TypeTable& type, SlotHeader* slot) {
@@ -153,9 +153,9 @@ std::string printNumber(const void* value) {
 
 }  // namespace
 
-std::size_t sizeOf(const TypeTable& type) {
+std::size_t sizeOf(const TypeTable& type) noexcept {
     const std::size_t count = type.rows == 0 ? 1 : countOf(type);
-    return count * withScalar(type.scalar, [](auto scalar) { return sizeof scalar; });
+    return count * sizeOf(type.scalar);
 }
 
 const TypeInfo& typeInfoOf(const TypeTable& type) {

@@ -23,8 +23,8 @@ inline bool isTransposed(const TypeTable& type) noexcept {
     return isMatrix(type) && type.rows > 1 && type.columns > 1;
 }
 
-/// Bytes of a value, or of a single number.
-std::size_t sizeOf(const TypeTable& type);
+/// Bytes of a value, or of a single number. Real-time safe.
+std::size_t sizeOf(const TypeTable& type) noexcept;
 
 /// The type of ports. Not real-time safe. @return lives as long as the library
 const TypeInfo& typeInfoOf(const TypeTable& type);

@@ -6,6 +6,7 @@
 #include <limits>
 #include <type_traits>
 
+#include "copy_bytes.hpp"
 #include "scalar.hpp"
 
 namespace rtcf::python {
@@ -24,10 +25,6 @@ decltype(auto) withMessageScalar(Scalar scalar, Use&& use) {
             return use(value);
         }
     });
-}
-
-std::size_t sizeOfScalar(Scalar scalar) {
-    return withScalar(scalar, [](auto value) { return sizeof value; });
 }
 
 std::int64_t timeOf(const std::byte* field, bool is_duration) noexcept {
@@ -71,17 +68,6 @@ void copyBools(std::byte* to, const std::byte* from, std::size_t count) noexcept
     for (std::size_t i = 0; i < count; ++i) to[i] = std::byte{from[i] != std::byte{0}};
 }
 
-/// A number of one, two, four or eight bytes, or an array.
-void copyBytes(void* to, const void* from, std::size_t size) noexcept {
-    if (size == sizeof(double)) {
-        std::memcpy(to, from, sizeof(double));
-    } else if (size == sizeof(float)) {
-        std::memcpy(to, from, sizeof(float));
-    } else {
-        std::memcpy(to, from, size);
-    }
-}
-
 }  // namespace
 
 MessageFields::MessageFields(const MessageTable& message, const LeafTable* leaves,
@@ -91,7 +77,7 @@ MessageFields::MessageFields(const MessageTable& message, const LeafTable* leave
         const MessageField& field = message.fields[leaf.field];
         const auto in_message = static_cast<std::size_t>(field.offset);
         const auto in_record = static_cast<std::size_t>(leaf.offset);
-        const std::size_t size = sizeOfScalar(field.scalar);
+        const std::size_t size = sizeOf(field.scalar);
         if (field.form == Form::Time) {
             times_.push_back({in_message, in_record, field.scalar == Scalar::Int32});
         } else if (field.form == Form::Sequence) {

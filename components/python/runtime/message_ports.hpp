@@ -83,7 +83,7 @@ class MessageOutput final : public OutputBase {
     }
 
     /// Forgets what a hook has published. Real-time safe.
-    void discard() noexcept { *written_ = false; }
+    void forget() noexcept { *written_ = false; }
 
    private:
     MessageOutput(Component* owner, const OutputTable& table, std::byte* record,

@@ -121,6 +121,7 @@ bool PythonComponent::start() {
     if (table_.start == nullptr) return true;
     takeTime();
     const void* const raised = table_.start(record_.bytes());
+    forgetWrites();  // a cycle alone writes
     return raised == nullptr || fail("{}", said(raised, record_.head().line));
 }
 
@@ -128,7 +129,7 @@ void PythonComponent::update() {
     readPorts();
     const void* const raised = update_(record_.bytes());
     if (__builtin_expect(static_cast<long>(raised != nullptr), 0) != 0) {
-        discardWrites();
+        forgetWrites();
         throw std::runtime_error(said(raised, record_.head().line));
     }
     writePorts();
@@ -180,9 +181,9 @@ __attribute__((noinline)) void PythonComponent::writeOthers() noexcept {
     for (MessageOutput& output : message_outputs_) output.write();
 }
 
-void PythonComponent::discardWrites() noexcept {
-    for (ValueOutput& output : outputs_) output.discard();
-    for (MessageOutput& output : message_outputs_) output.discard();
+void PythonComponent::forgetWrites() noexcept {
+    for (ValueOutput& output : outputs_) output.forget();
+    for (MessageOutput& output : message_outputs_) output.forget();
 }
 
 /// "my.py:12: `x = 1 / y`: ZeroDivisionError: division by zero". Not real-time safe: the loop ends.

@@ -49,7 +49,7 @@ class PythonComponent final : public Component {
     void readOthers() noexcept;
     void writePorts() noexcept;
     void writeOthers() noexcept;
-    void discardWrites() noexcept;
+    void forgetWrites() noexcept;
     std::string said(const void* raised, std::int64_t noted) const;
 
     const ComponentTable& table_;

@@ -2,6 +2,8 @@
 /// From the number of an element's type to the C++ type.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <stdexcept>
 
@@ -12,6 +14,7 @@ namespace rtcf::python {
 /// Calls `use(T())` with a value of that type, and returns what it returns.
 template <typename Use>
 decltype(auto) withScalar(Scalar scalar, Use&& use) {
+    // NOLINTBEGIN(bugprone-branch-clone): branches differ by type
     switch (scalar) {
         case Scalar::Bool:
             return use(bool());
@@ -36,13 +39,21 @@ decltype(auto) withScalar(Scalar scalar, Use&& use) {
         case Scalar::Double:
             return use(double());
     }
+    // NOLINTEND(bugprone-branch-clone)
     throw std::logic_error("no scalar of this number");
 }
 
 /// Calls `use(float())` or `use(double())`.
 template <typename Use>
 decltype(auto) withFloat(Scalar scalar, Use&& use) {
-    return scalar == Scalar::Float ? use(float()) : use(double());
+    if (scalar == Scalar::Float) return use(float());
+    return use(double());
+}
+
+/// Bytes of an element. Real-time safe.
+inline std::size_t sizeOf(Scalar scalar) noexcept {
+    constexpr std::array<std::size_t, 11> kSizes{1, 1, 2, 4, 8, 1, 2, 4, 8, 4, 8};
+    return kSizes[static_cast<std::size_t>(scalar)];
 }
 
 }  // namespace rtcf::python

@@ -24,7 +24,7 @@ class ParameterField final : public ParameterBase {
     ParameterField(Component* owner, const ParameterTable& table, std::byte* record)
         : ParameterBase(owner, declarationOf(table, record)),
           scalar_(table.scalar),
-          size_(withScalar(table.scalar, [](auto value) { return sizeof value; })),
+          size_(sizeOf(table.scalar)),
           offset_(static_cast<std::size_t>(table.offset)),
           field_(record + table.offset) {
         std::memcpy(value_, field_, size_);

@@ -1,6 +1,8 @@
 #include "value_copy.hpp"
 
 #include "array_type.hpp"
+#include "copy_bytes.hpp"
+#include "scalar.hpp"
 
 namespace rtcf::python {
 
@@ -27,14 +29,14 @@ void transpose(void* to, const void* from, std::size_t rows, std::size_t columns
 
 ValueCopy::ValueCopy(const TypeTable& type)
     : size_(sizeOf(type)),
-      scalar_size_(sizeOf({type.scalar, 0, 0})),
+      scalar_size_(sizeOf(type.scalar)),
       rows_(isTransposed(type) ? static_cast<std::size_t>(type.rows) : 0),
       columns_(static_cast<std::size_t>(type.columns)),
       is_word_(size_ == sizeof(double)) {}
 
 void ValueCopy::othersToRecord(void* field, const void* value) const noexcept {
     if (rows_ == 0) {
-        std::memcpy(field, value, size_);
+        copyBytes(field, value, size_);
     } else {
         transpose(field, value, rows_, columns_, scalar_size_);
     }
@@ -42,7 +44,7 @@ void ValueCopy::othersToRecord(void* field, const void* value) const noexcept {
 
 void ValueCopy::othersToPort(void* value, const void* field) const noexcept {
     if (rows_ == 0) {
-        std::memcpy(value, field, size_);
+        copyBytes(value, field, size_);
     } else {
         transpose(value, field, columns_, rows_, scalar_size_);
     }

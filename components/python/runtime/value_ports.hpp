@@ -72,7 +72,7 @@ class ValueOutput final : public OutputBase {
     }
 
     /// Forgets what a hook has written. Real-time safe.
-    void discard() noexcept { *written_ = false; }
+    void forget() noexcept { *written_ = false; }
 
    private:
     ValueOutput(Component* owner, const OutputTable& table, std::byte* record, const Finite& finite)

@@ -1,0 +1,161 @@
+// A component made of tables, whose hooks are functions here: what goes between ports and record.
+#include "python_component.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "rtcf/component.hpp"
+
+namespace rtcf::test {
+
+namespace {
+
+using namespace rtcf::python;
+
+struct Record {
+    RecordHead head;
+    double u;
+    std::int64_t age;
+    double x;
+    double gain;
+    std::int64_t count;
+    bool is_new, is_valid, is_connected, is_written;
+};
+constexpr Record kFresh{{}, 0.0, 0, 0.0, 2.5, 0, false, false, false, false};
+
+struct Raised {
+    const char* bytes;
+    std::int32_t size;
+};
+constexpr Raised kLimit{"limit", 5};
+
+const void* start(void* memory) {
+    Record& record = *static_cast<Record*>(memory);
+    record.x = 9.0;
+    record.is_written = true;
+    return nullptr;
+}
+
+// Writes u * gain where u is new, and raises where it is negative.
+const void* update(void* memory) {
+    Record& record = *static_cast<Record*>(memory);
+    record.head.line = 12;
+    ++record.count;
+    record.x = record.u * record.gain;
+    record.is_written = record.is_new;
+    return record.u < 0.0 ? &kLimit : nullptr;
+}
+
+constexpr std::uint64_t hashOf(std::string_view text) { return detail::stateHash(text); }
+
+const TypeTable kNumber{Scalar::Double, 0, 0};
+const TypeTable kInteger{Scalar::Int64, 0, 0};
+const InputTable kInput{"u",
+                        &kNumber,
+                        nullptr,
+                        nullptr,
+                        offsetof(Record, u),
+                        offsetof(Record, is_new),
+                        offsetof(Record, age),
+                        offsetof(Record, is_connected),
+                        nullptr,
+                        0,
+                        {}};
+const OutputTable kOutput{
+    "x",     "m", &kNumber, nullptr, 0, offsetof(Record, x), offsetof(Record, is_written),
+    nullptr, 0,   nullptr,  0};
+const ParameterTable kGain{"gain", "", "", Scalar::Double, offsetof(Record, gain), 1, 0, 0.0, 0.0};
+const StateTable kCount{"count", "", "", &kInteger, offsetof(Record, count)};
+const RaiseTable kRaise{hashOf("limit"), 0, "ValueError: limit"};
+const LineTable kLine{12, "self.x.write(y)"};
+const ComponentTable kTable{"Gain",  "doc",    "gain.py", nullptr, &kFresh, sizeof(Record),
+                            nullptr, &start,   &update,   nullptr, 0,       &kInput,
+                            1,       &kOutput, 1,         &kGain,  1,       nullptr,
+                            0,       &kCount,  1,         &kRaise, 1,       &kLine,
+                            1};
+
+}  // namespace
+
+class PythonComponents : public testing::Test {
+   protected:
+    PythonComponents() {
+        source_->value = 3.0;
+        component_.inputs().front()->rewire(source_.get(), false);
+    }
+    const Slot<double>& written() const {
+        return *static_cast<const Slot<double>*>(component_.outputs().front()->slot().get());
+    }
+
+    std::shared_ptr<Slot<double>> source_ = std::make_shared<Slot<double>>();
+    PythonComponent component_{kTable};
+};
+
+TEST_F(PythonComponents, DeclaresWhatItsTableHas) {
+    EXPECT_EQ(component_.inputs().front()->name(), "u");
+    EXPECT_EQ(component_.outputs().front()->unit(), "m");
+    const ParameterDeclaration& gain = component_.parameters().front()->declaration();
+    EXPECT_EQ(gain.type, "double");
+    EXPECT_EQ(std::get<double>(gain.default_value), 2.5);
+    EXPECT_EQ(gain.minimum, 0.0);
+    EXPECT_FALSE(gain.maximum);
+    EXPECT_EQ(component_.states().front().type, "int64");
+}
+
+TEST_F(PythonComponents, WritesInACycleAlone) {
+    ASSERT_TRUE(component_.start());
+    component_.update();
+    EXPECT_EQ(written().sequence, 0U);
+    ++source_->sequence;
+    component_.update();
+    EXPECT_EQ(written().sequence, 1U);
+    EXPECT_EQ(written().value, 7.5);
+    component_.update();
+    EXPECT_EQ(written().sequence, 1U);
+}
+
+TEST_F(PythonComponents, AParameterCountsFromItsCommitOn) {
+    ParameterBase& gain = *component_.parameters().front();
+    ++source_->sequence;
+    gain.stage(10.0);
+    component_.update();
+    EXPECT_EQ(written().value, 7.5);
+    gain.commit();
+    gain.release();
+    ++source_->sequence;
+    component_.update();
+    EXPECT_EQ(written().value, 30.0);
+    EXPECT_FALSE(gain.staged());
+}
+
+TEST_F(PythonComponents, WhatRaisesWritesNothingAndSaysWhere) {
+    source_->value = -1.0;
+    ++source_->sequence;
+    std::string said;
+    try {
+        component_.update();
+    } catch (const std::runtime_error& error) {
+        said = error.what();
+    }
+    EXPECT_EQ(said, "gain.py:12: `self.x.write(y)`: ValueError: limit");
+    EXPECT_EQ(written().sequence, 0U);
+    source_->value = 1.0;
+    component_.update();
+    EXPECT_EQ(written().sequence, 0U);
+}
+
+TEST_F(PythonComponents, StateIsThatOfItsRecord) {
+    component_.update();
+    component_.update();
+    const StateDeclaration& count = component_.states().front();
+    EXPECT_EQ(*static_cast<const std::int64_t*>(count.value), 2);
+    EXPECT_EQ(count.print(count.value), "2");
+    EXPECT_EQ(count.print(count.initial.data()), "0");
+}
+
+}  // namespace rtcf::test
