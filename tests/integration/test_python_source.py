@@ -110,17 +110,24 @@ def _history(client: rtcf.Client) -> list[tuple[str, str, object]]:
     ]
 
 
+def _save(source: Path, text: str) -> None:
+    """Write at once: a file that is written in steps is swapped in for each of them."""
+    part = source.with_suffix(".part")
+    part.write_text(text)
+    part.replace(source)
+
+
 def test_what_was_tuned_stays_when_a_source_is_saved(
     tmp_path: Path, daemon: Daemon, client: rtcf.Client
 ) -> None:
     source = tmp_path / "tuned.py"
-    source.write_text(TUNED.format(kp=1.0, most=100.0, ki=0.25))
+    _save(source, TUNED.format(kp=1.0, most=100.0, ki=0.25))
     with Watching(daemon, str(source), "Tuned", "--param", "ki:=0.5") as watching:
         watching.wait_for("loaded /Tuned")
         assert _parameters(client) == {"kp": 1.0, "ki": 0.5}
         assert daemon.ctl("set", "Tuned", "kp:=50").returncode == 0
         # Another default of what was tuned, or given, changes nothing.
-        source.write_text(TUNED.format(kp=2.0, most=90.0, ki=0.75))
+        _save(source, TUNED.format(kp=2.0, most=90.0, ki=0.75))
         watching.wait_for("replaced /Tuned")
         assert f"replaced /Tuned by {source} as it is now, which keeps kp 50\n" in watching.said
         assert _parameters(client) == {"kp": 50.0, "ki": 0.5}
@@ -130,7 +137,7 @@ def test_what_was_tuned_stays_when_a_source_is_saved(
         assert _parameters(client)["kp"] == 1.0
         assert daemon.ctl("set", "Tuned", "kp:=50", "ki:=3").returncode == 0
         history += [("undo", "kp", 1.0), ("set", "kp", 50.0), ("set", "ki", 3.0)]
-        source.write_text(TUNED.format(kp=3.0, most=9.0, ki=0.75))
+        _save(source, TUNED.format(kp=3.0, most=9.0, ki=0.75))
         watching.wait_for("replaced /Tuned", 2)
         note = "rtcfctl: note: /Tuned: kp = 50.0 does not fit: 0 to 9; it is 3.0 now\n"
         assert watching.said.count(note) == 1
@@ -138,7 +145,7 @@ def test_what_was_tuned_stays_when_a_source_is_saved(
         history += [("replace", "kp", 3.0)]
         assert _history(client) == history
         # Nobody has tuned it by now: its default counts.
-        source.write_text(TUNED.format(kp=4.0, most=9.0, ki=1.0))
+        _save(source, TUNED.format(kp=4.0, most=9.0, ki=1.0))
         watching.wait_for("replaced /Tuned", 3)
         assert _parameters(client)["kp"] == 4.0
         assert _history(client)[: len(history)] == history
