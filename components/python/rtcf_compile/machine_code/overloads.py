@@ -18,7 +18,11 @@ from rtcf_compile.machine_code.tile import ROWS
 from rtcf_compile.rewriting import helpers
 
 # numba takes an overload apart by its parameters' names and reads its returned function as source.
-_OPTIONS = {"boundscheck": False, "error_model": "numpy", **backend.NO_WRAPPERS}
+_OPTIONS: dict[str, Any] = {
+    "boundscheck": False,
+    "error_model": "numpy",
+    **backend.NO_WRAPPERS,
+}
 
 
 def _compiled_as(

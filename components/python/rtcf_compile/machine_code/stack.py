@@ -59,7 +59,8 @@ class _Function:
 
     def promoted(self) -> list[str]:
         """Return the lines, changed."""
-        variables, left = [], _ALL
+        variables: list[str] = []
+        left = _ALL
         # A block that becomes a variable is null where its references are counted.
         for number, line in enumerate(self._lines):
             if _COUNTED.match(line):
