@@ -58,6 +58,7 @@ struct Matrix {
 // As rtcf-compile makes them.
 template <typename Shape>
 struct Table {
+    using Element = typename Shape::Scalar;
     static const TypeTable table;
 
     static std::shared_ptr<SlotHeader> makeSlot(const SlotHeader* sample) {
@@ -85,20 +86,9 @@ struct Table {
     }
 };
 template <typename Shape>
-const TypeTable Table<Shape>::table{scalarOf<typename Shape::Scalar>(),
-                                    Shape::kRows,
-                                    Shape::kColumns,
-                                    &makeSlot,
-                                    &copy,
-                                    &exchange,
-                                    &length,
-                                    &serialize,
-                                    &deserialize,
-                                    &print,
-                                    &finite,
-                                    &sample,
-                                    &copies,
-                                    &printState};
+const TypeTable Table<Shape>::table{
+    scalarOf<Element>(), Shape::kRows, Shape::kColumns, &makeSlot, &copy,   &exchange, &length,
+    &serialize,          &deserialize, &print,          &finite,   &sample, &copies,   &printState};
 
 template <typename Shape>
 class PythonArray : public testing::Test {

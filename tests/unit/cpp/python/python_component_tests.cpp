@@ -66,7 +66,7 @@ const InputTable kInput{"u",
                         offsetof(Record, is_connected),
                         nullptr,
                         0,
-                        {}};
+                        {LogLevel::Warn, "gain.py", 3, "update", "too large"}};
 const OutputTable kOutput{
     "x",     "m", &kNumber, nullptr, 0, offsetof(Record, x), offsetof(Record, is_written),
     nullptr, 0,   nullptr,  0};
