@@ -39,7 +39,10 @@ double interpolated(double x, const std::array<double, Size>& points,
     return slope * (x - points[i]) + values[i];
 }
 
-double sign(double x) { return static_cast<double>((x > 0.0) - (x < 0.0)); }
+double sign(double x) {
+    if (x > 0.0) return 1.0;
+    return x < 0.0 ? -1.0 : 0.0;
+}
 
 class Lookup final : public rtcf::Component {
     rtcf::Input<double> current{this, "current"};

@@ -55,10 +55,9 @@ class SCurve final : public rtcf::Component {
             a = 0.0;
         } else {
             const double error = wantedVelocity(distance) - v;
-            const double sign = static_cast<double>((error > 0.0) - (error < 0.0));
-            const double wanted =
-                std::clamp(sign * std::sqrt(2.0 * max_jerk * std::abs(error)) / 1.5,
-                           -max_acceleration.value(), max_acceleration.value());
+            const double size = std::sqrt(2.0 * max_jerk * std::abs(error)) / 1.5;
+            const double wanted = std::clamp(std::copysign(size, error), -max_acceleration.value(),
+                                             max_acceleration.value());
             const double step = max_jerk * dt();
             a += std::clamp(wanted - a, -step, step);
             v += a * dt();
