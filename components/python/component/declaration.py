@@ -7,6 +7,7 @@ as one NumPy record, which compiled code sees as one C struct and the interprete
 import inspect
 import keyword
 import re
+import typing
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -114,6 +115,7 @@ class Member:
     options: dict[str, Any]
     line: int
     message: MessageType | None = None  # then `type` says nothing
+    is_none: bool = False  # at the beginning
 
     @property
     def leaves(self) -> tuple[Leaf, ...]:
@@ -127,6 +129,11 @@ class Member:
             return [self.name]
         places = np.ndindex(self.type.shape)
         return ["_".join([self.name, *map(str, place)]) for place in places]
+
+    @property
+    def known(self) -> str:
+        """Return the name of the state that says whether an optional one is not None."""
+        return f"{self.name}__known"
 
     @property
     def size(self) -> int:
@@ -179,9 +186,17 @@ def describe(cls: type) -> Description:
             continue
         lines = _lines(base)
         annotations = inspect.get_annotations(base, eval_str=True)
+        annotations = {
+            name: annotation
+            for name, annotation in annotations.items()
+            if not is_constant(annotation)
+        }
         for name, annotation in annotations.items():
             try:
-                result.members[name] = _member(base, name, annotation, lines.get(name, 0))
+                member = _member(base, name, annotation, lines.get(name, 0))
+                result.members[name] = member
+                if member.type.optional:
+                    result.members[member.known] = _known(member)
             except DeclarationError as error:
                 raise _at(error, base, lines.get(name, 0), name) from None
         for name, value in vars(base).items():
@@ -235,6 +250,8 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
         if kind in (*PORTS, Derived):
             raise DeclarationError(f"is {_a(kind)} and has no initial value")
         initial = given
+    if declared.optional and kind is not State:
+        raise DeclarationError("may be None: a State alone may; a port says .valid")
     if kind is Parameter and initial is None:
         raise DeclarationError(f"has no default: write {name}: Parameter[…] = Parameter(1.0)")
     if kind is Queue:
@@ -243,7 +260,23 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
         raise DeclarationError("is an array of bools: a parameter is a number or an array of them")
     if options.get("texts") is not None:
         _check_texts(message, options["texts"])
-    return Member(name, kind, declared, _initial(declared, initial), options, line, message)
+    value = _initial(declared, initial)
+    return Member(
+        name, kind, declared, value, options, line, message, declared.optional and initial is None
+    )
+
+
+def is_constant(annotation: object) -> bool:
+    """Tell whether an annotation is ClassVar, as it is or as text."""
+    if isinstance(annotation, str):
+        return "ClassVar" in annotation.partition("[")[0]
+    return ClassVar in (annotation, typing.get_origin(annotation))
+
+
+def _known(member: Member) -> Member:
+    """Return the state that says whether another one is not None."""
+    known = ValueType(np.dtype(np.bool_))
+    return Member(member.known, State, known, np.array(not member.is_none), {}, member.line)
 
 
 def _message(annotation: Declared) -> MessageType | None:

@@ -20,6 +20,7 @@ from rtcf.component.declaration import (
     Queue,
     State,
     describe,
+    is_constant,
 )
 from rtcf.component.message_view import MessageView, checked, named, put
 from rtcf.component.value_type import ValueType
@@ -43,6 +44,8 @@ class _Value:
         if self._member.message:
             is_output = self._member.kind is Output
             return MessageView(self._record, self._member.name, self._member.message, is_output)
+        if self._member.type.optional and not self._record[self._member.known]:
+            return None
         value = self._record[self._member.name]
         if self._member.type.shape:
             return value
@@ -63,6 +66,12 @@ class _Value:
                 f"{self._member.name} is a {self._member.message.name}: "
                 f"set .value.…, then .publish()"
             )
+        if self._member.type.optional:
+            self._record[self._member.known] = value is not None
+            if value is None:
+                return
+        if self._member.type.enumeration:
+            value = self._member.type.enumeration(value)
         self._record[self._member.name] = checked(value, self._member.type, self._member.name)
 
 
@@ -232,8 +241,8 @@ class Component:
     def __init_subclass__(cls, **options: Any) -> None:
         """Keep what was declared beside the names that instances use."""
         super().__init_subclass__(**options)
-        for name in list(vars(cls).get("__annotations__", {})):
-            if name in vars(cls):
+        for name, annotation in dict(vars(cls).get("__annotations__", {})).items():
+            if name in vars(cls) and not is_constant(annotation):
                 setattr(cls, f"_declared_{name}", vars(cls)[name])
                 delattr(cls, name)
 

@@ -1,7 +1,9 @@
 """What a port, a parameter or a state carries: a number, a bool, an enum, or an array of these."""
 
 import enum
-from dataclasses import dataclass
+import types
+import typing
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -35,6 +37,7 @@ class ValueType:
     scalar: np.dtype[Any]
     shape: tuple[int, ...] = ()
     enumeration: type[enum.IntEnum] | None = None
+    optional: bool = False  # it may be None
 
     @property
     def cpp(self) -> str:
@@ -59,12 +62,17 @@ class ValueType:
     def __str__(self) -> str:
         """Return it as a declaration has it."""
         name = self.enumeration.__name__ if self.enumeration else self.scalar.name
+        name += " | None" if self.optional else ""
         return ", ".join([name, *map(str, self.shape)])
 
 
 def value_type(declared: Any) -> ValueType:
     """Return the type of `X` in `Input[X]`, where X is `type` or `type, size, …`."""
     element, *sizes = declared if isinstance(declared, tuple) else (declared,)
+    if typing.get_origin(element) in (typing.Union, types.UnionType):
+        others = [each for each in typing.get_args(element) if each is not types.NoneType]
+        if len(others) == 1 and len(typing.get_args(element)) == 2:
+            return replace(value_type((others[0], *sizes)), optional=True)
     if len(sizes) == 1 and isinstance(sizes[0], tuple):
         sizes = list(sizes[0])
     for size in sizes:

@@ -133,13 +133,17 @@ class Program:
         """Set what a mask or an array of indices selects."""
         change = self._draw.choice(["", "", "+", "*"])
         if self._draw.random() < 0.3:
-            target = f"{self._draw.choice(_MATRICES)}[{self._matrix(scope, 0)} > {self._float(scope, 0)}]"
+            mask = f"{self._matrix(scope, 0)} > {self._float(scope, 0)}"
+            target = f"{self._draw.choice(_MATRICES)}[{mask}]"
             return [f"{target} {change}= {self._float(scope, 1)}"]
         count, lines, places = self._draw.randint(1, 4), [], self._name()
         taken = ", ".join(str(self._draw.randint(-_SIDE, _SIDE - 1)) for _ in range(count))
         lines = [f"{places} = np.array(({taken},))"]
         if self._draw.random() < 0.5:
-            target, value = f"{self._draw.choice(_VECTORS)}[{places}]", self._vector(scope, count, 1)
+            target, value = (
+                f"{self._draw.choice(_VECTORS)}[{places}]",
+                self._vector(scope, count, 1),
+            )
         elif self._draw.random() < 0.5:
             value = self._vector(scope, _SIDE, 1)
             target = f"{self._draw.choice(_MATRICES)}[{places}]"
@@ -151,12 +155,10 @@ class Program:
         if self._draw.random() < 0.3:
             return [*lines, f"{target} {change}= {self._float(scope, 1)}"]
         if self._draw.random() < 0.2:
-            read = target.partition("[")[2]
-            return [*lines, f"{target} = {self._draw.choice(_MATRICES if self._is_matrix(target) else _VECTORS)}[{read}"]
+            sources = _MATRICES if target.startswith(_MATRICES) else _VECTORS
+            index = target.partition("[")[2]
+            return [*lines, f"{target} = {self._draw.choice(sources)}[{index}"]
         return [*lines, f"{target} {change}= {value}"]
-
-    def _is_matrix(self, target: str) -> bool:
-        return target.startswith(_MATRICES)
 
     def _set_any(self, scope: _Scope) -> list[str]:
         """Set by an index whose type is not seen."""
@@ -354,13 +356,16 @@ class Program:
             one, other = self._int(scope, depth - 1), self._int(scope, depth - 1)
             return f"({one} {self._draw.choice(['+', '-', '*'])} {other})"
         if draw < 0.7:
-            return f"({self._int(scope, depth - 1)} {self._draw.choice(['//', '%'])} {self._draw.choice([2, 3, -3])})"
+            how = f"{self._draw.choice(['//', '%'])} {self._draw.choice([2, 3, -3])}"
+            return f"({self._int(scope, depth - 1)} {how})"
         if draw < 0.8:
             name = self._draw.choice(["int", "round", "math.floor", "math.ceil"])
             return f"{name}({self._float(scope, depth - 1)})"
         if draw < 0.9:
             return f"abs({self._int(scope, depth - 1)})"
-        return f"({self._int(scope, 0)} if {self._bool(scope, depth - 1)} else {self._int(scope, 0)})"
+        return (
+            f"({self._int(scope, 0)} if {self._bool(scope, depth - 1)} else {self._int(scope, 0)})"
+        )
 
     def _bool(self, scope: _Scope, depth: int) -> str:
         draw = self._draw.random()

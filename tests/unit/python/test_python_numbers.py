@@ -1,7 +1,6 @@
 """Where Python's numbers have no value it raises; compiled code raises there, too."""
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np

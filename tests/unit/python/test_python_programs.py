@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from rtcf_compile.comparison import verify
 from rtcf_compile.machine_code import lowering
 from rtcf_compile.source import modules
-
 from unit.python.programs import Program, module
 
 TOGETHER = 25  # programs of one component

@@ -15,7 +15,8 @@ from rtcf_compile.machine_code import lowering
 from rtcf_compile.source import modules as source
 
 FOLDER = Path(__file__).parents[2] / "components" / "python"
-FILES = [source.load(FOLDER / f"{name}.py") for name in ("controllers", "filters", "messages")]
+NAMES = ("controllers", "filters", "messages", "written")
+FILES = [source.load(FOLDER / f"{name}.py") for name in NAMES]
 # One way of Failing fills the arena, which the interpreter does not have.
 CLASSES = {
     each.__name__: each

@@ -17,23 +17,32 @@ from typing import Any, Protocol
 
 import numpy as np
 from rtcf.component import Component
-from rtcf.component.declaration import Input, Member, Output, Parameter, Queue
+from rtcf.component.declaration import (
+    Derived,
+    Input,
+    Member,
+    MemberAttribute,
+    Output,
+    Parameter,
+    Queue,
+)
 from rtcf.component.interpreter import QueuePort
 from rtcf.component.value_type import ValueType
 
 from rtcf_compile.comparison.inside import Inside
 from rtcf_compile.machine_code.lowering import Compiled
-from rtcf_compile.rewriting import helpers
-from rtcf_compile.rewriting.functions import made
+from rtcf_compile.rewriting import helpers, numpy_functions
+from rtcf_compile.rewriting.functions import made as made_of
 from rtcf_compile.rewriting.products import Products
 from rtcf_compile.source.mistake import display, source_line
-from rtcf_compile.source.modules import is_own, read
+from rtcf_compile.source.modules import Source, is_own, read
 from rtcf_compile.source.processor_time import HOOK_S, TimeLimitError, loop_line
 
 LARGEST_ULP = 4
 MOST_DIFFERENCES = 10
 # A difference in the last place of what is read, tried so often, explains one so much larger.
 _TRIES, _ROUNDING = 8, 16.0
+_HELPERS = {**helpers.BY_NAME, **numpy_functions.BY_NAME}
 _ANEW = 200  # cycles from one start to the next
 _EDGES = (0.0, -0.0, 1.0, -1.0, 1e-300, -1e-300, 1e-3, 1e3, 1e12, -1e12, 1e300, np.inf, np.nan)
 # Python raises where IEEE 754 goes on to infinity or NaN.
@@ -139,6 +148,7 @@ class _Comparing:
         self._cycle = 0
         self._mine = bounds.record(compiled.description.record)
         self._draw = np.random.default_rng(1)  # of its own, so that inputs are the same
+        self._prepared: dict[bytes, Any] = {}  # by the parameters
 
     def run(self, enough: Callable[[int], bool], draw: Any, edges: float) -> None:
         """Run hooks in the order of a loop's."""
@@ -154,9 +164,10 @@ class _Comparing:
                 record[...] = fresh
                 if self._cycle:
                     _parameters(record, description.of(Parameter), draw)
-                for hook in ("prepare", "start"):
-                    if hook in hooks:
-                        self._both(hook)
+                if "prepare" in hooks:
+                    self._prepare()
+                if "start" in hooks:
+                    self._both("start")
                 # Every other time without special values: one NaN stays in a filter's state.
                 share = edges if self._cycle // _ANEW % 2 else 0.0
                 inputs = [_Inputs(each, draw, share) for each in description.of(Input)]
@@ -172,6 +183,16 @@ class _Comparing:
             result.cycles = self._cycle
         if "safe" in hooks:
             self._both("safe")
+
+    def _prepare(self) -> None:
+        """Compute Derived members, once for the same parameters."""
+        record, description = self._record, self._compiled.description
+        given = b"".join(record[each.name].tobytes() for each in description.of(Parameter))
+        if given not in self._prepared:
+            self._both("prepare")
+            self._prepared[given] = record.copy()
+        for derived in description.of(Derived):
+            record[derived.name] = self._prepared[given][derived.name]
 
     def _made(self) -> Any:
         """Return the component in the interpreter."""
@@ -410,34 +431,67 @@ def _parameters(record: Any, parameters: list[Member], draw: Any) -> None:
 
 
 def _interpreted(cls: type[Component]) -> type[Component]:
-    """Return the class with helpers in the place of `@` and np.linalg."""
-    changed: dict[str, Any] = {}
+    """Return the class, and its bases, with helpers in the place of `@`, np.linalg and others."""
+    copies: dict[type, type] = {}
+    known: dict[FunctionType, FunctionType] = {}
     for base in reversed(cls.__mro__):
-        if base in (object, Component):
+        if base is object or base.__module__.startswith(("rtcf.component", "typing")):
+            copies[base] = base
             continue
-        for name, value in vars(base).items():
+        members = {
+            name: value
+            for name, value in vars(base).items()
+            if name not in ("__dict__", "__weakref__") and not isinstance(value, MemberAttribute)
+        }
+        copy = type(base)(base.__name__, tuple(copies[each] for each in base.__bases__), members)
+        copies[base] = copy
+        for name, value in members.items():
             if isinstance(value, FunctionType) and is_own(value):
-                changed[name] = _with_helpers(value, {})
-    return type(cls.__name__, (cls,), changed)
+                setattr(copy, name, _with_helpers(value, known, copy, copies))
+            elif isinstance(value, staticmethod) and is_own(value.__func__):
+                own = _with_helpers(value.__func__, known, copy, copies)
+                setattr(copy, name, staticmethod(own))
+            elif isinstance(value, property) and is_own(value.fget):
+                own = _with_helpers(value.fget, known, copy, copies)
+                setattr(copy, name, property(own, value.fset))
+    return copies[cls]
 
 
-def _with_helpers(function: FunctionType, known: dict[FunctionType, FunctionType]) -> FunctionType:
+def _with_helpers(
+    function: Any,
+    known: dict[FunctionType, FunctionType],
+    owner: type | None = None,
+    copies: dict[type, type] | None = None,
+) -> FunctionType:
     if function in known:
         return known[function]
     source = read(function)
     products = Products(source)
-    body: list[ast.stmt] = []
-    for statement in source.tree.body:
-        new = products.visit(statement)
-        body.extend(new if isinstance(new, list) else [new])
-    source.tree.body = body
-    source.tree.returns = None
-    for each in source.tree.args.args:
+    tree = source.tree
+    tree.body = products.statements(tree.body)
+    tree.returns = None
+    tree.decorator_list = []
+    for each in tree.args.args:
         each.annotation = None
-    scope = {**function.__globals__, **helpers.BY_NAME, **products.constants}
-    known[function] = made(source.tree, scope, source)
+    scope = {**function.__globals__, **_HELPERS, **products.constants}
+    for name, value in scope.items():
+        if isinstance(value, type) and copies and value in copies:
+            scope[name] = copies[value]
+    known[function] = _in_class(tree, scope, source, owner)
     for name in function.__code__.co_names:
         value = scope.get(name)
-        if isinstance(value, FunctionType) and is_own(value):
+        if isinstance(value, FunctionType) and is_own(value) and name not in _HELPERS:
             scope[name] = _with_helpers(value, known)
     return known[function]
+
+
+def _in_class(
+    tree: ast.FunctionDef, scope: dict[str, Any], source: Source, owner: type | None
+) -> FunctionType:
+    """Return a function of a rewritten tree, in which super() is that of its class."""
+    place = ast.arguments([], [ast.arg("__class__")], None, [], [], None, [])
+    name = ast.Return(ast.Name(tree.name, ast.Load()))
+    outer = ast.FunctionDef("rtcf_in_class", place, [tree, name], [])
+    ast.copy_location(outer, tree)
+    made: FunctionType = made_of(outer, scope, source)(owner)
+    return made

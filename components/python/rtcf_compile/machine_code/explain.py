@@ -13,6 +13,7 @@ _KNOWN: tuple[tuple[str, str, str], ...] = (
         "np.{0} is not compiled",
         "write it as arithmetic on elements",
     ),
+    (r"bool\(OptionalType", "may be None, or 0", "write `is not None`"),
     (
         r"Unknown attribute '(\w+)' of type Module\(<module '(\w+)'",
         "{1}.{0} is not compiled",
@@ -84,5 +85,7 @@ def _plain(words: str) -> str:
         r"array of \1 of shape (\2)",
         words,
     )
+    words = re.sub(r"OptionalType\((\w+)\)", r"\1 or None", words)
+    words = re.sub(r"IntEnum<\w+>?\((\w+)\)?", r"\1", words)
     words = re.sub(r"Literal\[(\w+)\]\([^)]*\)", r"\1", words)
     return words.replace("<built-in function ", "").replace(">", "").strip()

@@ -16,12 +16,14 @@ from numba.core import errors
 from rtcf.component import Component, describe
 from rtcf.component.declaration import Description
 
+import rtcf_compile.machine_code.numpy_functions
 import rtcf_compile.machine_code.overloads  # noqa: F401, registers them
 from rtcf_compile.machine_code import arena, backend, explain, gate, stack, trial
 from rtcf_compile.machine_code.raises import Raise, raises_in
 from rtcf_compile.rewriting import log_calls
 from rtcf_compile.rewriting.functions import Functions
 from rtcf_compile.rewriting.logs import Logs
+from rtcf_compile.rewriting.products import ARENA
 from rtcf_compile.source.mistake import Mistake
 
 warnings.filterwarnings("ignore", category=errors.NumbaWarning)
@@ -35,7 +37,6 @@ _COUNTS = "declare void @NRT_incref(i8*)\ndeclare void @NRT_decref(i8*)\n"
 _OPTIONS = {"boundscheck": True, "error_model": "python", **backend.NO_WRAPPERS}
 # What runs in the real-time thread, and beside it.
 _REALTIME, _BESIDE = ("update", "safe"), ("prepare", "start")
-ARENA = 64 * 1024
 
 
 @dataclass

@@ -1,21 +1,23 @@
 """The helpers as numba compiles them. Imported only where something is compiled."""
 
 import functools
+import inspect
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numba import types
+from numba.core import cgutils
 from numba.core.errors import TypingError
-from numba.extending import overload, register_jitable
+from numba.extending import intrinsic, lower_builtin, lower_cast, overload, register_jitable
 from numba.np.numpy_support import as_dtype
 
 from rtcf_compile.machine_code import backend
 from rtcf_compile.machine_code.sharing import overlaps, shares
 from rtcf_compile.machine_code.tile import ROWS
-from rtcf_compile.rewriting import helpers
+from rtcf_compile.rewriting import helpers, numpy_functions
 
 # numba takes an overload apart by its parameters' names and reads its returned function as source.
 _OPTIONS: dict[str, Any] = {
@@ -25,54 +27,255 @@ _OPTIONS: dict[str, Any] = {
 }
 
 
-def _compiled_as(
-    helper: Callable[..., Any], checked: bool = False
+def compiled_as(
+    helper: Callable[..., Any], checked: bool = False, arrays: Sequence[str] = ()
 ) -> Callable[[Callable[..., Any]], None]:
     """Register what chooses a helper's implementation by types; numba wants no annotations.
-    `checked` are the indices that it uses.
+    `checked` are the indices that it uses; arguments of the names `arrays` may be numbers in rows.
     """
 
     def register(choose: Callable[..., Any]) -> None:
         choose.__annotations__ = {}
+        names = list(inspect.signature(choose).parameters)
 
         @functools.wraps(choose)
         def typed(*types_of: Any, **named: Any) -> Any:
+            changed = {}
+            for name, kind in {**dict(zip(names, types_of, strict=False)), **named}.items():
+                if isinstance(kind, types.Optional):
+                    changed[name] = f"some({name})"
+                elif name in arrays and isinstance(kind, types.BaseTuple):
+                    changed[name] = f"array({name}, None)"
+            if changed:
+                return _again(helper, names, changed)
             implementation = choose(*types_of, **named)
-            implementation.__annotations__ = {}
+            if implementation is not None:
+                implementation.__annotations__ = {}
             return implementation
 
-        overload(helper, jit_options={**_OPTIONS, "boundscheck": checked})(typed)
+        options: dict[str, Any] = {**_OPTIONS, "boundscheck": checked}
+        overload(helper, jit_options=options)(typed)
 
     return register
 
 
-@_compiled_as(helpers.rtcf_float)
+def _again(helper: Callable[..., Any], names: list[str], changed: dict[str, str]) -> Any:
+    """Return a function that calls a helper with some arguments changed."""
+    scope = {"helper": helper, "some": _some, "array": numpy_functions.rtcf_array}
+    given = ", ".join(changed.get(name, name) for name in names)
+    exec(f"def again({', '.join(names)}):\n    return helper({given})\n", scope)
+    return scope["again"]
+
+
+def _some(value: Any) -> Any:
+    raise NotImplementedError
+
+
+@intrinsic
+def _unwrapped(typing, value):  # type: ignore[no-untyped-def]
+    """What may be None, and is not."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        return context.cast(builder, arguments[0], value, value.type)
+
+    return value.type(value), generate
+
+
+@overload(_some)
+def _value_of(value):  # type: ignore[no-untyped-def]
+    """What may be None; raises where it is."""
+
+    def some(value):  # type: ignore[no-untyped-def]
+        if value is None:
+            raise TypeError("None is no number")
+        return _unwrapped(value)
+
+    return some
+
+
+@lower_cast(types.IntEnumMember, types.Float)
+def _enum_to_float(context, builder, kind, wanted, value):  # type: ignore[no-untyped-def]
+    return context.cast(builder, value, kind.dtype, wanted)
+
+
+@intrinsic
+def _member(typing, value, cls):  # type: ignore[no-untyped-def]
+    """The member of an enum with a value."""
+    result = types.IntEnumMember(cls.instance_class, types.int64)
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        return context.cast(builder, arguments[0], value, types.int64)
+
+    return result(value, cls), generate
+
+
+@lower_builtin(operator.is_, types.Optional, types.IntEnumMember)
+def _maybe_is(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+    """`x is Mode.RUN` of what may be None."""
+    optional, member = signature.args
+    if optional.type != member:
+        return context.get_constant(types.boolean, False)
+    value = context.make_helper(builder, optional, value=arguments[0])
+    same = builder.icmp_signed("==", value.data, arguments[1])
+    return builder.and_(cgutils.as_bool_bit(builder, value.valid), same)
+
+
+@compiled_as(helpers.rtcf_member)
+def _member_of(value: Any, cls: Any) -> Any:
+    return lambda value, cls: _member(value, cls)
+
+
+@compiled_as(helpers.rtcf_enum)
+def _enum(value: Any, cls: Any) -> Any:
+    enumeration = cls.instance_class
+    if isinstance(value, types.IntEnumMember):
+        if value.instance_class is not enumeration:
+            raise TypingError(
+                f"RTCF:{value.instance_class.__name__} is not {enumeration.__name__}:"
+                f"give it a {enumeration.__name__}"
+            )
+        return lambda value, cls: value
+    if not isinstance(value, types.Integer):
+        raise TypingError(f"RTCF:{enumeration.__name__} of {words(value)}:it takes an int")
+    test = " or ".join(f"value == {int(each)}" for each in enumeration)
+    text = f"""\
+def checked(value, cls):
+    if {test}:
+        return member(value, cls)
+    raise ValueError("not a valid {enumeration.__name__}")
+"""
+    scope: dict[str, Any] = {"member": _member}
+    exec(text, scope)
+    return scope["checked"]
+
+
+@compiled_as(helpers.rtcf_is)
+def _is(value: Any, constant: Any) -> Any:
+    if isinstance(value, types.Boolean):
+        return lambda value, constant: value == constant
+    return lambda value, constant: False
+
+
+@overload(helpers.rtcf_maybe)
+def _maybe(value, is_known):  # type: ignore[no-untyped-def]
+    def maybe(value, is_known):  # type: ignore[no-untyped-def]
+        return value if is_known else None
+
+    return maybe
+
+
+@overload(helpers.rtcf_equal)
+def _equal(a, b):  # type: ignore[no-untyped-def]
+    none = [isinstance(each, types.NoneType) for each in (a, b)]
+    if any(none):
+        if all(none):
+            return lambda a, b: True
+        return lambda a, b: a is b
+    if isinstance(a, types.Optional):
+        return lambda a, b: False if a is None else helpers.rtcf_equal(_unwrapped(a), b)
+    if isinstance(b, types.Optional):
+        return lambda a, b: False if b is None else helpers.rtcf_equal(a, _unwrapped(b))
+    return lambda a, b: a == b
+
+
+@overload(helpers.rtcf_is_known)
+def _is_known(value):  # type: ignore[no-untyped-def]
+    if isinstance(value, types.Optional):
+        return lambda value: value is not None
+    known = not isinstance(value, types.NoneType)
+    return lambda value: known
+
+
+@overload(helpers.rtcf_or_old)
+def _or_old(value, old):  # type: ignore[no-untyped-def]
+    if isinstance(value, types.NoneType):
+        return lambda value, old: old
+    if not isinstance(value, types.Optional):
+        return lambda value, old: value
+
+    def either(value, old):  # type: ignore[no-untyped-def]
+        if value is None:
+            return old
+        return _unwrapped(value)
+
+    return either
+
+
+@intrinsic
+def _without_sizes(typing, array):  # type: ignore[no-untyped-def]
+    """An array of a record, whose type has no sizes, as a view."""
+    result = types.Array(array.dtype, array.ndim, "C", aligned=array.aligned)
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        return arguments[0]  # the record is not counted
+
+    return result(array), generate
+
+
+@compiled_as(helpers.rtcf_view)
+def _view(array: Any) -> Any:
+    if isinstance(array, types.NestedArray):
+        return lambda array: _without_sizes(array)
+    return lambda array: array
+
+
+@compiled_as(helpers.rtcf_store, arrays=("value",))
+def _store(target: Any, value: Any) -> Any:
+    if not isinstance(value, types.Array):
+        return lambda target, value: helpers.rtcf_assign(target, value)
+    if value.ndim != target.ndim:
+        raise TypingError(
+            f"RTCF:{words(target)} is set to {words(value)}:it takes an array of its shape"
+        )
+
+    def store(target: Any, value: Any) -> None:
+        if target.shape != value.shape:
+            raise ValueError("an array is set to one of another shape")
+        helpers.rtcf_assign(target, value)
+
+    return store
+
+
+@compiled_as(helpers.rtcf_to_float)
+def _to_float(value: Any) -> Any:
+    if isinstance(value, types.IntEnumMember):
+        return lambda value: float(value.value)
+    if isinstance(value, types.Number | types.Boolean):
+        return lambda value: float(value)
+    raise TypingError(f"RTCF:float of {words(value)}:it takes a number")
+
+
+@compiled_as(helpers.rtcf_float)
 def _float(value: Any) -> Any:
+    if isinstance(value, types.IntEnumMember):
+        return lambda value: float(value.value)
     if isinstance(value, types.Float | types.Integer):
         return lambda value: float(value)
-    raise TypingError(f"RTCF:a number is set to {_words(value)}:give it a float")
+    raise TypingError(f"RTCF:a number is set to {words(value)}:give it a float")
 
 
-@_compiled_as(helpers.rtcf_int)
+@compiled_as(helpers.rtcf_int)
 def _int(value: Any) -> Any:
+    if isinstance(value, types.IntEnumMember):
+        return lambda value: value.value
     if isinstance(value, types.Integer):
         return lambda value: value
-    raise TypingError(f"RTCF:a whole number is set to {_words(value)}:round it by int(…)")
+    raise TypingError(f"RTCF:a whole number is set to {words(value)}:round it by int(…)")
 
 
-@_compiled_as(helpers.rtcf_bool)
+@compiled_as(helpers.rtcf_bool)
 def _bool(value: Any) -> Any:
     if isinstance(value, types.Boolean):
         return lambda value: value
-    raise TypingError(f"RTCF:a bool is set to {_words(value)}:compare it: x != 0")
+    raise TypingError(f"RTCF:a bool is set to {words(value)}:compare it: x != 0")
 
 
-@_compiled_as(helpers.rtcf_matmul)
+@compiled_as(helpers.rtcf_matmul)
 def _matmul(a: Any, b: Any) -> Any:
     if not isinstance(a, types.Array) or not isinstance(b, types.Array):
-        raise TypingError(f"RTCF:@ of {_words(a)} and {_words(b)}:it takes arrays; use *")
+        raise TypingError(f"RTCF:@ of {words(a)} and {words(b)}:it takes arrays; use *")
     if not isinstance(a.dtype, types.Float) and not isinstance(b.dtype, types.Float):
-        raise TypingError(f"RTCF:@ of {_words(a)} and {_words(b)}:one of them must be of floats")
+        raise TypingError(f"RTCF:@ of {words(a)} and {words(b)}:one of them must be of floats")
     if (a.ndim, b.ndim) == (1, 1):
         return _inner_product
     if (a.dtype, b.dtype) != (types.float64, types.float64):
@@ -176,7 +379,7 @@ def _row_of_any() -> Any:
     """Return the same for a matrix whose strides are known late: when all functions are inlined."""
     along_out, along_sum, along_nothing = ROWS["out"], ROWS["sum"], ROWS[""]
 
-    @_plain
+    @plain
     def row(factors, first, step, matrix, down, across, count, out, place, width):  # type: ignore[no-untyped-def]
         if across == 8:
             along_out(factors, first, step, matrix, down, across, count, out, place, width)
@@ -188,20 +391,22 @@ def _row_of_any() -> Any:
     return row
 
 
-@_compiled_as(helpers.rtcf_assign)
+@compiled_as(helpers.rtcf_assign)
 def _assign(target: Any, value: Any) -> Any:
     if not isinstance(target, types.Array):
-        raise TypingError(f"RTCF:{_words(target)} is set as an array:use =")
+        raise TypingError(f"RTCF:{words(target)} is set as an array:use =")
     new = value.dtype if isinstance(value, types.Array) else value
     if isinstance(new, types.Float) and not isinstance(target.dtype, types.Float):
         raise TypingError(f"RTCF:elements of {target.dtype} are set to {new}:round them first")
     if isinstance(value, types.Number | types.Boolean):
         return _filling(target.ndim)
     if isinstance(value, types.UniTuple | types.Tuple) and target.ndim == 1:
-        return lambda target, value: helpers.rtcf_assign(target, np.array(value))
+        return lambda target, value: helpers.rtcf_assign(
+            target, numpy_functions.rtcf_array(value, None)
+        )
     if not isinstance(value, types.Array) or value.ndim > target.ndim:
         raise TypingError(
-            f"RTCF:{_words(target)} is set to {_words(value)}:it takes an array of its shape"
+            f"RTCF:{words(target)} is set to {words(value)}:it takes an array of its shape"
         )
     copying = _copying(target.ndim, value.ndim)
 
@@ -261,26 +466,28 @@ def _copying(of_target: int, of_value: int) -> Any:
                 target[i, j] = value[i * down, j * along]
 
     chosen = {(1, 1): vector, (2, 1): rows, (2, 2): matrix}[of_target, of_value]
-    return _plain(chosen)
+    return plain(chosen)
 
 
-def _plain(function: Any) -> Any:
+def plain(function: Any) -> Any:
     """Return a function that compiled ones call, compiled as they are."""
     function.__annotations__ = {}
     return register_jitable(**_OPTIONS)(function)
 
 
-@_compiled_as(helpers.rtcf_get, checked=True)
+@compiled_as(helpers.rtcf_get, checked=True)
 def _get(base: Any, index: Any) -> Any:
+    if any(isinstance(each, types.IntEnumMember) for each in index.types):
+        return _by_values("base, index", "helpers.rtcf_get(base, ({}))", index)
     if not isinstance(base, types.Array):
-        return lambda base, index: base[index]
+        return lambda base, index: base[index[0]]
     kinds = _kinds(base, index)
-    if kinds in (("array",), ("array", "slice")):
-        if kinds == ("array", "slice"):
-            return lambda base, index: _gathered(base[:, index[1]], index[0])
-        return lambda base, index: _gathered(base, index)
+    if kinds == ("array",):
+        return lambda base, index: _gathered(base, index[0])
+    if kinds == ("array", "slice"):
+        return lambda base, index: _gathered(base[:, index[1]], index[0])
     if kinds == ("mask",):
-        return lambda base, index: _where_true(base, index)
+        return lambda base, index: _where_true(base, index[0])
     if kinds == ("int", "array"):
         return lambda base, index: _gathered(base[index[0]], index[1])
     if kinds == ("array", "int"):
@@ -311,10 +518,14 @@ def _get(base: Any, index: Any) -> Any:
     return lambda base, index: base[index]
 
 
-@_compiled_as(helpers.rtcf_set, checked=True)
+@compiled_as(helpers.rtcf_set, checked=True)
 def _set(base: Any, index: Any, value: Any) -> Any:
+    if any(isinstance(each, types.IntEnumMember) for each in index.types):
+        return _by_values("base, index, value", "helpers.rtcf_set(base, ({}), value)", index)
+    if isinstance(value, types.IntEnumMember):
+        return lambda base, index, value: helpers.rtcf_set(base, index, value.value)
     if not isinstance(base, types.Array):
-        raise TypingError(f"RTCF:elements of {_words(base)} are set:use an array")
+        raise TypingError(f"RTCF:elements of {words(base)} are set:use an array")
     if not base.mutable:
         raise TypingError("RTCF:a constant of the module is set:declare a State, or copy it")
     new = value.dtype if isinstance(value, types.Array) else value
@@ -326,7 +537,7 @@ def _set(base: Any, index: Any, value: Any) -> Any:
     if "slice" in kinds or len(kinds) < base.ndim:
         return lambda base, index, value: helpers.rtcf_assign(base[index], value)
     if not isinstance(value, types.Number | types.Boolean):
-        raise TypingError(f"RTCF:an element is set to {_words(value)}:give it a number")
+        raise TypingError(f"RTCF:an element is set to {words(value)}:give it a number")
 
     def element(base: Any, index: Any, value: Any) -> None:
         base[index] = value
@@ -334,14 +545,24 @@ def _set(base: Any, index: Any, value: Any) -> Any:
     return element
 
 
+def _by_values(parameters: str, call: str, index: Any) -> Any:
+    """Return a function that calls a helper with ints in the place of enums in an index."""
+    parts = "".join(
+        f"index[{k}].value, " if isinstance(each, types.IntEnumMember) else f"index[{k}], "
+        for k, each in enumerate(index.types)
+    )
+    scope: dict[str, Any] = {"helpers": helpers}
+    exec(f"def again({parameters}):\n    return {call.format(parts)}\n", scope)
+    return scope["again"]
+
+
 def _kinds(base: Any, index: Any) -> tuple[str, ...]:
     """Return the kinds of the parts of an index: int, slice, array, or a mask of two dimensions."""
-    parts = index.types if isinstance(index, types.BaseTuple) else (index,)
     kinds: list[str] = []
-    for each in parts:
+    for each in index.types:
         if isinstance(each, types.Array):
             if not isinstance(each.dtype, types.Integer | types.Boolean):
-                raise TypingError(f"RTCF:an index is {_words(each)}:use ints or bools")
+                raise TypingError(f"RTCF:an index is {words(each)}:use ints or bools")
             whole = each.ndim == base.ndim == 2 and isinstance(each.dtype, types.Boolean)
             kinds.append("array" if each.ndim == 1 else "mask" if whole else "")
         elif isinstance(each, types.Integer):
@@ -350,30 +571,32 @@ def _kinds(base: Any, index: Any) -> tuple[str, ...]:
             kinds.append("slice")
         else:
             kinds.append("")
-    several = len(kinds) > 1 and ("mask" in kinds or any(
-        isinstance(each, types.EllipsisType) for each in parts) and "array" in kinds)  # fmt: skip
+    rest = any(isinstance(each, types.EllipsisType) for each in index.types)
+    several = len(kinds) > 1 and ("mask" in kinds or (rest and "array" in kinds))
     if len(kinds) > base.ndim or "" in kinds or several:
-        given = ", ".join(_words(each) for each in parts)
-        raise TypingError(f"RTCF:{_words(base)} has no index {given}:use ints, slices and arrays")
+        given = ", ".join(words(each) for each in index.types)
+        raise TypingError(f"RTCF:{words(base)} has no index {given}:use ints, slices and arrays")
     return tuple(kinds)
 
 
 def _selected(kinds: tuple[str, ...], value: Any) -> Any:
     """Return what sets what a mask or an array of numbers selects."""
     if isinstance(value, types.BaseTuple):
-        return lambda base, index, value: helpers.rtcf_set(base, index, np.array(value))
+        return lambda base, index, value: helpers.rtcf_set(
+            base, index, numpy_functions.rtcf_array(value, None)
+        )
     if not isinstance(value, types.Array | types.Number | types.Boolean):
-        raise TypingError(f"RTCF:elements are set to {_words(value)}:give them numbers")
+        raise TypingError(f"RTCF:elements are set to {words(value)}:give them numbers")
     if kinds == ("array",):
         return lambda base, index, value: _scatter(
-            base, _places(index, base.shape[0]), _apart(base, value)
+            base, _places(index[0], base.shape[0]), _apart(base, value)
         )
     if kinds == ("mask",):
-        return lambda base, index, value: _masked(base, index, _apart(base, value))
+        return lambda base, index, value: _masked(base, index[0], _apart(base, value))
     if kinds == ("int", "array"):
-        return lambda base, index, value: helpers.rtcf_set(base[index[0]], index[1], value)
+        return lambda base, index, value: helpers.rtcf_set(base[index[0]], (index[1],), value)
     if kinds in (("array", "int"), ("array", "slice")):
-        return lambda base, index, value: helpers.rtcf_set(base[:, index[1]], index[0], value)
+        return lambda base, index, value: helpers.rtcf_set(base[:, index[1]], (index[0],), value)
     if kinds == ("slice", "array"):
         return lambda base, index, value: _scatter_columns(
             base[index[0]], _places(index[1], base.shape[1]), _apart(base, value)
@@ -390,7 +613,7 @@ def _gathered(base: Any, index: Any) -> Any:
     raise NotImplementedError
 
 
-@_compiled_as(_gathered)
+@compiled_as(_gathered)
 def _gather(base: Any, index: Any) -> Any:
     """Elements of a vector, or rows of a matrix."""
     if base.ndim == 1:
@@ -415,7 +638,7 @@ def _gather(base: Any, index: Any) -> Any:
     return rows
 
 
-@_plain
+@plain
 def _where_true(base: Any, mask: Any) -> Any:
     """Return the elements of a matrix where a mask of its shape is true, row by row."""
     if mask.shape != base.shape:
@@ -430,7 +653,7 @@ def _where_true(base: Any, mask: Any) -> Any:
     return result
 
 
-@_plain
+@plain
 def _count(mask: Any) -> Any:
     count = 0
     for i in range(mask.shape[0]):
@@ -440,7 +663,7 @@ def _count(mask: Any) -> Any:
     return count
 
 
-@_plain
+@plain
 def _steps(rows: Any, columns: Any) -> Any:
     """Return the steps in indices of two dimensions: 0 for one of a single element."""
     down = 0 if rows.shape[0] == 1 else 1
@@ -454,7 +677,7 @@ def _places(index: Any, size: Any) -> Any:
     raise NotImplementedError
 
 
-@_compiled_as(_places)
+@compiled_as(_places)
 def _places_of(index: Any, size: Any) -> Any:
     """The places that an index selects, each within the size."""
     if isinstance(index.dtype, types.Boolean):
@@ -494,7 +717,7 @@ def _apart(base: Any, value: Any) -> Any:
     raise NotImplementedError
 
 
-@_compiled_as(_apart)
+@compiled_as(_apart)
 def _apart_from(base: Any, value: Any) -> Any:
     """The value, copied if it may share memory with the base."""
     if not isinstance(value, types.Array):
@@ -509,7 +732,7 @@ def _scatter(base: Any, places: Any, value: Any) -> Any:
     raise NotImplementedError
 
 
-@_compiled_as(_scatter)
+@compiled_as(_scatter)
 def _scattered(base: Any, places: Any, value: Any) -> Any:
     """Elements of a vector, or rows of a matrix."""
     if not isinstance(value, types.Array):
@@ -528,7 +751,7 @@ def _scattered(base: Any, places: Any, value: Any) -> Any:
 
         return fill_rows
     if value.ndim > base.ndim:
-        raise TypingError(f"RTCF:parts of {_words(base)} are set to {_words(value)}:make them fit")
+        raise TypingError(f"RTCF:parts of {words(base)} are set to {words(value)}:make them fit")
     if base.ndim == 1:
 
         def elements(base: Any, places: Any, value: Any) -> None:
@@ -565,7 +788,7 @@ def _scatter_columns(base: Any, places: Any, value: Any) -> Any:
     raise NotImplementedError
 
 
-@_compiled_as(_scatter_columns)
+@compiled_as(_scatter_columns)
 def _scattered_columns(base: Any, places: Any, value: Any) -> Any:
     if not isinstance(value, types.Array):
 
@@ -603,10 +826,10 @@ def _scatter_pairs(base: Any, rows: Any, columns: Any, value: Any) -> Any:
     raise NotImplementedError
 
 
-@_compiled_as(_scatter_pairs)
+@compiled_as(_scatter_pairs)
 def _scattered_pairs(base: Any, rows: Any, columns: Any, value: Any) -> Any:
     if isinstance(value, types.Array) and value.ndim > 1:
-        raise TypingError(f"RTCF:elements are set to {_words(value)}:give them a vector")
+        raise TypingError(f"RTCF:elements are set to {words(value)}:give them a vector")
 
     def pairs(base: Any, rows: Any, columns: Any, value: Any) -> None:
         down, along = _steps(rows, columns)
@@ -622,11 +845,11 @@ def _masked(base: Any, mask: Any, value: Any) -> Any:
     raise NotImplementedError
 
 
-@_compiled_as(_masked)
+@compiled_as(_masked)
 def _set_where(base: Any, mask: Any, value: Any) -> Any:
     """Elements of a matrix where a mask of its shape is true, row by row."""
     if isinstance(value, types.Array) and value.ndim > 1:
-        raise TypingError(f"RTCF:elements are set to {_words(value)}:give them a vector")
+        raise TypingError(f"RTCF:elements are set to {words(value)}:give them a vector")
 
     def where(base: Any, mask: Any, value: Any) -> None:
         if mask.shape != base.shape:
@@ -646,7 +869,7 @@ def _step(value: Any, count: Any) -> Any:
     raise NotImplementedError
 
 
-@_compiled_as(_step)
+@compiled_as(_step)
 def _step_of(value: Any, count: Any) -> Any:
     """1 to take a value after the other, 0 to take the only one again and again."""
     if not isinstance(value, types.Array):
@@ -666,7 +889,7 @@ def _item(value: Any, place: Any) -> Any:
     raise NotImplementedError
 
 
-@_compiled_as(_item)
+@compiled_as(_item)
 def _item_of(value: Any, place: Any) -> Any:
     if isinstance(value, types.Array):
         return lambda value, place: value[place]
@@ -676,7 +899,7 @@ def _item_of(value: Any, place: Any) -> Any:
 def _changing(helper: Any, operation: Any) -> None:
     """Register `target += value` for one operation."""
 
-    @_compiled_as(helper)
+    @compiled_as(helper)
     def _change(target: Any, value: Any) -> Any:
         if not isinstance(target, types.Array):
             return lambda target, value: operation(target, value)
@@ -688,7 +911,21 @@ def _changing(helper: Any, operation: Any) -> None:
         return change
 
 
-for _node, _helper in helpers.IN_PLACE.items():
+def _with_lists(helper: Any, operation: Any) -> None:
+    """Register an operation of an array and a list."""
+
+    @compiled_as(helper)
+    def _operate(left: Any, right: Any) -> Any:
+        if isinstance(left, types.Array) and isinstance(right, types.BaseTuple):
+            return lambda left, right: operation(left, numpy_functions.rtcf_array(right, None))
+        if isinstance(left, types.BaseTuple) and isinstance(right, types.Array):
+            return lambda left, right: operation(numpy_functions.rtcf_array(left, None), right)
+        raise TypingError("RTCF:a list is computed with what is no array:use np.array([…])")
+
+
+for _helper in helpers.OF_LISTS.values():
+    _with_lists(_helper, getattr(operator, _helper.__name__.removeprefix("rtcf_of_lists_")))
+for _helper in helpers.IN_PLACE.values():
     _changing(_helper, getattr(operator, _helper.__name__.removeprefix("rtcf_in_place_")))
 
 
@@ -700,10 +937,10 @@ def _checking(helper: Any, function: Any) -> None:
     if function is math.log2:  # which numba does not know
         function = types.ExternalFunction("log2", types.float64(types.float64))
 
-    @_compiled_as(helper)
+    @compiled_as(helper)
     def _check(value: Any) -> Any:
         if not isinstance(value, types.Number | types.Boolean):
-            raise TypingError(f"RTCF:math.{name} of {_words(value)}:it takes a number; arrays: np")
+            raise TypingError(f"RTCF:math.{name} of {words(value)}:it takes a number; arrays: np")
 
         def checked(value: Any) -> Any:
             result = function(float(value))
@@ -718,11 +955,11 @@ def _checking(helper: Any, function: Any) -> None:
         return checked
 
 
-for _function, _helper in helpers.MATH.items():
-    _checking(_helper, _function)
+for _function, _checked_function in helpers.MATH.items():
+    _checking(_checked_function, _function)
 
 
-@_compiled_as(helpers.rtcf_math_fmod)
+@compiled_as(helpers.rtcf_math_fmod)
 def _fmod(x: Any, y: Any) -> Any:
     def fmod(x: Any, y: Any) -> Any:
         result = np.fmod(float(x), float(y))
@@ -733,7 +970,7 @@ def _fmod(x: Any, y: Any) -> Any:
     return fmod
 
 
-@_compiled_as(helpers.rtcf_pow)
+@compiled_as(helpers.rtcf_pow)
 def _pow(base: Any, exponent: Any) -> Any:
     numbers = types.Number | types.Boolean
     if not isinstance(base, numbers) or not isinstance(exponent, numbers):
@@ -762,17 +999,19 @@ def _pow(base: Any, exponent: Any) -> Any:
     return power
 
 
-@_compiled_as(helpers.rtcf_math_pow)
+@compiled_as(helpers.rtcf_math_pow)
 def _math_pow(base: Any, exponent: Any) -> Any:
     return lambda base, exponent: helpers.rtcf_pow(float(base), float(exponent))
 
 
-@_compiled_as(helpers.rtcf_to_int)
+@compiled_as(helpers.rtcf_to_int)
 def _to_int(value: Any) -> Any:
+    if isinstance(value, types.IntEnumMember):
+        return lambda value: value.value
     if isinstance(value, types.Integer):
         return lambda value: value
     if not isinstance(value, types.Float | types.Boolean):
-        raise TypingError(f"RTCF:int of {_words(value)}:it takes a number")
+        raise TypingError(f"RTCF:int of {words(value)}:it takes a number")
 
     def to_int(value: Any) -> Any:
         if math.isnan(value):
@@ -784,31 +1023,54 @@ def _to_int(value: Any) -> Any:
     return to_int
 
 
-@_compiled_as(helpers.rtcf_floor)
+@compiled_as(helpers.rtcf_floor)
 def _floor(value: Any) -> Any:
     return lambda value: helpers.rtcf_to_int(np.floor(value))
 
 
-@_compiled_as(helpers.rtcf_ceil)
+@compiled_as(helpers.rtcf_ceil)
 def _ceil(value: Any) -> Any:
     return lambda value: helpers.rtcf_to_int(np.ceil(value))
 
 
-@_compiled_as(helpers.rtcf_round)
+@compiled_as(helpers.rtcf_round)
 def _round(value: Any) -> Any:
     if isinstance(value, types.Integer | types.Boolean):
         return lambda value: helpers.rtcf_to_int(value)
     return lambda value: helpers.rtcf_to_int(np.rint(value))
 
 
-@_compiled_as(helpers.rtcf_index)
+@compiled_as(helpers.rtcf_index)
 def _index(value: Any) -> Any:
+    if isinstance(value, types.IntEnumMember):
+        return lambda value: value.value
     if isinstance(value, types.Integer | types.Boolean):
         return lambda value: value
-    raise TypingError(f"RTCF:range of {_words(value)}:make it an int: int(…)")
+    raise TypingError(f"RTCF:range of {words(value)}:make it an int: int(…)")
 
 
-@_compiled_as(helpers.rtcf_front)
+@compiled_as(helpers.rtcf_items)
+def _items(values: Any, count: Any) -> Any:
+    n = count.count
+    if isinstance(values, types.BaseTuple):
+        if values.count != n:
+            raise TypingError(f"RTCF:{values.count} values for {n} names:make them fit")
+        return lambda values, count: values
+    if not isinstance(values, types.Array):
+        raise TypingError(f"RTCF:{words(values)} for {n} names:give it a vector or several values")
+    elements = ", ".join(f"values[{k}]" for k in range(n))
+    text = f"""\
+def items(values, count):
+    if values.shape[0] != {n}:
+        raise ValueError("another number of values than of names")
+    return ({elements},)
+"""
+    scope: dict[str, Any] = {}
+    exec(text, scope)
+    return scope["items"]
+
+
+@compiled_as(helpers.rtcf_front)
 def _front(ring: Any, oldest: Any, count: Any) -> Any:
     def front(ring: Any, oldest: Any, count: Any) -> Any:
         if count == 0:
@@ -818,27 +1080,27 @@ def _front(ring: Any, oldest: Any, count: Any) -> Any:
     return front
 
 
-@_compiled_as(helpers.rtcf_age)
+@compiled_as(helpers.rtcf_age)
 def _age(now: Any, written: Any, oldest: Any, count: Any) -> Any:
     return lambda now, written, oldest, count: (
         -1 if count == 0 else max(np.int64(0), now - written[oldest])
     )
 
 
-@_compiled_as(helpers.rtcf_after)
+@compiled_as(helpers.rtcf_after)
 def _after(place: Any, size: Any) -> Any:
     return lambda place, size: 0 if place + 1 == size else place + 1
 
 
-@_compiled_as(helpers.rtcf_where)
+@compiled_as(helpers.rtcf_where)
 def _where(condition: Any, x: Any, y: Any) -> Any:
     given = (condition, x, y)
     dimensions = {each.ndim for each in given if isinstance(each, types.Array)}
     if len(dimensions) > 1 or not all(
         isinstance(each, types.Array | types.Number | types.Boolean) for each in given
     ):
-        words = ", ".join(_words(each) for each in given)
-        raise TypingError(f"RTCF:np.where of {words}:it takes arrays of one shape, and numbers")
+        kinds = ", ".join(words(each) for each in given)
+        raise TypingError(f"RTCF:np.where of {kinds}:it takes arrays of one shape, and numbers")
     if not dimensions:
         return lambda condition, x, y: x if condition else y
     dtype = np.result_type(*(as_dtype(types.unliteral(getattr(each, "dtype", each)))
@@ -863,7 +1125,7 @@ def _shape(condition: Any, x: Any, y: Any) -> Any:
     raise NotImplementedError
 
 
-@_compiled_as(_shape)
+@compiled_as(_shape)
 def _shape_of_the_first_array(condition: Any, x: Any, y: Any) -> Any:
     if isinstance(condition, types.Array):
         return lambda condition, x, y: condition.shape
@@ -876,7 +1138,7 @@ def _fits(value: Any, shape: Any) -> Any:
     raise NotImplementedError
 
 
-@_compiled_as(_fits)
+@compiled_as(_fits)
 def _has_shape(value: Any, shape: Any) -> Any:
     if isinstance(value, types.Array):
         return lambda value, shape: value.shape == shape
@@ -887,14 +1149,14 @@ def _element(value: Any, place: Any) -> Any:
     raise NotImplementedError
 
 
-@_compiled_as(_element)
+@compiled_as(_element)
 def _element_or_number(value: Any, place: Any) -> Any:
     if isinstance(value, types.Array):
         return lambda value, place: value[place]
     return lambda value, place: value
 
 
-@_compiled_as(helpers.rtcf_solve)
+@compiled_as(helpers.rtcf_solve)
 def _solve(a: Any, b: Any) -> Any:
     if b.ndim == 1:
 
@@ -912,7 +1174,7 @@ def _eliminated(a: Any, b: Any) -> Any:
     raise NotImplementedError
 
 
-@_compiled_as(_eliminated)
+@compiled_as(_eliminated)
 def _eliminate(a: Any, b: Any) -> Any:
     def eliminate(a: Any, b: Any) -> Any:
         n = a.shape[0]
@@ -953,12 +1215,12 @@ def _eliminate(a: Any, b: Any) -> Any:
     return eliminate
 
 
-@_compiled_as(helpers.rtcf_inv)
+@compiled_as(helpers.rtcf_inv)
 def _inv(a: Any) -> Any:
     return lambda a: _eliminated(a, np.eye(a.shape[0]))
 
 
-@_compiled_as(helpers.rtcf_cholesky)
+@compiled_as(helpers.rtcf_cholesky)
 def _cholesky(a: Any) -> Any:
     def cholesky(a: Any) -> Any:
         n = a.shape[0]
@@ -981,7 +1243,7 @@ def _cholesky(a: Any) -> Any:
     return cholesky
 
 
-def _words(value: Any) -> str:
+def words(value: Any) -> str:
     """Return numba's type in the words of NumPy."""
     if isinstance(value, types.Array):
         dimensions = "a vector" if value.ndim == 1 else f"an array of {value.ndim} dimensions"
@@ -993,5 +1255,9 @@ def _words(value: Any) -> str:
     if isinstance(value, types.Integer):
         return "an int"
     if isinstance(value, types.BaseTuple):
-        return "a tuple"
+        return "several values"
+    if isinstance(value, types.IntEnumMember):
+        return f"a {value.instance_class.__name__}"
+    if isinstance(value, types.Optional):
+        return f"{words(value.type)} or None"
     return "None" if isinstance(value, types.NoneType) else str(value)

@@ -12,14 +12,16 @@ import numpy as np
 from rtcf.component import Component, Fault
 from rtcf.component.declaration import HOOKS, Description
 
-from rtcf_compile.rewriting import helpers
+from rtcf_compile.rewriting import helpers, numpy_functions
 from rtcf_compile.rewriting.logs import Logs
-from rtcf_compile.rewriting.products import Products
+from rtcf_compile.rewriting.methods import Method, Methods
+from rtcf_compile.rewriting.products import ARENA, Products
 from rtcf_compile.rewriting.rewrite import Hook
 from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import Mistake, at
 from rtcf_compile.source.modules import Source, is_own, read
 
+_OURS = {*helpers.BY_NAME, *numpy_functions.BY_NAME}
 # What makes a compiled function of a Python one, and what stands for a log call.
 Compiler = Callable[[FunctionType], Any]
 
@@ -34,38 +36,45 @@ class Functions:
         self.lines: set[int] = set()
         self.used: set[str] = set()
         self._cls, self._compiler = cls, compiler
-        self._methods = {
-            name: value
-            for base in reversed(cls.__mro__)
-            if base is not Component and issubclass(base, Component)
-            for name, value in vars(base).items()
-            if inspect.isfunction(value) or isinstance(value, staticmethod | classmethod | property)
-        }
+        self._methods = Methods(cls)
         self._made: dict[FunctionType, Any] = {}
-        self._hooks: dict[str, Hook] = {}
+        self._hooks: dict[FunctionType, Hook] = {}
         self._making: list[FunctionType] = []
+        # Which function calls which, and the arrays that are too large for the arena.
+        self._calls: dict[FunctionType, set[FunctionType]] = {}
+        self._large: dict[FunctionType, Mistake] = {}
 
     def hooks(self) -> dict[str, FunctionType]:
         """Return the hooks that the class has, rewritten but not compiled."""
-        if "update" not in self._methods:
+        if self._methods.find("update") is None:
             file = inspect.getsourcefile(self._cls) or "?"
             line = inspect.getsourcelines(self._cls)[1]
             raise Mistake(file, line, "has no update", "write `def update(self):`")
+        if (own := self._methods.find("__init__")) is not None and own.function is not None:
+            raise Mistake(
+                read(own.function).file,
+                read(own.function).tree.lineno,
+                "__init__ is not compiled",
+                "give members initial values, or set them in start",
+            )
         found = {}
         for hook in HOOKS:
-            if hook in self._methods:
-                source = read(self._plain(hook))
+            method = self._methods.find(hook)
+            if method is not None:
+                source = read(self._plain(method))
                 check(source)
                 self._hook_form(source)
-                found[hook] = self._method(source)
-        if "prepare" in found:
-            self._check_prepare("prepare", set())
+                found[hook] = self._method(source, method)
+                if hook == "prepare":
+                    self._check_prepare(source.function, set())
+                elif hook in ("update", "safe"):
+                    self._check_large(source.function, set())
         return found
 
-    def _check_prepare(self, name: str, seen: set[str]) -> None:
+    def _check_prepare(self, function: FunctionType, seen: set[FunctionType]) -> None:
         """Refuse what prepare and the methods that it calls cannot know."""
-        seen.add(name)
-        hook = self._hooks[name]
+        seen.add(function)
+        hook = self._hooks[function]
         for node in hook.touched.values():
             raise at(
                 hook.source.file,
@@ -73,8 +82,16 @@ class Functions:
                 "prepare runs beside the loop, with parameters alone",
                 "compute it in update, or declare a Parameter",
             )
-        for called in set(hook.called) - seen:
+        for called in self._calls.get(function, set()) & set(self._hooks) - seen:
             self._check_prepare(called, seen)
+
+    def _check_large(self, function: FunctionType, seen: set[FunctionType]) -> None:
+        """Refuse arrays that find no room in the arena, whatever else lies there."""
+        seen.add(function)
+        if function in self._large:
+            raise self._large[function]
+        for called in self._calls.get(function, set()) - seen:
+            self._check_large(called, seen)
 
     def file(self) -> str:
         """Return the file of the class."""
@@ -93,78 +110,104 @@ class Functions:
             if value is not None and getattr(value, "value", value) is not None:
                 raise at(source.file, node, "a hook returns nothing", "write an Output")
 
-    def _plain(self, name: str) -> FunctionType:
-        value = self._methods[name]
-        if isinstance(value, FunctionType):
-            return value
-        function: Any = getattr(value, "__func__", None) or getattr(value, "fget", None)
-        source = read(function)
+    def _plain(self, method: Method) -> FunctionType:
+        if method.function is not None:
+            return method.function
+        file = inspect.getsourcefile(method.owner) or "?"
         raise Mistake(
-            source.file,
-            source.tree.lineno,
-            f"{name} is a {type(value).__name__}",
-            "write a plain method, or a function of the module",
+            file,
+            inspect.getsourcelines(method.owner)[1],
+            f"{method.name} is a {method.kind}",
+            "write a method, a static method or a property by `def`",
         )
 
-    def _method(self, source: Source) -> FunctionType:
+    def _method(self, source: Source, method: Method) -> FunctionType:
         function = source.function
         check(source)
-        if function in self._making:
-            raise Mistake(
-                source.file, source.tree.lineno, f"{function.__name__} calls itself", "use a loop"
-            )
-        self._making.append(function)
-        names = set(self._methods) - set(HOOKS)
-        hook = Hook(source, self.description, names, self.logs)
+        self._begin(function, source)
+        hook = Hook(source, self.description, self._methods, method.owner, self.logs)
         tree = hook.function()
-        self._hooks[source.tree.name] = hook
+        self._hooks[function] = hook
         self.used |= hook.used
         self.lines |= hook.lines
-        scope = self._scope(source, hook.constants)
-        for name in hook.called:
-            scope[f"method_{name}"] = self._compiled_method(self._plain(name))
+        self._note_large(hook)
+        scope = self._scope(source, tree, hook.constants)
+        for called in hook.called.values():
+            if called.kind == "static method":
+                scope[called.symbol] = self._own_function(self._plain(called))
+            else:
+                scope[called.symbol] = self._compiled_method(called)
         for number, call in enumerate(self.logs.calls):
             scope[f"rtcf_log_{number}"] = _log(number, call.count)
         self._making.pop()
         return made(tree, scope, source)
 
-    def _compiled_method(self, function: FunctionType) -> Any:
-        if function not in self._made:
-            self._made[function] = self._compiler(self._method(read(function)))
-        return self._made[function]
-
-    def _own_function(self, function: FunctionType) -> Any:
-        if function in self._made:
-            return self._made[function]
-        source = read(function)
+    def _begin(self, function: FunctionType, source: Source) -> None:
         if function in self._making:
             raise Mistake(
                 source.file, source.tree.lineno, f"{function.__name__} calls itself", "use a loop"
             )
         self._making.append(function)
+
+    def _note(self, function: FunctionType) -> None:
+        """Note that the function in work calls another."""
+        if self._making:
+            self._calls.setdefault(self._making[-1], set()).add(function)
+
+    def _note_large(self, products: Products) -> None:
+        for node in products.large:
+            self._large[products.source.function] = at(
+                products.source.file,
+                node,
+                f"is larger than all temporaries of a cycle together, {ARENA // 1024} KiB",
+                "declare a State, or make it smaller",
+            )
+
+    def _compiled_method(self, method: Method) -> Any:
+        function = self._plain(method)
+        self._note(function)
+        if function not in self._made:
+            source = read(function)
+            if function in self._making:
+                self._begin(function, source)
+            self._made[function] = self._compiler(self._method(source, method))
+        return self._made[function]
+
+    def _own_function(self, function: FunctionType) -> Any:
+        self._note(function)
+        if function in self._made:
+            return self._made[function]
+        source = read(function)
+        self._begin(function, source)
         check(source)
         products = Products(source)
-        body: list[ast.stmt] = []
-        for statement in source.tree.body:
-            new = products.visit(statement)
-            body.extend(new if isinstance(new, list) else [new])
-        source.tree.body = body
+        source.tree.body = products.statements(source.tree.body)
         source.tree.returns = None
+        source.tree.decorator_list = []
         for each in source.tree.args.args:
             each.annotation = None
-        plain = made(source.tree, self._scope(source, products.constants), source)
+        self._note_large(products)
+        plain = made(source.tree, self._scope(source, source.tree, products.constants), source)
         own = self._compiler(plain)
         self._making.pop()
         self._made[function] = own
         return own
 
-    def _scope(self, source: Source, constants: dict[str, Any]) -> dict[str, Any]:
-        scope = {**source.function.__globals__, **helpers.BY_NAME, **constants}
+    def _scope(
+        self, source: Source, tree: ast.FunctionDef, constants: dict[str, Any]
+    ) -> dict[str, Any]:
+        scope = {
+            **source.function.__globals__,
+            **helpers.BY_NAME,
+            **numpy_functions.BY_NAME,
+            **{name: frozen(value) for name, value in constants.items()},
+        }
         scope["rtcf_fault"] = Fault
-        for node in ast.walk(source.tree):
-            if isinstance(node, ast.Name) and node.id in scope:
-                value = scope[node.id]
-                if is_own(value) and value not in helpers.BY_NAME.values():
+        variables = set(source.function.__code__.co_varnames)
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Name) and node.id in scope and node.id not in variables:
+                value = scope[node.id] = frozen(scope[node.id])
+                if is_own(value) and node.id not in _OURS:
                     scope[node.id] = self._own_function(value)
                 else:
                     _constant(node, value, source)
@@ -174,13 +217,20 @@ class Functions:
         return scope
 
 
+def frozen(value: Any) -> Any:
+    """Return a constant with tuples in the place of lists, whose numbers are of one type."""
+    if not isinstance(value, list):
+        return value
+    elements = tuple(frozen(each) for each in value)
+    if {type(each) for each in elements} == {int, float}:
+        return tuple(float(each) for each in elements)
+    return elements
+
+
 def _constant(node: ast.Name, value: Any, source: Source) -> None:
     """Refuse a global that is no constant of a kind that can be compiled."""
-    if source.function.__code__.co_varnames and node.id in source.function.__code__.co_varnames:
-        return
     kinds: dict[type, str] = {
         dict: "a dict",
-        list: "a list",
         set: "a set",
         bytearray: "a bytearray",
     }
@@ -202,7 +252,8 @@ def made(tree: ast.FunctionDef, scope: dict[str, Any], source: Source) -> Functi
     module = ast.fix_missing_locations(ast.Module([tree], []))
     code = compile(module, source.file, "exec", dont_inherit=True)
     inner = next(each for each in code.co_consts if isinstance(each, CodeType))
-    return FunctionType(inner, scope, tree.name, source.function.__defaults__)
+    defaults = source.function.__defaults__ if tree.name == source.tree.name else None
+    return FunctionType(inner, scope, tree.name, defaults)
 
 
 def _log(number: int, count: int) -> Any:

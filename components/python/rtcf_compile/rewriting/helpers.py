@@ -47,15 +47,15 @@ def rtcf_assign(target: Any, value: Any) -> None:
 
 def rtcf_get(base: Any, index: Any) -> Any:
     """Return base[index]: an element, a view, or a copy of what a mask or an array of numbers
-    selects.
+    selects. Of a tuple an element.
     """
-    return base[index]
+    return base[index] if isinstance(base, np.ndarray) else base[index[0]]
 
 
 def rtcf_set(base: Any, index: Any, value: Any) -> None:
     """Set what NumPy takes for base[index]: an element, a view, or what a mask or an array of
-    numbers selects. The arrays may share memory: NumPy copies the value in all cases but of an array
-    of numbers.
+    numbers selects. The arrays may share memory: the value is copied, as NumPy does in all cases
+    but of an array of numbers.
     """
     new = np.array(value)
     if new.dtype.kind == "f" and base.dtype.kind != "f":
@@ -89,6 +89,27 @@ IN_PLACE: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 }
 
 
+def _of_lists(operation: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    def of_lists(left: Any, right: Any) -> Any:
+        """Return an operation of an array and a list."""
+        return operation(np.asarray(left), np.asarray(right))
+
+    of_lists.__name__ = f"rtcf_of_lists_{operation.__name__}"
+    return of_lists
+
+
+# `x + [1.0, 2.0]`, by the operator's node.
+OF_LISTS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    node: _of_lists(operation)
+    for node, operation in {
+        ast.Add: operator.add,
+        ast.Sub: operator.sub,
+        ast.Mult: operator.mul,
+        ast.Div: operator.truediv,
+    }.items()
+}
+
+
 def _checked(function: Callable[[float], float]) -> Callable[[Any], float]:
     def checked(value: Any) -> float:
         return function(value)
@@ -100,14 +121,12 @@ def _checked(function: Callable[[float], float]) -> Callable[[Any], float]:
 
 # Functions of one number that raise ValueError outside their domain and OverflowError beyond the
 # largest float. What the C library gives there, NaN and infinity, is no value to Python.
-MATH: dict[Callable[..., Any], Callable[[Any], float]] = {
-    each: _checked(each)
-    for each in (
-        *(math.sqrt, math.exp, math.expm1, math.log, math.log1p, math.log2, math.log10),
-        *(math.sin, math.cos, math.tan, math.asin, math.acos, math.atan),
-        *(math.sinh, math.cosh, math.tanh, math.asinh, math.acosh, math.atanh),
-    )
-}
+_MATH: list[Callable[[float], float]] = [
+    *(math.sqrt, math.exp, math.expm1, math.log, math.log1p, math.log2, math.log10),
+    *(math.sin, math.cos, math.tan, math.asin, math.acos, math.atan),
+    *(math.sinh, math.cosh, math.tanh, math.asinh, math.acosh, math.atanh),
+]
+MATH: dict[Callable[..., Any], Callable[[Any], float]] = {each: _checked(each) for each in _MATH}
 
 
 def rtcf_math_fmod(x: Any, y: Any) -> float:
@@ -143,6 +162,11 @@ def rtcf_to_int(value: Any) -> Any:
     return whole
 
 
+def rtcf_to_float(value: Any) -> Any:
+    """Return float(value)."""
+    return float(value)
+
+
 def rtcf_floor(value: Any) -> Any:
     """Return math.floor(value). Raises where that is no int64."""
     return rtcf_to_int(math.floor(value))
@@ -176,6 +200,61 @@ def rtcf_int(value: Any) -> Any:
 def rtcf_bool(value: Any) -> Any:
     """Return a bool."""
     return bool(value)
+
+
+def rtcf_items(values: Any, count: Any) -> Any:
+    """Return the elements of what is taken apart into as many names as `count` has elements."""
+    values = tuple(values)
+    if len(values) != len(count):
+        raise ValueError("another number of values than of names")
+    return values
+
+
+def rtcf_view(array: Any) -> Any:
+    """Return an array of the record."""
+    return array
+
+
+def rtcf_store(target: Any, value: Any) -> None:
+    """Set all elements of a member, from a number or an array of its shape."""
+    if np.shape(value) not in (target.shape, ()):
+        raise ValueError(f"an array of shape {target.shape} is set to one of {np.shape(value)}")
+    rtcf_assign(target, value)
+
+
+def rtcf_maybe(value: Any, is_known: Any) -> Any:
+    """Return a value that is None where it is not known."""
+    return value if is_known else None
+
+
+def rtcf_is_known(value: Any) -> Any:
+    """Tell whether a value is not None."""
+    return value is not None
+
+
+def rtcf_or_old(value: Any, old: Any) -> Any:
+    """Return a value, or the old one in the place of None."""
+    return old if value is None else value
+
+
+def rtcf_equal(a: Any, b: Any) -> Any:
+    """Return a == b; None is equal to no number."""
+    return a == b
+
+
+def rtcf_enum(value: Any, cls: Any) -> Any:
+    """Return the member of an enum with a value; ValueError if there is none."""
+    return cls(value)
+
+
+def rtcf_member(value: Any, cls: Any) -> Any:
+    """Return the member of an enum with a value, which it has."""
+    return cls(value)
+
+
+def rtcf_is(value: Any, constant: Any) -> Any:
+    """Tell whether a value is True, or False."""
+    return value is constant or (isinstance(value, np.bool_) and bool(value) == constant)
 
 
 def rtcf_front(ring: Any, oldest: Any, count: Any) -> Any:
@@ -265,6 +344,7 @@ INSTEAD: dict[Callable[..., Any], Callable[..., Any]] = {
     math.ceil: rtcf_ceil,
     math.trunc: rtcf_to_int,
     builtins.int: rtcf_to_int,
+    builtins.float: rtcf_to_float,
     builtins.pow: rtcf_pow,
     **MATH,
 }
@@ -272,8 +352,20 @@ BY_NAME = {
     each.__name__: each
     for each in (
         *(rtcf_matmul, rtcf_assign, rtcf_get, rtcf_set, rtcf_float, rtcf_int, rtcf_bool),
-        *(rtcf_front, rtcf_age, rtcf_after, rtcf_pow, rtcf_round, rtcf_index),
+        *(
+            rtcf_equal,
+            rtcf_view,
+            rtcf_store,
+            rtcf_maybe,
+            rtcf_is_known,
+            rtcf_or_old,
+            rtcf_enum,
+            rtcf_member,
+            rtcf_is,
+        ),
+        *(rtcf_items, rtcf_front, rtcf_age, rtcf_after, rtcf_pow, rtcf_round, rtcf_index),
         *IN_PLACE.values(),
+        *OF_LISTS.values(),
         *INSTEAD.values(),
     )
 }

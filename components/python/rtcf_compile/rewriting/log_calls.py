@@ -35,7 +35,9 @@ def _typed(number: int, given: tuple[Any, ...]) -> tuple[Any, Any]:
     logs = _PRESENT[0]
     passed = []
     for each in given[1:]:
-        if isinstance(each, types.Boolean):
+        if isinstance(each, types.IntEnumMember):
+            passed.append(types.int64)
+        elif isinstance(each, types.Boolean):
             passed.append(types.boolean)
         elif isinstance(each, types.Integer):
             passed.append(types.int64)

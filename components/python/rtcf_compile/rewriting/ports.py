@@ -23,11 +23,21 @@ class Ports(Products):
 
     def __init__(self, source: Source, description: Description) -> None:
         """Rewrite a method of a class that has these members."""
-        super().__init__(source)
         self._description = description
         self._self = source.tree.args.args[0].arg if source.tree.args.args else ""
+        super().__init__(source)
         self.used: set[str] = set()
         self.touched: dict[str, ast.AST] = {}
+
+    def _is_enum(self, node: ast.expr) -> bool:
+        if not isinstance(node, ast.Attribute):
+            return False
+        owner = node.value if node.attr in ("value", "front") else node
+        for each in (node, owner):
+            if isinstance(each, ast.Attribute) and self._is_self(each.value):
+                member = self._description.members.get(each.attr)
+                return member is not None and member.type.enumeration is not None
+        return False
 
     def _port(self, node: ast.Attribute, port: Member) -> ast.AST:
         fields = _INPUT_FIELDS if port.kind is Input else {"value": ""}
@@ -39,7 +49,28 @@ class Ports(Products):
             raise self.mistake(node, "a port's value is not set", f"self.{port.name}.write(…)")
         if port.message and node.attr == "value":
             raise self._no_number(node, port.message, ())
-        return like(node, self._field(port.name + fields[node.attr], node.ctx))
+        if node.attr != "value":
+            return like(node, self._field(port.name + fields[node.attr], node.ctx))
+        value = self._read(port.name, port.type)
+        return like(node, self._as_enum(value, port.type, checked=port.kind is Input))
+
+    def _is_uncertain(self, node: ast.expr, names: set[str]) -> bool:
+        if isinstance(node, ast.Attribute) and self._is_self(node.value):
+            member = self._description.members.get(node.attr)
+            return member is None or member.type.optional
+        return super()._is_uncertain(node, names)
+
+    def _read(self, name: str, kind: ValueType) -> ast.expr:
+        """Return a field's value; an array as a view, whose type has no sizes."""
+        field = self._field(name, ast.Load())
+        return call_of("rtcf_view", field) if kind.shape else field
+
+    def _as_enum(self, field: ast.expr, kind: ValueType, checked: bool = False) -> ast.expr:
+        """Return an int of the record as the enum that it is declared as."""
+        if kind.enumeration is None:
+            return field
+        function = "rtcf_enum" if checked else "rtcf_member"
+        return call_of(function, field, self._enum(kind.enumeration))
 
     def _message(self, node: ast.AST) -> tuple[Member | None, tuple[str, ...]]:
         """Return the port and the path of `self.port.value.path`, if it carries a message."""
@@ -60,7 +91,9 @@ class Ports(Products):
             if port.message.leaf(path[:-1]) is not None:
                 return super().visit_Attribute(node)
             raise self._no_number(node, port.message, path)
-        field = self._field(port.name + leaf.field, ast.Load() if leaf.is_variable else node.ctx)
+        if isinstance(node.ctx, ast.Store) and not leaf.is_variable:
+            return like(node, self._field(port.name + leaf.field))
+        field = self._read(port.name + leaf.field, leaf.type)
         if not leaf.is_variable or port.kind is Output:
             return like(node, field)
         count = self._field(port.name + leaf.count, ast.Load())

@@ -8,17 +8,25 @@ import dataclasses
 import enum
 import inspect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
 
-from rtcf_compile.rewriting.helpers import IN_PLACE, INSTEAD, rtcf_round
+from rtcf_compile.rewriting import numpy_functions
+from rtcf_compile.rewriting.helpers import IN_PLACE, INSTEAD, OF_LISTS, rtcf_round
 from rtcf_compile.source.checks import resolve
 from rtcf_compile.source.mistake import at
-from rtcf_compile.source.modules import Source
+from rtcf_compile.source.modules import Source, is_own
 
 _Node = TypeVar("_Node", bound=ast.AST)
+_STANDS_FOR = [*INSTEAD.items(), *numpy_functions.STANDS_FOR]
+# Temporaries of a cycle in the real-time thread, bytes.
+ARENA = 64 * 1024
+_NEW = (np.zeros, np.ones, np.empty, np.full, np.eye, np.identity)
+_DTYPES = {float: np.float64, int: np.int64, bool: np.bool_}
+# Functions of NumPy whose argument of that place is a type of elements.
+_TYPED = {np.zeros: 1, np.ones: 1, np.empty: 1, np.full: 2, np.zeros_like: 1, np.ones_like: 1}
 
 
 class Products(ast.NodeTransformer):
@@ -28,7 +36,12 @@ class Products(ast.NodeTransformer):
         """Rewrite a function of that source."""
         self.source = source
         self.constants: dict[str, Any] = {}
-        self._counted: set[str] | None = None
+        # Seen before anything is rewritten.
+        self._counters = self._find_counters()
+        self._lists: set[str] = set()
+        self._lists = self._find_lists()
+        self._uncertain = self._find_uncertain()
+        self.large: list[ast.AST] = []
 
     def mistake(self, node: ast.AST, what: str, way_out: str) -> Exception:
         """Return a mistake at a node."""
@@ -38,7 +51,11 @@ class Products(ast.NodeTransformer):
         """`GAINS.kp` of a dataclass of constants, `Mode.RUN` of an enum."""
         owner = resolve(node.value, self.source)
         if isinstance(member := resolve(node, self.source), enum.IntEnum):
-            return like(node, ast.Constant(int(member)))
+            return like(node, ast.Attribute(self._enum(type(member)), member.name, ast.Load()))
+        if node.attr == "name" and (isinstance(owner, enum.Enum) or self._is_enum(node.value)):
+            raise self.mistake(
+                node, "text is not made in the cycle", 'log it: self.info("{}", self.mode.name)'
+            )
         if dataclasses.is_dataclass(owner) and not isinstance(owner, type):
             name = f"constant_{ast.unparse(node).replace('.', '_')}"
             self.constants[name] = getattr(owner, node.attr)
@@ -46,27 +63,327 @@ class Products(ast.NodeTransformer):
         self.generic_visit(node)
         return node
 
+    def _enum(self, cls: type[enum.IntEnum]) -> ast.expr:
+        """Return an enum class as a constant."""
+        name, number = f"rtcf_enum_{cls.__name__}", 0
+        while self.constants.setdefault(name, cls) is not cls:
+            name, number = f"rtcf_enum_{cls.__name__}_{number}", number + 1
+        return ast.Name(name, ast.Load())
+
+    def _is_enum(self, node: ast.expr) -> bool:
+        """Tell whether an expression is declared as an enum."""
+        return False
+
+    def visit(self, node: ast.AST) -> Any:
+        """Put `y := x` before the statement that it stands in."""
+        if isinstance(node, ast.stmt) and (before := self._before(node)):
+            return self.statements(before)
+        return super().visit(node)
+
+    def visit_NamedExpr(self, node: ast.NamedExpr) -> ast.AST:
+        """`y := x` where it is not always computed, or after what depends on it."""
+        raise self.mistake(node, "a := within what is computed", "write it as a statement before")
+
+    def _before(self, node: ast.stmt) -> list[ast.stmt] | None:
+        """Return a statement with its `y := x` as statements before it; None without."""
+        field = "test" if isinstance(node, ast.If | ast.While) else "value"
+        value = getattr(node, field, None)
+        if not isinstance(value, ast.expr) or not _has_walrus(value):
+            return None
+        before, value = self._without_walrus(value, isinstance(node, ast.If | ast.While))
+        if not before:
+            return None
+        if isinstance(node, ast.While):
+            if node.orelse:
+                raise self.mistake(node, "while with := and else", "write a := as a statement")
+            leave = like(node, ast.If(ast.UnaryOp(ast.Not(), value), [ast.Break()], []))
+            loop = ast.While(ast.Constant(True), [*before, leave, *node.body], [])
+            return [like(node, loop)]
+        new = copy.copy(node)
+        setattr(new, field, value)
+        return [*before, new]
+
+    def _without_walrus(self, node: ast.expr, is_test: bool) -> tuple[list[ast.stmt], ast.expr]:
+        """Return the assignments of `y := x` in an expression, and the expression without them."""
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+            before, operand = self._without_walrus(node.operand, True)
+            return before, like(node, ast.UnaryOp(node.op, operand))
+        if isinstance(node, ast.BoolOp) and is_test and any(map(_has_walrus, node.values[1:])):
+            name = f"rtcf_test_{node.lineno}_{node.col_offset}"
+            before, first = self._without_walrus(node.values[0], True)
+            before.append(_assigned(node, ast.Name(name, ast.Store()), _as_bool(first)))
+            rest = node.values[1:]
+            others = rest[0] if len(rest) == 1 else like(node, ast.BoolOp(node.op, rest))
+            after, value = self._without_walrus(others, True)
+            after.append(_assigned(node, ast.Name(name, ast.Store()), _as_bool(value)))
+            test: ast.expr = ast.Name(name, ast.Load())
+            if isinstance(node.op, ast.Or):
+                test = ast.UnaryOp(ast.Not(), test)
+            before.append(like(node, ast.If(test, after, [])))
+            return before, like(node, ast.Name(name, ast.Load()))
+        found: list[ast.stmt] = []
+
+        class First(ast.NodeTransformer):
+            """Takes out what is computed in any case, in the order of the source."""
+
+            def visit_BoolOp(self, each: ast.BoolOp) -> ast.AST:
+                each.values[0] = self.visit(each.values[0])
+                return each
+
+            def visit_IfExp(self, each: ast.IfExp) -> ast.AST:
+                each.test = self.visit(each.test)
+                return each
+
+            def visit_NamedExpr(self, each: ast.NamedExpr) -> ast.AST:
+                target, value = each.target, self.visit(each.value)
+                found.append(_assigned(each, ast.Name(target.id, ast.Store()), value))
+                return like(each, ast.Name(target.id, ast.Load()))
+
+        new = First().visit(copy.deepcopy(node))
+        set_there = {each.targets[0].id: each for each in found}  # type: ignore[attr-defined]
+        for each in ast.walk(node):
+            early = isinstance(each, ast.Name) and each.id in set_there and _is_before(
+                each, set_there[each.id]
+            ) and isinstance(each.ctx, ast.Load)  # fmt: skip
+            calls = isinstance(each, ast.Call) and any(
+                _is_before(each, other) and not _contains(each, other) for other in found
+            )
+            if early or (calls and resolve(each.func, self.source) is None):  # type: ignore[attr-defined]
+                raise self.mistake(
+                    node, "a := after what it may change", "write it as a statement before"
+                )
+        return found, new
+
+    def visit_Match(self, node: ast.Match) -> list[ast.stmt]:
+        """`match x:` becomes if and elif."""
+        place = f"{node.lineno}_{node.col_offset}"
+        before: list[ast.stmt] = []
+
+        def named(value: ast.expr, name: str) -> ast.expr:
+            """Return a subject, or its parts, by names."""
+            if isinstance(value, ast.Tuple | ast.List):
+                parts = [named(each, f"{name}_{k}") for k, each in enumerate(value.elts)]
+                return ast.Tuple(parts, ast.Load())
+            before.append(_assigned(node, ast.Name(name, ast.Store()), value))
+            return ast.Name(name, ast.Load())
+
+        subject = named(node.subject, f"rtcf_subject_{place}")
+        result: list[ast.stmt] = []
+        for case in reversed(node.cases):
+            tests, sets = self._pattern(case.pattern, subject)
+            bound = [
+                _assigned(case.pattern, ast.Name(name, ast.Store()), copy.deepcopy(value))
+                for name, value in sets
+            ]
+            body = list(case.body)
+            if case.guard is not None and bound:
+                first: list[ast.stmt] = bound
+                if tests:
+                    first = [like(case.pattern, ast.If(_all(tests), bound, []))]
+                test = _all([*tests, case.guard])
+                result = [*first, like(case.pattern, ast.If(test, body, result))]
+                continue
+            tests = [*tests, case.guard] if case.guard is not None else tests
+            if tests:
+                result = [like(case.pattern, ast.If(_all(tests), [*bound, *body], result))]
+            else:
+                result = [*bound, *body]
+        return self.statements([*before, *result])
+
+    def _pattern(
+        self, pattern: ast.pattern, subject: ast.expr
+    ) -> tuple[list[ast.expr], list[tuple[str, ast.expr]]]:
+        """Return the conditions of a pattern, and the names that it sets."""
+        value = copy.deepcopy(subject)
+        if isinstance(pattern, ast.MatchValue):
+            return [like(pattern, ast.Compare(value, [ast.Eq()], [pattern.value]))], []
+        if isinstance(pattern, ast.MatchSingleton):
+            constant = ast.Constant(pattern.value)
+            if pattern.value is None:
+                return [like(pattern, ast.Compare(value, [ast.Is()], [constant]))], []
+            return [like(pattern, call_of("rtcf_is", value, constant))], []
+        if isinstance(pattern, ast.MatchAs):
+            tests, sets = ([], []) if pattern.pattern is None else self._pattern(
+                pattern.pattern, subject
+            )  # fmt: skip
+            return tests, [*sets, *([(pattern.name, value)] if pattern.name else [])]
+        if isinstance(pattern, ast.MatchOr):
+            ways = [self._pattern(each, subject) for each in pattern.patterns]
+            if any(sets for _, sets in ways):
+                raise self.mistake(pattern, "a | of patterns with names", "write two cases")
+            if any(not tests for tests, _ in ways):
+                return [], []
+            either = ast.BoolOp(ast.Or(), [_all(tests) for tests, _ in ways])
+            return [like(pattern, either)], []
+        if isinstance(pattern, ast.MatchSequence) and isinstance(subject, ast.Tuple):
+            if len(pattern.patterns) == len(subject.elts):
+                found = [
+                    self._pattern(each, part)
+                    for each, part in zip(pattern.patterns, subject.elts, strict=True)
+                ]
+                return (
+                    [test for tests, _ in found for test in tests],
+                    [each for _, sets in found for each in sets],
+                )
+            return [ast.Constant(False)], []
+        raise self.mistake(
+            pattern, "a pattern that takes apart", "match numbers, enums, or (a, b) by (1, _)"
+        )
+
+    def visit_Compare(self, node: ast.Compare) -> ast.AST:
+        """`x in (1, 2)`, and comparison with a list."""
+        contained = node.comparators[0]
+        if (
+            len(node.ops) == 1
+            and isinstance(node.ops[0], ast.In | ast.NotIn)
+            and isinstance(contained, ast.Tuple | ast.List | ast.Set)
+            and contained.elts
+            and not any(isinstance(each, ast.Call) for each in ast.walk(node.left))
+        ):
+            tests: list[ast.expr] = [
+                ast.Compare(copy.deepcopy(node.left), [ast.Eq()], [each]) for each in contained.elts
+            ]
+            either = tests[0] if len(tests) == 1 else ast.BoolOp(ast.Or(), tests)
+            if isinstance(node.ops[0], ast.NotIn):
+                either = ast.UnaryOp(ast.Not(), either)
+            return self.visit(like(node, either))  # type: ignore[no-any-return]
+        uncertain = self._may_be_none(node.left) or self._may_be_none(contained)
+        if uncertain and len(node.ops) == 1 and isinstance(node.ops[0], ast.Eq | ast.NotEq):
+            sides = self._arrays(node.left), self._arrays(contained)
+            equal = call_of("rtcf_equal", *(self.visit(each) for each in sides))
+            is_equal = isinstance(node.ops[0], ast.Eq)
+            return like(node, equal if is_equal else ast.UnaryOp(ast.Not(), equal))
+        if not all(isinstance(each, ast.In | ast.NotIn) for each in node.ops):
+            node.left = self._arrays(node.left)
+            node.comparators = [self._arrays(each) for each in node.comparators]
+        self.generic_visit(node)
+        return node
+
+    def _may_be_none(self, node: ast.expr) -> bool:
+        """Tell whether a comparison has to look for None: of a variable that is given, or set to
+        what may be None. Types are not known here.
+        """
+        return isinstance(node, ast.Name) and node.id in self._uncertain
+
+    def _find_uncertain(self) -> set[str]:
+        found = {each.arg for each in self.source.tree.args.args}
+        for each in ast.walk(self.source.tree):
+            if isinstance(each, ast.Assign) and self._is_uncertain(each.value, found):
+                found |= {name.id for target in each.targets for name in ast.walk(target)
+                          if isinstance(name, ast.Name)}  # fmt: skip
+        return found
+
+    def _is_uncertain(self, node: ast.expr, names: set[str]) -> bool:
+        """Tell whether a value may be None."""
+        if isinstance(node, ast.IfExp):
+            return self._is_uncertain(node.body, names) or self._is_uncertain(node.orelse, names)
+        if isinstance(node, ast.Tuple | ast.List):
+            return any(self._is_uncertain(each, names) for each in node.elts)
+        if isinstance(node, ast.Call):
+            return resolve(node.func, self.source) is None or is_own(
+                resolve(node.func, self.source)
+            )
+        if isinstance(node, ast.Name):
+            return node.id in names
+        return isinstance(node, ast.Constant) and node.value is None
+
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         """`a @ b`, `a ** b`."""
+        if (of_lists := self._of_lists(node)) is not None:
+            return of_lists
         self.generic_visit(node)
         if isinstance(node.op, ast.MatMult):
             return like(node, call_of("rtcf_matmul", node.left, node.right))
         # A constant power is a product, which has a value everywhere.
-        if isinstance(node.op, ast.Pow) and not _is_power(node.right):
-            return like(node, call_of("rtcf_pow", node.left, node.right))
+        if isinstance(node.op, ast.Pow):
+            power = "rtcf_whole_pow" if _is_power(node.right) else "rtcf_pow"
+            return like(node, call_of(power, node.left, node.right))
         return node
+
+    def visit_List(self, node: ast.List) -> ast.AST:
+        """`[1.0, x]`, whose size is constant."""
+        if isinstance(node.ctx, ast.Load):
+            if not node.elts:
+                raise self.mistake(
+                    node, "a list that grows allocates", "use an array of State and a count"
+                )
+            numbers = [type(each.value) for each in node.elts if isinstance(each, ast.Constant)]
+            mixed = len(numbers) == len(node.elts) and set(numbers) == {int, float}
+            for each in node.elts if mixed else ():
+                each.value = float(each.value)  # type: ignore[attr-defined]
+            node.elts = [self.visit(each) for each in node.elts]
+            return like(node, ast.Tuple(node.elts, ast.Load()))
+        self.generic_visit(node)
+        return node
+
+    def _is_list(self, node: ast.expr) -> bool:
+        """Tell whether an expression is a list."""
+        if isinstance(node, ast.Name):
+            if node.id in self.source.function.__code__.co_varnames:
+                return node.id in self._lists
+            return isinstance(resolve(node, self.source), list)
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Mult):
+            return self._is_list(node.left) or self._is_list(node.right)
+        return isinstance(node, ast.List)
+
+    def _of_lists(self, node: ast.BinOp) -> ast.AST | None:
+        """`[0.0] * 3`, `[1.0] + values`, `x + [1.0, 2.0]`."""
+        left, right = self._is_list(node.left), self._is_list(node.right)
+        if not left and not right:
+            return None
+        if isinstance(node.op, ast.Mult) and (
+            self._is_whole(node.right) if left else self._is_whole(node.left)
+        ):
+            values, times = (node.left, node.right) if left else (node.right, node.left)
+            count = self._constant(times)
+            if not isinstance(count, int) or not isinstance(values, ast.List) or count < 1:
+                raise self.mistake(
+                    node, "repeats a list by what is not constant", "write its elements"
+                )
+            if any(isinstance(each, ast.Call) for each in ast.walk(values)):
+                raise self.mistake(node, "repeats calls", "give their values names before")
+            elements = [copy.deepcopy(each) for _ in range(count) for each in values.elts]
+            return self.visit(like(node, ast.List(elements, ast.Load())))  # type: ignore[no-any-return]
+        if isinstance(node.op, ast.Add) and left and right:
+            one, other = self.visit(node.left), self.visit(node.right)
+            if isinstance(one, ast.Tuple) and isinstance(other, ast.Tuple):
+                return like(node, ast.Tuple([*one.elts, *other.elts], ast.Load()))
+            return like(node, ast.BinOp(one, ast.Add(), other))
+        if isinstance(node.op, ast.MatMult):
+            sides = [self.visit(self._arrays(each)) for each in (node.left, node.right)]
+            return like(node, call_of("rtcf_matmul", *sides))
+        if type(node.op) not in OF_LISTS:
+            raise self.mistake(node, "is not done with a list", "use np.array([…])")
+        helper = OF_LISTS[type(node.op)].__name__
+        return like(node, call_of(helper, self.visit(node.left), self.visit(node.right)))
+
+    def _constant(self, node: ast.expr) -> Any:
+        """Return the value of an expression of constants, or None."""
+        names = {each.id for each in ast.walk(node) if isinstance(each, ast.Name)}
+        if names & set(self.source.function.__code__.co_varnames):
+            return None
+        if any(isinstance(each, ast.Call) for each in ast.walk(node)):
+            return None
+        try:
+            code = compile(ast.Expression(copy.deepcopy(node)), "", "eval")
+            return eval(code, dict(self.source.function.__globals__))
+        except Exception:
+            return None
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         """`np.linalg.solve(a, b)`, `a.dot(b)`."""
         target = resolve(node.func, self.source)
         if target is math.log and len(node.args) == 2 and not node.keywords:
             parts = [like(node, ast.Call(node.func, [each], [])) for each in node.args]
-            return self.visit(like(node, ast.BinOp(parts[0], ast.Div(), parts[1])))
-        instead = next((own for each, own in INSTEAD.items() if each is target), None)
+            quotient = like(node, ast.BinOp(parts[0], ast.Div(), parts[1]))
+            return self.visit(quotient)  # type: ignore[no-any-return]
+        instead = next((own for each, own in _STANDS_FOR if each is target), None)
         if instead is not None:
-            return self._instead(node, instead)
+            return self._instead(node, instead, node.args)
         if target is round and len(node.args) == 1 and not node.keywords:
-            return self._instead(node, rtcf_round)
+            return self._instead(node, rtcf_round, node.args)
+        if target is round:
+            raise self.mistake(node, "round to digits is not compiled", "use np.round(x, digits)")
         if target is range and not node.keywords:
             node.args = [
                 each if isinstance(each, ast.Constant) else like(each, call_of("rtcf_index", each))
@@ -77,9 +394,22 @@ class Products(ast.NodeTransformer):
             raise self.mistake(
                 node, f"{target.__name__} has an argument too many", "set what it returns: x[:] = …"
             )
-        if isinstance(node.func, ast.Attribute) and target is None and node.func.attr == "dot":
-            arguments = [self.visit(each) for each in node.args]
-            return like(node, call_of("rtcf_matmul", self.visit(node.func.value), *arguments))
+        if isinstance(node.func, ast.Attribute) and target is None:
+            if node.func.attr == "dot":
+                arguments = [self.visit(each) for each in node.args]
+                return like(node, call_of("rtcf_matmul", self.visit(node.func.value), *arguments))
+            if node.func.attr in numpy_functions.METHODS:
+                return self._method(node, node.func)
+        if isinstance(target, type) and issubclass(target, enum.IntEnum) and len(node.args) == 1:
+            return like(node, call_of("rtcf_enum", self.visit(node.args[0]), self._enum(target)))
+        self._typed(node, target)
+        if self._bytes(node, target) > ARENA - 64:
+            self.large.append(node)
+        if isinstance(target, np.ufunc):
+            node.args = [
+                call_of("rtcf_array", each, ast.Constant(None)) if self._is_list(each) else each
+                for each in node.args
+            ]
         if getattr(target, "__module__", "") == "numpy.linalg" or (
             isinstance(node.func, ast.Attribute)
             and resolve(node.func.value, self.source) is np.linalg
@@ -90,33 +420,164 @@ class Products(ast.NodeTransformer):
         self.generic_visit(node)
         return node
 
-    def _instead(self, node: ast.Call, helper: Callable[..., Any]) -> ast.AST:
+    def _bytes(self, node: ast.Call, target: Any) -> int:
+        """Return how large a new array of constant size is."""
+        if not node.args or not any(target is each for each in _NEW):
+            return 0
+        size = self._constant(node.args[0])
+        if target in (np.eye, np.identity) and isinstance(size, int):
+            size = (size, self._constant(node.args[1]) if len(node.args) > 1 else size)
+        sizes = size if isinstance(size, tuple | list) else (size,)
+        if not all(isinstance(each, int) for each in sizes):
+            return 0
+        return 8 * math.prod(sizes)
+
+    def _method(self, node: ast.Call, called: ast.Attribute) -> ast.AST:
+        """`a.sum(axis=0)`."""
+        helper, arguments = numpy_functions.METHODS[called.attr], node.args
+        if called.attr == "reshape" and len(arguments) > 1:
+            arguments = [like(node, ast.Tuple(arguments, ast.Load()))]
+        return self._instead(node, helper, [called.value, *arguments])
+
+    def _instead(
+        self, node: ast.Call, helper: Callable[..., Any], arguments: Sequence[ast.expr]
+    ) -> ast.AST:
         """Return the call of what stands in the place of a function."""
-        takes = len(inspect.signature(helper).parameters)
-        if node.keywords or len(node.args) != takes:
-            name = ast.unparse(node.func)
-            raise self.mistake(node, f"{name} takes {_number(takes)}", "write it so")
-        return like(node, call_of(helper.__name__, *(self.visit(each) for each in node.args)))
+        signature = inspect.signature(helper)
+        try:
+            named = {each.arg: each.value for each in node.keywords if each.arg}
+            bound = signature.bind(*arguments, **named).arguments
+        except TypeError:
+            name, takes = ast.unparse(node.func), ", ".join(signature.parameters)
+            way_out = 'write kind="stable"' if "kind" in signature.parameters else "write it so"
+            raise self.mistake(node, f"{name} takes {takes}", way_out) from None
+        given: list[ast.expr] = []
+        for name, parameter in signature.parameters.items():
+            value = bound.get(name)
+            if value is None:
+                given.append(ast.Constant(parameter.default))
+            elif name == "dtype":
+                given.append(self._dtype(value))
+            else:
+                given.append(self._argument(value, parameter.default))
+        return like(node, call_of(helper.__name__, *given))
+
+    def _argument(self, value: ast.expr, default: Any) -> ast.expr:
+        if isinstance(value, ast.Constant) and isinstance(value.value, str):
+            if value.value not in numpy_functions.WORDS:
+                raise self.mistake(value, "has no meaning here", "leave it away")
+            return like(value, ast.Constant(numpy_functions.WORDS[value.value]))
+        if default is None and isinstance(value, ast.Constant) and value.value is False:
+            return like(value, ast.Constant(None))
+        return self.visit(value)  # type: ignore[no-any-return]
+
+    def _dtype(self, node: ast.expr) -> ast.expr:
+        """Return a type of elements as a constant."""
+        value: Any = node.value if isinstance(node, ast.Constant) else resolve(node, self.source)
+        if value is None:
+            return node
+        value = _DTYPES.get(value, value)
+        try:
+            scalar = np.dtype(value)
+        except TypeError:
+            scalar = np.dtype(object)
+        if scalar.kind not in "fiub":
+            raise self.mistake(node, "is no type of a number", "use np.float64, np.int64 or bool")
+        name = f"rtcf_dtype_{scalar.name}"
+        self.constants[name] = scalar.type
+        return like(node, ast.Name(name, ast.Load()))
+
+    def _typed(self, node: ast.Call, target: Any) -> None:
+        """Give types of elements as numba knows them: dtype=float."""
+        for each in node.keywords:
+            if each.arg == "dtype":
+                each.value = self._dtype(each.value)
+        place = next((each for own, each in _TYPED.items() if own is target), len(node.args))
+        if place < len(node.args):
+            node.args[place] = self._dtype(node.args[place])
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
         """`x[i]`, where i may be an array."""
-        parts = _parts(node)
+        node.slice = self._arrays(node.slice)
+        parts = list(_parts(node))
         self.generic_visit(node)
         if isinstance(node.ctx, ast.Load) and any(self._may_select(each) for each in parts):
             return like(node, call_of("rtcf_get", node.value, _index(node.slice)))
         return node
 
+    def _arrays(self, node: ast.expr) -> ast.expr:
+        """Return an index, or an operand, with arrays in the place of lists."""
+        if isinstance(node, ast.Tuple):
+            return like(node, ast.Tuple([self._arrays(each) for each in node.elts], ast.Load()))
+        if self._is_list(node):
+            return like(node, call_of("rtcf_array", node, ast.Constant(None)))
+        return node
+
     def _may_select(self, node: ast.expr) -> bool:
         """Tell whether an index may be an array."""
-        return not _is_view(node) and not self._is_whole(node)
+        is_new = ast.unparse(node) in ("None", "np.newaxis", "numpy.newaxis")
+        return not is_new and not _is_view(node) and not self._is_whole(node)
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST | list[ast.stmt]:
-        """`x[1:3] = value`, `x[i] = value`."""
+        """`x[1:3] = value`, `x[i] = value`, `a, b = f()`."""
+        if (steps := self._steps(node)) is not None:
+            return self.statements(steps)
         target = node.targets[0]
         if len(node.targets) == 1 and isinstance(target, ast.Subscript):
             return self._set_part(node, target)
         self.generic_visit(node)
         return node
+
+    def statements(self, statements: Sequence[ast.stmt]) -> list[ast.stmt]:
+        """Return statements rewritten, each as one or several."""
+        found: list[ast.stmt] = []
+        for each in statements:
+            new = self.visit(each)
+            found.extend(new if isinstance(new, list) else [new])
+        return found
+
+    def _steps(self, node: ast.Assign) -> list[ast.stmt] | None:
+        """Return single assignments in the place of one to several targets, values first; None for
+        what is a single one, or one of variables alone.
+        """
+        place = f"{node.lineno}_{node.col_offset}"
+        if len(node.targets) > 1:
+            if all(isinstance(each, ast.Name) for each in node.targets):
+                return None
+            value = f"rtcf_same_{place}"
+            steps = [_assigned(node, ast.Name(value, ast.Store()), node.value)]
+            steps += [_assigned(node, each, ast.Name(value, ast.Load())) for each in node.targets]
+            return steps
+        target = node.targets[0]
+        if not isinstance(target, ast.Tuple | ast.List):
+            return None
+        parts, values = target.elts, node.value
+        if isinstance(values, ast.Tuple | ast.List):
+            if len(values.elts) != len(parts):
+                raise self.mistake(
+                    node, f"{len(values.elts)} values for {len(parts)} names", "make them fit"
+                )
+        elif _is_call(values, "rtcf_items"):
+            return None
+        else:
+            count = ast.Tuple([ast.Constant(0)] * len(parts), ast.Load())
+            values = like(node, call_of("rtcf_items", values, count))
+        if all(isinstance(each, ast.Name) for each in parts):
+            if values is node.value and isinstance(target, ast.Tuple):
+                return None
+            names = like(node, ast.Tuple(list(parts), ast.Store()))
+            return [_assigned(node, names, values)]
+        names_of = [f"rtcf_part_{place}_{number}" for number in range(len(parts))]
+        stored: list[ast.expr] = [ast.Name(each, ast.Store()) for each in names_of]
+        if isinstance(values, ast.Tuple | ast.List):
+            steps = [_assigned(node, *each) for each in zip(stored, values.elts, strict=True)]
+        else:
+            steps = [_assigned(node, ast.Tuple(stored, ast.Store()), values)]
+        steps += [
+            _assigned(node, part, ast.Name(name, ast.Load()))
+            for part, name in zip(parts, names_of, strict=True)
+        ]
+        return steps
 
     def _set_part(self, node: ast.Assign, target: ast.Subscript) -> ast.stmt | list[ast.stmt]:
         """`x[…] = value`: of one element as it is, else by what looks at the index's type."""
@@ -137,12 +598,15 @@ class Products(ast.NodeTransformer):
             name = f"rtcf_value_{node.lineno}_{node.col_offset}"
             before = [like(node, ast.Assign([ast.Name(name, ast.Store())], value))]
             value = ast.Name(name, ast.Load())
-        base, index = self.visit(loaded(target.value)), _index(self.visit(target.slice))
+        base = self.visit(loaded(target.value))
+        index = _index(self.visit(self._arrays(target.slice)))
         return [*before, like(node, ast.Expr(call_of("rtcf_set", base, index, value)))]
 
     def _check_constant(self, target: ast.expr) -> None:
-        """Refuse to set elements of what belongs to the module."""
+        """Refuse to set elements of lists and of what belongs to the module."""
         base = target
+        if self._is_list(target.value):  # type: ignore[attr-defined]
+            raise self.mistake(target, "a list that changes allocates", "use np.array([…])")
         while isinstance(base, ast.Subscript | ast.Attribute):
             base = base.value
         if isinstance(base, ast.Name) and base.id not in self.source.function.__code__.co_varnames:
@@ -167,21 +631,28 @@ class Products(ast.NodeTransformer):
         if isinstance(node, ast.Constant):
             return type(node.value) is int
         if isinstance(node, ast.Name) and node.id in self.source.function.__code__.co_varnames:
-            return node.id in self._counters()
+            return node.id in self._counters
         return type(resolve(node, self.source)) is int
 
-    def _counters(self) -> set[str]:
+    def _find_counters(self) -> set[str]:
         """Return the variables that are set by `for … in range(…)` alone."""
-        if self._counted is None:
-            sets = [each.id for each in ast.walk(self.source.tree)
-                    if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Store)]  # fmt: skip
-            loops = [each for each in ast.walk(self.source.tree) if isinstance(each, ast.For)]
-            by_range = [each.target.id for each in loops
-                        if isinstance(each.target, ast.Name) and _is_range(each.iter)]  # fmt: skip
-            taken = {each.arg for each in self.source.tree.args.args}
-            self._counted = {each for each in by_range if by_range.count(each) == sets.count(each)}
-            self._counted -= taken
-        return self._counted
+        tree = self.source.tree
+        sets = [each.id for each in ast.walk(tree)
+                if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Store)]  # fmt: skip
+        sets += [each.name for each in ast.walk(tree)
+                 if isinstance(each, ast.MatchAs) and each.name]  # fmt: skip
+        sets += [each.arg for each in tree.args.args]
+        by_range = [each.target.id for each in ast.walk(tree) if isinstance(each, ast.For)
+                    and isinstance(each.target, ast.Name) and _is_range(each.iter)]  # fmt: skip
+        return {each for each in by_range if by_range.count(each) == sets.count(each)}
+
+    def _find_lists(self) -> set[str]:
+        """Return the variables that are set to lists."""
+        found: set[str] = set()
+        for each in ast.walk(self.source.tree):
+            if isinstance(each, ast.Assign) and self._is_list(each.value):
+                found |= {name.id for name in each.targets if isinstance(name, ast.Name)}
+        return found
 
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST | list[ast.stmt]:
         """`x += value`, `x[1:3] += value`, `x @= m`."""
@@ -211,7 +682,7 @@ class Products(ast.NodeTransformer):
 
         if isinstance(target, ast.Subscript):
             target = Calls().visit(copy.deepcopy(target))
-        return [self.visit(each) for each in before], target
+        return self.statements(before), target
 
 
 def _parts(node: ast.Subscript) -> list[ast.expr]:
@@ -222,26 +693,62 @@ def _is_view(index: ast.AST) -> bool:
     return isinstance(index, ast.Slice) or _is_ellipsis(index)
 
 
+def _has_walrus(node: ast.AST) -> bool:
+    return any(isinstance(each, ast.NamedExpr) for each in ast.walk(node))
+
+
+def _place(node: ast.AST) -> tuple[int, int]:
+    return node.lineno, node.col_offset
+
+
+def _is_before(node: ast.AST, other: ast.AST) -> bool:
+    return _place(node) < _place(other)
+
+
+def _contains(node: ast.AST, other: ast.AST) -> bool:
+    end = (node.end_lineno, node.end_col_offset)
+    return _place(node) <= _place(other) < end
+
+
+def _as_bool(node: ast.expr) -> ast.expr:
+    """Return a condition as a bool."""
+    return like(node, ast.UnaryOp(ast.Not(), ast.UnaryOp(ast.Not(), node)))
+
+
+def _all(tests: Sequence[ast.expr]) -> ast.expr:
+    """Return the condition that all of several hold."""
+    found = [copy.deepcopy(each) for each in tests]
+    return found[0] if len(found) == 1 else ast.BoolOp(ast.And(), found)
+
+
+def _is_call(node: ast.AST, function: str) -> bool:
+    return isinstance(node, ast.Call) and ast.unparse(node.func) == function
+
+
+def _assigned(node: ast.AST, target: ast.expr, value: ast.expr) -> ast.stmt:
+    target.ctx = ast.Store()  # type: ignore[attr-defined]
+    return like(node, ast.Assign([target], value))
+
+
 def _is_range(node: ast.AST) -> bool:
     return isinstance(node, ast.Call) and ast.unparse(node.func) in ("range",)
 
 
 def _index(node: ast.expr) -> ast.expr:
-    """Return an index as an argument: slices become objects."""
-    if isinstance(node, ast.Tuple):
-        return like(node, ast.Tuple([_index(each) for each in node.elts], ast.Load()))
-    if isinstance(node, ast.Slice):
-        bounds = [each or ast.Constant(None) for each in (node.lower, node.upper, node.step)]
-        return like(node, call_of("slice", *bounds[: 3 if node.step else 2]))
-    return node
+    """Return an index as a tuple; slices become objects."""
+    parts = node.elts if isinstance(node, ast.Tuple) else [node]
+    return like(node, ast.Tuple([_sliced(each) for each in parts], ast.Load()))
+
+
+def _sliced(node: ast.expr) -> ast.expr:
+    if not isinstance(node, ast.Slice):
+        return node
+    bounds = [each or ast.Constant(None) for each in (node.lower, node.upper, node.step)]
+    return like(node, call_of("slice", *bounds[: 3 if node.step else 2]))
 
 
 def _is_power(node: ast.AST) -> bool:
     return isinstance(node, ast.Constant) and type(node.value) is int and node.value >= 0
-
-
-def _number(count: int) -> str:
-    return "one argument" if count == 1 else f"{count} arguments"
 
 
 def _is_ellipsis(node: ast.AST) -> bool:

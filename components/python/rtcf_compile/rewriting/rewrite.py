@@ -5,9 +5,11 @@
 """
 
 import ast
+from collections.abc import Sequence
 from typing import Any
 
 from rtcf.component.declaration import (
+    HOOKS,
     LOG_LEVELS,
     PORTS,
     TIME_FIELDS,
@@ -23,9 +25,10 @@ from rtcf.component.declaration import (
 from rtcf.component.value_type import ValueType
 
 from rtcf_compile.rewriting.logs import Logs
+from rtcf_compile.rewriting.methods import Method, Methods
 from rtcf_compile.rewriting.ports import Ports, a_kind
 from rtcf_compile.rewriting.products import call_of, like, loaded
-from rtcf_compile.source.checks import METHODS
+from rtcf_compile.source.checks import METHODS, resolve
 from rtcf_compile.source.modules import Source
 
 
@@ -33,12 +36,17 @@ class Hook(Ports):
     """Puts fields of the record in the place of `self`'s members."""
 
     def __init__(
-        self, source: Source, description: Description, methods: set[str], logs: Logs
+        self,
+        source: Source,
+        description: Description,
+        methods: Methods,
+        owner: type,
+        logs: Logs,
     ) -> None:
-        """Rewrite a method of a class that has these members and methods."""
+        """Rewrite a method that a class defines, for one that has these members and methods."""
         super().__init__(source, description)
-        self._methods, self._logs = methods, logs
-        self.called: dict[str, ast.AST] = {}
+        self._methods, self._owner, self._logs = methods, owner, logs
+        self.called: dict[str, Method] = {}
         self.lines: set[int] = set()
 
     def function(self) -> ast.FunctionDef:
@@ -46,10 +54,7 @@ class Hook(Ports):
         tree = self.source.tree
         if not self._self:
             raise self.mistake(tree, f"{tree.name} has no self", f"def {tree.name}(self):")
-        body: list[ast.stmt] = []
-        for statement in tree.body:
-            new = self.visit(statement)
-            body.extend(new if isinstance(new, list) else [new])
+        body = self.statements(tree.body)
         arguments = ast.arguments(
             posonlyargs=[],
             args=[ast.arg(each.arg) for each in tree.args.args],
@@ -89,7 +94,43 @@ class Hook(Ports):
             return self._queue(node, port) if port.kind is Queue else self._port(node, port)
         if self._is_self(node.value):
             return self._own(node)
+        if _is_super(node.value):
+            method = self._of_super(node)
+            if method.kind == "property":
+                return self._call(node, method, [])
         return super().visit_Attribute(node)
+
+    def visit_Compare(self, node: ast.Compare) -> ast.AST:
+        """`self.last is None` of an optional state."""
+        if len(node.ops) == 1 and _is_none(node.comparators[0]):
+            member = self._optional(node.left)
+            if member is not None and isinstance(node.ops[0], ast.Is | ast.Eq):
+                return like(node, ast.UnaryOp(ast.Not(), self._field(member.known, ast.Load())))
+            if member is not None and isinstance(node.ops[0], ast.IsNot | ast.NotEq):
+                return like(node, self._field(member.known, ast.Load()))
+        if len(node.ops) == 1 and isinstance(node.ops[0], ast.Eq | ast.NotEq):
+            for one, other in ((node.left, node.comparators[0]), (node.comparators[0], node.left)):
+                member = self._optional(one)
+                if member is not None and self._optional(other) is None:
+                    # None is equal to no number.
+                    value = self._as_enum(self._read(member.name, member.type), member.type)
+                    equal = ast.Compare(value, [ast.Eq()], [self.visit(other)])
+                    known = self._field(member.known, ast.Load())
+                    test: ast.expr = ast.BoolOp(ast.And(), [known, equal])
+                    if isinstance(node.ops[0], ast.NotEq):
+                        test = ast.UnaryOp(ast.Not(), test)
+                    return like(node, test)
+        return super().visit_Compare(node)
+
+    def _optional(self, node: ast.AST) -> Member | None:
+        """Return the state that may be None and that an expression is."""
+        if not isinstance(node, ast.Attribute) or not self._is_self(node.value):
+            return None
+        member = self._description.members.get(node.attr)
+        if member is None or not member.type.optional:
+            return None
+        self._touch(node, node.attr)
+        return member
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         """`self.method(…)`, `self.x.write(…)`, `self.info(…)`, `self.fault(…)`."""
@@ -102,14 +143,18 @@ class Hook(Ports):
                 return like(node, call_of(f"rtcf_log_{number}", component, *arguments))
             if called.attr == "fault":
                 raise self.mistake(node, "ends the hook", "write it as a statement of its own")
-            if called.attr in self._methods:
-                self.called[called.attr] = node
-                arguments = [self.visit(each) for each in node.args]
-                own = ast.Name(self._self, ast.Load())
-                new = call_of(f"method_{called.attr}", own, *arguments)
-                new.keywords = [self.visit(each) for each in node.keywords]
-                return like(node, new)
+            method = self._methods.find(called.attr)
+            if method is not None and called.attr not in HOOKS:
+                return self._call(node, method, node.args)
+        if isinstance(called, ast.Attribute) and _is_super(called.value):
+            return self._call(node, self._of_super(called), node.args)
         if isinstance(called, ast.Attribute):
+            owner = resolve(called.value, self.source)
+            method = self._methods.find_of(owner, called.attr) if isinstance(owner, type) else None
+            if method is not None and method.kind == "static method":
+                return self._call(node, method, node.args)
+            if method is not None and node.args and self._is_self(node.args[0]):
+                return self._call(node, method, node.args[1:])
             port = self._member(called.value)
             if port is not None and port.kind is Output and called.attr == "write":
                 raise self.mistake(
@@ -131,9 +176,40 @@ class Hook(Ports):
                 )
         return super().visit_Call(node)
 
+    def _call(self, node: ast.AST, method: Method, arguments: Sequence[ast.expr]) -> ast.AST:
+        """Return the call of a method's compiled function."""
+        if method.function is None:
+            raise self.mistake(
+                node,
+                f"{method.name} is a {method.kind}",
+                "write a method, a static method or a property by `def`",
+            )
+        self.called[method.symbol] = method
+        given = [self.visit(each) for each in arguments]
+        if method.kind != "static method":
+            given.insert(0, ast.Name(self._self, ast.Load()))
+        new = call_of(method.symbol, *given)
+        if isinstance(node, ast.Call):
+            new.keywords = [self.visit(each) for each in node.keywords]
+        return like(node, new)
+
+    def _of_super(self, node: ast.Attribute) -> Method:
+        method = self._methods.find(node.attr, behind=self._owner)
+        if method is None:
+            raise self.mistake(node, f"no base has {node.attr}", "call a method of a base")
+        return method
+
     def visit_Expr(self, node: ast.Expr) -> ast.AST | list[ast.stmt]:
         """Statements that write and that end."""
         call = node.value
+        if (
+            isinstance(call, ast.Call)
+            and isinstance(call.func, ast.Attribute)
+            and _is_super(call.func.value)
+            and call.func.attr in ("prepare", "start", "safe")
+            and self._methods.find(call.func.attr, behind=self._owner) is None
+        ):
+            return like(node, ast.Pass())  # that of Component, which does nothing
         if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute):
             port = self._member(call.func.value)
             if port is not None and port.kind is Output and call.func.attr == "publish":
@@ -151,7 +227,8 @@ class Hook(Ports):
                 if len(call.args) != 1 or call.keywords:
                     raise self.mistake(call, "writes one value", f"self.{port.name}.write(value)")
                 flag = ast.Assign([self._field(f"{port.name}__written")], ast.Constant(True))
-                return [self._set(node, port, self.visit(call.args[0])), like(node, flag)]
+                value = self._set_field(node, port.name, port.type, self.visit(call.args[0]))
+                return [value, like(node, flag)]
             if port is not None and port.kind is Queue and call.func.attr == "pop":
                 if call.args or call.keywords:
                     raise self.mistake(call, "takes nothing", f"self.{port.name}.pop()")
@@ -162,6 +239,8 @@ class Hook(Ports):
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST | list[ast.stmt]:
         """`self.name = value`."""
+        if (steps := self._steps(node)) is not None:
+            return self.statements(steps)
         for target in node.targets:
             self._check_elements(target)
         own = [each for target in node.targets for each in self._owned(target)]
@@ -169,8 +248,6 @@ class Hook(Ports):
             return self._set_field(node, *part, self.visit(node.value))
         if not own:
             return super().visit_Assign(node)
-        if len(node.targets) > 1 or isinstance(node.targets[0], ast.Tuple | ast.List):
-            raise self.mistake(node, "sets several at once", "write one assignment a line")
         target = node.targets[0]
         if isinstance(target, ast.Attribute) and self._is_self(target.value):
             return self._set(node, self._settable(target), self.visit(node.value))
@@ -185,7 +262,7 @@ class Hook(Ports):
         plain = ast.Assign([node.target], node.value)
         return self.visit(like(node, plain))  # type: ignore[no-any-return]
 
-    def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST:
+    def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST | list[ast.stmt]:
         """`self.name += value`."""
         target = node.target
         self._check_elements(target)
@@ -221,6 +298,11 @@ class Hook(Ports):
                 raise self.mistake(
                     node, "is a constant of the class", f"declare {node.attr}: State[…]"
                 )
+            method = self._methods.find(node.attr)
+            if method is not None and method.kind == "property":
+                raise self.mistake(
+                    node, "a property is set", f"call a method: self.set_{node.attr}(…)"
+                )
             raise self.mistake(
                 node, "is not declared", f"write `{node.attr}: State[float]` in the class"
             )
@@ -235,13 +317,36 @@ class Hook(Ports):
             raise self.mistake(node, f"is {a_kind(member)}", f"it is {way}")
         return member
 
-    def _set(self, node: ast.stmt, member: Member, value: ast.expr) -> ast.stmt:
-        return self._set_field(node, member.name, member.type, value)
+    def _value(self, node: ast.Attribute, name: str, member: Member) -> ast.AST:
+        """Return a state's, a parameter's or a derived value."""
+        if isinstance(node.ctx, ast.Store):
+            return like(node, self._field(name))
+        field = self._read(name, member.type)
+        field = self._as_enum(field, member.type, checked=member.kind is Parameter)
+        if member.type.optional:
+            field = call_of("rtcf_maybe", field, self._field(member.known, ast.Load()))
+        return like(node, field)
+
+    def _set(self, node: ast.stmt, member: Member, value: ast.expr) -> ast.AST | list[ast.stmt]:
+        if not member.type.optional:
+            return self._set_field(node, member.name, member.type, value)
+        new = f"rtcf_new_{node.lineno}_{node.col_offset}"
+        flag = call_of("rtcf_is_known", ast.Name(new, ast.Load()))
+        old = self._as_enum(self._read(member.name, member.type), member.type)
+        some = call_of("rtcf_or_old", ast.Name(new, ast.Load()), old)
+        return [
+            like(node, ast.Assign([ast.Name(new, ast.Store())], value)),
+            like(node, ast.Assign([self._field(member.known)], flag)),
+            self._set_field(node, member.name, member.type, some),
+        ]
 
     def _set_field(self, node: ast.stmt, name: str, kind: ValueType, value: ast.expr) -> ast.stmt:
         if kind.shape:
-            call = call_of("rtcf_assign", self._field(name, ast.Load()), value)
+            call = call_of("rtcf_store", self._read(name, kind), value)
             return like(node, ast.Expr(call))
+        if kind.enumeration:
+            member = call_of("rtcf_enum", value, self._enum(kind.enumeration))
+            return like(node, ast.Assign([self._field(name)], call_of("rtcf_int", member)))
         convert = "rtcf_float" if kind.is_float else "rtcf_bool" if kind.is_bool else "rtcf_int"
         return like(node, ast.Assign([self._field(name)], call_of(convert, value)))
 
@@ -266,11 +371,14 @@ class Hook(Ports):
             if member.kind in PORTS:
                 value = "front" if member.kind is Queue else "value"
                 raise self.mistake(node, f"is {a_kind(member)}", f"write self.{name}.{value}")
-            return like(node, self._field(name, node.ctx))
+            return self._value(node, name, member)
         if name in self._description.constants:
             self.constants[f"constant_{name}"] = self._description.constants[name]
             return like(node, ast.Name(f"constant_{name}", ast.Load()))
-        if name in self._methods:
+        method = self._methods.find(name)
+        if method is not None and method.kind == "property":
+            return self._call(node, method, [])
+        if method is not None:
             raise self.mistake(node, "a method is no value", f"call it: self.{name}(…)")
         raise self.mistake(node, "is not declared", f"write `{name}: State[float]` in the class")
 
@@ -279,3 +387,13 @@ class Hook(Ports):
         if isinstance(target, ast.Tuple | ast.List):
             return [found for each in target.elts for found in self._owned(each)]
         return [target] if isinstance(target, ast.Attribute) and self._is_self(target.value) else []
+
+
+def _is_super(node: ast.AST) -> bool:
+    return (
+        isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "super"
+    )
+
+
+def _is_none(node: ast.AST) -> bool:
+    return isinstance(node, ast.Constant) and node.value is None

@@ -82,11 +82,11 @@ class _Flow:
         return known
 
     def _if(self, node: ast.If, known: frozenset[str]) -> _Known:
-        known = self._used(node.test, known)
+        if_true, if_false = self._test(node.test, known)
         then, other = (_constant(node.test) is not False, _constant(node.test) is not True)
         return _both(
-            self._block(node.body, known) if then else None,
-            self._block(node.orelse, known) if other else None,
+            self._block(node.body, if_true) if then else None,
+            self._block(node.orelse, if_false) if other else None,
         )
 
     def _for(self, node: ast.For, known: frozenset[str]) -> _Known:
@@ -97,8 +97,8 @@ class _Flow:
         return _both(self._block(node.orelse, ended) if ended is not None else None, left)
 
     def _while(self, node: ast.While, known: frozenset[str]) -> _Known:
-        known = self._used(node.test, known)
-        end, left = self._loop(node, known)
+        if_true, known = self._test(node.test, known)
+        end, left = self._loop(node, if_true)
         if _constant(node.test) is True:
             return left
         ended = _both(known, end)
@@ -134,10 +134,27 @@ class _Flow:
             return known
         if isinstance(node, ast.Starred):
             return self._target(node.value, known)
-        for each in ast.iter_child_nodes(node):
-            if isinstance(each, ast.expr):
-                known = self._used(each, known)
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.expr):
+                known = self._used(child, known)
         return known
+
+    def _test(self, node: ast.expr, known: frozenset[str]) -> tuple[frozenset[str], frozenset[str]]:
+        """Look at a condition; return what is known where it holds, and where it does not."""
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+            if_true, if_false = self._test(node.operand, known)
+            return if_false, if_true
+        if isinstance(node, ast.BoolOp):
+            all_of = isinstance(node.op, ast.And)
+            ended: frozenset[str] | None = None  # where one of them has decided
+            for each in node.values:
+                if_true, if_false = self._test(each, known)
+                known, out = (if_true, if_false) if all_of else (if_false, if_true)
+                ended = out if ended is None else ended & out
+            assert ended is not None
+            return (known, ended) if all_of else (ended, known)
+        after = self._used(node, known)
+        return after, after
 
     def _used(self, node: ast.expr, known: frozenset[str]) -> frozenset[str]:
         """Look at the variables of an expression; return what is known after it."""
@@ -153,15 +170,11 @@ class _Flow:
         if isinstance(node, ast.NamedExpr):
             return self._used(node.value, known) | {node.target.id}
         if isinstance(node, ast.BoolOp):
-            first = self._used(node.values[0], known)
-            after = first
-            for each in node.values[1:]:
-                after = self._used(each, after)
-            return first  # the others may not have been reached
+            if_true, if_false = self._test(node, known)
+            return if_true & if_false
         if isinstance(node, ast.IfExp):
-            known = self._used(node.test, known)
-            then, other = self._used(node.body, known), self._used(node.orelse, known)
-            return then & other
+            if_true, if_false = self._test(node.test, known)
+            return self._used(node.body, if_true) & self._used(node.orelse, if_false)
         for each in ast.iter_child_nodes(node):
             if isinstance(each, ast.keyword):
                 each = each.value

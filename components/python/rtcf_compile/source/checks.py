@@ -13,7 +13,6 @@ from rtcf_compile.source.mistake import Mistake, at
 from rtcf_compile.source.modules import Source
 
 _REFUSED: dict[type[ast.AST], tuple[str, str]] = {
-    ast.List: ("a list allocates", "use np.array((…)), or an array of State"),
     ast.ListComp: ("a list allocates", "use a loop that fills an array"),
     ast.Dict: ("a dict allocates", "use an enum.IntEnum and `if`, or an array by number"),
     ast.DictComp: ("a dict allocates", "use an array by number"),
@@ -35,7 +34,6 @@ _REFUSED: dict[type[ast.AST], tuple[str, str]] = {
     ast.FunctionDef: ("a function in a function", "define it in the module"),
     ast.ClassDef: ("a class in a hook", "define it in the module"),
     ast.Delete: ("nothing is deleted in the cycle", "set it to 0, or leave it"),
-    ast.Match: ("match is not compiled", "use if and elif"),
     ast.Starred: ("a * takes apart what has no fixed size", "write the elements"),
 }
 _BUILTINS: dict[str, tuple[str, str]] = {
@@ -57,13 +55,9 @@ _BUILTINS: dict[str, tuple[str, str]] = {
     "isinstance": ("types are fixed when compiled", "declare ports of that type"),
     "eval": ("no Python runs in the cycle", "write the expression"),
     "exec": ("no Python runs in the cycle", "write the statements"),
-    "super": ("is not compiled", "call the base's method by another name"),
 }
 _GROWS = {
     "append": "use an array of State and a count",
-    "concatenate": "fill an array of the whole size by slices",
-    "hstack": "fill an array of the whole size by slices",
-    "vstack": "fill an array of the whole size by slices",
     "insert": "use an array of State and a count",
     "delete": "use an array of State and a count",
     "resize": "declare the largest size",
@@ -72,6 +66,7 @@ METHODS = {
     "append": ("grows", "use an array of State and a count"),
     "extend": ("grows", "use an array of State and a count"),
     "insert": ("grows", "use an array of State and a count"),
+    "remove": ("shrinks", "use an array of State and a count"),
     "pop": ("shrinks", "use an array of State and a count"),
     "format": ("text is not made in the cycle", 'log with arguments: self.info("x {}", x)'),
     "tolist": ("a list allocates", "use the array"),
@@ -92,14 +87,17 @@ _MODULES = {
     "logging": ("formats and writes", 'log by self.info("x {}", x)'),
     "rospy": ("is not real-time", "use an Input or Output: ROS is connected to ports"),
 }
+# What changes nothing of a function, or only how it is called.
+_DECORATORS = ("property", "staticmethod", "override", "final")
 _LARGEST, _SMALLEST = 2**63 - 1, -(2**63)
 
 
 def check(source: Source) -> None:
     """Raise the first Mistake of a function."""
     tree, file = source.tree, source.file
-    if tree.decorator_list:
-        raise at(file, tree.decorator_list[0], "a decorator is not compiled", "call the function")
+    for each in tree.decorator_list:
+        if ast.unparse(each).rpartition(".")[2] not in _DECORATORS:
+            raise at(file, each, "a decorator is not compiled", "call the function")
     arguments = tree.args
     if arguments.vararg or arguments.kwarg:
         raise Mistake(file, tree.lineno, f"{tree.name} takes any number of arguments", "name them")
@@ -128,6 +126,8 @@ def resolve(node: ast.AST, source: Source) -> Any:
     """Return what a dotted name stands for in the module, or None."""
     if isinstance(node, ast.Name):
         scope = source.function.__globals__
+        if node.id in source.function.__code__.co_varnames:
+            return None
         if node.id in scope:
             return scope[node.id]
         builtins = scope.get("__builtins__", {})

@@ -68,7 +68,10 @@ def components(module: ModuleType) -> list[type[Component]]:
         and issubclass(each, Component)
         and each.__module__ == module.__name__
     ]
-    return sorted(dict.fromkeys(found), key=lambda each: inspect.getsourcelines(each)[1])
+    bases = {base for each in found for base in each.__mro__[1:]}
+    # A base without update is there for its subclasses.
+    whole = [each for each in found if each not in bases or each.update is not Component.update]
+    return sorted(dict.fromkeys(whole), key=lambda each: inspect.getsourcelines(each)[1])
 
 
 def read(function: FunctionType) -> Source:

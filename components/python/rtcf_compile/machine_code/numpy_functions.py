@@ -1,0 +1,1568 @@
+"""The functions of NumPy as numba compiles them: numbers, vectors and matrices. Imported only where
+something is compiled.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.errors import TypingError
+from numba.extending import intrinsic
+from numba.np import arrayobj
+from numba.np.numpy_support import as_dtype
+
+from rtcf_compile.machine_code.overloads import compiled_as, plain, words
+from rtcf_compile.rewriting import helpers
+from rtcf_compile.rewriting import numpy_functions as own
+
+_Numbers = types.Number | types.Boolean
+_LONG = 128  # elements that NumPy sums with eight accumulators, before it halves
+
+
+def _dtype(kind: Any) -> Any:
+    """Return NumPy's type of a number, or of an array's elements."""
+    return as_dtype(types.unliteral(kind.dtype if isinstance(kind, types.Array) else kind))
+
+
+def _needs(kind: Any, what: str, dimensions: tuple[int, ...] = (1, 2)) -> None:
+    """Refuse what is no array of so many dimensions."""
+    if isinstance(kind, types.Array) and kind.ndim in dimensions:
+        return
+    names: dict[tuple[int, ...], str] = {(1,): "a vector", (2,): "a matrix"}
+    raise TypingError(f"RTCF:{what} of {words(kind)}:it takes {names.get(dimensions, 'an array')}")
+
+
+# Making arrays.
+
+
+def _leaves(kind: Any) -> tuple[tuple[int, ...], list[Any]]:
+    """Return the shape of numbers in rows, and their types."""
+    if not isinstance(kind, types.BaseTuple):
+        if not isinstance(kind, _Numbers):
+            raise TypingError(f"RTCF:an array of {words(kind)}:it is made of numbers")
+        return (), [kind]
+    found = [_leaves(each) for each in kind.types]
+    shapes = {shape for shape, _ in found}
+    if len(shapes) != 1:
+        raise TypingError("RTCF:rows of different length make no array:make them fit")
+    return (len(found), *shapes.pop()), [each for _, types_of in found for each in types_of]
+
+
+@intrinsic  # type: ignore[misc]
+def _store(typing: Any, array: Any, values: Any) -> Any:
+    """Set the elements of a new array from numbers in rows."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        data = arrayobj.make_array(array)(context, builder, arguments[0]).data
+        place = 0
+
+        def walk(value: Any, kind: Any) -> None:
+            nonlocal place
+            if isinstance(kind, types.BaseTuple):
+                for number, each in enumerate(kind.types):
+                    walk(builder.extract_value(value, number), each)
+                return
+            cast = context.cast(builder, value, kind, array.dtype)
+            pointer = builder.gep(data, [ir.Constant(ir.IntType(64), place)])
+            arrayobj.store_item(context, builder, array, cast, pointer)
+            place += 1
+
+        walk(arguments[1], values)
+        return context.get_dummy_value()
+
+    return types.none(array, values), generate
+
+
+def _wanted(given: Any, dtype: Any) -> Any:
+    """Return the type of elements that a dtype asks for, or that follows of given ones."""
+    follows = np.result_type(*(_dtype(each) for each in given))
+    if isinstance(dtype, types.NoneType):
+        return follows
+    wanted = _dtype(dtype.dtype if isinstance(dtype, types.DTypeSpec) else dtype.instance_type)
+    if follows.kind == "f" and wanted.kind != "f":
+        raise TypingError(f"RTCF:elements are {follows}, not {wanted}:round them first")
+    return wanted
+
+
+@compiled_as(own.rtcf_array)
+def _array(object: Any, dtype: Any) -> Any:
+    if isinstance(object, types.Array):
+        wanted = _wanted([object], dtype)
+        if object.ndim == 1:
+
+            def vector(object: Any, dtype: Any) -> Any:
+                result = np.empty(object.shape[0], wanted)
+                for i in range(object.shape[0]):
+                    result[i] = object[i]
+                return result
+
+            return vector
+
+        def matrix(object: Any, dtype: Any) -> Any:
+            result = np.empty(object.shape, wanted)
+            for i in range(object.shape[0]):
+                for j in range(object.shape[1]):
+                    result[i, j] = object[i, j]
+            return result
+
+        return matrix
+    if isinstance(object, types.BaseTuple) and any(
+        isinstance(each, types.Array) for each in object.types
+    ):
+        if not isinstance(dtype, types.NoneType):
+            return lambda object, dtype: own.rtcf_array(own.rtcf_stack(object, 0), dtype)
+        return lambda object, dtype: own.rtcf_stack(object, 0)
+    shape, leaves = _leaves(object)
+    if not 1 <= len(shape) <= 2 or 0 in shape:
+        raise TypingError(f"RTCF:an array of {words(object)}:give it rows of numbers")
+    wanted = _wanted(leaves, dtype)
+
+    def made(object: Any, dtype: Any) -> Any:
+        result = np.empty(shape, wanted)
+        _store(result, object)
+        return result
+
+    return made
+
+
+@compiled_as(own.rtcf_asarray)
+def _asarray(a: Any, dtype: Any) -> Any:
+    if isinstance(a, types.Array) and (
+        isinstance(dtype, types.NoneType) or _wanted([a], dtype) == _dtype(a)
+    ):
+        return lambda a, dtype: a
+    return lambda a, dtype: own.rtcf_array(a, dtype)
+
+
+@compiled_as(own.rtcf_diag, arrays=("v",))
+def _diag(v: Any, k: Any) -> Any:
+    _needs(v, "np.diag")
+    if v.ndim == 1:
+
+        def matrix(v: Any, k: Any) -> Any:
+            n = v.shape[0] + abs(k)
+            result = np.zeros((n, n), v.dtype)
+            for i in range(v.shape[0]):
+                result[i + max(0, -k), i + max(0, k)] = v[i]
+            return result
+
+        return matrix
+
+    def diagonal(v: Any, k: Any) -> Any:
+        down, along = max(0, -k), max(0, k)
+        result = np.empty(max(0, min(v.shape[0] - down, v.shape[1] - along)), v.dtype)
+        for i in range(result.shape[0]):
+            result[i] = v[i + down, i + along]
+        return result
+
+    return diagonal
+
+
+@compiled_as(own.rtcf_diagonal, arrays=("a",))
+def _diagonal(a: Any) -> Any:
+    _needs(a, "np.diagonal", (2,))
+    return lambda a: own.rtcf_diag(a, 0)
+
+
+@compiled_as(own.rtcf_linspace)
+def _linspace(start: Any, stop: Any, num: Any, endpoint: Any) -> Any:
+    def linspace(start: Any, stop: Any, num: Any, endpoint: Any) -> Any:
+        if num < 0:
+            raise ValueError("np.linspace of a negative number of elements")
+        result = np.empty(num)
+        parts = num - 1 if endpoint else num
+        delta = stop * 1.0 - start * 1.0
+        step = delta / parts if parts > 0 else 0.0
+        for i in range(num):
+            if parts > 0 and step == 0.0:
+                result[i] = i / parts * delta + start
+            elif parts > 0:
+                result[i] = i * step + start
+            else:
+                result[i] = i * delta + start
+        if endpoint and num > 1:
+            result[num - 1] = stop
+        return result
+
+    return linspace
+
+
+# Shapes.
+
+
+@intrinsic  # type: ignore[misc]
+def _viewed(typing: Any, array: Any, shape: Any, strides: Any) -> Any:
+    """Return a view of an array's memory with another shape and other strides."""
+    layout = "C" if array.layout == "C" else "A"
+    result = types.Array(array.dtype, shape.count, layout, not array.mutable, aligned=array.aligned)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        old = arrayobj.make_array(array)(context, builder, arguments[0])
+        new = arrayobj.make_array(result)(context, builder)
+        arrayobj.populate_array(
+            new,
+            data=old.data,
+            shape=cgutils.unpack_tuple(builder, arguments[1]),
+            strides=cgutils.unpack_tuple(builder, arguments[2]),
+            itemsize=old.itemsize,
+            meminfo=old.meminfo,
+            parent=old.parent,
+        )
+        return arrayobj.impl_ret_borrowed(context, builder, result, new._getvalue())
+
+    return result(array, shape, strides), generate
+
+
+@plain
+def _sizes(wanted: Any, count: Any) -> Any:
+    """Return a shape with the size in the place of -1."""
+    known = 1
+    open_ones = 0
+    for each in wanted:
+        if each < 0:
+            open_ones += 1
+        else:
+            known *= each
+    if open_ones > 1 or (open_ones == 1 and (known == 0 or count % known != 0)):
+        raise ValueError("cannot reshape an array into that shape")
+    if open_ones == 0 and known != count:
+        raise ValueError("cannot reshape an array into that shape")
+    return count // known if open_ones else 0
+
+
+@compiled_as(own.rtcf_reshape, arrays=("a",))
+def _reshape(a: Any, newshape: Any) -> Any:
+    _needs(a, "np.reshape")
+    if isinstance(newshape, types.Integer):
+        return lambda a, newshape: own.rtcf_reshape(a, (newshape,))
+    if not isinstance(newshape, types.UniTuple) or newshape.count > 2:
+        raise TypingError(f"RTCF:np.reshape to {words(newshape)}:an array has one or two sizes")
+    if a.layout == "C":
+
+        def view(a: Any, newshape: Any) -> Any:
+            shape = _filled(newshape, _sizes(newshape, a.size))
+            return _viewed(a, shape, _strides(shape, a.itemsize))
+
+        return view
+
+    def reshape(a: Any, newshape: Any) -> Any:
+        shape = _filled(newshape, _sizes(newshape, a.size))
+        step = _only_step(a)
+        if step != 0:
+            return _viewed(a, shape, _strides(shape, step))
+        if _is_same(a, shape):
+            return _viewed(a, shape, _same_strides(a, shape))
+        copy = own.rtcf_array(a, None)
+        return _viewed(_any_layout(copy), shape, _strides(shape, a.itemsize))
+
+    return reshape
+
+
+def _filled(shape: Any, rest: Any) -> Any:
+    raise NotImplementedError
+
+
+@compiled_as(_filled)
+def _filled_in(shape: Any, rest: Any) -> Any:
+    if shape.count == 1:
+        return lambda shape, rest: (rest if shape[0] < 0 else shape[0],)
+    return lambda shape, rest: (
+        rest if shape[0] < 0 else shape[0],
+        rest if shape[1] < 0 else shape[1],
+    )
+
+
+def _strides(shape: Any, step: Any) -> Any:
+    raise NotImplementedError
+
+
+@compiled_as(_strides)
+def _strides_of(shape: Any, step: Any) -> Any:
+    if shape.count == 1:
+        return lambda shape, step: (step,)
+    return lambda shape, step: (step * shape[1], step)
+
+
+def _only_step(a: Any) -> Any:
+    raise NotImplementedError
+
+
+@compiled_as(_only_step)
+def _step_between(a: Any) -> Any:
+    """The distance of one element to the next, bytes, if it is the same for all; else 0."""
+    if a.ndim == 1:
+        return lambda a: a.strides[0] if a.shape[0] > 1 else a.itemsize
+
+    def step(a: Any) -> Any:
+        if a.size <= 1:
+            return a.itemsize
+        if a.shape[1] == 1:
+            return a.strides[0]
+        if a.shape[0] == 1 or a.strides[0] == a.shape[1] * a.strides[1]:
+            return a.strides[1]
+        return 0
+
+    return step
+
+
+def _is_same(a: Any, shape: Any) -> Any:
+    raise NotImplementedError
+
+
+@compiled_as(_is_same)
+def _has_that_shape(a: Any, shape: Any) -> Any:
+    if a.ndim == 2 and shape.count == 2:
+        return lambda a, shape: a.shape == shape
+    return lambda a, shape: False
+
+
+def _same_strides(a: Any, shape: Any) -> Any:
+    raise NotImplementedError
+
+
+@compiled_as(_same_strides)
+def _strides_as_before(a: Any, shape: Any) -> Any:
+    if a.ndim == 2 and shape.count == 2:
+        return lambda a, shape: a.strides
+    return lambda a, shape: shape
+
+
+@intrinsic  # type: ignore[misc]
+def _any_layout(typing: Any, array: Any) -> Any:
+    """Return an array as one of any layout."""
+    result = types.Array(array.dtype, array.ndim, "A", not array.mutable, aligned=array.aligned)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return arrayobj.impl_ret_borrowed(context, builder, result, arguments[0])
+
+    return result(array), generate
+
+
+@compiled_as(own.rtcf_ravel, arrays=("a",))
+def _ravel(a: Any) -> Any:
+    _needs(a, "np.ravel")
+    if a.ndim == 1:
+        return lambda a: a
+    return lambda a: own.rtcf_reshape(a, (a.size,))
+
+
+@compiled_as(own.rtcf_flatten, arrays=("a",))
+def _flatten(a: Any) -> Any:
+    _needs(a, "flatten")
+    if a.ndim == 1:
+        return lambda a: own.rtcf_array(a, None)
+
+    def flatten(a: Any) -> Any:
+        result = np.empty(a.size, a.dtype)
+        for i in range(a.shape[0]):
+            for j in range(a.shape[1]):
+                result[i * a.shape[1] + j] = a[i, j]
+        return result
+
+    return flatten
+
+
+def _joined(name: str, parts: Any, along: Any) -> Any:
+    """Return a function that copies arrays one after the other: vectors (along None), matrices
+    below each other (0) or side by side (1). Rows and columns are what vectors become there.
+    """
+    result = np.result_type(*(_dtype(each) for each in parts))
+    count = len(parts)
+    # numba takes elements of a tuple of several types by constant indices alone.
+    lines = [f"def joined({name}):"]
+    for k in range(count):
+        lines.append(f"    p{k} = {name}[{k}]")
+    vector = along is None
+    if vector:
+        lines.append(
+            f"    result = np.empty({' + '.join(f'p{k}.shape[0]' for k in range(count))}, wanted)"
+        )
+    else:
+        for k, each in enumerate(parts):
+            if each.ndim == 1:
+                size = f"p{k}.shape[0]"
+                lines.append(f"    n{k}, m{k} = " + (f"1, {size}" if along == 0 else f"{size}, 1"))
+            else:
+                lines.append(f"    n{k}, m{k} = p{k}.shape")
+        other = "m" if along == 0 else "n"
+        if count > 1:
+            differ = " or ".join(f"{other}{k} != {other}0" for k in range(1, count))
+            lines += [f"    if {differ}:", '        raise ValueError("arrays to join do not fit")']
+        grow = "n" if along == 0 else "m"
+        total = " + ".join(f"{grow}{k}" for k in range(count))
+        shape = f"({total}, m0)" if along == 0 else f"(n0, {total})"
+        lines.append(f"    result = np.empty({shape}, wanted)")
+    lines.append("    at = 0")
+    for k, each in enumerate(parts):
+        if vector:
+            lines += [
+                f"    for i in range(p{k}.shape[0]):",
+                f"        result[at + i] = p{k}[i]",
+                f"    at += p{k}.shape[0]",
+            ]
+            continue
+        place = "at + i, j" if along == 0 else "i, at + j"
+        element = ("j" if along == 0 else "i") if each.ndim == 1 else "i, j"
+        lines += [
+            f"    for i in range(n{k}):",
+            f"        for j in range(m{k}):",
+            f"            result[{place}] = p{k}[{element}]",
+            f"    at += {'n' if along == 0 else 'm'}{k}",
+        ]
+    lines.append("    return result")
+    return _function("\n".join(lines), "joined", {"np": np, "wanted": result})
+
+
+def _function(text: str, name: str, scope: dict[str, Any]) -> Any:
+    exec(text, scope)
+    return scope[name]
+
+
+def _arrays_of(name: str, given: Any, what: str, helper: str, numbers: bool, rest: str = "") -> Any:
+    """Return None if a tuple has arrays alone, else a function that makes them of rows and numbers
+    and calls the helper again.
+    """
+    if isinstance(given, types.Array) and given.ndim == 2:
+        raise TypingError(f"RTCF:{what} of one matrix:give it several arrays")
+    if not isinstance(given, types.BaseTuple) or not given.count:
+        raise TypingError(f"RTCF:{what} of {words(given)}:give it arrays in ( )")
+    if all(isinstance(each, types.Array) and each.ndim in (1, 2) for each in given.types):
+        return None
+    parts = []
+    for k, each in enumerate(given.types):
+        if isinstance(each, types.Array) and each.ndim in (1, 2):
+            parts.append(f"{name}[{k}]")
+        elif isinstance(each, types.BaseTuple):
+            parts.append(f"array({name}[{k}], None)")
+        elif isinstance(each, _Numbers) and numbers:
+            parts.append(f"array(({name}[{k}],), None)")
+        else:
+            raise TypingError(f"RTCF:{what} of {words(each)}:give it arrays")
+    more = "".join(f", {each}" for each in rest.split(", ") if each)
+    text = f"def again({name}{more}):\n    return helper(({', '.join(parts)},){more})\n"
+    scope = {"array": own.rtcf_array, "helper": getattr(own, helper)}
+    return _function(text, "again", scope)
+
+
+@compiled_as(own.rtcf_concatenate)
+def _concatenate(arrays: Any, axis: Any) -> Any:
+    again = _arrays_of("arrays", arrays, "np.concatenate", "rtcf_concatenate", False, "axis")
+    if again is not None:
+        return again
+    dimensions = {each.ndim for each in arrays.types}
+    if len(dimensions) != 1:
+        raise TypingError("RTCF:np.concatenate of vectors and matrices:make them of one dimension")
+    if dimensions == {1}:
+        vectors = plain(_joined("arrays", arrays.types, None))
+
+        def one_axis(arrays: Any, axis: Any) -> Any:
+            if axis != 0 and axis != -1:
+                raise ValueError("np.concatenate: axis is out of bounds")
+            return vectors(arrays)
+
+        return one_axis
+    below = plain(_joined("arrays", arrays.types, 0))
+    beside = plain(_joined("arrays", arrays.types, 1))
+
+    def concatenate(arrays: Any, axis: Any) -> Any:
+        if axis == 0 or axis == -2:
+            return below(arrays)
+        if axis != 1 and axis != -1:
+            raise ValueError("np.concatenate: axis is out of bounds")
+        return beside(arrays)
+
+    return concatenate
+
+
+@compiled_as(own.rtcf_hstack)
+def _hstack(tup: Any) -> Any:
+    again = _arrays_of("tup", tup, "np.hstack", "rtcf_hstack", True)
+    if again is not None:
+        return again
+    dimensions = {each.ndim for each in tup.types}
+    if len(dimensions) != 1:
+        raise TypingError("RTCF:np.hstack of vectors and matrices:use np.column_stack")
+    return _joined("tup", tup.types, None if dimensions == {1} else 1)
+
+
+@compiled_as(own.rtcf_vstack)
+def _vstack(tup: Any) -> Any:
+    again = _arrays_of("tup", tup, "np.vstack", "rtcf_vstack", True)
+    return _joined("tup", tup.types, 0) if again is None else again
+
+
+@compiled_as(own.rtcf_column_stack)
+def _column_stack(tup: Any) -> Any:
+    again = _arrays_of("tup", tup, "np.column_stack", "rtcf_column_stack", True)
+    return _joined("tup", tup.types, 1) if again is None else again
+
+
+@compiled_as(own.rtcf_stack)
+def _stack(arrays: Any, axis: Any) -> Any:
+    again = _arrays_of("arrays", arrays, "np.stack", "rtcf_stack", False, "axis")
+    if again is not None:
+        return again
+    if any(each.ndim != 1 for each in arrays.types):
+        raise TypingError("RTCF:np.stack of matrices:an array has one or two dimensions here")
+    below = plain(_joined("arrays", arrays.types, 0))
+    beside = plain(_joined("arrays", arrays.types, 1))
+
+    def stack(arrays: Any, axis: Any) -> Any:
+        if axis == 0 or axis == -2:
+            return below(arrays)
+        if axis != 1 and axis != -1:
+            raise ValueError("np.stack: axis is out of bounds")
+        return beside(arrays)
+
+    return stack
+
+
+@compiled_as(own.rtcf_roll, arrays=("a",))
+def _roll(a: Any, shift: Any) -> Any:
+    _needs(a, "np.roll", (1,))
+
+    def roll(a: Any, shift: Any) -> Any:
+        n = a.shape[0]
+        result = np.empty(n, a.dtype)
+        for i in range(n):
+            result[(i + shift) % n] = a[i]
+        return result
+
+    return roll
+
+
+@compiled_as(own.rtcf_flip, arrays=("m",))
+def _flip(m: Any) -> Any:
+    _needs(m, "np.flip")
+    if m.ndim == 1:
+        return lambda m: m[::-1]
+    return lambda m: m[::-1, ::-1]
+
+
+@compiled_as(own.rtcf_diff, arrays=("a",))
+def _diff(a: Any) -> Any:
+    _needs(a, "np.diff")
+    if a.ndim == 1:
+        return lambda a: a[1:] - a[:-1]
+    return lambda a: a[:, 1:] - a[:, :-1]
+
+
+# One number of many.
+
+
+@plain
+def _pairwise(a: Any, begin: Any, n: Any, result: Any) -> Any:
+    """Return the sum of up to 128 elements of a vector, as NumPy adds them."""
+    if n < 8:
+        for i in range(n):
+            result += a[begin + i]
+        return result
+    r0, r1, r2, r3 = a[begin], a[begin + 1], a[begin + 2], a[begin + 3]
+    r4, r5, r6, r7 = a[begin + 4], a[begin + 5], a[begin + 6], a[begin + 7]
+    i = 8
+    while i < n - n % 8:
+        r0 += a[begin + i]
+        r1 += a[begin + i + 1]
+        r2 += a[begin + i + 2]
+        r3 += a[begin + i + 3]
+        r4 += a[begin + i + 4]
+        r5 += a[begin + i + 5]
+        r6 += a[begin + i + 6]
+        r7 += a[begin + i + 7]
+        i += 8
+    total = ((r0 + r1) + (r2 + r3)) + ((r4 + r5) + (r6 + r7))
+    while i < n:
+        total += a[begin + i]
+        i += 1
+    return total
+
+
+@plain
+def _halves(a: Any, begin: Any, n: Any, zero: Any) -> Any:
+    """Return the sum of a longer vector: of halves of halves, from the last to the first."""
+    if n <= _LONG:
+        return _pairwise(a, begin, n, zero)
+    # Parts that wait, and sums of parts, by their depth; NumPy calls itself instead.
+    sums = np.empty(64, a.dtype)
+    begins, sizes, depths = np.empty(64, np.int64), np.empty(64, np.int64), np.empty(64, np.int64)
+    done_at = np.empty(64, np.int64)
+    waiting, done = 1, 0
+    begins[0], sizes[0], depths[0] = begin, n, 0
+    while waiting > 0:
+        waiting -= 1
+        here, size, depth = begins[waiting], sizes[waiting], depths[waiting]
+        if size > _LONG:
+            half = size // 2
+            half -= half % 8
+            begins[waiting], sizes[waiting], depths[waiting] = here + half, size - half, depth + 1
+            waiting += 1
+            begins[waiting], sizes[waiting], depths[waiting] = here, half, depth + 1
+            waiting += 1
+            continue
+        total = _pairwise(a, here, size, zero)
+        # The second half is there when the first one waits at the same depth.
+        while done > 0 and done_at[done - 1] == depth:
+            done -= 1
+            total = sums[done] + total
+            depth -= 1
+        sums[done], done_at[done] = total, depth
+        done += 1
+    return sums[0]
+
+
+def _summed(a: Any) -> Any:
+    """Return the sum of a vector."""
+    raise NotImplementedError
+
+
+@compiled_as(_summed)
+def _sum_of(a: Any) -> Any:
+    if isinstance(a.dtype, types.Float):
+        zero = _dtype(a).type(0)
+        return lambda a: zero + _halves(a, 0, a.shape[0], zero)
+    whole = np.uint64(0) if _dtype(a).kind == "u" else np.int64(0)
+
+    def in_order(a: Any) -> Any:
+        result = whole
+        for i in range(a.shape[0]):
+            result += whole.dtype.type(a[i])
+        return result
+
+    def wide(a: Any) -> Any:
+        result = np.int64(0)
+        for i in range(a.shape[0]):
+            result += np.int64(a[i])
+        return result
+
+    return wide if whole.dtype.kind == "i" else in_order
+
+
+@plain
+def _summed_in_order(a: Any) -> Any:
+    """Return the sum of a column among others, which NumPy adds row by row."""
+    if a.shape[0] == 0:
+        return _summed(a)
+    result = a[0] + _summed(a[:0])
+    for i in range(1, a.shape[0]):
+        result += a[i]
+    return result
+
+
+@plain
+def _largest(a: Any) -> Any:
+    return a[_place_of_largest(a)]
+
+
+@plain
+def _smallest(a: Any) -> Any:
+    return a[_place_of_smallest(a)]
+
+
+@plain
+def _place_of_largest(a: Any) -> Any:
+    if a.shape[0] == 0:
+        raise ValueError("the largest of no elements")
+    place = 0
+    for i in range(a.shape[0]):
+        if a[i] != a[i]:
+            return i
+        if a[i] > a[place]:
+            place = i
+    return place
+
+
+@plain
+def _place_of_smallest(a: Any) -> Any:
+    if a.shape[0] == 0:
+        raise ValueError("the smallest of no elements")
+    place = 0
+    for i in range(a.shape[0]):
+        if a[i] != a[i]:
+            return i
+        if a[i] < a[place]:
+            place = i
+    return place
+
+
+@plain
+def _is_any(a: Any) -> Any:
+    found = False
+    for i in range(a.shape[0]):
+        if a[i]:
+            found = True
+    return found
+
+
+@plain
+def _is_all(a: Any) -> Any:
+    found = True
+    for i in range(a.shape[0]):
+        if not a[i]:
+            found = False
+    return found
+
+
+def _multiplied(a: Any) -> Any:
+    raise NotImplementedError
+
+
+@compiled_as(_multiplied)
+def _product_of(a: Any) -> Any:
+    kind = _dtype(a)
+    wide = kind if kind.kind == "f" else np.dtype(np.uint64 if kind.kind == "u" else np.int64)
+    one = wide.type(1)
+    convert = wide.type
+
+    def product(a: Any) -> Any:
+        result = one
+        for i in range(a.shape[0]):
+            result = convert(result * convert(a[i]))
+        return result
+
+    return product
+
+
+def _reduction(
+    helper: Any, name: str, whole: Any, column: Any = None, result: Any = None, keeps: bool = False
+) -> None:
+    """Register a function of all elements of an array, or of each row or column. `whole` is that of
+    a vector, `column` of a column of a matrix; `result` the type of its elements by those of the
+    array.
+    """
+    column = column or whole
+
+    def choose(a: Any, axis: Any, keepdims: Any) -> Any:
+        if isinstance(a, _Numbers):
+            return lambda a, axis, keepdims: whole(own.rtcf_array((a,), None))
+        _needs(a, name)
+        if isinstance(axis, types.BaseTuple):
+            raise TypingError(f"RTCF:{name} along several axes:leave axis away")
+        dtype = _dtype(a) if result is None else result(_dtype(a))
+        stays = not isinstance(keepdims, types.NoneType)
+        if a.ndim == 1:
+            if stays:
+                return lambda a, axis, keepdims: own.rtcf_array((whole(a),), None)
+            if isinstance(axis, types.NoneType):
+                return lambda a, axis, keepdims: whole(a)
+
+            def one_axis(a: Any, axis: Any, keepdims: Any) -> Any:
+                if axis != 0 and axis != -1:
+                    raise ValueError("axis is out of bounds")
+                return whole(a)
+
+            return one_axis
+        if isinstance(axis, types.NoneType):
+            if stays:
+                return lambda a, axis, keepdims: own.rtcf_array(
+                    ((whole(own.rtcf_ravel(a)),),), None
+                )
+            return lambda a, axis, keepdims: whole(own.rtcf_ravel(a))
+
+        def along(a: Any, axis: Any, keepdims: Any) -> Any:
+            if axis == 1 or axis == -1:
+                found = np.empty(a.shape[0], dtype)
+                for i in range(a.shape[0]):
+                    found[i] = whole(a[i])
+            elif axis == 0 or axis == -2:
+                found = np.empty(a.shape[1], dtype)
+                for j in range(a.shape[1]):
+                    if a.shape[1] == 1:
+                        found[j] = whole(a[:, j])
+                    else:
+                        found[j] = column(a[:, j])
+            else:
+                raise ValueError("axis is out of bounds")
+            return found
+
+        if not stays:
+            return along
+        plainly = plain(along)
+
+        def kept(a: Any, axis: Any, keepdims: Any) -> Any:
+            found = plainly(a, axis, None)
+            if axis == 1 or axis == -1:
+                return own.rtcf_reshape(found, (found.shape[0], 1))
+            return own.rtcf_reshape(found, (1, found.shape[0]))
+
+        return kept
+
+    if keeps:
+        compiled_as(helper, arrays=("a",))(choose)
+        return
+
+    def without(a: Any, axis: Any) -> Any:
+        chosen = choose(a, axis, types.none)
+        return _with_two(plain(chosen))
+
+    compiled_as(helper, arrays=("a",))(without)
+
+
+def _with_two(function: Any) -> Any:
+    return lambda a, axis: function(a, axis, None)
+
+
+def _wide(dtype: Any) -> Any:
+    """Return the type of a sum."""
+    if dtype.kind == "f":
+        return dtype
+    return np.dtype(np.uint64) if dtype.kind == "u" else np.dtype(np.int64)
+
+
+_reduction(own.rtcf_sum, "np.sum", _summed, _summed_in_order, _wide, keeps=True)
+_reduction(own.rtcf_max, "np.max", _largest, keeps=True)
+_reduction(own.rtcf_min, "np.min", _smallest, keeps=True)
+_reduction(own.rtcf_prod, "np.prod", _multiplied, result=_wide)
+_reduction(own.rtcf_argmax, "np.argmax", _place_of_largest, result=lambda _: np.dtype(np.int64))
+_reduction(own.rtcf_argmin, "np.argmin", _place_of_smallest, result=lambda _: np.dtype(np.int64))
+_reduction(own.rtcf_any, "np.any", _is_any, result=lambda _: np.dtype(np.bool_))
+_reduction(own.rtcf_all, "np.all", _is_all, result=lambda _: np.dtype(np.bool_))
+
+
+@compiled_as(own.rtcf_ptp, arrays=("a",))
+def _ptp(a: Any, axis: Any) -> Any:
+    return lambda a, axis: own.rtcf_max(a, axis, None) - own.rtcf_min(a, axis, None)
+
+
+def _as_floats(a: Any) -> Any:
+    raise NotImplementedError
+
+
+@compiled_as(_as_floats)
+def _floats_of(a: Any) -> Any:
+    if isinstance(a.dtype, types.Float):
+        return lambda a: a
+    return lambda a: own.rtcf_array(a, np.float64)
+
+
+def _elements(a: Any, axis: Any) -> Any:
+    raise NotImplementedError
+
+
+@compiled_as(_elements)
+def _elements_along(a: Any, axis: Any) -> Any:
+    """How many elements make one number."""
+    if isinstance(axis, types.NoneType):
+        return lambda a, axis: a.size
+    return lambda a, axis: a.shape[axis]
+
+
+@compiled_as(own.rtcf_mean, arrays=("a",))
+def _mean(a: Any, axis: Any, keepdims: Any) -> Any:
+    if isinstance(a, _Numbers):
+        return lambda a, axis, keepdims: float(a)
+    _needs(a, "np.mean")
+    return lambda a, axis, keepdims: (
+        own.rtcf_sum(_as_floats(a), axis, keepdims) / _elements(a, axis)
+    )
+
+
+@compiled_as(own.rtcf_var, arrays=("a",))
+def _var(a: Any, axis: Any, ddof: Any) -> Any:
+    _needs(a, "np.var")
+
+    def var(a: Any, axis: Any, ddof: Any) -> Any:
+        values = _as_floats(a)
+        mean = _kept_mean(values, axis)
+        far = values - mean
+        return own.rtcf_sum(far * far, axis, None) / max(_elements(a, axis) - ddof, 0)
+
+    return var
+
+
+def _kept_mean(a: Any, axis: Any) -> Any:
+    raise NotImplementedError
+
+
+@compiled_as(_kept_mean)
+def _mean_to_subtract(a: Any, axis: Any) -> Any:
+    if isinstance(axis, types.NoneType) or a.ndim == 1:
+        return lambda a, axis: own.rtcf_mean(a, axis, None)
+    return lambda a, axis: own.rtcf_mean(a, axis, True)
+
+
+@compiled_as(own.rtcf_std, arrays=("a",))
+def _std(a: Any, axis: Any, ddof: Any) -> Any:
+    return lambda a, axis, ddof: np.sqrt(own.rtcf_var(a, axis, ddof))
+
+
+@compiled_as(own.rtcf_count_nonzero, arrays=("a",))
+def _count_nonzero(a: Any) -> Any:
+    _needs(a, "np.count_nonzero")
+
+    def count(a: Any) -> Any:
+        found = 0
+        row = own.rtcf_ravel(a)
+        for i in range(row.shape[0]):
+            if row[i]:
+                found += 1
+        return found
+
+    return count
+
+
+@compiled_as(own.rtcf_median, arrays=("a",))
+def _median(a: Any) -> Any:
+    _needs(a, "np.median")
+
+    def median(a: Any) -> Any:
+        ordered = own.rtcf_sort(_as_floats(own.rtcf_ravel(a)), -1)
+        n = ordered.shape[0]
+        if n == 0 or ordered[n - 1] != ordered[n - 1]:
+            return np.nan
+        if n % 2:
+            return ordered[n // 2] + 0.0
+        return (ordered[n // 2 - 1] + ordered[n // 2]) / 2.0
+
+    return median
+
+
+@compiled_as(own.rtcf_trace, arrays=("a",))
+def _trace(a: Any) -> Any:
+    _needs(a, "np.trace", (2,))
+    return lambda a: own.rtcf_sum(own.rtcf_diag(a, 0), None, None)
+
+
+def _running(helper: Any, name: str, step: Any) -> None:
+    """Register sums or products up to each element."""
+
+    @compiled_as(helper, arrays=("a",))
+    def _run(a: Any, axis: Any) -> Any:
+        _needs(a, name)
+        dtype = _wide(_dtype(a))
+
+        def vector(a: Any) -> Any:
+            result = np.empty(a.shape[0], dtype)
+            for i in range(a.shape[0]):
+                result[i] = a[i] if i == 0 else step(result[i - 1], a[i])
+            return result
+
+        of_a_vector = plain(vector)
+        if isinstance(axis, types.NoneType) or a.ndim == 1:
+            return lambda a, axis: of_a_vector(own.rtcf_ravel(a))
+
+        def along(a: Any, axis: Any) -> Any:
+            result = np.empty(a.shape, dtype)
+            if axis == 1 or axis == -1:
+                for i in range(a.shape[0]):
+                    helpers.rtcf_assign(result[i], of_a_vector(a[i]))
+            elif axis == 0 or axis == -2:
+                for j in range(a.shape[1]):
+                    helpers.rtcf_assign(result[:, j], of_a_vector(a[:, j]))
+            else:
+                raise ValueError("axis is out of bounds")
+            return result
+
+        return along
+
+
+@plain
+def _added(x: Any, y: Any) -> Any:
+    return x + y
+
+
+@plain
+def _times(x: Any, y: Any) -> Any:
+    return x * y
+
+
+_running(own.rtcf_cumsum, "np.cumsum", _added)
+_running(own.rtcf_cumprod, "np.cumprod", _times)
+
+
+# Order.
+
+
+@plain
+def _before(x: Any, y: Any) -> Any:
+    """Tell whether one number stands before another: NaN is the last."""
+    return x < y or (y != y and x == x)
+
+
+@plain
+def _merge(values: Any, spare: Any, begin: Any, middle: Any, end: Any) -> None:
+    i, j = begin, middle
+    for k in range(begin, end):
+        if i < middle and (j >= end or not _before(values[j], values[i])):
+            spare[k] = values[i]
+            i += 1
+        else:
+            spare[k] = values[j]
+            j += 1
+    for k in range(begin, end):
+        values[k] = spare[k]
+
+
+@plain
+def _sort_vector(values: Any) -> None:
+    """Sort a vector: runs of eight by insertion, then merged."""
+    n = values.shape[0]
+    for begin in range(0, n, 8):
+        for i in range(begin + 1, min(begin + 8, n)):
+            value = values[i]
+            j = i
+            while j > begin and _before(value, values[j - 1]):
+                values[j] = values[j - 1]
+                j -= 1
+            values[j] = value
+    if n <= 8:
+        return
+    spare = np.empty(n, values.dtype)
+    run = 8
+    while run < n:
+        for begin in range(0, n - run, 2 * run):
+            _merge(values, spare, begin, begin + run, min(begin + 2 * run, n))
+        run *= 2
+
+
+@compiled_as(own.rtcf_sort_in_place)
+def _sort_in_place(a: Any, axis: Any) -> Any:
+    _needs(a, "sort")
+    if not a.mutable:
+        raise TypingError("RTCF:a constant of the module is sorted:copy it")
+    if a.ndim == 1:
+        return lambda a, axis: _sort_vector(a)
+
+    def sort(a: Any, axis: Any) -> None:
+        if axis == 0 or axis == -2:
+            for j in range(a.shape[1]):
+                _sort_vector(a[:, j])
+        else:
+            for i in range(a.shape[0]):
+                _sort_vector(a[i])
+
+    return sort
+
+
+@compiled_as(own.rtcf_sort, arrays=("a",))
+def _sort(a: Any, axis: Any) -> Any:
+    _needs(a, "np.sort")
+    if isinstance(axis, types.NoneType):
+        return lambda a, axis: own.rtcf_sort(own.rtcf_flatten(a), -1)
+
+    def sort(a: Any, axis: Any) -> Any:
+        result = own.rtcf_array(a, None)
+        own.rtcf_sort_in_place(result, axis)
+        return result
+
+    return sort
+
+
+@compiled_as(own.rtcf_argsort, arrays=("a",))
+def _argsort(a: Any, kind: Any) -> Any:
+    _needs(a, "np.argsort", (1,))
+
+    def argsort(a: Any, kind: Any) -> Any:
+        n = a.shape[0]
+        places, spare = np.empty(n, np.int64), np.empty(n, np.int64)
+        for i in range(n):
+            places[i] = i
+        run = 1
+        while run < n:
+            for begin in range(0, n - run, 2 * run):
+                middle, end = begin + run, min(begin + 2 * run, n)
+                i, j = begin, middle
+                for k in range(begin, end):
+                    if i < middle and (j >= end or not _before(a[places[j]], a[places[i]])):
+                        spare[k] = places[i]
+                        i += 1
+                    else:
+                        spare[k] = places[j]
+                        j += 1
+                for k in range(begin, end):
+                    places[k] = spare[k]
+            run *= 2
+        return places
+
+    return argsort
+
+
+@plain
+def _first_not_below(a: Any, v: Any) -> Any:
+    low, high = 0, a.shape[0]
+    while low < high:
+        middle = low + (high - low) // 2
+        if _before(a[middle], v):
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@plain
+def _first_above(a: Any, v: Any) -> Any:
+    low, high = 0, a.shape[0]
+    while low < high:
+        middle = low + (high - low) // 2
+        if _before(v, a[middle]):
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+@compiled_as(own.rtcf_searchsorted, arrays=("a", "v"))
+def _searchsorted(a: Any, v: Any, side: Any) -> Any:
+    _needs(a, "np.searchsorted", (1,))
+    search = _first_not_below if isinstance(side, types.NoneType) else _first_above
+    if isinstance(v, _Numbers):
+        return lambda a, v, side: search(a, v)
+    _needs(v, "np.searchsorted", (1,))
+
+    def each(a: Any, v: Any, side: Any) -> Any:
+        result = np.empty(v.shape[0], np.int64)
+        for i in range(v.shape[0]):
+            result[i] = search(a, v[i])
+        return result
+
+    return each
+
+
+# Elements of arrays, and numbers.
+
+
+@compiled_as(own.rtcf_clip, arrays=("a", "a_min", "a_max"))
+def _clip(a: Any, a_min: Any, a_max: Any) -> Any:
+    low, high = (not isinstance(each, types.NoneType) for each in (a_min, a_max))
+    if low and high:
+        return lambda a, a_min, a_max: np.minimum(np.maximum(a, a_min), a_max)
+    if low:
+        return lambda a, a_min, a_max: np.maximum(a, a_min)
+    if high:
+        return lambda a, a_min, a_max: np.minimum(a, a_max)
+    raise TypingError("RTCF:np.clip without bounds:give it one")
+
+
+def _elementwise(function: Callable[..., Any]) -> Any:
+    """Return a function of numbers as one of arrays, too."""
+    function.__annotations__ = {}
+    return numba.vectorize(function)
+
+
+def _about(a: Any, b: Any, rtol: Any, atol: Any, equal_nan: Any) -> Any:
+    if math.isfinite(a) and math.isfinite(b):
+        return abs(a - b) <= atol + rtol * abs(b)
+    return a == b or (equal_nan and a != a and b != b)
+
+
+_isclose_each = _elementwise(_about)
+
+
+@compiled_as(own.rtcf_isclose, arrays=("a", "b"))
+def _isclose(a: Any, b: Any, rtol: Any, atol: Any, equal_nan: Any) -> Any:
+    return lambda a, b, rtol, atol, equal_nan: _isclose_each(
+        a * 1.0, b * 1.0, rtol, atol, equal_nan
+    )
+
+
+@compiled_as(own.rtcf_allclose, arrays=("a", "b"))
+def _allclose(a: Any, b: Any, rtol: Any, atol: Any, equal_nan: Any) -> Any:
+    return lambda a, b, rtol, atol, equal_nan: own.rtcf_all(
+        own.rtcf_isclose(a, b, rtol, atol, equal_nan), None
+    )
+
+
+@compiled_as(own.rtcf_array_equal, arrays=("a1", "a2"))
+def _array_equal(a1: Any, a2: Any) -> Any:
+    _needs(a1, "np.array_equal")
+    _needs(a2, "np.array_equal")
+    if a1.ndim != a2.ndim:
+        return lambda a1, a2: False
+
+    def equal(a1: Any, a2: Any) -> Any:
+        if a1.shape != a2.shape:
+            return False
+        return own.rtcf_all(a1 == a2, None)
+
+    return equal
+
+
+@compiled_as(own.rtcf_math_isclose)
+def _math_isclose(a: Any, b: Any, rel_tol: Any, abs_tol: Any) -> Any:
+    def isclose(a: Any, b: Any, rel_tol: Any, abs_tol: Any) -> Any:
+        x, y = float(a), float(b)
+        if rel_tol < 0.0 or abs_tol < 0.0:
+            raise ValueError("tolerances must be non-negative")
+        if x == y:
+            return True
+        if math.isinf(x) or math.isinf(y):
+            return False
+        far = abs(y - x)
+        return far <= abs(rel_tol * y) or far <= abs(rel_tol * x) or far <= abs_tol
+
+    return isclose
+
+
+@compiled_as(own.rtcf_np_round, arrays=("a",))
+def _np_round(a: Any, decimals: Any) -> Any:
+    if not isinstance(a.dtype if isinstance(a, types.Array) else a, types.Float):
+        raise TypingError(f"RTCF:np.round of {words(a)}:it takes floats")
+
+    def rounded(a: Any, decimals: Any) -> Any:
+        if decimals == 0:
+            return np.rint(a) * 1.0
+        scale = 10.0 ** abs(decimals)
+        if decimals > 0:
+            return np.rint(a * scale) / scale
+        return np.rint(a / scale) * scale
+
+    return rounded
+
+
+def _replaced(x: Any, nan: Any, posinf: Any, neginf: Any) -> Any:
+    if x != x:
+        return nan
+    if math.isinf(x):
+        return posinf if x > 0.0 else neginf
+    return x
+
+
+_nan_to_num_each = _elementwise(_replaced)
+
+
+@compiled_as(own.rtcf_nan_to_num, arrays=("x",))
+def _nan_to_num(x: Any, nan: Any, posinf: Any, neginf: Any) -> Any:
+    top = np.finfo(np.float64).max
+    up, down = (isinstance(each, types.NoneType) for each in (posinf, neginf))
+    if up and down:
+        return lambda x, nan, posinf, neginf: _nan_to_num_each(x, nan, top, -top)
+    if up:
+        return lambda x, nan, posinf, neginf: _nan_to_num_each(x, nan, top, neginf)
+    if down:
+        return lambda x, nan, posinf, neginf: _nan_to_num_each(x, nan, posinf, -top)
+    return lambda x, nan, posinf, neginf: _nan_to_num_each(x, nan, posinf, neginf)
+
+
+@plain
+def _interval(x: Any, xp: Any, guess: Any) -> Any:
+    """Return the interval that a number lies in, as NumPy finds it: -1 before the first point,
+    their number behind the last one.
+    """
+    n = xp.shape[0]
+    if x > xp[n - 1]:
+        return n
+    if x < xp[0]:
+        return -1
+    if n <= 4:
+        i = 1
+        while i < n and x >= xp[i]:
+            i += 1
+        return i - 1
+    guess = max(1, min(guess, n - 3))
+    low, high = 0, n
+    if x < xp[guess]:
+        if x < xp[guess - 1]:
+            high = guess - 1
+            if guess > 8 and x >= xp[guess - 8]:
+                low = guess - 8
+        else:
+            return guess - 1
+    else:
+        if x < xp[guess + 1]:
+            return guess
+        if x < xp[guess + 2]:
+            return guess + 1
+        low = guess + 2
+        if guess < n - 8 - 1 and x < xp[guess + 8]:
+            high = guess + 8
+    while low < high:
+        middle = low + (high - low) // 2
+        if x >= xp[middle]:
+            low = middle + 1
+        else:
+            high = middle
+    return low - 1
+
+
+@plain
+def _between(x: Any, xp: Any, fp: Any, left: Any, right: Any, j: Any) -> Any:
+    """Return the value of a function at x, which lies in interval j."""
+    n = xp.shape[0]
+    if x != x:
+        return x
+    if n == 1:
+        return left if x < xp[0] else right if x > xp[0] else fp[0] * 1.0
+    if j == -1:
+        return left
+    if j == n:
+        return right
+    if j == n - 1 or xp[j] == x:
+        return fp[j] * 1.0
+    slope = (fp[j + 1] - fp[j]) / (xp[j + 1] - xp[j])
+    result = slope * (x - xp[j]) + fp[j]
+    if result != result:
+        result = slope * (x - xp[j + 1]) + fp[j + 1]
+        if result != result and fp[j] == fp[j + 1]:
+            result = fp[j] * 1.0
+    return result
+
+
+@plain
+def _interpolated(x: Any, xp: Any, fp: Any, left: Any, right: Any) -> Any:
+    if xp.shape[0] == 0 or xp.shape[0] != fp.shape[0]:
+        raise ValueError("np.interp: xp and fp need the same number of points, one at least")
+    x = x * 1.0
+    return _between(x, xp, fp, left, right, _interval(x, xp, 0))
+
+
+def _or_end(value: Any, fp: Any, place: Any) -> Any:
+    raise NotImplementedError
+
+
+@compiled_as(_or_end)
+def _value_or_end(value: Any, fp: Any, place: Any) -> Any:
+    if isinstance(value, types.NoneType):
+        return lambda value, fp, place: fp[place] * 1.0 if fp.shape[0] else 0.0
+    return lambda value, fp, place: value * 1.0
+
+
+@compiled_as(own.rtcf_interp, arrays=("x", "xp", "fp"))
+def _interp(x: Any, xp: Any, fp: Any, left: Any, right: Any) -> Any:
+    _needs(xp, "np.interp", (1,))
+    _needs(fp, "np.interp", (1,))
+    if isinstance(x, _Numbers):
+        return lambda x, xp, fp, left, right: _interpolated(
+            x, xp, fp, _or_end(left, fp, 0), _or_end(right, fp, -1)
+        )
+    _needs(x, "np.interp", (1,))
+
+    def each(x: Any, xp: Any, fp: Any, left: Any, right: Any) -> Any:
+        if xp.shape[0] == 0 or xp.shape[0] != fp.shape[0]:
+            raise ValueError("np.interp: xp and fp need the same number of points, one at least")
+        low, high = _or_end(left, fp, 0), _or_end(right, fp, -1)
+        result = np.empty(x.shape[0])
+        j = 0
+        for i in range(x.shape[0]):
+            value = x[i] * 1.0
+            if value == value:
+                j = _interval(value, xp, j)
+            result[i] = _between(value, xp, fp, low, high, j)
+        return result
+
+    return each
+
+
+@compiled_as(own.rtcf_polyval, arrays=("p", "x"))
+def _polyval(p: Any, x: Any) -> Any:
+    _needs(p, "np.polyval", (1,))
+
+    def number(p: Any, x: Any) -> Any:
+        result = 0.0
+        for i in range(p.shape[0]):
+            result = result * x + p[i]
+        return result
+
+    if isinstance(x, _Numbers):
+        return number
+    _needs(x, "np.polyval", (1,))
+    of_one = plain(number)
+
+    def each(p: Any, x: Any) -> Any:
+        result = np.empty(x.shape[0])
+        for i in range(x.shape[0]):
+            result[i] = of_one(p, x[i])
+        return result
+
+    return each
+
+
+@compiled_as(own.rtcf_trapz, arrays=("y", "x"))
+def _trapz(y: Any, x: Any, dx: Any) -> Any:
+    _needs(y, "np.trapz", (1,))
+    if isinstance(x, types.NoneType):
+        return lambda y, x, dx: own.rtcf_sum(dx * (y[1:] + y[:-1]) / 2.0, None, None)
+    _needs(x, "np.trapz", (1,))
+    return lambda y, x, dx: own.rtcf_sum((x[1:] - x[:-1]) * (y[1:] + y[:-1]) / 2.0, None, None)
+
+
+# Matrices and vectors.
+
+
+@compiled_as(own.rtcf_outer, arrays=("a", "b"))
+def _outer(a: Any, b: Any) -> Any:
+    _needs(a, "np.outer")
+    _needs(b, "np.outer")
+    if a.ndim == 2 or b.ndim == 2:
+        return lambda a, b: own.rtcf_outer(own.rtcf_ravel(a), own.rtcf_ravel(b))
+    dtype = np.result_type(_dtype(a), _dtype(b))
+
+    def outer(a: Any, b: Any) -> Any:
+        result = np.empty((a.shape[0], b.shape[0]), dtype)
+        for i in range(a.shape[0]):
+            for j in range(b.shape[0]):
+                result[i, j] = a[i] * b[j]
+        return result
+
+    return outer
+
+
+@compiled_as(own.rtcf_cross, arrays=("a", "b"))
+def _cross(a: Any, b: Any) -> Any:
+    _needs(a, "np.cross", (1,))
+    _needs(b, "np.cross", (1,))
+
+    def cross(a: Any, b: Any) -> Any:
+        if a.shape[0] != 3 or b.shape[0] != 3:
+            raise ValueError("np.cross takes vectors of three elements")
+        return own.rtcf_array(
+            (
+                a[1] * b[2] - a[2] * b[1],
+                a[2] * b[0] - a[0] * b[2],
+                a[0] * b[1] - a[1] * b[0],
+            ),
+            None,
+        )
+
+    return cross
+
+
+@compiled_as(own.rtcf_inner, arrays=("a", "b"))
+def _inner(a: Any, b: Any) -> Any:
+    _needs(a, "np.inner", (1,))
+    _needs(b, "np.inner", (1,))
+    return lambda a, b: helpers.rtcf_matmul(a, b)
+
+
+@compiled_as(own.rtcf_norm, arrays=("x",))
+def _norm(x: Any, ord: Any, axis: Any) -> Any:
+    _needs(x, "np.linalg.norm")
+    default = isinstance(ord, types.NoneType)
+    if isinstance(axis, types.NoneType):
+        if default:
+
+            def of_all(x: Any, ord: Any, axis: Any) -> Any:
+                total = 0.0
+                row = own.rtcf_ravel(x)
+                for i in range(row.shape[0]):
+                    total += float(row[i]) * float(row[i])
+                return np.sqrt(total)
+
+            return of_all
+        if x.ndim == 2:
+            raise TypingError("RTCF:this norm of a matrix is not compiled:leave ord away")
+
+        def of_vector(x: Any, ord: Any, axis: Any) -> Any:
+            if ord == 2:
+                return np.sqrt(helpers.rtcf_matmul(x * 1.0, x * 1.0))
+            if ord == 1:
+                return own.rtcf_sum(np.abs(x * 1.0), None, None)
+            if ord == np.inf:
+                return own.rtcf_max(np.abs(x * 1.0), None, None)
+            if ord == -np.inf:
+                return own.rtcf_min(np.abs(x * 1.0), None, None)
+            raise ValueError("np.linalg.norm: ord is 1, 2 or np.inf")
+
+        return of_vector
+    if not default:
+        raise TypingError("RTCF:np.linalg.norm with ord and axis:leave ord away")
+    return lambda x, ord, axis: np.sqrt(own.rtcf_sum(x * 1.0 * x, axis, None))
+
+
+@compiled_as(own.rtcf_det, arrays=("a",))
+def _det(a: Any) -> Any:
+    _needs(a, "np.linalg.det", (2,))
+
+    def det(a: Any) -> Any:
+        n = a.shape[0]
+        if a.shape[1] != n:
+            raise ValueError("det of a matrix that is not square")
+        matrix = own.rtcf_array(a, np.float64)
+        result = 1.0
+        for k in range(n):
+            pivot = k
+            for i in range(k + 1, n):
+                if abs(matrix[i, k]) > abs(matrix[pivot, k]):
+                    pivot = i
+            if matrix[pivot, k] == 0.0:
+                return 0.0
+            if pivot != k:
+                for j in range(n):
+                    matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+                result = -result
+            result = result * matrix[k, k]
+            for i in range(k + 1, n):
+                factor = matrix[i, k] / matrix[k, k]
+                for j in range(k + 1, n):
+                    matrix[i, j] = matrix[i, j] - factor * matrix[k, j]
+        return result
+
+    return det
+
+
+@compiled_as(own.rtcf_matrix_power, arrays=("a",))
+def _matrix_power(a: Any, n: Any) -> Any:
+    _needs(a, "np.linalg.matrix_power", (2,))
+
+    def power(a: Any, n: Any) -> Any:
+        size = a.shape[0]
+        if a.shape[1] != size:
+            raise ValueError("matrix_power of a matrix that is not square")
+        square = helpers.rtcf_inv(a) if n < 0 else own.rtcf_array(a, np.float64)
+        n = abs(n)
+        if n == 0:
+            return np.eye(size)
+        if n == 3:
+            return helpers.rtcf_matmul(helpers.rtcf_matmul(square, square), square)
+        while n % 2 == 0:
+            square = helpers.rtcf_matmul(square, square)
+            n //= 2
+        result = square
+        n //= 2
+        while n > 0:
+            square = helpers.rtcf_matmul(square, square)
+            if n % 2:
+                result = helpers.rtcf_matmul(result, square)
+            n //= 2
+        return result
+
+    return power
+
+
+@compiled_as(own.rtcf_whole_pow)
+def _whole_pow(base: Any, exponent: Any) -> Any:
+    def power(base: Any, exponent: Any) -> Any:
+        square = base
+        while exponent % 2 == 0 and exponent > 0:
+            square = square * square
+            exponent //= 2
+        result = square
+        exponent //= 2
+        while exponent > 0:
+            square = square * square
+            if exponent % 2:
+                result = result * square
+            exponent //= 2
+        return result
+
+    return power
+
+
+# The C library's functions, by those of NumPy.
+
+
+def _by_libm(helper: Any, name: str) -> None:
+    function = getattr(np, name)
+    if function.nin == 2:
+
+        @compiled_as(helper, arrays=("x", "y"))
+        def _binary(x: Any, y: Any) -> Any:
+            return lambda x, y: function(x, y)
+
+        return
+
+    @compiled_as(helper, arrays=("x",))
+    def _unary(x: Any) -> Any:
+        return lambda x: function(x)
+
+
+for _helper, _name in own.BY_LIBM.items():
+    _by_libm(_helper, _name)
+
+
+@compiled_as(own.rtcf_math_hypot)
+def _math_hypot(x: Any, y: Any) -> Any:
+    return lambda x, y: math.hypot(x, y)

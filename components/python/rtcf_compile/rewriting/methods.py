@@ -1,0 +1,68 @@
+"""The methods of a component class as Python finds them: its own, those of bases and mixins."""
+
+import inspect
+from dataclasses import dataclass
+from types import FunctionType
+from typing import Any
+
+from rtcf.component import Component
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method, a static method or a property of a class; others have no function."""
+
+    name: str
+    owner: type
+    kind: str
+    function: FunctionType | None
+
+    @property
+    def symbol(self) -> str:
+        """Return the name that its compiled function has in other functions."""
+        return f"method_{self.owner.__name__}_{self.name}"
+
+
+class Methods:
+    """The methods of one component class."""
+
+    def __init__(self, cls: type[Component]) -> None:
+        """Look at a class and its bases."""
+        self._classes = [
+            each
+            for each in cls.__mro__
+            if each is not object and not each.__module__.startswith(("rtcf.component", "typing"))
+        ]
+
+    def find(self, name: str, behind: type | None = None) -> Method | None:
+        """Return what self.name is, or super().name in a class."""
+        begin = 0 if behind is None else self._classes.index(behind) + 1
+        return self._first(name, begin)
+
+    def find_of(self, owner: Any, name: str) -> Method | None:
+        """Return what Owner.name is, of a class among the bases; None for others."""
+        if owner not in self._classes:
+            return None
+        return self._first(name, self._classes.index(owner))
+
+    def names(self) -> set[str]:
+        """Return the names of all methods."""
+        return {name for each in self._classes for name in vars(each) if self.find(name)}
+
+    def _first(self, name: str, begin: int) -> Method | None:
+        for each in self._classes[begin:]:
+            if name in vars(each):
+                return _method(name, each, vars(each)[name])
+        return None
+
+
+def _method(name: str, owner: type, value: Any) -> Method | None:
+    if inspect.isfunction(value):
+        return Method(name, owner, "method", value)
+    if isinstance(value, staticmethod) and inspect.isfunction(value.__func__):
+        return Method(name, owner, "static method", value.__func__)
+    if isinstance(value, property) and inspect.isfunction(value.fget):
+        return Method(name, owner, "property", value.fget)
+    if isinstance(value, staticmethod | classmethod | property):
+        return Method(name, owner, type(value).__name__, None)
+    return None

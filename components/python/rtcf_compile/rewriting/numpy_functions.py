@@ -1,0 +1,502 @@
+"""Functions of NumPy and math that are compiled by overloads of our own: for numbers, vectors and
+matrices, without BLAS, LAPACK and lists.
+
+Each is registered once, by the functions that it stands for. Called by Python it is NumPy's
+function, except where the order of sums or the C library decides about the last place: there it
+does the same as the overload.
+"""
+
+import ctypes
+import ctypes.util
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from rtcf_compile.rewriting import helpers
+
+Function = Callable[..., Any]
+
+# By identity: functions of several modules are equal, or not to be hashed.
+STANDS_FOR: list[tuple[Function, Function]] = []
+# `a.sum(axis=0)`: by the name of the method, with the array as the first argument.
+METHODS: dict[str, Function] = {}
+
+
+# Words among arguments: what None and True mean to the functions below.
+WORDS = {"left": None, "right": True, "stable": None, "fro": None}
+
+
+def _stands_for(*functions: Function, method: str = "") -> Callable[[Function], Function]:
+    """Register what stands for functions, and for a method of arrays."""
+
+    def register(own: Function) -> Function:
+        STANDS_FOR.extend((each, own) for each in functions)
+        if method:
+            METHODS[method] = own
+        return own
+
+    return register
+
+
+# Making arrays.
+
+
+@_stands_for(np.array, np.copy)
+def rtcf_array(object: Any, dtype: Any = None) -> Any:
+    """Return a new array of a number, an array, or numbers and arrays in rows."""
+    return np.array(object, dtype)
+
+
+@_stands_for(np.asarray, np.ascontiguousarray)
+def rtcf_asarray(a: Any, dtype: Any = None) -> Any:
+    """Return an array, or what makes one as a new array."""
+    return np.asarray(a, dtype)
+
+
+@_stands_for(np.diag)
+def rtcf_diag(v: Any, k: Any = 0) -> Any:
+    """Return the matrix with a vector in its diagonal, or the diagonal of a matrix."""
+    return np.array(np.diag(v, k))
+
+
+@_stands_for(np.diagonal, method="diagonal")
+def rtcf_diagonal(a: Any) -> Any:
+    """Return the diagonal of a matrix."""
+    return np.array(np.diagonal(a))
+
+
+@_stands_for(np.linspace)
+def rtcf_linspace(start: Any, stop: Any, num: Any = 50, endpoint: Any = True) -> Any:
+    """Return numbers at the same distance from each other."""
+    return np.linspace(start, stop, num, endpoint)
+
+
+# Shapes.
+
+
+@_stands_for(np.reshape, method="reshape")
+def rtcf_reshape(a: Any, newshape: Any) -> Any:
+    """Return an array's elements in another shape: a view where NumPy makes one."""
+    return np.reshape(a, newshape)
+
+
+@_stands_for(np.ravel, method="ravel")
+def rtcf_ravel(a: Any) -> Any:
+    """Return an array's elements in a row: a view where NumPy makes one."""
+    return np.ravel(a)
+
+
+def rtcf_flatten(a: Any) -> Any:
+    """Return a copy of an array's elements in a row."""
+    return np.array(np.ravel(a))
+
+
+METHODS["flatten"] = rtcf_flatten
+
+
+@_stands_for(np.concatenate)
+def rtcf_concatenate(arrays: Any, axis: Any = 0) -> Any:
+    """Return arrays one after the other."""
+    return np.concatenate(arrays, axis)
+
+
+@_stands_for(np.hstack)
+def rtcf_hstack(tup: Any) -> Any:
+    """Return vectors one after the other, matrices side by side."""
+    return np.hstack(tup)
+
+
+@_stands_for(np.vstack)
+def rtcf_vstack(tup: Any) -> Any:
+    """Return vectors and matrices one below the other."""
+    return np.vstack(tup)
+
+
+@_stands_for(np.stack)
+def rtcf_stack(arrays: Any, axis: Any = 0) -> Any:
+    """Return vectors as the rows of a matrix, or as its columns."""
+    return np.stack(arrays, axis)
+
+
+@_stands_for(np.column_stack)
+def rtcf_column_stack(tup: Any) -> Any:
+    """Return vectors as the columns of a matrix, beside matrices."""
+    return np.column_stack(tup)
+
+
+@_stands_for(np.roll)
+def rtcf_roll(a: Any, shift: Any) -> Any:
+    """Return a vector whose elements have moved, the last ones to the first places."""
+    return np.roll(a, shift)
+
+
+@_stands_for(np.flip)
+def rtcf_flip(m: Any) -> Any:
+    """Return an array in reverse order, a view."""
+    return np.flip(m)
+
+
+@_stands_for(np.diff)
+def rtcf_diff(a: Any) -> Any:
+    """Return the differences of elements that follow each other."""
+    return np.diff(a)
+
+
+# One number of many, along all axes or one.
+
+
+def _sequential(a: Any) -> Any:
+    """Return an array in the order of its elements, in which the overload sums it."""
+    return np.ascontiguousarray(a) if isinstance(a, np.ndarray) and a.ndim else a
+
+
+@_stands_for(np.sum, method="sum")
+def rtcf_sum(a: Any, axis: Any = None, keepdims: Any = None) -> Any:
+    """Return the sum, in pairs as NumPy has it."""
+    return np.sum(_sequential(a), axis=axis, keepdims=bool(keepdims))
+
+
+@_stands_for(np.prod, method="prod")
+def rtcf_prod(a: Any, axis: Any = None) -> Any:
+    """Return the product, from the first element to the last."""
+    return np.prod(_sequential(a), axis=axis)
+
+
+@_stands_for(np.mean, method="mean")
+def rtcf_mean(a: Any, axis: Any = None, keepdims: Any = None) -> Any:
+    """Return the mean."""
+    return np.mean(_sequential(a), axis=axis, keepdims=bool(keepdims))
+
+
+@_stands_for(np.var, method="var")
+def rtcf_var(a: Any, axis: Any = None, ddof: Any = 0) -> Any:
+    """Return the variance."""
+    return np.var(_sequential(a), axis=axis, ddof=ddof)
+
+
+@_stands_for(np.std, method="std")
+def rtcf_std(a: Any, axis: Any = None, ddof: Any = 0) -> Any:
+    """Return the standard deviation."""
+    return np.std(_sequential(a), axis=axis, ddof=ddof)
+
+
+@_stands_for(np.max, np.amax, method="max")
+def rtcf_max(a: Any, axis: Any = None, keepdims: Any = None) -> Any:
+    """Return the largest element, NaN if one is."""
+    return np.max(a, axis=axis, keepdims=bool(keepdims))
+
+
+@_stands_for(np.min, np.amin, method="min")
+def rtcf_min(a: Any, axis: Any = None, keepdims: Any = None) -> Any:
+    """Return the smallest element, NaN if one is."""
+    return np.min(a, axis=axis, keepdims=bool(keepdims))
+
+
+@_stands_for(np.ptp, method="ptp")
+def rtcf_ptp(a: Any, axis: Any = None) -> Any:
+    """Return the largest element minus the smallest."""
+    return np.ptp(a, axis=axis)
+
+
+@_stands_for(np.argmax, method="argmax")
+def rtcf_argmax(a: Any, axis: Any = None) -> Any:
+    """Return the place of the largest element, or of the first NaN."""
+    return np.argmax(a, axis=axis)
+
+
+@_stands_for(np.argmin, method="argmin")
+def rtcf_argmin(a: Any, axis: Any = None) -> Any:
+    """Return the place of the smallest element, or of the first NaN."""
+    return np.argmin(a, axis=axis)
+
+
+@_stands_for(np.any, method="any")
+def rtcf_any(a: Any, axis: Any = None) -> Any:
+    """Tell whether an element is not 0."""
+    return np.any(a, axis=axis)
+
+
+@_stands_for(np.all, method="all")
+def rtcf_all(a: Any, axis: Any = None) -> Any:
+    """Tell whether all elements are not 0."""
+    return np.all(a, axis=axis)
+
+
+@_stands_for(np.count_nonzero)
+def rtcf_count_nonzero(a: Any) -> Any:
+    """Return how many elements are not 0."""
+    return np.count_nonzero(a)
+
+
+@_stands_for(np.median)
+def rtcf_median(a: Any) -> Any:
+    """Return the median of all elements, NaN if one is."""
+    return np.median(a)
+
+
+@_stands_for(np.trace, method="trace")
+def rtcf_trace(a: Any) -> Any:
+    """Return the sum of a matrix's diagonal, in pairs as NumPy has it."""
+    return np.trace(a)
+
+
+@_stands_for(np.cumsum, method="cumsum")
+def rtcf_cumsum(a: Any, axis: Any = None) -> Any:
+    """Return the sums up to each element."""
+    return np.cumsum(a, axis=axis)
+
+
+@_stands_for(np.cumprod, method="cumprod")
+def rtcf_cumprod(a: Any, axis: Any = None) -> Any:
+    """Return the products up to each element."""
+    return np.cumprod(a, axis=axis)
+
+
+# Order.
+
+
+@_stands_for(np.sort)
+def rtcf_sort(a: Any, axis: Any = -1) -> Any:
+    """Return a sorted copy, NaN last."""
+    return np.sort(a, axis)
+
+
+def rtcf_sort_in_place(a: Any, axis: Any = -1) -> None:
+    """Sort an array, NaN last."""
+    a.sort(axis)
+
+
+METHODS["sort"] = rtcf_sort_in_place
+
+
+@_stands_for(np.argsort, method="argsort")
+def rtcf_argsort(a: Any, kind: Any) -> Any:
+    """Return the places of a vector's elements in their order, equal ones as they are."""
+    return np.argsort(a, kind="stable")
+
+
+@_stands_for(np.searchsorted, method="searchsorted")
+def rtcf_searchsorted(a: Any, v: Any, side: Any = None) -> Any:
+    """Return where a number, or each of a vector, would stand in a sorted vector."""
+    return np.searchsorted(a, v, "right" if side else "left")
+
+
+# Elements of arrays, and numbers.
+
+
+@_stands_for(np.clip, method="clip")
+def rtcf_clip(a: Any, a_min: Any, a_max: Any) -> Any:
+    """Return numbers within bounds; one that is None is none."""
+    return np.clip(a, a_min, a_max)
+
+
+@_stands_for(np.isclose)
+def rtcf_isclose(
+    a: Any, b: Any, rtol: Any = 1e-05, atol: Any = 1e-08, equal_nan: Any = False
+) -> Any:
+    """Tell which numbers are about equal."""
+    return np.isclose(a, b, rtol, atol, equal_nan)
+
+
+@_stands_for(np.allclose)
+def rtcf_allclose(
+    a: Any, b: Any, rtol: Any = 1e-05, atol: Any = 1e-08, equal_nan: Any = False
+) -> Any:
+    """Tell whether all numbers are about equal."""
+    return np.allclose(a, b, rtol, atol, equal_nan)
+
+
+@_stands_for(np.array_equal)
+def rtcf_array_equal(a1: Any, a2: Any) -> Any:
+    """Tell whether two arrays have the same shape and elements."""
+    return np.array_equal(a1, a2)
+
+
+@_stands_for(math.isclose)
+def rtcf_math_isclose(a: Any, b: Any, rel_tol: Any = 1e-09, abs_tol: Any = 0.0) -> Any:
+    """Tell whether two numbers are about equal."""
+    return math.isclose(a, b, rel_tol=rel_tol, abs_tol=abs_tol)
+
+
+@_stands_for(np.round, np.around, method="round")
+def rtcf_np_round(a: Any, decimals: Any = 0) -> Any:
+    """Return numbers rounded to so many decimals, halves to the even one."""
+    return np.round(a, decimals)
+
+
+@_stands_for(np.nan_to_num)
+def rtcf_nan_to_num(x: Any, nan: Any = 0.0, posinf: Any = None, neginf: Any = None) -> Any:
+    """Return numbers with others in the place of NaN and infinity."""
+    return np.nan_to_num(x, nan=nan, posinf=posinf, neginf=neginf)
+
+
+@_stands_for(np.interp)
+def rtcf_interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> Any:
+    """Return values of a function between the points at which it is known."""
+    return np.interp(x, xp, fp, left, right)
+
+
+@_stands_for(np.polyval)
+def rtcf_polyval(p: Any, x: Any) -> Any:
+    """Return the values of a polynomial, whose highest power is the first."""
+    return np.polyval(p, x)
+
+
+_TRAPEZOID = [getattr(np, name) for name in ("trapezoid", "trapz") if hasattr(np, name)]
+
+
+@_stands_for(*_TRAPEZOID)
+def rtcf_trapz(y: Any, x: Any = None, dx: Any = 1.0) -> Any:
+    """Return the integral by the trapezoidal rule."""
+    return _TRAPEZOID[0](y, x, dx)
+
+
+# Matrices and vectors.
+
+
+@_stands_for(np.outer)
+def rtcf_outer(a: Any, b: Any) -> Any:
+    """Return the products of each element with each."""
+    return np.outer(a, b)
+
+
+@_stands_for(np.cross)
+def rtcf_cross(a: Any, b: Any) -> Any:
+    """Return the cross product of two vectors of three elements."""
+    if np.shape(a) != (3,) or np.shape(b) != (3,):
+        raise ValueError(f"cross of shapes {np.shape(a)} and {np.shape(b)}")
+    return np.cross(a, b)
+
+
+@_stands_for(np.inner, np.vdot)
+def rtcf_inner(a: Any, b: Any) -> Any:
+    """Return the inner product of two vectors, from the first element to the last."""
+    if np.ndim(a) != 1 or np.ndim(b) != 1:
+        raise ValueError(f"inner of shapes {np.shape(a)} and {np.shape(b)}")
+    return helpers.rtcf_matmul(a, b)
+
+
+@_stands_for(np.linalg.norm)
+def rtcf_norm(x: Any, ord: Any = None, axis: Any = None) -> Any:
+    """Return a norm; squares are summed from the first element to the last."""
+    x = np.asarray(x)
+    if axis is None and (ord is None or (x.ndim == 1 and ord == 2)):
+        row = np.ravel(x).astype(np.float64)
+        return np.sqrt(helpers.rtcf_matmul(row, row))
+    if axis is None and x.ndim != 1:
+        raise ValueError("norm of a matrix: the one of all elements alone")
+    return np.linalg.norm(_sequential(x), ord, axis)
+
+
+@_stands_for(np.linalg.det)
+def rtcf_det(a: Any) -> Any:
+    """Return the determinant, by elimination with row pivots."""
+    matrix = np.array(a, np.float64)
+    n = matrix.shape[0]
+    if matrix.ndim != 2 or matrix.shape[1] != n:
+        raise ValueError(f"det of shape {matrix.shape}")
+    result = 1.0
+    for k in range(n):
+        pivot = k + int(np.argmax(np.abs(matrix[k:, k])))
+        if matrix[pivot, k] == 0.0:
+            return 0.0
+        if pivot != k:
+            matrix[[k, pivot]] = matrix[[pivot, k]]
+            result = -result
+        result = result * matrix[k, k]
+        for i in range(k + 1, n):
+            factor = matrix[i, k] / matrix[k, k]
+            matrix[i, k + 1 :] = matrix[i, k + 1 :] - factor * matrix[k, k + 1 :]
+    return float(result)
+
+
+@_stands_for(np.linalg.matrix_power)
+def rtcf_matrix_power(a: Any, n: Any) -> Any:
+    """Return a power of a matrix, in NumPy's order of products."""
+    a = np.array(a, np.float64)
+    if a.ndim != 2 or a.shape[0] != a.shape[1]:
+        raise ValueError(f"matrix_power of shape {a.shape}")
+    if n < 0:
+        a, n = helpers.rtcf_inv(a), -n
+    if n == 0:
+        return np.eye(len(a))
+    if n == 3:
+        return helpers.rtcf_matmul(helpers.rtcf_matmul(a, a), a)
+    result, square = None, None
+    while n > 0:
+        square = a if square is None else helpers.rtcf_matmul(square, square)
+        n, bit = divmod(n, 2)
+        if bit:
+            result = square if result is None else helpers.rtcf_matmul(result, square)
+    return np.array(result)
+
+
+def rtcf_whole_pow(base: Any, exponent: Any) -> Any:
+    """Return a constant whole power, as a product: squares of squares."""
+    result = None
+    while exponent > 0:
+        if exponent % 2:
+            result = base if result is None else result * base
+        exponent //= 2
+        if exponent:
+            base = base * base
+    return 1 + 0 * base if result is None else result
+
+
+# The C library decides about the last place of these, in the loop as here.
+
+_LIBM = ctypes.CDLL(ctypes.util.find_library("m") or "libm.so.6")
+
+
+def _of_the_c_library(function: Function, name: str) -> Function:
+    c_function = _LIBM[name]
+    count = 2 if name in ("atan2", "hypot", "pow") else 1
+    c_function.argtypes, c_function.restype = [ctypes.c_double] * count, ctypes.c_double
+    elementwise = np.vectorize(c_function, otypes=[np.float64])
+
+    def call(*arguments: Any) -> Any:
+        if any(np.asarray(each).dtype == np.float32 for each in arguments) or any(
+            np.size(each) == 0 for each in arguments
+        ):
+            return function(*arguments)
+        result = elementwise(*arguments)
+        return result if result.ndim else np.float64(result)
+
+    if count == 2:
+
+        def binary(x: Any, y: Any) -> Any:
+            return call(x, y)
+
+        return binary
+
+    def unary(x: Any) -> Any:
+        return call(x)
+
+    return unary
+
+
+# By the names of NumPy's functions, those of the C library.
+LIBM = {
+    **{name: name for name in ("sin", "cos", "tan", "exp", "exp2", "expm1", "cbrt", "hypot")},
+    **{name: name for name in ("log", "log2", "log10", "log1p", "sinh", "cosh", "tanh")},
+    **{f"arc{name}": f"a{name}" for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "tan2")},
+}
+BY_LIBM: dict[Function, str] = {}
+for _name, _c_name in LIBM.items():
+    _own = _of_the_c_library(getattr(np, _name), _c_name)
+    _own.__name__ = f"rtcf_np_{_name}"
+    BY_LIBM[_own] = _name
+    STANDS_FOR.append((getattr(np, _name), _own))
+
+
+def rtcf_math_hypot(x: Any, y: Any) -> float:
+    """Return math.hypot(x, y)."""
+    return float(BY_NAME["rtcf_np_hypot"](x, y))
+
+
+STANDS_FOR.append((math.hypot, rtcf_math_hypot))
+
+_ALL: list[Function] = [*(own for _, own in STANDS_FOR), *METHODS.values(), rtcf_whole_pow]
+BY_NAME: dict[str, Function] = {each.__name__: each for each in _ALL}
