@@ -1,5 +1,5 @@
-"""A disturbance observer for a drive: what force acts on it beside the commanded one (Ohnishi, Shibata
-and Murakami, Motion control for advanced mechatronics, 1996).
+"""A disturbance observer for a drive: what force acts on it beside the commanded one (Ohnishi,
+Shibata and Murakami, Motion control for advanced mechatronics, 1996).
 """
 
 import numpy as np

@@ -1,5 +1,5 @@
-"""Moves joints through the points that come: a quintic for each joint, which meets position, velocity
-and acceleration at both ends (Craig, Introduction to Robotics, 2005, section 7.3).
+"""Moves joints through the points that come: a quintic for each joint, which meets position,
+velocity and acceleration at both ends (Craig, Introduction to Robotics, 2005, section 7.3).
 """
 
 import numpy as np

@@ -1,5 +1,5 @@
-"""A motor's torque from a measured table, linear between its points, and a friction table by speed and
-temperature, bilinear (Press and others, Numerical Recipes, 2007, sections 3.1 and 3.6).
+"""A motor's torque from a measured table, linear between its points, and a friction table by
+speed and temperature, bilinear (Press and others, Numerical Recipes, 2007, sections 3.1 and 3.6).
 """
 
 import numpy as np

@@ -1,5 +1,5 @@
-"""A linear-quadratic regulator for a cart with a pendulum: the gain is computed of the weights, when
-they change, by iterating the Riccati equation (Anderson and Moore, Optimal Control, 1990,
+"""A linear-quadratic regulator for a cart with a pendulum: the gain is computed of the weights,
+when they change, by iterating the Riccati equation (Anderson and Moore, Optimal Control, 1990,
 section 2.4).
 """
 

@@ -1,5 +1,5 @@
-"""Orientation from gyroscope and accelerometer (Madgwick, An efficient orientation filter for inertial
-and inertial/magnetic sensor arrays, 2010).
+"""Orientation from gyroscope and accelerometer (Madgwick, An efficient orientation filter for
+inertial and inertial/magnetic sensor arrays, 2010).
 """
 
 import numpy as np

@@ -1,5 +1,5 @@
-"""Model-predictive control of an axis: ten steps ahead with three inputs, limits on the inputs, solved
-by an accelerated projected gradient (Richter, Jones and Morari, 2012).
+"""Model-predictive control of an axis: ten steps ahead with three inputs, limits on the inputs,
+solved by an accelerated projected gradient (Richter, Jones and Morari, 2012).
 """
 
 import numpy as np

@@ -32,11 +32,11 @@ class Pid(Component):
         self.last = y
 
         filter_time = self.td / self.n
-        self.derivative = (
-            filter_time * self.derivative - self.kp * self.td * slope
-        ) / (filter_time + self.dt)
+        self.derivative = (filter_time * self.derivative - self.kp * self.td * slope) / (
+            filter_time + self.dt
+        )
         wanted = self.kp * error + self.integral + self.derivative
         effort = np.clip(wanted, -self.limit, self.limit)
         tracking = np.sqrt(self.ti * self.td) if self.td > 0.0 else self.ti
-        self.integral += self.kp / self.ti * error * self.dt + (effort - wanted) * self.dt / tracking
+        self.integral += self.dt * (self.kp / self.ti * error + (effort - wanted) / tracking)
         self.effort.write(effort)

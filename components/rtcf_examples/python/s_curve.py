@@ -1,5 +1,6 @@
-"""An S-curve: moves one axis with limits of velocity, acceleration and jerk, in closed loop with its
-own state, so that a new target may come at any time (after Gerelli and Guarino Lo Bianco, 2010).
+"""An S-curve: moves one axis with limits of velocity, acceleration and jerk, in closed loop with
+its own state, so that a new target may come at any time (after Gerelli and Guarino Lo Bianco,
+2010).
 """
 
 import enum

@@ -34,7 +34,7 @@ class Pid final : public rtcf::Component {
         const double wanted = kp * error + integral + derivative;
         const double limited = std::clamp(wanted, -limit.value(), limit.value());
         const double tracking = td > 0.0 ? std::sqrt(ti * td) : ti.value();
-        integral += kp / ti * error * dt() + (limited - wanted) * dt() / tracking;
+        integral += dt() * (kp / ti * error + (limited - wanted) / tracking);
         effort.write(limited);
     }
 };

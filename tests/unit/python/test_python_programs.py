@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from programs import Program, module
 from rtcf_compile.comparison import verify
 from rtcf_compile.machine_code import lowering
 from rtcf_compile.source import modules
-from unit.python.programs import Program, module
 
 TOGETHER = 25  # programs of one component
 TIMES = 12  # that each runs, on average
