@@ -17,7 +17,14 @@ PRODUCTS = [
     *("a @ narrow", "narrow @ b", "narrow @ narrow", "whole @ b", "a @ whole", "whole @ a.T"),
 ]
 WRONG = ["a @ w", "v @ a", "a @ a", "narrow @ a"]
-SHAPES: dict[str, Any] = {"a": (15, 11), "b": (11, 15), "v": 11, "w": 15, "narrow": (11, 11), "whole": 11}
+SHAPES: dict[str, Any] = {
+    "a": (15, 11),
+    "b": (11, 15),
+    "v": 11,
+    "w": 15,
+    "narrow": (11, 11),
+    "whole": 11,
+}
 HEAD = """\
 import numpy as np
 from rtcf.component import Component, State
