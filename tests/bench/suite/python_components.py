@@ -29,7 +29,7 @@ def run(setting: Setting) -> Result:
     """Compile them, and measure both in turn."""
     library = setting.output / "controllers.so"
     sources = [str(EXAMPLES / f"{name}.py") for name in CONTROLLERS]
-    output_of([str(setting.build / "bin/rtcf-compile"), *sources, "-o", str(library)])
+    output_of([str(setting.build / "bin/rtcf-compile"), *sources, "-o", str(library)], 60.0)
     reference = setting.build / "lib/rtcf/rtcf_bench/rtcf_bench_controllers.so"
     types = [name for name, _ in CONTROLLERS.values()]
     found = json.loads(
