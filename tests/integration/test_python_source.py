@@ -126,7 +126,7 @@ def test_what_was_tuned_stays_when_a_source_is_saved(
         watching.wait_for("loaded /Tuned")
         assert _parameters(client) == {"kp": 1.0, "ki": 0.5}
         assert daemon.ctl("set", "Tuned", "kp:=50").returncode == 0
-        # Another default of what was tuned, or given, changes nothing.
+        # Another default of a tuned or given parameter changes nothing.
         _save(source, TUNED.format(kp=2.0, most=90.0, ki=0.75))
         watching.wait_for("replaced /Tuned")
         assert f"replaced /Tuned by {source} as it is now, which keeps kp 50\n" in watching.said

@@ -94,7 +94,7 @@ def watch(
             continue
         try:
             spec = _spec(args, output)
-            # What the command line gives is the same each time; what was tuned since stays.
+            # The command line gives the same each time; tuned values stay.
             result = client.replace(name, spec, args.runner, output.progress, given_before=spec)
         except (rtcf.RefusedError, python_source.NotCompiledError) as error:
             # What runs goes on; the next time may be better.

@@ -134,7 +134,7 @@ class _Work:
             if content != self._last:
                 self.apply(client, self.read())
             elif rebuilt:
-                # One by one: what was loaded besides stays.
+                # One by one: other components stay.
                 for runner, name in rebuilt:
                     given = self._given.get(runner, {}).get(name)
                     result = client.replace(

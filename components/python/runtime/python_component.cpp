@@ -191,7 +191,7 @@ std::string PythonComponent::said(const void* raised, std::int64_t noted) const 
     Raised what{};
     std::memcpy(&what, raised, sizeof what);
     const std::uint64_t hash = hashOf(what);
-    const char* text = "raised what is not known";
+    const char* text = "raised an unknown exception";
     std::int64_t line = noted;
     for (std::int64_t i = 0; i < table_.raise_count; ++i) {
         const RaiseTable& each = table_.raises[i];

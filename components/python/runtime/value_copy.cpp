@@ -8,7 +8,7 @@ namespace rtcf::python {
 
 namespace {
 
-/// Writes row by row what has so many rows, and lies column by column.
+/// Writes a matrix row by row that lies column by column.
 template <typename T>
 void transposeAs(void* to, const void* from, std::size_t rows, std::size_t columns) noexcept {
     const T* const source = static_cast<const T*>(from);

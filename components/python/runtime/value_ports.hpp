@@ -95,7 +95,7 @@ class QueuePort final : public QueueBase {
     QueuePort(Component* owner, const InputTable& table, std::byte* record)
         : QueuePort(owner, table, record, slotsOf(table)) {}
 
-    /// Moves what has come into the record's ring; what finds it full is lost. Real-time safe.
+    /// Moves new messages into the record's ring; those that find it full are lost. Real-time safe.
     void read() noexcept {
         const std::int64_t now_ns = owner().time();
         for (const SlotHeader* slot = oldest(); slot != nullptr; slot = oldest()) {

@@ -26,11 +26,11 @@ class Tuned:
     kept: list[graph_pb2.ParameterSetting] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     before: dict[str, graph_pb2.ParameterValue] = field(default_factory=dict)
-    # By what is given now, or by what does not fit; not by another default.
+    # By a value given now, or by one that does not fit; not by another default.
     changed: list[graph_pb2.ParameterSetting] = field(default_factory=list)
 
     def note(self, runner: RunnerCore, component: str, acting: Caller | None, how: str) -> None:
-        """Note in the history what was changed: what stays is its setter's."""
+        """Note changes in the history: a value that stays is its setter's."""
         parameters.note(runner, component, self.changed, self.before, acting, how)
 
     def tell(self, result: control_pb2.ChangeResult) -> None:
@@ -44,7 +44,7 @@ async def keep_all(
     specs: Iterable[graph_pb2.ComponentSpec],
     given_before: Iterable[graph_pb2.ComponentSpec],
 ) -> dict[str, Tuned]:
-    """Put what was tuned into the components of a graph; return what became of it, by name."""
+    """Put tuned values into the components of a graph; return the notes on them, by name."""
     earlier = {full_name(each): each for each in given_before}
     found = {}
     live = await parameters.live_components(runner)
@@ -62,7 +62,7 @@ async def keep(
     spec: graph_pb2.ComponentSpec,
     given_before: graph_pb2.ComponentSpec,
 ) -> Tuned:
-    """Put what was tuned of the component `old` into that which replaces it."""
+    """Put tuned values of the component `old` into its replacement."""
     info = None if old in runner.left_out else await parameters.live_component(runner, old)
     values = _values(runner, old, info, given_before)
     return await _keep(runner.catalog, spec, given_before, values)

@@ -78,7 +78,7 @@ class Cache:
         )
 
     def compile(self, source: str, name: str = "source") -> str:
-        """Compile a source; return what was said."""
+        """Compile a source; return the message."""
         process = self.start(source, name)
         said = process.communicate(timeout=DEADLINE_S)[1]
         assert process.returncode == 0, said

@@ -66,7 +66,7 @@ class Faulty(Component):
 IN_UPDATE = {
     "list growth": ("values = []", "a list that grows allocates"),
     "element of a list set": ("a = [1.0]\n        a[0] = 2.0", "a list that changes allocates"),
-    "list times a variable": ("a = [0.0] * self.n", "a list is computed with what is no array"),
+    "list times a variable": ("a = [0.0] * self.n", "a list is computed with, but with no array"),
     "number of values": ("a, b = self.z[0], 1, 2", "3 values for 2 names"),
     "order of equal elements": ("a = np.argsort(self.z)", 'write kind="stable"'),
     "unknown option of a function": ("a = np.sum(self.z, where=True)", "np.sum takes a, axis"),

@@ -61,5 +61,5 @@ class Inside:
         size = ctypes.cast(place, ctypes.POINTER(ctypes.c_int32))[0]
         meaning = self._compiled.raises.get(hash_of(ctypes.string_at(begin or 0, size)))
         if meaning is None:
-            return f"{noted}: raised what is not known"
+            return f"{noted}: raised an unknown exception"
         return f"{meaning.line or noted}: {meaning.text}"

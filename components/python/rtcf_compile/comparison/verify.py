@@ -40,7 +40,7 @@ from rtcf_compile.source.processor_time import HOOK_S, TimeLimitError, loop_line
 
 LARGEST_ULP = 4
 MOST_DIFFERENCES = 10
-# A difference in the last place of what is read, tried so often, explains one so much larger.
+# Changes of the last place of the values read, so many, explain a difference so much larger.
 _TRIES, _ROUNDING = 8, 16.0
 _HELPERS = {**helpers.BY_NAME, **numpy_functions.BY_NAME}
 _ANEW = 200  # cycles from one start to the next

@@ -81,7 +81,7 @@ def compare_all(
 
 
 class _Notes:
-    """Of what is about to run, in shared memory."""
+    """Of the next hook, in shared memory."""
 
     def __init__(self, shared: mmap.mmap) -> None:
         self._shared = shared
@@ -150,7 +150,7 @@ def _next(results: BinaryIO) -> Comparison | Mistake | None:
 
 
 def _end(compiled: Compiled, status: int, shared: mmap.mmap) -> Comparison:
-    """Return what is known of a comparison that has ended before its time."""
+    """Return the result of a comparison that has ended before its time."""
     numbers: Any = np.ndarray(4, np.int64, shared)
     hook, cycle, in_machine_code = (int(numbers[each]) for each in (_HOOK, _CYCLE, _COMPILED))
     record: Any = np.ndarray((), compiled.description.record, shared, _HEADER)

@@ -349,7 +349,7 @@ def _forward(name: str, function: str, table: Value, result: str, taken: tuple[s
 
 
 def _word(given: str, stored: str, number: int) -> list[str]:
-    """Return what makes 64 bits of an argument."""
+    """Return the conversion of an argument to 64 bits."""
     value, word = f"%a{number}", f"%word{number}"
     if given == "float64":
         return [f"  {word} = bitcast double {value} to i64"]

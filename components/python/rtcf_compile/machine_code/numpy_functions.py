@@ -30,7 +30,7 @@ def _dtype(kind: Any) -> Any:
 
 
 def _needs(kind: Any, what: str, dimensions: tuple[int, ...] = (1, 2)) -> None:
-    """Refuse what is no array of so many dimensions."""
+    """Refuse all but an array of so many dimensions."""
     if isinstance(kind, types.Array) and kind.ndim in dimensions:
         return
     names: dict[tuple[int, ...], str] = {(1,): "a vector", (2,): "a matrix"}

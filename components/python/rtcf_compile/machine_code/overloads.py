@@ -920,7 +920,7 @@ def _with_lists(helper: Any, operation: Any) -> None:
             return lambda left, right: operation(left, numpy_functions.rtcf_array(right, None))
         if isinstance(left, types.BaseTuple) and isinstance(right, types.Array):
             return lambda left, right: operation(numpy_functions.rtcf_array(left, None), right)
-        raise TypingError("RTCF:a list is computed with what is no array:use np.array([…])")
+        raise TypingError("RTCF:a list is computed with, but with no array:use np.array([…])")
 
 
 for _helper in helpers.OF_LISTS.values():

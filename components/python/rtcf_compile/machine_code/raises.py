@@ -1,6 +1,6 @@
 """What compiled code may raise: constants that numba puts into the code, as pickled bytes.
 
-The runtime finds by a hash of these bytes what was raised and where; nothing is unpickled there.
+The runtime finds the exception and its line by a hash of these bytes; nothing is unpickled there.
 """
 
 import pickle

@@ -203,7 +203,7 @@ def rtcf_bool(value: Any) -> Any:
 
 
 def rtcf_items(values: Any, count: Any) -> Any:
-    """Return the elements of what is taken apart into as many names as `count` has elements."""
+    """Return the elements of a value that is unpacked into as many names as `count` has."""
     values = tuple(values)
     if len(values) != len(count):
         raise ValueError("another number of values than of names")

@@ -51,7 +51,7 @@ def rtcf_array(object: Any, dtype: Any = None) -> Any:
 
 @_stands_for(np.asarray, np.ascontiguousarray)
 def rtcf_asarray(a: Any, dtype: Any = None) -> Any:
-    """Return an array, or what makes one as a new array."""
+    """Return an array, or a new array of a list."""
     return np.asarray(a, dtype)
 
 

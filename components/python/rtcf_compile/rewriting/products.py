@@ -82,7 +82,7 @@ class Products(ast.NodeTransformer):
 
     def visit_NamedExpr(self, node: ast.NamedExpr) -> ast.AST:
         """`y := x` where it is not always computed, or after what depends on it."""
-        raise self.mistake(node, "a := within what is computed", "write it as a statement before")
+        raise self.mistake(node, "a := within an expression", "write it as a statement before")
 
     def _before(self, node: ast.stmt) -> list[ast.stmt] | None:
         """Return a statement with its `y := x` as statements before it; None without."""
@@ -124,7 +124,7 @@ class Products(ast.NodeTransformer):
         found: list[ast.stmt] = []
 
         class First(ast.NodeTransformer):
-            """Takes out what is computed in any case, in the order of the source."""
+            """Takes out the parts that are computed in any case, in the order of the source."""
 
             def visit_BoolOp(self, each: ast.BoolOp) -> ast.AST:
                 each.values[0] = self.visit(each.values[0])
@@ -337,9 +337,7 @@ class Products(ast.NodeTransformer):
             values, times = (node.left, node.right) if left else (node.right, node.left)
             count = self._constant(times)
             if not isinstance(count, int) or not isinstance(values, ast.List) or count < 1:
-                raise self.mistake(
-                    node, "repeats a list by what is not constant", "write its elements"
-                )
+                raise self.mistake(node, "repeats a list by a variable", "write its elements")
             if any(isinstance(each, ast.Call) for each in ast.walk(values)):
                 raise self.mistake(node, "repeats calls", "give their values names before")
             elements = [copy.deepcopy(each) for _ in range(count) for each in values.elts]
@@ -669,8 +667,8 @@ class Products(ast.NodeTransformer):
         return [*before, *(new if isinstance(new, list) else [new])]
 
     def _steady(self, target: ast.expr) -> tuple[list[ast.stmt], ast.expr]:
-        """Return a target that is evaluated twice with the effect of once, and what comes before:
-        calls in its indices.
+        """Return a target that may be evaluated twice with one effect, and the statements before
+        it: calls in its indices.
         """
         before: list[ast.stmt] = []
 

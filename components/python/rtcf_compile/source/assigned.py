@@ -18,7 +18,7 @@ def check_assigned(source: Source) -> None:
 
 
 def _both(one: _Known, other: _Known) -> _Known:
-    """Return what is known where two ways meet."""
+    """Return the assigned variables where two ways meet."""
     if one is None or other is None:
         return other if one is None else one
     return one & other
@@ -105,7 +105,7 @@ class _Flow:
         return _both(self._block(node.orelse, ended) if ended is not None else None, left)
 
     def _loop(self, node: ast.For | ast.While, known: frozenset[str]) -> tuple[_Known, _Known]:
-        """Return what is known when the body has run once, and where it is left by break."""
+        """Return the assigned variables after one turn of the body, and where break leaves it."""
         self._breaks.append(None)
         self._continues.append(None)
         end = self._block(node.body, known)
@@ -140,7 +140,7 @@ class _Flow:
         return known
 
     def _test(self, node: ast.expr, known: frozenset[str]) -> tuple[frozenset[str], frozenset[str]]:
-        """Look at a condition; return what is known where it holds, and where it does not."""
+        """Look at a condition; return the assigned variables if it holds, and if it does not."""
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
             if_true, if_false = self._test(node.operand, known)
             return if_false, if_true
@@ -157,7 +157,7 @@ class _Flow:
         return after, after
 
     def _used(self, node: ast.expr, known: frozenset[str]) -> frozenset[str]:
-        """Look at the variables of an expression; return what is known after it."""
+        """Look at an expression; return the assigned variables after it."""
         if isinstance(node, ast.Name):
             if isinstance(node.ctx, ast.Load) and node.id in self._variables - known:
                 raise at(
