@@ -19,7 +19,7 @@ from rtcf_compile.source.mistake import Mistake
 _CPP = {"bool": "Bool", "float32": "Float", "float64": "Double"}
 _FLAGS = (
     *("-std=c++17", "-O2", "-g1", "-DNDEBUG", "-fPIC", "-fvisibility=hidden", "-w"),
-    *("-fvisibility-inlines-hidden", "-fno-gnu-unique"),
+    "-fvisibility-inlines-hidden",
 )
 
 
@@ -90,7 +90,10 @@ def _key(message: MessageType) -> str:
 
 def _command() -> list[str]:
     here = Path(__file__).resolve().parent
-    return [*toolchain.compiler(), *_FLAGS, f"-I{here}", *toolchain.flags(), "-c"]
+    compiler = toolchain.compiler()
+    # clang makes no unique symbols, and does not know the option.
+    more = [] if any("clang" in each for each in compiler) else ["-fno-gnu-unique"]
+    return [*compiler, *_FLAGS, *more, f"-I{here}", *toolchain.flags(), "-c"]
 
 
 def _compile(message: MessageType, file: Path, folder: Path) -> _Adapter:
