@@ -157,7 +157,7 @@ TEST_F(Rollback, NoMemoryForAnOptionalComponentsValueTakesItOut) {
 }
 
 // Who reads late has a copy, which is made before the components' turns.
-TEST_F(Rollback, ACycleThatLacksMemoryBeforeItsComponentsIsNotCounted) {
+TEST_F(Rollback, NoMemoryBeforeTheComponentsRunIsNoCycle) {
     WantedComponent writer = wanted("Touchy", "A");
     WantedComponent reader = wanted("Touchy", "B");
     reader.definition.remaps = {{"in", "A_out"}, {"out", "B_out"}};
