@@ -22,7 +22,7 @@ from rtcf.component.declaration import (
     describe,
     is_constant,
 )
-from rtcf.component.message_view import MessageView, checked, named, put
+from rtcf.component.message_view import MessageView, checked, copy, named, put
 from rtcf.component.value_type import ValueType
 
 
@@ -61,6 +61,9 @@ class _Value:
         return True
 
     def set(self, value: Any) -> None:
+        if self._member.message and isinstance(value, MessageView):
+            copy(self._record, self._member.name, self._member.message, (), value)
+            return
         if self._member.message:
             raise TypeError(
                 f"{self._member.name} is a {self._member.message.name}: "

@@ -53,6 +53,7 @@ class MessageType:
     texts: tuple[tuple[str, ...], ...]
     others: tuple[tuple[str, ...], ...]
     md5: str = ""
+    parts: tuple[tuple[tuple[str, ...], str], ...] = ()  # messages in it, by their types
 
     @property
     def cpp(self) -> str:
@@ -62,6 +63,30 @@ class MessageType:
     def leaf(self, path: tuple[str, ...]) -> Leaf | None:
         """Return what is at a path, or None if it is no number."""
         return next((each for each in self.leaves if each.path == path), None)
+
+    def type_of(self, path: tuple[str, ...]) -> str | None:
+        """Return the message type of a part; None for what is no message."""
+        return dict(self.parts).get(path) if path else self.name
+
+    def pairs(
+        self, path: tuple[str, ...], other: "MessageType", place: tuple[str, ...]
+    ) -> list[tuple[Leaf, Leaf]]:
+        """Return the numbers of a part beside those of another message's, from which they are
+        copied. Raise TypeError if that cannot be.
+        """
+        mine, theirs = self.type_of(path), other.type_of(place)
+        if mine is None or mine != theirs:
+            raise TypeError(f"{mine or '.'.join(path)} is not {theirs or '.'.join(place)}")
+        for each in (*self.texts, *self.others):
+            if each[: len(path)] == path:
+                raise TypeError(f"{'.'.join(each)} is not copied in the cycle")
+        found = []
+        for leaf in self.leaves:
+            if leaf.path[: len(path)] == path:
+                source = other.leaf((*place, *leaf.path[len(path) :]))
+                assert source is not None
+                found.append((leaf, source))
+        return found
 
     def below(self, path: tuple[str, ...]) -> list[str]:
         """Return the names that follow a path."""
@@ -85,12 +110,15 @@ def message_type(cls: Any, size: int | None) -> MessageType:
     leaves: list[Leaf] = []
     texts: list[tuple[str, ...]] = []
     others: list[tuple[str, ...]] = []
-    _collect(cls, (), size, leaves, texts, others)
+    parts: list[tuple[tuple[str, ...], str]] = []
+    _collect(cls, (), size, leaves, texts, others, parts)
     if size is not None and not any(each.is_variable for each in leaves):
         raise DeclarationError(f"{cls._type} has no array of variable size: declare no size")
     if sum(each.type.count for each in leaves) > _LARGEST:
         raise DeclarationError(f"{cls._type} has more than {_LARGEST} elements: declare fewer")
-    return MessageType(cls._type, tuple(leaves), tuple(texts), tuple(others), cls._md5sum)
+    return MessageType(
+        cls._type, tuple(leaves), tuple(texts), tuple(others), cls._md5sum, tuple(parts)
+    )
 
 
 def _collect(
@@ -100,6 +128,7 @@ def _collect(
     leaves: list[Leaf],
     texts: list[tuple[str, ...]],
     others: list[tuple[str, ...]],
+    parts: list[tuple[tuple[str, ...], str]],
 ) -> None:
     for name, declared in zip(cls.__slots__, cls._slot_types, strict=True):
         here = (*path, name)
@@ -126,7 +155,8 @@ def _collect(
         elif length is not None:
             others.append(here)  # a list of messages
         else:
-            _collect(_class_of(element), here, size, leaves, texts, others)
+            parts.append((here, element))
+            _collect(_class_of(element), here, size, leaves, texts, others, parts)
 
 
 def _class_of(name: str) -> Any:

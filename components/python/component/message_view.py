@@ -45,9 +45,21 @@ class MessageView:
         leaf = self._message.leaf(path)
         if not self._is_output:
             raise AttributeError(f"{self._port} is an input: it is only read")
+        if leaf is None and isinstance(value, MessageView):
+            copy(self._record, self._port, self._message, path, value)
+            return
         if leaf is None:
             raise AttributeError(f"{'.'.join(path)} is no number of {self._message.name}")
         self._record[self._port + leaf.field] = checked(value, leaf.type, ".".join(path))
+
+
+def copy(record: Any, port: str, message: MessageType, path: Any, source: MessageView) -> None:
+    """Set a part of an output's message, or all of it, from another message."""
+    for leaf, theirs in message.pairs(path, source._message, source._path):
+        value: Any = source
+        for name in theirs.path[len(source._path) :]:
+            value = getattr(value, name)
+        record[port + leaf.field] = checked(value, leaf.type, ".".join(leaf.path))
 
 
 def put(record: Any, port: str, message: MessageType, given: Any) -> bool:

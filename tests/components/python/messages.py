@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from geometry_msgs.msg import PoseWithCovariance, TwistStamped
+from geometry_msgs.msg import PoseWithCovariance, Twist, TwistStamped
 from rtcf.component import Component, Input, Output, Parameter, State
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -99,3 +99,22 @@ class Crowd(Component):
         """Say so."""
         self.joints.value.position[:] = 1.0
         self.joints.publish()
+
+
+class Relay(Component):
+    """Copies messages, and gives them names."""
+
+    wanted: Input[TwistStamped]
+    twist: Output[Twist]
+    stamped: Output[TwistStamped]
+    speed: State[float]
+
+    def update(self):
+        twist = self.wanted.value.twist
+        linear = twist.linear
+        self.speed = linear.x + linear.y
+        self.twist.write(twist)
+        out = self.stamped.value
+        out.twist = twist
+        out.twist.linear.x = 2.0 + linear.x
+        self.stamped.publish()

@@ -15,6 +15,9 @@ ALWAYS = {
     "elements": "for i in (1, 2):\n    x = i\nreturn x",
     "before a break": "while True:\n    x = 1\n    if c:\n        break\nreturn x",
     "a condition": "if (x := c) > 1:\n    return x\nreturn x",
+    "all of a condition": "if c and (x := c) > 1:\n    return x\nreturn 0",
+    "none of a condition": "if not c or (x := c) > 1:\n    return 0\nreturn x",
+    "while it holds": "while c and (x := c):\n    c = x\nreturn c",
     "all cases": "match c:\n    case 1:\n        x = 1\n    case _:\n        x = 2\nreturn x",
     "a case's own": "match c:\n    case 1:\n        x = 1\n    case x:\n        pass\nreturn x",
     "the end of a loop": "for i in range(c):\n    pass\nelse:\n    x = 1\nreturn x",
@@ -31,6 +34,7 @@ NOT_ALWAYS = {
     ),
     "after a break": ("while True:\n    if c:\n        break\n    x = 1\nreturn x", 5),
     "behind and": ("a = c and (x := c)\nreturn x", 2),
+    "any of a condition": ("if c or (x := c) > 1:\n    return x\nreturn 0", 2),
     "one case": ("match c:\n    case 1:\n        x = 1\nreturn x", 4),
     "itself": ("x += 1\nreturn x", 1),
     "the loop was left": (

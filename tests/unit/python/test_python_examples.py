@@ -4,10 +4,13 @@ as in the interpreter.
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rtcf_compile.main import main
+from rtcf_compile.rewriting import numpy_functions
 
-FOLDER = Path(__file__).parents[3] / "components" / "rtcf_examples" / "python"
+ROOT = Path(__file__).parents[3]
+FOLDER = ROOT / "components" / "rtcf_examples" / "python"
 EXAMPLES = sorted(each.stem for each in FOLDER.glob("*.py"))
 
 
@@ -20,3 +23,14 @@ def test_an_example_does_the_same_compiled_and_in_the_interpreter(name: str) -> 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_it_does_so_over_20000_cycles(name: str) -> None:
     assert main([str(FOLDER / f"{name}.py"), "--verify", "20000"]) == 0
+
+
+def test_functions_of_numpy_are_in_the_documentation() -> None:
+    page = (ROOT / "docs" / "python-components.md").read_text()
+    libm = set(numpy_functions.LIBM) - {"exp", "log", "hypot"}
+    aliases = {"ascontiguousarray", "amax", "amin", "around", "vdot", "matmul"}
+    aliases |= {"round_", "trapezoid"}
+    for function, _ in numpy_functions.STANDS_FOR:
+        name = function.__name__
+        is_numpy = name not in libm | aliases and getattr(np, name, None) is function
+        assert not is_numpy or f"`{name}`" in page, name

@@ -25,11 +25,15 @@ FILTERS = {
     for each in components(load(TREE / "tests" / "components" / "python" / "filters.py"))
 }
 CHECKED: Any = load(TREE / "tests" / "components" / "python" / "checked.py")
-ARM: Any = next(
-    each
+WRITTEN: dict[str, Any] = {
+    each.__name__: each
+    for each in components(load(TREE / "tests" / "components" / "python" / "written.py"))
+}
+MESSAGES: dict[str, Any] = {
+    each.__name__: each
     for each in components(load(TREE / "tests" / "components" / "python" / "messages.py"))
-    if each.__name__ == "Arm"
-)
+}
+ARM = MESSAGES["Arm"]
 
 
 def made(name: str, **parameters: object) -> Any:
@@ -196,6 +200,44 @@ def test_a_fault_is_an_exception() -> None:
     failing = made("Failing", way=4, after=1)
     with pytest.raises(Fault, match="no reply from the drive"):
         failing.cycle()
+
+
+def test_a_state_is_none_until_it_is_set() -> None:
+    unknown = WRITTEN["Unknown"]()
+    assert (unknown.last, unknown.first, unknown.row, unknown.way) == (None, 2.0, None, None)
+    unknown.last, unknown.row = 0.5, [1.0, 2.0, 3.0]
+    assert (unknown.last, unknown.row.tolist()) == (0.5, [1.0, 2.0, 3.0])
+    unknown.last = None
+    assert unknown.last is None
+
+
+def test_an_enum_takes_its_values_alone() -> None:
+    unknown = WRITTEN["Unknown"]()
+    unknown.mode = 4
+    assert unknown.mode.name == "HOLD"
+    with pytest.raises(ValueError, match="3 is not a valid Mode"):
+        unknown.mode = 3
+
+
+def test_bases_and_mixins_are_python_s() -> None:
+    inherited = WRITTEN["InheritedAgain"](bound=0.5)
+    inherited.start()
+    assert (inherited.z, inherited.turns, inherited.wide) == (1.0, 3, False)
+    inherited.u.put(9.0)
+    inherited.cycle()
+    assert (inherited.turns, inherited.count.value) == (4, 1)
+
+
+def test_a_message_is_copied_as_a_whole_or_in_parts() -> None:
+    relay: Any = MESSAGES["Relay"]()
+    message = TwistStamped()
+    message.twist.linear.x, message.twist.angular.z = 1.0, 2.0
+    relay.wanted.put(message)
+    relay.cycle()
+    assert relay.twist.value.linear.x == 1.0
+    assert (relay.stamped.value.twist.linear.x, relay.stamped.value.twist.angular.z) == (3.0, 2.0)
+    with pytest.raises(TypeError, match="frame_id is not copied"):
+        relay.stamped.write(relay.wanted.value)
 
 
 def test_instances_have_state_of_their_own() -> None:

@@ -51,6 +51,7 @@ class Faulty(Component):
     t: Input[Twist]
     p: Output[PoseStamped]
     o: State[float | None]
+    s: Input[PoseStamped]
     mode: State[Mode]
 
     @classmethod
@@ -117,6 +118,13 @@ IN_UPDATE = {
     "output assigned": ("self.y = 2.0", "is an Output"),
     "port's unknown field": ("self.n = self.u.count", "an Input has no count"),
     "wrong shape": ("self.z[:] = np.zeros(3)", "shape"),
+    "types that nothing is for": ("a = np.clip(self.z, A, 'x')", "has no meaning here"),
+    "message of another type": ("self.p.value.pose = self.t.value", "geometry_msgs/Pose is not"),
+    "text copied": ("self.p.write(self.s.value)", "frame_id is not copied in the cycle"),
+    "variable that is a message": (
+        "a = self.t.value\n        a = 1.0",
+        "a is a message",
+    ),
     "product of wrong shapes": ("self.z[:] = A @ np.zeros(3)", "@ of shapes"),
     "number set to an array": ("self.y.write(self.z)", "a number is set to"),
     "array set to a matrix": ("self.z[:] = np.eye(2)", "is set to"),
@@ -171,7 +179,7 @@ IN_UPDATE = {
     "pop of an array": ("self.z.pop()", "shrinks"),
     "queue assigned": ("self.q = 2.0", "is a Queue"),
     "message as value": ("self.y.write(self.t.value)", "geometry_msgs/Twist is no number"),
-    "part of a message": ("a = self.t.value.linear", "geometry_msgs/Twist.linear is no number"),
+    "part of a message": ("self.y.write(self.t.value.linear)", "Twist.linear is no number"),
     "field that a message has not": ("a = self.t.value.linear.w", "Twist.linear.w is not there"),
     "text of a message": ("self.p.value.header.frame_id = 'base'", "header.frame_id is text"),
     "message of an input set": ("self.t.value.linear.x = 1.0", "is of an Input"),

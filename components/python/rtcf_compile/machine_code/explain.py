@@ -7,6 +7,9 @@ from typing import Any
 from rtcf_compile.source.mistake import Mistake
 
 _MARK = re.compile(r"RTCF:([^:\n]+):([^\n]+?)(?:\x1b|\n|$)")
+# One of our helpers that has no overload for such types.
+_HELPER = re.compile(r"No implementation of function Function\(<function \w+ [^)]*\) found for "
+                     r"signature:\s*>>> \w+\(([^\n]*)\)")  # fmt: skip
 _KNOWN: tuple[tuple[str, str, str], ...] = (
     (
         r"Use of unsupported NumPy function '?(?:numpy\.)?([\w.]+)",
@@ -69,6 +72,9 @@ def mistake(error: Any, function: FunctionType) -> Mistake:
     line = lines[-1] if lines else getattr(place, "line", function.__code__.co_firstlineno)
     if found := _MARK.search(text):
         return Mistake(file, line, found[1].strip(), found[2].strip())
+    if found := _HELPER.search(text):
+        kinds = ", ".join(_plain(each) for each in _arguments(found[1]))
+        return Mistake(file, line, f"is not possible with {kinds}", "give it numbers and arrays")
     for pattern, what, way_out in _KNOWN:
         if found := re.search(pattern, text):
             words = [_plain(each or "") for each in found.groups()]
@@ -77,8 +83,22 @@ def mistake(error: Any, function: FunctionType) -> Mistake:
     return Mistake(file, line, f"cannot be compiled ({_plain(first)[:120]})", "write it simpler")
 
 
+def _arguments(text: str) -> list[str]:
+    """Return the types that stand between commas, of which they have some themselves."""
+    found, depth = [""], 0
+    for each in text:
+        depth += (each in "([{<") - (each in ")]}>")
+        if each == "," and depth == 0:
+            found.append("")
+        else:
+            found[-1] += each
+    return [each.strip() for each in found]
+
+
 def _plain(words: str) -> str:
     """Return numba's names of types as NumPy has them."""
+    words = re.sub(r"(?:Uni)?Tuple\(.*\)", "several values", words)
+    words = re.sub(r"readonly ", "", words)
     words = re.sub(r"array\((\w+), (\d)d, \w+\)", r"\2-dimensional array of \1", words)
     words = re.sub(
         r"(?:unaligned )?nestedarray\((\w+), \(([\d, ]+?),?\)\)",

@@ -1,6 +1,7 @@
 """Log calls of a component: the text and the types of the arguments that each stores."""
 
 import ast
+import string
 from dataclasses import dataclass, field
 
 from rtcf_compile.source.mistake import at
@@ -51,3 +52,24 @@ class Logs:
     def symbol(self, number: int) -> str:
         """Return the name of the C function that a call becomes."""
         return f"rtcf_log_{self.component}_{number}"
+
+
+def with_name(text: str, number: int, name: str) -> str | None:
+    """Return a format with a name in the place of one of its {}; None where fields have numbers."""
+    result, place = "", 0
+    try:
+        parts = list(string.Formatter().parse(text))
+    except ValueError:
+        return None
+    for literal, field_name, form, conversion in parts:
+        result += literal.replace("{", "{{").replace("}", "}}")
+        if field_name is None:
+            continue
+        if field_name or conversion:
+            return None
+        if place == number:
+            result += format(name, form or "").replace("{", "{{").replace("}", "}}")
+        else:
+            result += f"{{:{form}}}" if form else "{}"
+        place += 1
+    return result if place > number else None

@@ -5,6 +5,8 @@
 """
 
 import ast
+import copy
+import enum
 
 from rtcf.component.declaration import PORTS, Description, Input, Member, Output, Queue
 from rtcf.component.message_type import MessageType
@@ -29,15 +31,17 @@ class Ports(Products):
         self.used: set[str] = set()
         self.touched: dict[str, ast.AST] = {}
 
+    def _enum_of(self, node: ast.expr) -> type[enum.IntEnum] | None:
+        """Return the enum that a member, or the value of a port, is declared as."""
+        is_value = isinstance(node, ast.Attribute) and node.attr == "value"
+        owner = node.value if is_value else node  # type: ignore[attr-defined]
+        if not isinstance(owner, ast.Attribute) or not self._is_self(owner.value):
+            return None
+        member = self._description.members.get(owner.attr)
+        return None if member is None else member.type.enumeration
+
     def _is_enum(self, node: ast.expr) -> bool:
-        if not isinstance(node, ast.Attribute):
-            return False
-        owner = node.value if node.attr in ("value", "front") else node
-        for each in (node, owner):
-            if isinstance(each, ast.Attribute) and self._is_self(each.value):
-                member = self._description.members.get(each.attr)
-                return member is not None and member.type.enumeration is not None
-        return False
+        return self._enum_of(node) is not None
 
     def _port(self, node: ast.Attribute, port: Member) -> ast.AST:
         fields = _INPUT_FIELDS if port.kind is Input else {"value": ""}
@@ -82,6 +86,77 @@ class Ports(Products):
             names.append(node.attr)
             node = node.value
         return None, ()
+
+    def _message_part(self, node: ast.AST) -> tuple[Member, tuple[str, ...]] | None:
+        """Return the port and the path of a message, or of a message in it."""
+        names: list[str] = []
+        while isinstance(node, ast.Attribute):
+            port = self._member(node)
+            if port is not None and port.message and names and names[-1] == "value":
+                path = tuple(reversed(names[:-1]))
+                return None if port.message.type_of(path) is None else (port, path)
+            names.append(node.attr)
+            node = node.value
+        return None
+
+    def _copied(self, node: ast.stmt, target: ast.expr, value: ast.expr) -> list[ast.stmt] | None:
+        """Return the assignments of all numbers of a message, or of a part of one; None for
+        others.
+        """
+        mine, theirs = self._message_part(target), self._message_part(value)
+        if mine is None or theirs is None:
+            return None
+        (port, path), (source, place) = mine, theirs
+        assert port.message is not None and source.message is not None
+        if port.kind is Input:
+            raise self.mistake(target, "is of an Input", "it is only read")
+        try:
+            pairs = port.message.pairs(path, source.message, place)
+        except TypeError as error:
+            raise self.mistake(node, str(error), "copy its numbers one by one") from None
+        steps: list[ast.stmt] = []
+        for leaf, given in pairs:
+            read = value
+            for name in given.path[len(place) :]:
+                read = ast.Attribute(read, name, ast.Load())
+            new = self.visit(like(node, copy.deepcopy(read)))
+            steps.append(self._set_field(node, port.name + leaf.field, leaf.type, new))
+        return steps
+
+    def _set_field(self, node: ast.stmt, name: str, kind: ValueType, value: ast.expr) -> ast.stmt:
+        raise NotImplementedError
+
+    def _without_aliases(self, tree: ast.FunctionDef) -> None:
+        """Put messages in the place of variables that stand for them: `m = self.twist.value`."""
+        known: dict[str, ast.expr] = {}
+        while True:
+            _Named(known).visit(tree)
+            found: dict[str, list[ast.Assign]] = {}
+            for each in ast.walk(tree):
+                if not isinstance(each, ast.Assign) or len(each.targets) > 1:
+                    continue
+                target = each.targets[0]
+                if isinstance(target, ast.Name) and self._message_part(each.value) is not None:
+                    found.setdefault(target.id, []).append(each)
+            new = {name: places for name, places in found.items() if name not in known}
+            if not new:
+                break
+            for name, places in new.items():
+                known[name] = places[0].value
+                self._check_alias(tree, name, places)
+        _Dropped(known).visit(tree)
+
+    def _check_alias(self, tree: ast.FunctionDef, name: str, places: list[ast.Assign]) -> None:
+        """Refuse a variable that is not always the same message."""
+        own = [each.targets[0] for each in places]
+        for each in ast.walk(tree):
+            if not isinstance(each, ast.Name) or isinstance(each.ctx, ast.Load):
+                continue
+            if each.id == name and not any(each is target for target in own):
+                raise self.mistake(each, f"{name} is a message", "take another name")
+        for place in places:
+            if ast.unparse(place.value) != ast.unparse(places[0].value):
+                raise self.mistake(place, f"{name} is once another message", "take another name")
 
     def _part(self, node: ast.Attribute, port: Member, path: tuple[str, ...]) -> ast.AST:
         assert port.message is not None
@@ -191,3 +266,28 @@ def a_kind(member: Member) -> str:
     """Return a member's kind with its article."""
     kind = member.kind.__name__
     return f"{'an' if kind[0] in 'IO' else 'a'} {kind}"
+
+
+class _Named(ast.NodeTransformer):
+    """Puts expressions in the place of variables that are read."""
+
+    def __init__(self, known: dict[str, ast.expr]) -> None:
+        self._known = known
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        if isinstance(node.ctx, ast.Load) and node.id in self._known:
+            return like(node, copy.deepcopy(self._known[node.id]))
+        return node
+
+
+class _Dropped(ast.NodeTransformer):
+    """Drops assignments to variables."""
+
+    def __init__(self, known: dict[str, ast.expr]) -> None:
+        self._known = known
+
+    def visit_Assign(self, node: ast.Assign) -> ast.AST:
+        target = node.targets[0]
+        if len(node.targets) == 1 and isinstance(target, ast.Name) and target.id in self._known:
+            return like(node, ast.Pass())
+        return node

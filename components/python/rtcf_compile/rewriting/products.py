@@ -322,8 +322,12 @@ class Products(ast.NodeTransformer):
             if node.id in self.source.function.__code__.co_varnames:
                 return node.id in self._lists
             return isinstance(resolve(node, self.source), list)
-        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Mult):
-            return self._is_list(node.left) or self._is_list(node.right)
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
+            return self._is_list(node.left) and self._is_list(node.right)
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult):
+            times = node.right if self._is_list(node.left) else node.left
+            values = node.left if times is node.right else node.right
+            return self._is_list(values) and self._is_whole(times)
         return isinstance(node, ast.List)
 
     def _of_lists(self, node: ast.BinOp) -> ast.AST | None:

@@ -5,6 +5,7 @@
 """
 
 import ast
+import copy
 from collections.abc import Sequence
 from typing import Any
 
@@ -24,7 +25,7 @@ from rtcf.component.declaration import (
 )
 from rtcf.component.value_type import ValueType
 
-from rtcf_compile.rewriting.logs import Logs
+from rtcf_compile.rewriting.logs import Logs, with_name
 from rtcf_compile.rewriting.methods import Method, Methods
 from rtcf_compile.rewriting.ports import Ports, a_kind
 from rtcf_compile.rewriting.products import call_of, like, loaded
@@ -54,6 +55,7 @@ class Hook(Ports):
         tree = self.source.tree
         if not self._self:
             raise self.mistake(tree, f"{tree.name} has no self", f"def {tree.name}(self):")
+        self._without_aliases(tree)
         body = self.statements(tree.body)
         arguments = ast.arguments(
             posonlyargs=[],
@@ -193,6 +195,30 @@ class Hook(Ports):
             new.keywords = [self.visit(each) for each in node.keywords]
         return like(node, new)
 
+    def _named(self, node: ast.Expr, call: ast.Call) -> ast.stmt | None:
+        """Return a log call with the name of an enum as one call for each name; None for others."""
+        if not isinstance(call.func, ast.Attribute) or call.func.attr not in LOG_LEVELS:
+            return None
+        for number, each in enumerate(call.args[1:]):
+            if not isinstance(each, ast.Attribute) or each.attr != "name":
+                continue
+            enumeration = self._enum_of(each.value)
+            text = call.args[0]
+            if enumeration is None or not isinstance(text, ast.Constant):
+                continue
+            result: list[ast.stmt] = []
+            rest = [*call.args[1 : number + 1], *call.args[number + 2 :]]
+            for member in enumeration:
+                new = with_name(str(text.value), number, member.name)
+                if new is None:
+                    raise self.mistake(call, "a name stands in a {} of its own", "write {}")
+                own = like(node, ast.Call(call.func, [ast.Constant(new), *rest], []))
+                test = ast.Compare(each.value, [ast.Eq()], [ast.Constant(int(member))])
+                statement = like(node, ast.Expr(copy.deepcopy(own)))
+                result = [like(node, ast.If(copy.deepcopy(test), [statement], result))]
+            return result[0]
+        return None
+
     def _of_super(self, node: ast.Attribute) -> Method:
         method = self._methods.find(node.attr, behind=self._owner)
         if method is None:
@@ -202,6 +228,8 @@ class Hook(Ports):
     def visit_Expr(self, node: ast.Expr) -> ast.AST | list[ast.stmt]:
         """Statements that write and that end."""
         call = node.value
+        if isinstance(call, ast.Call) and (logged := self._named(node, call)) is not None:
+            return self.statements([logged])
         if (
             isinstance(call, ast.Call)
             and isinstance(call.func, ast.Attribute)
@@ -218,6 +246,12 @@ class Hook(Ports):
                 flag = ast.Assign([self._field(f"{port.name}__written")], ast.Constant(True))
                 return like(node, flag)
             if port is not None and port.kind is Output and call.func.attr == "write":
+                if port.message and len(call.args) == 1:
+                    whole = ast.Attribute(call.func.value, "value", ast.Load())
+                    copied = self._copied(node, whole, call.args[0])
+                    if copied is not None:
+                        written = self._field(f"{port.name}__written")
+                        return [*copied, like(node, ast.Assign([written], ast.Constant(True)))]
                 if port.message:
                     raise self.mistake(
                         call,
@@ -244,6 +278,10 @@ class Hook(Ports):
         for target in node.targets:
             self._check_elements(target)
         own = [each for target in node.targets for each in self._owned(target)]
+        if len(node.targets) == 1:
+            copied = self._copied(node, node.targets[0], node.value)
+            if copied is not None:
+                return copied
         if len(node.targets) == 1 and (part := self._settable_part(node.targets[0])):
             return self._set_field(node, *part, self.visit(node.value))
         if not own:
