@@ -1,5 +1,6 @@
-"""Random programs for a component in Python: assignments, slices, views, broadcasting, products of
-matrices and control flow on a state of two vectors, two matrices, numbers, a bool and an enum.
+"""Random programs for a component in Python: assignments, slices, views, broadcasting, functions of
+NumPy, lists, products of matrices, match and control flow on a state of two vectors, two matrices,
+numbers, of which one may be None, a bool and an enum.
 """
 
 import random
@@ -39,6 +40,11 @@ class Programs(Component):
     n: State[int]
     flag: State[bool]
     mode: State[Mode]
+    last: State[float | None]
+
+    @property
+    def gap(self):
+        return self.x - self.y
 
     def update(self):
         self.a[:] = self.vectors.value[0]
@@ -50,6 +56,7 @@ class Programs(Component):
         self.n = self.count.value % 7
         self.flag = self.x > self.y
         self.mode = Mode.RUN
+        self.last = None
         which = self.which.value % {count}
 """
 _VECTORS = ("self.a", "self.b")
@@ -91,9 +98,11 @@ class Program:
             self._set_slice, self._set_slice, self._change_slice, self._set_matrix, self._set_row,
             self._set_element, self._set_number, self._change_number, self._view, self._change_view,
             self._variable, self._set_whole, self._set_mode, self._set_selected, self._set_any,
+            self._set_several, self._set_several, self._set_last,
         ]  # fmt: skip
         if depth < 2 and self._draw.random() < 0.3:
-            return self._draw.choice([self._if, self._for, self._while])(scope, depth)
+            ways = [self._if, self._for, self._while, self._match, self._walrus]
+            return self._draw.choice(ways)(scope, depth)
         return self._draw.choice(simple)(scope)
 
     def _set_slice(self, scope: _Scope) -> list[str]:
@@ -171,6 +180,33 @@ class Program:
             value = self._vector(scope, _SIDE, 1)
         return [*lines, f"{target} {self._draw.choice(['', '+', '*'])}= {value}"]
 
+    def _set_several(self, scope: _Scope) -> list[str]:
+        """Set several targets at once, from several values or from the elements of a vector."""
+        draw = self._draw.random()
+        numbers = ["self.x", "self.y", *scope.numbers]
+        numbers += [f"{each}[{self._index(scope, _LONG)}]" for each in _VECTORS]
+        one, other = self._draw.sample(numbers, 2)
+        if draw < 0.3:
+            return [f"{one}, {other} = {self._float(scope, 1)}, {self._float(scope, 1)}"]
+        if draw < 0.5:
+            return [f"{one} = {other} = {self._float(scope, 1)}"]
+        if draw < 0.7:
+            first, second = self._draw.sample(_VECTORS, 2)
+            values = f"{self._vector(scope, _LONG, 1)}, {self._vector(scope, _LONG, 1)}"
+            return [f"{first}, {second} = {values}"]
+        names = [self._name() for _ in range(3)]
+        lines = [f"{', '.join(names)} = {self._vector(scope, 3, 2)}"]
+        scope.numbers += names
+        return lines
+
+    def _set_last(self, scope: _Scope) -> list[str]:
+        value = self._float(scope, 1)
+        how = self._draw.choice(["{0}", "None", "{0} if {1} else None", "self.last"])
+        lines = [f"self.last = {how.format(value, self._bool(scope, 1))}"]
+        if self._draw.random() < 0.5:
+            lines += ["if self.last is not None:", f"    self.last += {self._float(scope, 1)}"]
+        return lines
+
     def _set_number(self, scope: _Scope) -> list[str]:
         return [f"self.{self._draw.choice('xy')} = {self._float(scope, 3)}"]
 
@@ -186,6 +222,8 @@ class Program:
     def _set_mode(self, scope: _Scope) -> list[str]:
         modes = [f"Mode.{each}" for each in ("OFF", "RUN", "HOLD")]
         one, other = self._draw.sample(modes, 2)
+        if self._draw.random() < 0.3:
+            return [f"self.mode = Mode({self._int(scope, 1)} % {self._draw.choice([3, 3, 4])})"]
         return [f"self.mode = {one} if {self._bool(scope, 1)} else {other}"]
 
     def _variable(self, scope: _Scope) -> list[str]:
@@ -214,6 +252,30 @@ class Program:
         if self._draw.random() < 0.5:
             lines += ["else:", *self._inside(scope, depth)]
         return lines
+
+    def _match(self, scope: _Scope, depth: int) -> list[str]:
+        if self._draw.random() < 0.5:
+            subject, cases = "self.mode", ["Mode.OFF", "Mode.RUN | Mode.HOLD", "Mode.HOLD", "_"]
+        else:
+            name = self._name()
+            subject = f"{self._int(scope, 1)} % 5"
+            cases = ["0", "1 | 2", f"{name} if {name} > self.n", f"2 as {name}", "_"]
+        lines = [f"match {subject}:"]
+        for case in sorted(self._draw.sample(cases, self._draw.randint(1, 3)), key=cases.index):
+            guard = f" if {self._bool(scope, 1)}" if self._draw.random() < 0.3 else ""
+            guard = "" if " if " in case else guard
+            lines.append(f"    case {case}{guard}:")
+            lines += [f"    {line}" for line in self._inside(scope, depth)]
+        return lines
+
+    def _walrus(self, scope: _Scope, depth: int) -> list[str]:
+        name, bound = self._name(), self._float(scope, 0)
+        test = f"({name} := {self._float(scope, 2)}) > {bound}"
+        if self._draw.random() < 0.3:
+            test = f"{self._bool(scope, 1)} and {test}"
+        inner = _Scope(dict(scope.views), dict(scope.indices), [*scope.numbers, name])
+        lines = [f"if {test}:", *self._inside(inner, depth)]
+        return [*lines, "else:", *self._inside(scope, depth)]
 
     def _for(self, scope: _Scope, depth: int) -> list[str]:
         index, end = self._name(), self._draw.randint(1, 4)
@@ -262,8 +324,10 @@ class Program:
 
     def _vector(self, scope: _Scope, size: int, depth: int) -> str:
         draw = self._draw.random()
-        if depth == 0 or draw < 0.35:
+        if depth == 0 or draw < 0.32:
             return self._vector_leaf(scope, size)
+        if draw < 0.4:
+            return self._vector_of(scope, size, depth)
         if draw < 0.65:
             one, other = self._vector(scope, size, depth - 1), self._vector(scope, size, depth - 1)
             return f"({one} {self._draw.choice('+-*')} {other})"
@@ -283,6 +347,77 @@ class Program:
             one, other = self._matrix(scope, depth - 1), self._vector(scope, size, depth - 1)
             return self._draw.choice([f"({one} @ {other})", f"({other} @ {one})"])
         return f"blend({self._vector(scope, size, 0)}, {self._vector(scope, size, 0)}, 0.25)"
+
+    def _vector_of(self, scope: _Scope, size: int, depth: int) -> str:
+        """Return a vector that a function of NumPy makes."""
+        first = self._draw.randint(0, size)
+        parts = [self._vector(scope, each, 0) for each in (first, size - first, size)]
+        numbers = [self._float(scope, 0) for _ in range(size)]
+        ways = [
+            f"np.concatenate(({parts[0]}, {parts[1]}))",
+            f"np.sort({parts[2]})",
+            f"np.cumsum({parts[2]})",
+            f"np.clip({parts[2]}, -2.0, {self._float(scope, 0)})",
+            f"np.clip({parts[2]}, {self._vector(scope, size, 0)}, 3.0)",
+            f"np.interp({parts[2]}, [-1.0, 0.0, 1.0, 4.0, 9.0, 9.5], [2.0, 1, 0, 3, 4.5, 5])",
+        ]
+        if numbers:
+            listed = f"[{', '.join(numbers)}]"
+            ways += [f"np.array({listed})", f"({parts[2]} + {listed})", f"np.asarray({listed})"]
+            ways += [f"np.hstack(({numbers[0]}, {self._vector(scope, size - 1, 0)}))"]
+        if size == _SIDE:
+            matrix, axis = self._matrix(scope, depth - 1), self._draw.choice(["0", "1", "-1"])
+            name = self._draw.choice(["sum", "max", "min", "mean", "std"])
+            ways += [f"np.{name}({matrix}, axis={axis})", f"{matrix}.{name}(axis={axis})"]
+            ways += [f"np.diag({matrix})", f"np.linalg.norm({matrix}, axis={axis})"]
+            ways += [f"np.cross({parts[2]}, {self._vector(scope, size, 0)})"]
+        return self._draw.choice(ways)
+
+    def _matrix_of(self, scope: _Scope, depth: int) -> str:
+        """Return a matrix that a function of NumPy makes."""
+        rows = [self._vector(scope, _SIDE, 0) for _ in range(_SIDE)]
+        numbers = [[self._float(scope, 0) for _ in range(_SIDE)] for _ in range(_SIDE)]
+        listed = ", ".join(f"[{', '.join(row)}]" for row in numbers)
+        return self._draw.choice(
+            [
+                f"np.vstack(({', '.join(rows)}))",
+                f"np.vstack([{self._matrix(scope, 0)}[:2], {rows[0]}])",
+                f"np.column_stack(({', '.join(rows)}))",
+                f"np.array([{listed}])",
+                f"np.outer({rows[0]}, {rows[1]})",
+                f"np.diag({rows[0]})",
+                f"np.linalg.matrix_power({self._matrix(scope, 0)}, {self._draw.randint(0, 4)})",
+                f"{self._matrix(scope, depth - 1)}.reshape(9)[::-1].reshape(3, -1)",
+                f"np.sort({self._matrix(scope, 0)}, axis={self._draw.choice([0, 1])})",
+            ]
+        )
+
+    def _number_of(self, scope: _Scope, depth: int) -> str:
+        """Return a number that a function makes of an array, or of numbers."""
+        size = self._draw.randint(1, 5)
+        vector, one = self._vector(scope, size, depth - 1), self._float(scope, depth - 1)
+        other, matrix = self._float(scope, 0), self._matrix(scope, 0)
+        name = self._draw.choice(["sum", "max", "min", "mean", "std", "median", "linalg.norm"])
+        return self._draw.choice(
+            [
+                f"np.{name}({vector})",
+                f"np.{self._draw.choice(['sum', 'max', 'linalg.norm', 'linalg.det'])}({matrix})",
+                f"{matrix}.{self._draw.choice(['sum', 'min', 'trace', 'mean'])}()",
+                f"np.clip({one}, -1.0, {other})",
+                f"np.hypot({one}, {other})",
+                f"np.sign({one})",
+                f"np.mod({one}, {other})",
+                f"math.fmod({one}, 3.0)",
+                f"np.trapz({vector})",
+                f"np.interp({one}, {self._vector_leaf_of_numbers()}, [3.0, -1.0, 2.0])",
+                f"float(self.mode.value + np.argmax({vector}))",
+                "self.gap",
+            ]
+        )
+
+    def _vector_leaf_of_numbers(self) -> str:
+        numbers = sorted(self._draw.uniform(-5, 5) for _ in range(3))
+        return f"[{', '.join(f'{each:.2f}' for each in numbers)}]"
 
     def _vector_leaf(self, scope: _Scope, size: int) -> str:
         leaves = []
@@ -309,6 +444,8 @@ class Program:
         if depth == 0 or draw < 0.4:
             name = self._draw.choice(_MATRICES)
             return name + self._draw.choice(["", ".T", "[::-1]", "[:, ::-1]", "[::-1, ::-1].T"])
+        if draw < 0.48:
+            return self._matrix_of(scope, depth)
         if draw < 0.6:
             one, other = self._matrix(scope, depth - 1), self._matrix(scope, depth - 1)
             return f"({one} {self._draw.choice('+-*')} {other})"
@@ -329,6 +466,8 @@ class Program:
                     f"self.m[{self._index(scope, _SIDE)}, {self._index(scope, _SIDE)}]",
                 ]
             )
+        if draw < 0.48:
+            return self._number_of(scope, depth)
         if draw < 0.65:
             one, other = self._float(scope, depth - 1), self._float(scope, depth - 1)
             return f"({one} {self._draw.choice('+-*')} {other})"
@@ -373,8 +512,13 @@ class Program:
             # Of two constants numba makes an int.
             name = self._draw.choice(["self.x", "self.y", *scope.numbers])
             compared = f"{name} {self._draw.choice(['<', '>', '<=', '=='])} {self._float(scope, 0)}"
-            mode = f"self.mode == Mode.{self._draw.choice(['OFF', 'RUN', 'HOLD'])}"
-            return f"({self._draw.choice(['self.flag', compared, compared, mode])})"
+            how = self._draw.choice(["==", "is", "!=", "is not"])
+            mode = f"self.mode {how} Mode.{self._draw.choice(['OFF', 'RUN', 'HOLD'])}"
+            others = [mode, "self.last is None", "self.last == self.x", "self.n in (0, 2, -3)"]
+            others += [f"math.isclose({name}, {self._float(scope, 0)}, rel_tol=0.5)"]
+            return f"({self._draw.choice(['self.flag', compared, compared, *others])})"
+        if draw < 0.35:
+            return f"np.any({self._vector(scope, 3, depth - 1)} > {self._float(scope, 0)})"
         if draw < 0.5:
             parts = [self._float(scope, depth - 1) for _ in range(2)]
             return f"({parts[0]} < self.x <= {parts[1]})"

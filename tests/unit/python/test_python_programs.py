@@ -29,7 +29,7 @@ def same(seed: int, folder: Path) -> None:
     assert found.differences == [], f"seed {seed}: {found}"
 
 
-@settings(max_examples=4)
+@settings(max_examples=3)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_programs_do_compiled_what_they_do_in_the_interpreter(
     tmp_path_factory: pytest.TempPathFactory, seed: int
