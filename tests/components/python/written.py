@@ -10,6 +10,7 @@ from rtcf.component import Component, Derived, Input, Output, Parameter, State
 POINTS = [0.0, 1, 2.5, 4.0, 7.0]
 VALUES = [0.5, -1.0, 2.0, 8.0, 1.0]
 ROWS = [2, 0]
+MATRIX = np.arange(30.0).reshape(10, 3) ** 1.5
 
 
 class Mode(enum.IntEnum):
@@ -157,7 +158,8 @@ class Sampling(Component):
         self.a[9:] = np.diff(u)[:3] + np.nan_to_num(m[0], nan=5.0)
         self.b = [np.median(u), np.linalg.det(m[:3]), np.trace(m), v, 1, np.inner(m[0], m[1])]
         self.s = m + np.sum(m, axis=1, keepdims=True) + np.cumsum(m, axis=0)
-        self.s += np.round(m) - m.max(axis=0)
+        self.s += np.round(m) - m.max(axis=0) + MATRIX.sum() + MATRIX.mean(axis=0)
+        self.s *= u[:4, None] * u[None, 4:7]
         view = self.s.reshape(6, 2)
         view[1] = 7.0
         self.s.T.ravel()[0] = 3.0

@@ -20,6 +20,7 @@ from std_msgs.msg import Float64MultiArray
 A = np.eye(2)
 GAINS = {"kp": 1.0}
 SIZE = 100
+TABLE = [1.0, 2.0]
 
 
 class Mode(enum.IntEnum):
@@ -133,6 +134,16 @@ IN_UPDATE = {
     "integer overflow": ("self.n = 2**63", "does not fit int64"),
     "big literal": ("self.n = 9223372036854775808", "does not fit int64"),
     "element of a constant set": ("A[0, 0] = 2.0", "A is a constant of the module"),
+    "list of the module set": ("TABLE[0] = 2.0", "TABLE is a constant of the module"),
+    "list of the module that grows": ("TABLE.append(2.0)", "TABLE is a constant of the module"),
+    "constant sorted": ("A.sort()", "a constant of the module is sorted"),
+    "constant filled": ("A.fill(0.0)", "a constant of the module is set"),
+    "constant changed in place": (
+        "a = A\n        a += 1.0",
+        "a constant of the module is set",
+    ),
+    "number among rows": ("a = np.array([self.z, 1.0])", "an array of arrays and numbers"),
+    "new axis of a matrix": ("a = A[None]", "a new axis of an array of 2"),
     "constant set by another name": ("a = A\n        a[0, 0] = 2.0", "a constant of the module"),
     "float set to a whole element": (
         "i = np.zeros(2, np.int64)\n        i[self.n] = 0.5",

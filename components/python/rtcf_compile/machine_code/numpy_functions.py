@@ -114,6 +114,8 @@ def _array(object: Any, dtype: Any) -> Any:
     if isinstance(object, types.BaseTuple) and any(
         isinstance(each, types.Array) for each in object.types
     ):
+        if not all(isinstance(each, types.Array | types.BaseTuple) for each in object.types):
+            raise TypingError("RTCF:an array of arrays and numbers:use np.hstack")
         if not isinstance(dtype, types.NoneType):
             return lambda object, dtype: own.rtcf_array(own.rtcf_stack(object, 0), dtype)
         return lambda object, dtype: own.rtcf_stack(object, 0)
@@ -261,6 +263,12 @@ def _reshape(a: Any, newshape: Any) -> Any:
         return _viewed(_any_layout(copy), shape, _strides(shape, a.itemsize))
 
     return reshape
+
+
+@compiled_as(own.rtcf_vector_as)
+def _vector_as(a: Any, shape: Any) -> Any:
+    _needs(a, "a new axis", (1,))
+    return lambda a, shape: own.rtcf_reshape(a, shape)
 
 
 def _filled(shape: Any, rest: Any) -> Any:
@@ -1050,6 +1058,11 @@ def _sort(a: Any, axis: Any) -> Any:
         return result
 
     return sort
+
+
+@compiled_as(own.rtcf_fill)
+def _fill(a: Any, value: Any) -> Any:
+    return lambda a, value: helpers.rtcf_assign(a, value)
 
 
 @compiled_as(own.rtcf_argsort, arrays=("a",))

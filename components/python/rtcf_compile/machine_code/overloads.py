@@ -395,6 +395,8 @@ def _row_of_any() -> Any:
 def _assign(target: Any, value: Any) -> Any:
     if not isinstance(target, types.Array):
         raise TypingError(f"RTCF:{words(target)} is set as an array:use =")
+    if not target.mutable:
+        raise TypingError("RTCF:a constant of the module is set:declare a State, or copy it")
     new = value.dtype if isinstance(value, types.Array) else value
     if isinstance(new, types.Float) and not isinstance(target.dtype, types.Float):
         raise TypingError(f"RTCF:elements of {target.dtype} are set to {new}:round them first")

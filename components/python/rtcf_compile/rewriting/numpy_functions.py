@@ -82,6 +82,13 @@ def rtcf_reshape(a: Any, newshape: Any) -> Any:
     return np.reshape(a, newshape)
 
 
+def rtcf_vector_as(a: Any, shape: Any) -> Any:
+    """Return a vector as a row or a column."""
+    if np.ndim(a) != 1:
+        raise ValueError("a new axis of what is no vector")
+    return np.reshape(a, shape)
+
+
 @_stands_for(np.ravel, method="ravel")
 def rtcf_ravel(a: Any) -> Any:
     """Return an array's elements in a row: a view where NumPy makes one."""
@@ -269,6 +276,14 @@ def rtcf_sort_in_place(a: Any, axis: Any = -1) -> None:
 
 
 METHODS["sort"] = rtcf_sort_in_place
+
+
+def rtcf_fill(a: Any, value: Any) -> None:
+    """Set all elements of an array."""
+    helpers.rtcf_assign(a, value)
+
+
+METHODS["fill"] = rtcf_fill
 
 
 @_stands_for(np.argsort, method="argsort")
@@ -498,5 +513,6 @@ def rtcf_math_hypot(x: Any, y: Any) -> float:
 
 STANDS_FOR.append((math.hypot, rtcf_math_hypot))
 
-_ALL: list[Function] = [*(own for _, own in STANDS_FOR), *METHODS.values(), rtcf_whole_pow]
+_ALL: list[Function] = [own for _, own in STANDS_FOR]
+_ALL += [*METHODS.values(), rtcf_whole_pow, rtcf_vector_as]
 BY_NAME: dict[str, Function] = {each.__name__: each for each in _ALL}

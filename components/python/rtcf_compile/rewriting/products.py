@@ -396,7 +396,9 @@ class Products(ast.NodeTransformer):
             raise self.mistake(
                 node, f"{target.__name__} has an argument too many", "set what it returns: x[:] = …"
             )
-        if isinstance(node.func, ast.Attribute) and target is None:
+        if isinstance(node.func, ast.Attribute) and (
+            target is None or isinstance(resolve(node.func.value, self.source), np.ndarray)
+        ):
             if node.func.attr == "dot":
                 arguments = [self.visit(each) for each in node.args]
                 return like(node, call_of("rtcf_matmul", self.visit(node.func.value), *arguments))
@@ -502,6 +504,8 @@ class Products(ast.NodeTransformer):
         """`x[i]`, where i may be an array."""
         node.slice = self._arrays(node.slice)
         parts = list(_parts(node))
+        if isinstance(node.ctx, ast.Load) and any(_is_new(each) for each in parts):
+            return self._with_new_axis(node, parts)
         self.generic_visit(node)
         if isinstance(node.ctx, ast.Load) and any(self._may_select(each) for each in parts):
             return like(node, call_of("rtcf_get", node.value, _index(node.slice)))
@@ -517,8 +521,19 @@ class Products(ast.NodeTransformer):
 
     def _may_select(self, node: ast.expr) -> bool:
         """Tell whether an index may be an array."""
-        is_new = ast.unparse(node) in ("None", "np.newaxis", "numpy.newaxis")
-        return not is_new and not _is_view(node) and not self._is_whole(node)
+        return not _is_view(node) and not self._is_whole(node)
+
+    def _with_new_axis(self, node: ast.Subscript, parts: list[ast.expr]) -> ast.AST:
+        """`v[:, None]`, `v[None, :]`: a vector as a column, or as a row."""
+        others = [each for each in parts if not _is_new(each)]
+        if len(parts) > 2 or len(others) > 1 or not all(_is_view(each) for each in others):
+            raise self.mistake(node, "a new axis of what is no vector", "use np.reshape")
+        is_row = _is_new(parts[0])
+        shape = ast.Tuple(
+            [ast.Constant(each) for each in ((1, -1) if is_row else (-1, 1))], ast.Load()
+        )
+        vector = ast.Subscript(node.value, others[0], ast.Load()) if others else node.value
+        return like(node, call_of("rtcf_vector_as", self.visit(like(node, vector)), shape))
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST | list[ast.stmt]:
         """`x[1:3] = value`, `x[i] = value`, `a, b = f()`."""
@@ -604,17 +619,17 @@ class Products(ast.NodeTransformer):
         index = _index(self.visit(self._arrays(target.slice)))
         return [*before, like(node, ast.Expr(call_of("rtcf_set", base, index, value)))]
 
-    def _check_constant(self, target: ast.expr) -> None:
-        """Refuse to set elements of lists and of what belongs to the module."""
-        base = target
-        if self._is_list(target.value):  # type: ignore[attr-defined]
-            raise self.mistake(target, "a list that changes allocates", "use np.array([…])")
+    def _check_constant(self, target: ast.Subscript) -> None:
+        """Refuse to set elements of what belongs to the module, and of lists."""
+        base: ast.expr = target
         while isinstance(base, ast.Subscript | ast.Attribute):
             base = base.value
         if isinstance(base, ast.Name) and base.id not in self.source.function.__code__.co_varnames:
             raise self.mistake(
                 target, f"{base.id} is a constant of the module", "declare a State, or copy it"
             )
+        if self._is_list(target.value):
+            raise self.mistake(target, "a list that changes allocates", "use np.array([…])")
 
     def _known(self, base: ast.expr) -> tuple[int, bool]:
         """Return how many dimensions an array is declared with, 0 if it is not, and whether its
@@ -689,6 +704,10 @@ class Products(ast.NodeTransformer):
 
 def _parts(node: ast.Subscript) -> list[ast.expr]:
     return node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+
+
+def _is_new(index: ast.AST) -> bool:
+    return ast.unparse(index) in ("None", "np.newaxis", "numpy.newaxis")
 
 
 def _is_view(index: ast.AST) -> bool:

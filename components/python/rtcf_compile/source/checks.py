@@ -205,6 +205,9 @@ def _call(node: ast.Call, source: Source) -> None:
     name = getattr(target, "__name__", "")
     if target is not None and getattr(np, name, None) is target and name in _GROWS:
         raise at(file, node, f"np.{name} makes an array that grows", _GROWS[name])
+    if isinstance(called, ast.Attribute) and isinstance(resolve(called.value, source), list):
+        name = ast.unparse(called.value)
+        raise at(file, node, f"{name} is a constant of the module", "declare a State, or copy it")
     if isinstance(called, ast.Attribute) and target is None and called.attr in METHODS:
         # What is declared as a queue has a pop() of its own: seen where declarations are known.
         may_be_queue = called.attr == "pop" and isinstance(called.value, ast.Attribute)
