@@ -144,7 +144,7 @@ class Sampling(Component):
     b: State[np.float64, 6]
     s: State[np.float64, (4, 3)]
     n: State[np.int64, 6]
-    on: State[bool, 4]
+    on: State[np.bool_, 4]
 
     def update(self):
         u, v, m = self.u.value, self.v.value, self.m.value
@@ -169,7 +169,9 @@ class Sampling(Component):
         self.on[0] = np.allclose(u, u * (1.0 + 1e-9)) and np.array_equal(m, m)
         self.on[1] = np.all(np.isclose(m, v, atol=1.0)) or np.any(u > 3.0)
         self.on[2] = v in (0.0, 1.0) or math.isclose(v, 1.0, abs_tol=0.5)
-        self.on[3] = np.count_nonzero(m > 0.0) > 5
+        self.on[3] = np.count_nonzero(m > 0.0) > 5 or any(u.astype(bool)) and all([v > 0, True])
+        for i in reversed(range(1, 4)):
+            self.n[i] += abs(u[:5]).astype(int)[i] % 7 + sum(POINTS[:3]) > 2
 
 
 class Unknown(Component):

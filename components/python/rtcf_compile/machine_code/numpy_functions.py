@@ -1150,6 +1150,50 @@ def _clip(a: Any, a_min: Any, a_max: Any) -> Any:
     raise TypingError("RTCF:np.clip without bounds:give it one")
 
 
+@compiled_as(own.rtcf_is_any, arrays=("values",))
+def _any_of_values(values: Any) -> Any:
+    _needs(values, "any", (1,))
+    return lambda values: own.rtcf_any(values, None)
+
+
+@compiled_as(own.rtcf_is_all, arrays=("values",))
+def _all_of_values(values: Any) -> Any:
+    _needs(values, "all", (1,))
+    return lambda values: own.rtcf_all(values, None)
+
+
+@compiled_as(own.rtcf_astype)
+def _astype(a: Any, dtype: Any) -> Any:
+    _needs(a, "astype")
+    wanted = _dtype(dtype.dtype if isinstance(dtype, types.DTypeSpec) else dtype.instance_type)
+    if wanted.kind == "b":
+        return lambda a, dtype: a != 0
+    if not (_dtype(a).kind == "f" and wanted.kind in "iu"):
+        return lambda a, dtype: own.rtcf_array(a, dtype)
+    if wanted != np.dtype(np.int64):
+        raise TypingError(f"RTCF:floats become {wanted}:make them int64 before")
+
+    def whole(a: Any, dtype: Any) -> Any:
+        row = own.rtcf_ravel(a)
+        result = np.empty(row.shape[0], np.int64)
+        for i in range(row.shape[0]):
+            # As the processor has it, where there is no such int.
+            if -9223372036854775808.0 <= row[i] < 9223372036854775808.0:
+                result[i] = int(row[i])
+            else:
+                result[i] = np.int64(-9223372036854775808)
+        return own.rtcf_reshape(result, a.shape)
+
+    return whole
+
+
+@compiled_as(own.rtcf_abs)
+def _abs(x: Any) -> Any:
+    if isinstance(x, types.Array):
+        return lambda x: np.abs(x)
+    return lambda x: abs(x)
+
+
 def _elementwise(function: Callable[..., Any]) -> Any:
     """Return a function of numbers as one of arrays, too."""
     function.__annotations__ = {}

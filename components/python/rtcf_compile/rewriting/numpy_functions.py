@@ -307,6 +307,32 @@ def rtcf_clip(a: Any, a_min: Any, a_max: Any) -> Any:
     return np.clip(a, a_min, a_max)
 
 
+@_stands_for(any)
+def rtcf_is_any(values: Any) -> Any:
+    """Tell whether one of several values is true."""
+    return bool(np.any(np.ravel(values)))
+
+
+@_stands_for(all)
+def rtcf_is_all(values: Any) -> Any:
+    """Tell whether all of several values are true."""
+    return bool(np.all(np.ravel(values)))
+
+
+def rtcf_astype(a: Any, dtype: Any) -> Any:
+    """Return an array with elements of another type; floats become ints towards 0."""
+    return a.astype(dtype)
+
+
+METHODS["astype"] = rtcf_astype
+
+
+@_stands_for(abs)
+def rtcf_abs(x: Any) -> Any:
+    """Return abs(x) of a number, or of the elements of an array."""
+    return abs(x)
+
+
 @_stands_for(np.isclose)
 def rtcf_isclose(
     a: Any, b: Any, rtol: Any = 1e-05, atol: Any = 1e-08, equal_nan: Any = False

@@ -386,6 +386,8 @@ class Products(ast.NodeTransformer):
             return self._instead(node, rtcf_round, node.args)
         if target is round:
             raise self.mistake(node, "round to digits is not compiled", "use np.round(x, digits)")
+        if target is reversed and len(node.args) == 1 and not node.keywords:
+            return self._reversed(node, node.args[0])
         if target is range and not node.keywords:
             node.args = [
                 each if isinstance(each, ast.Constant) else like(each, call_of("rtcf_index", each))
@@ -435,6 +437,17 @@ class Products(ast.NodeTransformer):
         if not all(isinstance(each, int) for each in sizes):
             return 0
         return 8 * math.prod(sizes)
+
+    def _reversed(self, node: ast.Call, of: ast.expr) -> ast.AST:
+        """`reversed(range(n))`, `reversed(x)` of a vector."""
+        if isinstance(of, ast.Call) and resolve(of.func, self.source) is range:
+            if not 1 <= len(of.args) <= 2:
+                raise self.mistake(node, "reverses a range with steps", "write its numbers so")
+            low = of.args[0] if len(of.args) == 2 else ast.Constant(0)
+            bounds = [ast.BinOp(each, ast.Sub(), ast.Constant(1)) for each in (of.args[-1], low)]
+            step = ast.UnaryOp(ast.USub(), ast.Constant(1))
+            return self.visit(like(node, ast.Call(of.func, [*bounds, step], [])))  # type: ignore[no-any-return]
+        return like(node, call_of("rtcf_flip", self.visit(of)))
 
     def _method(self, node: ast.Call, called: ast.Attribute) -> ast.AST:
         """`a.sum(axis=0)`."""
