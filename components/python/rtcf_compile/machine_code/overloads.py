@@ -391,6 +391,12 @@ def _row_of_any() -> Any:
     return row
 
 
+def plain(function: Any) -> Any:
+    """Return a function that compiled ones call, compiled as they are."""
+    function.__annotations__ = {}
+    return register_jitable(**_OPTIONS)(function)
+
+
 @compiled_as(helpers.rtcf_assign)
 def _assign(target: Any, value: Any) -> Any:
     if not isinstance(target, types.Array):
@@ -411,6 +417,20 @@ def _assign(target: Any, value: Any) -> Any:
             f"RTCF:{words(target)} is set to {words(value)}:it takes an array of its shape"
         )
     copying = _copying(target.ndim, value.ndim)
+    if target.ndim == 1:
+
+        def along(target: Any, value: Any) -> None:
+            if value.shape[0] == 1 or target.strides[0] * value.strides[0] < 0:
+                if shares(target, value):
+                    copying(target, value.copy())
+                else:
+                    copying(target, value)
+            elif _is_from_the_end(target, value):
+                _copying_back(target, value)
+            else:
+                copying(target, value)
+
+        return along
 
     def assign(target: Any, value: Any) -> None:
         if shares(target, value):
@@ -419,6 +439,28 @@ def _assign(target: Any, value: Any) -> Any:
             copying(target, value)
 
     return assign
+
+
+@plain
+def _is_from_the_end(target: Any, value: Any) -> Any:
+    """Tell whether NumPy copies a vector from its last element to its first: where it would
+    otherwise set what it has yet to read. It looks at the addresses alone, not at the strides.
+    """
+    n = target.shape[0]
+    if n == 0 or value.shape[0] != n:
+        return False
+    to, step_to = np.int64(target.ctypes.data), target.strides[0]
+    at, step_at = np.int64(value.ctypes.data), value.strides[0]
+    if step_to >= 0:
+        return at < to < at + n * step_at
+    to, at = to + (n - 1) * step_to, at + (n - 1) * step_at
+    return not at < to < at - n * step_at
+
+
+@plain
+def _copying_back(target: Any, value: Any) -> None:
+    for i in range(target.shape[0] - 1, -1, -1):
+        target[i] = value[i]
 
 
 def _filling(dimensions: int) -> Any:
@@ -469,12 +511,6 @@ def _copying(of_target: int, of_value: int) -> Any:
 
     chosen = {(1, 1): vector, (2, 1): rows, (2, 2): matrix}[of_target, of_value]
     return plain(chosen)
-
-
-def plain(function: Any) -> Any:
-    """Return a function that compiled ones call, compiled as they are."""
-    function.__annotations__ = {}
-    return register_jitable(**_OPTIONS)(function)
 
 
 @compiled_as(helpers.rtcf_get, checked=True)

@@ -1,0 +1,56 @@
+"""Parts of a vector that are set from other parts of it: compiled code has NumPy's result, also
+where that depends on the order in which it copies.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rtcf_compile.comparison.inside import Inside
+from rtcf_compile.machine_code import lowering
+from rtcf_compile.source import modules
+
+SIZE = 8
+SOURCE = """\
+import numpy as np
+from rtcf.component import Component, State
+
+
+class Overlap(Component):
+    a: State[np.float64, 8]
+    to: State[np.int64, 3]
+    at: State[np.int64, 3]
+
+    def update(self):
+        begin, end, step = self.to
+        first, last, by = self.at
+        self.a[begin:end:step] = self.a[first:last:by]
+"""
+PARTS = [
+    (begin, end, step)
+    for step in (1, 2, 3, -1, -2)
+    for begin in range(SIZE)
+    for end in (range(begin + 1, SIZE + 1) if step > 0 else (-SIZE - 1, *range(begin)))
+]
+
+
+def test_a_part_is_set_from_another_as_numpy_does(tmp_path: Path) -> None:
+    file = tmp_path / "overlap.py"
+    file.write_text(SOURCE)
+    (cls,) = modules.components(modules.load(file))
+    inside = Inside(lowering.compile_component(cls))
+    interpreted: Any = cls()
+    values = np.arange(1.0, SIZE + 1.0)
+    sizes = {part: len(values[slice(*part)]) for part in PARTS}
+    compared = 0
+    for to in PARTS:
+        for at in PARTS:
+            if sizes[at] not in (sizes[to], 1):
+                continue
+            interpreted.a, interpreted.to, interpreted.at = values, to, at
+            record = interpreted._record.copy()
+            interpreted.update()
+            assert inside.call("update", record) is None
+            assert np.array_equal(record["a"], interpreted.a), (to, at)
+            compared += 1
+    assert compared > 5000
