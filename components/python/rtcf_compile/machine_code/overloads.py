@@ -449,12 +449,12 @@ def _is_from_the_end(target: Any, value: Any) -> Any:
     n = target.shape[0]
     if n == 0 or value.shape[0] != n:
         return False
-    to, step_to = np.int64(target.ctypes.data), target.strides[0]
-    at, step_at = np.int64(value.ctypes.data), value.strides[0]
+    # A difference of addresses in the same record is a constant, which addresses are not.
+    ahead = np.int64(target.ctypes.data) - np.int64(value.ctypes.data)
+    step_to, step_at = target.strides[0], value.strides[0]
     if step_to >= 0:
-        return at < to < at + n * step_at
-    to, at = to + (n - 1) * step_to, at + (n - 1) * step_at
-    return not at < to < at - n * step_at
+        return 0 < ahead < n * step_at
+    return not 0 < ahead + (n - 1) * (step_to - step_at) < -n * step_at
 
 
 @plain
