@@ -5,14 +5,14 @@ owner of the CPU.  A cause is named only if the cycle would have been on time wi
 is unknown.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
 _IDLE = 0  # pid of the idle thread
 _FIRST_FAIR_PRIORITY = 100  # of the kernel; smaller ones are real-time
-_FAULT_NS = 5_000  # a page fault takes so long, if its page is in memory
+FAULT_NS = 5_000  # a page fault takes so long at most, if its page is in memory
 _FAULT_TO_WAIT_NS = 200_000  # and else it waits after so long at most
 
 
@@ -23,6 +23,7 @@ class Switch:
     time_ns: int
     cpu: int
     previous: int  # pid, as the next ones
+    previous_name: str
     runnable: bool  # the previous one would go on: it was preempted
     previous_priority: int  # of the kernel: 0 to 99 are real-time, the smallest first
     next: int
@@ -143,13 +144,16 @@ _WAITED = _Cause(Kind.PAGE_FAULT, "a page fault of the loop's thread, which wait
 _BLOCKED = _Cause(Kind.BLOCKED, "a component slept in a system call")
 
 
-def find_culprit(events: Iterable[Event], thread: int, cycle: LateCycle) -> Culprit:
+def find_culprit(
+    events: Iterable[Event], thread: int, cycle: LateCycle, fault_ns: int = FAULT_NS
+) -> Culprit:
     """Return the cause of a late cycle.
 
     `thread`: pid of the loop's thread.  The events are in order of time, of the CPU of the loop at
     least, and begin before the deadline with a switch, which names the running thread.
+    `fault_ns`: the longest time of a page fault whose page is in memory.
     """
-    taken = _shares(list(events), thread, cycle)
+    taken = _shares(list(events), thread, cycle, fault_ns)
     lost = taken.pop(_LOST, 0)
     taken.pop(_OWN, 0)
     if lost:
@@ -175,11 +179,14 @@ def _grouped(taken: dict[_Cause, int]) -> dict[_Cause, int]:
     return groups
 
 
-def _shares(events: list[Event], thread: int, cycle: LateCycle) -> dict[_Cause, int]:
+def _shares(
+    events: list[Event], thread: int, cycle: LateCycle, fault_ns: int
+) -> dict[_Cause, int]:
     """Return for how long each cause had the CPU between deadline and end, ns."""
     cpu = _cpu_of(events, thread, cycle)
     taken: dict[_Cause, int] = {}
-    state = _State(thread)
+    switches = [each for each in events if isinstance(each, Switch) and each.cpu == cpu]
+    state = _State(thread, fault_ns, iter(switches[1:]))
     now = cycle.deadline_ns
     seen = False
     for event in events:
@@ -215,9 +222,12 @@ class _State:
     """The state of a CPU and of the loop's thread."""
 
     thread: int
+    fault_limit_ns: int
+    later: Iterator[Switch]  # the switches of the CPU behind the one that is taken next
     current: int | None = None  # pid; None: not seen yet
     name: str = ""
-    priority: int = 0
+    priority: int = 0  # when it got the CPU, and when it gave it back
+    last_priority: int = 0
     own_priority: int | None = None
     nested: list[Enter] = field(default_factory=list)  # interrupts, the innermost last
     runnable: bool = False  # the loop's thread waits for the CPU
@@ -256,7 +266,11 @@ class _State:
                 and event.time_ns - self.fault_ns <= _FAULT_TO_WAIT_NS
             )
         self.current, self.name = event.next, event.next_name
-        self.priority = event.next_priority
+        self.priority = self.last_priority = event.next_priority
+        back = next(self.later, None)
+        if back is not None and back.previous == event.next:
+            # Meanwhile it may have changed both.
+            self.name, self.last_priority = back.previous_name, back.previous_priority
         if event.next == self.thread:
             self.own_priority = event.next_priority
             self.runnable = self.throttled = False
@@ -269,11 +283,14 @@ class _State:
 
     def _is_less_urgent(self) -> bool:
         """Tell whether the scheduler would choose the loop's thread, were it free to."""
-        if self.current == _IDLE:
-            return True
+        return self.current == _IDLE or self._is_below(self.priority)
+
+    def _is_below(self, priority: int) -> bool:
+        """Tell whether a priority is below the loop's, if that is real-time: among threads of
+        other priorities each has its share.
+        """
         own = self.own_priority
-        # Among threads without real-time priority each has its share.
-        return own is not None and own < _FIRST_FAIR_PRIORITY and self.priority > own
+        return own is not None and own < _FIRST_FAIR_PRIORITY and priority > own
 
     def add(self, taken: dict[_Cause, int], begin: int, end: int, cycle: LateCycle) -> None:
         """Add a time in which nothing changes to its causes."""
@@ -283,7 +300,7 @@ class _State:
             own_fault = self.current == self.thread and not self.nested and self.fault_ns
             if own_fault and at >= cycle.begin_ns:
                 # The kernel does not say when it is done.
-                done = max(at, min(until, own_fault + _FAULT_NS))
+                done = max(at, min(until, own_fault + self.fault_limit_ns))
                 _add(taken, _FAULTS, done - at)
                 _add(taken, _OWN, until - done)
             else:
@@ -307,14 +324,23 @@ class _State:
         return _WAITED if self.waits_for_page else _BLOCKED
 
     def _who(self) -> str:
-        kind = (
-            f"real-time priority {_FIRST_FAIR_PRIORITY - 1 - self.priority}"
-            if 0 <= self.priority < _FIRST_FAIR_PRIORITY
-            else f"nice {self.priority - 120}"
-            if self.priority >= _FIRST_FAIR_PRIORITY
-            else "SCHED_DEADLINE"
-        )
-        return f"thread {self.name} (pid {self.current}, {kind})"
+        words = [f"pid {self.current}"]
+        priority = self.priority
+        if not self.throttled and self._is_below(priority):
+            priority = self.last_priority
+        # It was more urgent in between only, if neither of them explains its turn.
+        if self.throttled or not self._is_below(priority):
+            words.append(_in_words(priority))
+        return f"thread {self.name} ({', '.join(words)})"
+
+
+def _in_words(priority: int) -> str:
+    """Return a priority of the kernel for a person."""
+    if priority >= _FIRST_FAIR_PRIORITY:
+        return f"nice {priority - 120}"
+    if priority >= 0:
+        return f"real-time priority {_FIRST_FAIR_PRIORITY - 1 - priority}"
+    return "SCHED_DEADLINE"
 
 
 def _add(taken: dict[_Cause, int], cause: _Cause, ns: int) -> None:

@@ -139,9 +139,10 @@ def _converter(name: str, described: Format) -> Convert:
             def switch(now: int, cpu: int, data: bytes) -> Event:
                 state = get(data, "prev_state")
                 return Switch(
-                    now, cpu, get(data, "prev_pid"), state == _RUNNING or bool(state & _PREEMPTED),
-                    get(data, "prev_prio"), get(data, "next_pid"), get(data, "next_comm"),
-                    get(data, "next_prio"), bool(state & _UNINTERRUPTIBLE),
+                    now, cpu, get(data, "prev_pid"), get(data, "prev_comm"),
+                    state == _RUNNING or bool(state & _PREEMPTED), get(data, "prev_prio"),
+                    get(data, "next_pid"), get(data, "next_comm"), get(data, "next_prio"),
+                    bool(state & _UNINTERRUPTIBLE),
                 )  # fmt: skip
 
             return switch

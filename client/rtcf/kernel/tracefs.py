@@ -5,6 +5,7 @@ See Documentation/trace/ftrace.rst of the kernel.  Other users of the tracer are
 
 import contextlib
 import functools
+import mmap
 import os
 import threading
 import time
@@ -14,7 +15,7 @@ from pathlib import Path
 from types import TracebackType
 
 from rtcf.errors import RtcfError
-from rtcf.kernel.culprit import Culprit, Event, LateCycle, Switch, find_culprit
+from rtcf.kernel.culprit import FAULT_NS, Culprit, Event, LateCycle, Switch, find_culprit
 from rtcf.kernel.pages import Decoder, Format, Page
 
 _EVENTS = (
@@ -35,6 +36,8 @@ _EVERY_S = 0.02
 _LONGEST_BACK_NS = 200_000_000  # from a deadline to the loop's turn before it
 _DECODED = 64  # pages that are kept as events, too: cycles in a row are late together
 _MARK = "rtcfctl trace\n"
+_FAULTS = 128  # pages that a measurement of page faults touches
+_COLDER = 3  # so many times longer do they take in a loop than in a measurement, at most
 
 
 class KernelTrace:
@@ -61,6 +64,7 @@ class KernelTrace:
             self._folder.mkdir()
             try:
                 self._begin()
+                self._fault_ns = max(FAULT_NS, _COLDER * _measured_fault_ns())
             except BaseException:
                 self._remove()
                 raise
@@ -86,7 +90,7 @@ class KernelTrace:
         for cpu in {each.cpu for each in pages}:
             events += self._since_last_turn([each for each in pages if each.cpu == cpu], cycle)
         events.sort(key=lambda each: each.time_ns)
-        return find_culprit(events, self._thread, cycle)
+        return find_culprit(events, self._thread, cycle, self._fault_ns)
 
     def _since_last_turn(self, pages: list[Page], cycle: LateCycle) -> list[Event]:
         """Return the events of a CPU, from the loop's turn before a deadline on."""
@@ -197,6 +201,25 @@ class KernelTrace:
             os.close(descriptor)
         with contextlib.suppress(OSError):
             self._folder.rmdir()
+
+
+def _measured_fault_ns() -> int:
+    """Return the time of a page fault on this machine, ns: the shortest mean of some."""
+    pages = range(0, _FAULTS * mmap.PAGESIZE, mmap.PAGESIZE)
+
+    def touch() -> int:
+        begin = time.monotonic_ns()
+        for page in pages:
+            memory[page] = 1
+        return time.monotonic_ns() - begin
+
+    with mmap.mmap(-1, _FAULTS * mmap.PAGESIZE, mmap.MAP_PRIVATE) as memory:
+        memory.madvise(mmap.MADV_NOHUGEPAGE)
+        means = []
+        for _ in range(4):
+            memory.madvise(mmap.MADV_DONTNEED)
+            means.append((touch() - touch()) // _FAULTS)
+    return min(means)
 
 
 def _root() -> Path:

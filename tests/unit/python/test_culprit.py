@@ -47,8 +47,8 @@ class Timeline:
         uninterruptible: bool = False,
     ) -> None:
         """Go to another thread; `runnable`: the one of before would go on."""
-        previous, _, of_previous = self.current
-        states = (previous, runnable, of_previous)
+        previous, name_of_previous, of_previous = self.current
+        states = (previous, name_of_previous, runnable, of_previous)
         self.events.append(Switch(self.now, CPU, *states, pid, name, priority, uninterruptible))
         self.current = (pid, name, priority)
 
@@ -242,6 +242,46 @@ def test_what_delays_the_beginning_is_named(kind: str, name: str, taken_us: int)
     assert said.taken_ns == taken_us * US
 
 
+@pytest.mark.parametrize(
+    ("at_first", "at_last", "words"),
+    [
+        (120, 9, "thread hog (pid 4711, real-time priority 90)"),
+        (9, 120, "thread hog (pid 4711, real-time priority 90)"),
+        (120, 120, "thread hog (pid 4711)"),
+    ],
+)
+def test_a_thread_is_named_as_it_was_when_it_gave_the_cpu_back(
+    at_first: int, at_last: int, words: str
+) -> None:
+    """It runs while the loop sleeps, and takes another name and priority."""
+    line, _ = begun()
+    line.idle()
+    line.switch(4711, "python3", at_first, runnable=False)
+    line.current = (4711, "hog", at_last)
+    line.run(100 * US)
+    deadline = line.now
+    line.interrupt("vector", "interrupt local timer", US)
+    line.wake()
+    line.run(2 * PERIOD_NS)
+    line.loop(runnable=True)
+    begin = line.now
+    line.run(10 * US)
+    late = LateCycle(deadline, begin, line.now, line.now - deadline - PERIOD_NS)
+    said = find_culprit(line.events, LOOP, late)
+    assert (said.kind, said.words) == (Kind.THREAD, words)
+
+
+def test_page_faults_take_as_long_as_on_this_machine() -> None:
+    line, deadline = begun()
+    begin = line.now
+    for _ in range(100):
+        line.events.append(Fault(line.now, CPU))
+        line.run(30 * US)
+    late = LateCycle(deadline, begin, line.now, line.now - deadline - PERIOD_NS)
+    assert find_culprit(line.events, LOOP, late).kind is Kind.UNKNOWN
+    assert find_culprit(line.events, LOOP, late, 30 * US).kind is Kind.PAGE_FAULT
+
+
 @given(st.integers(1, 3), names)
 def test_a_timer_that_comes_late_is_unknown(threads: int, name: str) -> None:
     """Less urgent threads run on meanwhile, and are not to blame for it."""
@@ -271,7 +311,7 @@ def test_a_cycle_that_waits_for_the_one_before_blames_that() -> None:
     line.run(3 * PERIOD_NS)
     end = line.now + 100 * US
     said = find_culprit(
-        [*line.events, Switch(end, CPU, LOOP, False, LOOP_PRIORITY, 0, "swapper/1", 120)],
+        [*line.events, Switch(end, CPU, LOOP, "rtcf-loop", False, LOOP_PRIORITY, 0, "swapper/1", 120)],
         LOOP, LateCycle(PERIOD_NS, 3 * PERIOD_NS, end, end - 2 * PERIOD_NS),
     )  # fmt: skip
     assert said.kind is Kind.PREVIOUS_CYCLE
@@ -292,7 +332,7 @@ def test_many_threads_of_one_name_are_named_together() -> None:
     st.lists(
         st.one_of(
             st.builds(Switch, st.integers(0, 3000), st.integers(0, 1),
-                      st.sampled_from([0, 1, LOOP]), st.booleans(), st.integers(-1, 139),
+                      st.sampled_from([0, 1, LOOP]), names, st.booleans(), st.integers(-1, 139),
                       st.sampled_from([0, 1, LOOP]), names,
                       st.integers(-1, 139), st.booleans()),
             st.builds(Wake, st.integers(0, 3000), st.integers(0, 1), st.sampled_from([1, LOOP])),
@@ -387,7 +427,7 @@ def test_pages_of_the_kernel_are_read() -> None:
     )  # fmt: skip
     decoder = Decoder(FORMATS, HEADER)
     first, second, third = decoder.events(page(1000, entries))
-    assert first == Switch(1010, 3, 100, True, 19, 55, "kworker/3:1", -1)
+    assert first == Switch(1010, 3, 100, "rtcf-loop", True, 19, 55, "kworker/3:1", -1)
     at = 1010 + (2 << 27) + 5 + 4 + 1
     assert second == Enter(at, 3, "irq 42", f"interrupt 42 ({long_name.decode()})")
     assert third.time_ns == (1 << 37) + 1 + 2
