@@ -1,5 +1,7 @@
 // Components that do in the loop what must not be done there, but leave their
 // process alive.
+#include <sys/mman.h>
+
 #include <chrono>
 #include <limits>
 #include <memory>
@@ -57,8 +59,58 @@ class NotFiniteStops final : public Faulty {
     rtcf::Output<double> value_{this, "value", "", rtcf::Finite(rtcf::OnNonFinite::Stop)};
 };
 
+// Is late once for each new value of `turn`, in the way that the other parameters choose.
+class Stumbles final : public rtcf::Component {
+   public:
+    ~Stumbles() override {
+        if (memory_ != nullptr) ::munmap(memory_, kSize);
+    }
+
+    // Takes the pages out of memory, as far as they are to be faulted in.
+    bool prepare(const rtcf::Values& proposed) override {
+        if (memory_ == nullptr && !map()) return fail("no memory to stumble over");
+        if (proposed[pages_] > 0) {
+            ::munlock(memory_, kSize);
+            ::madvise(memory_, kSize, MADV_DONTNEED);
+        }
+        return true;
+    }
+
+    void update() override {
+        if (turn_ == done_) return;
+        done_ = turn_;
+        for (std::int32_t page = 0; page < pages_; ++page) memory_[page * kPage] = 1;
+        if (sleep_us_ > 0) std::this_thread::sleep_for(std::chrono::microseconds(sleep_us_));
+        const auto until = std::chrono::steady_clock::now() + std::chrono::microseconds(spin_us_);
+        while (std::chrono::steady_clock::now() < until) {
+        }
+    }
+
+   private:
+    static constexpr std::int32_t kPage = 4096;
+    static constexpr std::int32_t kMostPages = 4096;
+    static constexpr std::size_t kSize = std::size_t{kMostPages} * kPage;
+
+    bool map() {
+        void* const memory =
+            ::mmap(nullptr, kSize, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+        if (memory == MAP_FAILED) return false;
+        memory_ = static_cast<char*>(memory);
+        ::madvise(memory, kSize, MADV_NOHUGEPAGE);
+        return true;
+    }
+
+    rtcf::Parameter<std::int32_t> turn_{this, "turn", 0};
+    rtcf::Parameter<std::int32_t> spin_us_{this, "spin_us", 0, rtcf::Min(0), rtcf::Max(100'000)};
+    rtcf::Parameter<std::int32_t> sleep_us_{this, "sleep_us", 0, rtcf::Min(0), rtcf::Max(100'000)};
+    rtcf::Parameter<std::int32_t> pages_{this, "pages", 0, rtcf::Min(0), rtcf::Max(kMostPages)};
+    std::int32_t done_ = 0;
+    char* memory_ = nullptr;
+};
+
 }  // namespace
 
+RTCF_COMPONENT(Stumbles, "Is late once for each new value of a parameter")
 RTCF_COMPONENT(Throws, "Throws an exception")
 RTCF_COMPONENT(Allocates, "Allocates 10 MB in each update")
 RTCF_COMPONENT(Hoards, "Takes 1 MB more in each update, until there is no memory left")

@@ -1,0 +1,205 @@
+"""`rtcfctl trace --kernel` beside culprits of random kind and name, on PREEMPT_RT."""
+
+import ctypes
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import rtcf
+from loop_2khz import Loop
+from machine import wait_for
+
+SEED = 25
+TRIALS = 100
+TRACEFS = Path("/sys/kernel/tracing")
+RT_LIMIT = Path("/proc/sys/kernel/sched_rt_runtime_us")
+# Takes the CPU once, and ends. Its arguments: priority, time (s), name.
+HOG = """
+import os, sys, time
+priority, seconds, name = int(sys.argv[1]), float(sys.argv[2]), sys.argv[3]
+open("/proc/self/comm", "w").write(name)
+os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+until = time.monotonic() + seconds
+while time.monotonic() < until:
+    pass
+os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+"""
+
+
+@dataclass(frozen=True)
+class Culprit:
+    """One cause of a late cycle, and the words by which a trace names it."""
+
+    kind: str
+    named: str  # a part of the words
+    act: Callable[[], None]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A culprit, and the cycles between which it acted."""
+
+    culprit: Culprit
+    first: int
+    last: int
+
+
+class Culprits:
+    """Culprits drawn at random."""
+
+    def __init__(self, client: rtcf.Client, draw: random.Random) -> None:
+        self._client, self._draw, self._turn = client, draw, 0
+
+    def next(self) -> Culprit:
+        """Return one of a random kind."""
+        kinds = (
+            self._thread, self._interrupts, self._throttled, self._faults, self._sleep, self._gap
+        )  # fmt: skip
+        return self._draw.choice(kinds)()
+
+    def _thread(self) -> Culprit:
+        letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_/:() "
+        name = "".join(self._draw.choice(letters) for _ in range(self._draw.randint(1, 13)))
+        name = f"x{name.strip()}x"
+        priority = self._draw.randint(84, 98)
+        seconds = self._draw.uniform(0.001, 0.01)
+        words = f"thread {name} (pid"
+        return Culprit("thread", words, lambda: self._hog(priority, seconds, name))
+
+    def _throttled(self) -> Culprit:
+        priority = self._draw.randint(1, 70)
+        return Culprit(
+            "throttled", "a limit of CPU time", lambda: self._hog(priority, 1.3, "below the loop")
+        )
+
+    def _interrupts(self) -> Culprit:
+        count = self._draw.randint(300, 500)
+        return Culprit("interrupt", "timer", lambda: sleepers(count))
+
+    def _faults(self) -> Culprit:
+        return self._stumble("page fault", "page fault", pages=self._draw.randint(1000, 4096))
+
+    def _sleep(self) -> Culprit:
+        return self._stumble(
+            "blocked", "slept in a system call", sleep_us=self._draw.randint(1000, 10_000)
+        )
+
+    def _gap(self) -> Culprit:
+        """Return what the kernel does not see: an SMI looks like a component that takes long."""
+        return self._stumble("unknown", "unknown", spin_us=self._draw.randint(1000, 10_000))
+
+    def _hog(self, priority: int, seconds: float, name: str) -> None:
+        command = [sys.executable, "-I", "-S", "-c", HOG, str(priority), str(seconds), name]
+        subprocess.run(command, check=True)
+
+    def _stumble(self, kind: str, named: str, **values: int) -> Culprit:
+        self._turn += 1
+        chosen = {"pages": 0, "sleep_us": 0, "spin_us": 0, "turn": self._turn} | values
+        settings = [rtcf.parse_parameter(f"{name}:={value}") for name, value in chosen.items()]
+
+        def act() -> None:
+            self._client.set_parameters("stumbles", settings)
+
+        return Culprit(kind, named, act)
+
+
+def sleepers(count: int) -> None:
+    """Let one interrupt of the timer wake so many threads below the loop."""
+    libc = ctypes.CDLL(None)
+
+    class TimeSpec(ctypes.Structure):
+        _fields_ = (("tv_sec", ctypes.c_long), ("tv_nsec", ctypes.c_long))
+
+    at = time.monotonic() + 0.5 + count * 0.01
+    wanted = TimeSpec(int(at), int(at % 1 * 1e9))
+    absolute = 1
+    children = []
+    for _ in range(count):
+        child = os.fork()
+        if child == 0:
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+            libc.clock_nanosleep(time.CLOCK_MONOTONIC, absolute, ctypes.byref(wanted), None)
+            os._exit(0)
+        children.append(child)
+    assert time.monotonic() < at, "too slow"
+    for child in children:
+        os.waitpid(child, 0)
+
+
+@contextmanager
+def traced(folder: Path) -> Iterator[list[dict[str, object]]]:
+    """Give the late cycles of a trace, when it has ended."""
+    if not os.path.ismount(TRACEFS):
+        subprocess.run(["mount", "-t", "tracefs", "tracefs", str(TRACEFS)], check=True)
+    file = folder / "trace.json"
+    tracing = subprocess.Popen(
+        ["rtcfctl", "trace", "-o", str(file), "--kernel", "--output", "json"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+
+    def begun() -> bool:
+        assert tracing.poll() is None, tracing.communicate()
+        parts = list(folder.glob(f".{file.name}.*.part"))
+        return bool(parts) and '"ph": "X"' in parts[0].read_text()
+
+    wait_for(begun, "the first cycles", 300)
+    found: list[dict[str, object]] = []
+    yield found
+    tracing.send_signal(signal.SIGINT)
+    said, complaint = tracing.communicate(timeout=600)
+    assert tracing.returncode == 0, complaint
+    found += json.loads(said)["kernel"]
+
+
+@pytest.fixture
+def limited() -> Iterator[None]:
+    """Limit the time of real-time threads, as kernels do unless told otherwise."""
+    before = RT_LIMIT.read_text()
+    RT_LIMIT.write_text("950000")
+    yield
+    RT_LIMIT.write_text(before)
+
+
+def test_culprits_are_named_right_in_95_of_100(loop: Loop, tmp_path: Path, limited: None) -> None:
+    draw = random.Random(SEED)
+    trials = []
+    with rtcf.Client() as client:
+        client.load(rtcf.component("rtcf_faults", "Stumbles", name="stumbles"))
+        culprits = Culprits(client, draw)
+        with traced(tmp_path) as found:
+            for _ in range(TRIALS):
+                culprit = culprits.next()
+                first = loop.now().iteration
+                culprit.act()
+                time.sleep(0.05)
+                trials.append(Trial(culprit, first, loop.now().iteration))
+    verdicts = {"right": 0, "unknown": 0, "wrong": 0, "on time": 0}
+    for trial in trials:
+        words = [
+            str(each["instead"])
+            for each in found
+            if trial.first <= int(str(each["cycle"])) <= trial.last
+            and each["kind"] != "previous cycle"
+        ]
+        if not words:
+            verdict = "on time"
+        elif any(trial.culprit.named in each for each in words):
+            verdict = "right"
+        else:
+            verdict = "unknown" if all("unknown" in each for each in words) else "wrong"
+        verdicts[verdict] += 1
+        print(verdict, trial.culprit.kind, repr(trial.culprit.named), sorted(set(words)))
+    print(verdicts)
+    late = sum(verdicts.values()) - verdicts["on time"]
+    assert late >= 0.8 * TRIALS, "culprits that make cycles late"
+    assert verdicts["right"] >= 0.95 * late
+    assert verdicts["wrong"] <= 0.02 * late
