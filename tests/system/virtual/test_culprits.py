@@ -1,6 +1,5 @@
 """`rtcfctl trace --kernel` beside culprits of random kind and name, on PREEMPT_RT."""
 
-import ctypes
 import json
 import os
 import random
@@ -32,6 +31,22 @@ until = time.monotonic() + seconds
 while time.monotonic() < until:
     pass
 os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+"""
+# One interrupt of the timer wakes so many threads below the loop. Its argument: how many.
+SLEEPERS = """
+import ctypes, os, sys, time
+count = int(sys.argv[1])
+libc = ctypes.CDLL(None)
+at = time.monotonic() + 0.5 + 0.02 * count
+wanted = (ctypes.c_long * 2)(int(at), int(at % 1 * 1e9))
+for _ in range(count):
+    if os.fork() == 0:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+        libc.clock_nanosleep(time.CLOCK_MONOTONIC, 1, wanted, None)
+        os._exit(0)
+assert time.monotonic() < at, "too slow"
+for _ in range(count):
+    assert os.wait()[1] == 0
 """
 
 
@@ -73,17 +88,17 @@ class Culprits:
         priority = self._draw.randint(84, 98)
         seconds = self._draw.uniform(0.001, 0.01)
         words = f"thread {name} (pid"
-        return Culprit("thread", words, lambda: self._hog(priority, seconds, name))
+        return Culprit("thread", words, lambda: run(HOG, priority, seconds, name))
 
     def _throttled(self) -> Culprit:
         priority = self._draw.randint(1, 70)
         return Culprit(
-            "throttled", "a limit of CPU time", lambda: self._hog(priority, 1.3, "below the loop")
+            "throttled", "a limit of CPU time", lambda: run(HOG, priority, 1.3, "below the loop")
         )
 
     def _interrupts(self) -> Culprit:
         count = self._draw.randint(300, 500)
-        return Culprit("interrupt", "timer", lambda: sleepers(count))
+        return Culprit("interrupt", "timer", lambda: run(SLEEPERS, count))
 
     def _faults(self) -> Culprit:
         return self._stumble("page fault", "page fault", pages=self._draw.randint(1000, 4096))
@@ -97,10 +112,6 @@ class Culprits:
         """Return what the kernel does not see: an SMI looks like a component that takes long."""
         return self._stumble("unknown", "unknown", spin_us=self._draw.randint(1000, 10_000))
 
-    def _hog(self, priority: int, seconds: float, name: str) -> None:
-        command = [sys.executable, "-I", "-S", "-c", HOG, str(priority), str(seconds), name]
-        subprocess.run(command, check=True)
-
     def _stumble(self, kind: str, named: str, **values: int) -> Culprit:
         self._turn += 1
         chosen = {"pages": 0, "sleep_us": 0, "spin_us": 0, "turn": self._turn} | values
@@ -112,27 +123,9 @@ class Culprits:
         return Culprit(kind, named, act)
 
 
-def sleepers(count: int) -> None:
-    """Let one interrupt of the timer wake so many threads below the loop."""
-    libc = ctypes.CDLL(None)
-
-    class TimeSpec(ctypes.Structure):
-        _fields_ = (("tv_sec", ctypes.c_long), ("tv_nsec", ctypes.c_long))
-
-    at = time.monotonic() + 0.5 + count * 0.01
-    wanted = TimeSpec(int(at), int(at % 1 * 1e9))
-    absolute = 1
-    children = []
-    for _ in range(count):
-        child = os.fork()
-        if child == 0:
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
-            libc.clock_nanosleep(time.CLOCK_MONOTONIC, absolute, ctypes.byref(wanted), None)
-            os._exit(0)
-        children.append(child)
-    assert time.monotonic() < at, "too slow"
-    for child in children:
-        os.waitpid(child, 0)
+def run(program: str, *arguments: object) -> None:
+    """Run a program in Python to its end."""
+    subprocess.run([sys.executable, "-I", "-S", "-c", program, *map(str, arguments)], check=True)
 
 
 @contextmanager
