@@ -179,9 +179,7 @@ def _grouped(taken: dict[_Cause, int]) -> dict[_Cause, int]:
     return groups
 
 
-def _shares(
-    events: list[Event], thread: int, cycle: LateCycle, fault_ns: int
-) -> dict[_Cause, int]:
+def _shares(events: list[Event], thread: int, cycle: LateCycle, fault_ns: int) -> dict[_Cause, int]:
     """Return for how long each cause had the CPU between deadline and end, ns."""
     cpu = _cpu_of(events, thread, cycle)
     taken: dict[_Cause, int] = {}

@@ -20,6 +20,9 @@ rtcf::Component* rtcf_python_create(const rtcf::python::ComponentTable* table,
                                     rtcf::ComponentContext* context);
 void rtcf_python_log(const rtcf::python::LogTable* table, rtcf::Component* component,
                      const std::int64_t* values) noexcept;
+std::int64_t rtcf_python_read(rtcf::python::ValueInput* input) noexcept;
+void rtcf_python_read_more(const rtcf::python::ValueInput* input, std::int64_t* age,
+                           bool* connected) noexcept;
 }
 
 namespace rtcf::python {
@@ -94,4 +97,17 @@ void rtcf_python_log(const rtcf::python::LogTable* table, rtcf::Component* compo
     std::memcpy(record->payload.data(), values,
                 static_cast<std::size_t>(table->count) * sizeof *values);
     component->logSink().commit(record);
+}
+
+/// Takes note of an input's newest value; machine code does the same by itself where it is that of
+/// the present writer. Real-time safe. @return the DataStatus
+std::int64_t rtcf_python_read(rtcf::python::ValueInput* input) noexcept {
+    return static_cast<std::int64_t>(input->read());
+}
+
+/// Gives the rest that hooks ask for; null: they do not. Real-time safe.
+void rtcf_python_read_more(const rtcf::python::ValueInput* input, std::int64_t* age,
+                           bool* connected) noexcept {
+    if (age != nullptr) *age = input->age();
+    if (connected != nullptr) *connected = input->connected();
 }

@@ -45,7 +45,7 @@ void PythonComponent::Record::Free::operator()(std::byte* bytes) const noexcept 
 }
 
 PythonComponent::PythonComponent(const ComponentTable& table)
-    : table_(table), update_(table.update), record_(table), times_(table.times) {
+    : table_(table), update_(table.update), record_(table) {
     record_.head().component = this;
     if (table.prepare != nullptr) {
         proposed_ = std::make_unique<Record>(table);
@@ -65,7 +65,11 @@ void PythonComponent::reserve() {
     inputs_.reserve(static_cast<std::size_t>(table_.input_count) - queues - message_inputs);
     message_outputs_.reserve(message_outputs);
     outputs_.reserve(static_cast<std::size_t>(table_.output_count) - message_outputs);
-    has_other_inputs_ = queues + message_inputs > 0;
+    ports_ = std::make_unique<void*[]>(
+        static_cast<std::size_t>(table_.input_count) - queues - message_inputs +
+        static_cast<std::size_t>(table_.output_count) - message_outputs);
+    takes_dt_ = (table_.times & kDt) != 0;
+    has_more_ = (table_.times & ~std::uint64_t{kDt}) != 0 || queues + message_inputs > 0;
     has_other_outputs_ = message_outputs > 0;
     parameters_.reserve(static_cast<std::size_t>(table_.parameter_count));
     derived_.reserve(static_cast<std::size_t>(table_.derived_count));
@@ -73,6 +77,7 @@ void PythonComponent::reserve() {
 
 void PythonComponent::declare() {
     std::byte* const record = record_.bytes();
+    void** port = ports_.get();
     for (std::int64_t i = 0; i < table_.input_count; ++i) {
         const InputTable& input = table_.inputs[i];
         if (isQueue(input)) {
@@ -80,7 +85,7 @@ void PythonComponent::declare() {
         } else if (isMessageInput(input)) {
             message_inputs_.add(this, input, record);
         } else {
-            inputs_.add(this, input, record);
+            *port++ = &inputs_.add(this, input);
         }
     }
     for (std::int64_t i = 0; i < table_.output_count; ++i) {
@@ -88,7 +93,7 @@ void PythonComponent::declare() {
         if (isMessageOutput(output)) {
             message_outputs_.add(this, output, record);
         } else {
-            outputs_.add(this, output, record);
+            *port++ = &outputs_.add(this, output, record);
         }
     }
     for (std::int64_t i = 0; i < table_.parameter_count; ++i)
@@ -119,66 +124,60 @@ bool PythonComponent::prepare(const Values& /*proposed*/) {
 
 bool PythonComponent::start() {
     if (table_.start == nullptr) return true;
-    takeTime();
+    takeDt();
+    takeTimes();
     const void* const raised = table_.start(record_.bytes());
     forgetWrites();  // a cycle alone writes
     return raised == nullptr || fail("{}", said(raised, record_.head().line));
 }
 
+// A cycle takes as long as the rest: what few components have, or none in a good cycle, is not in
+// line.
+
 void PythonComponent::update() {
-    readPorts();
-    const void* const raised = update_(record_.bytes());
-    if (__builtin_expect(static_cast<long>(raised != nullptr), 0) != 0) {
-        forgetWrites();
-        throw std::runtime_error(said(raised, record_.head().line));
-    }
-    writePorts();
+    takeDt();
+    if (has_more_) readMore();
+    const void* const raised = update_(record_.bytes(), ports_.get());
+    if (__builtin_expect(static_cast<long>(raised != nullptr), 0) != 0) fault(raised);
+    if (has_other_outputs_) writeOthers();
 }
 
 void PythonComponent::safe() noexcept {
     if (table_.safe == nullptr) return;
-    readPorts();
-    if (table_.safe(record_.bytes()) != nullptr) {
+    takeDt();
+    if (has_more_) readMore();
+    if (table_.safe(record_.bytes(), ports_.get()) != nullptr) {
         RTCF_ERROR(this, "safe() in {} raised at line {}", table_.file, record_.head().line);
     }
-    writePorts();
+    if (has_other_outputs_) writeOthers();
 }
 
-// These are in line, what few components have is not: a cycle takes as long as the rest.
-
-inline void PythonComponent::takeTime() noexcept {
-    if (times_ == 0) return;
-    if (times_ != kDt) takeTimes();
-    if ((times_ & kDt) != 0) record_.head().dt = dt();
+inline void PythonComponent::takeDt() noexcept {
+    if (takes_dt_) record_.head().dt = dt();
 }
 
-__attribute__((noinline)) void PythonComponent::takeTimes() noexcept {
-    RecordHead& head = record_.head();
-    if ((times_ & kTime) != 0) head.time = time();
-    if ((times_ & kStamp) != 0) head.stamp = stamp();
-    if ((times_ & kPeriod) != 0) head.period = period();
-    if ((times_ & kIteration) != 0) head.iteration = static_cast<std::int64_t>(iteration());
-    if ((times_ & kFrequency) != 0) head.frequency = frequency();
-}
-
-inline void PythonComponent::readPorts() noexcept {
-    takeTime();
-    for (ValueInput& input : inputs_) input.read();
-    if (has_other_inputs_) readOthers();
-}
-
-__attribute__((noinline)) void PythonComponent::readOthers() noexcept {
+__attribute__((noinline)) void PythonComponent::readMore() noexcept {
+    takeTimes();
     for (MessageInput& input : message_inputs_) input.read();
     for (QueuePort& queue : queues_) queue.read();
 }
 
-inline void PythonComponent::writePorts() noexcept {
-    for (ValueOutput& output : outputs_) output.write();
-    if (has_other_outputs_) writeOthers();
+void PythonComponent::takeTimes() noexcept {
+    RecordHead& head = record_.head();
+    if ((table_.times & kTime) != 0) head.time = time();
+    if ((table_.times & kStamp) != 0) head.stamp = stamp();
+    if ((table_.times & kPeriod) != 0) head.period = period();
+    if ((table_.times & kIteration) != 0) head.iteration = static_cast<std::int64_t>(iteration());
+    if ((table_.times & kFrequency) != 0) head.frequency = frequency();
 }
 
 __attribute__((noinline)) void PythonComponent::writeOthers() noexcept {
     for (MessageOutput& output : message_outputs_) output.write();
+}
+
+__attribute__((noinline, cold)) void PythonComponent::fault(const void* raised) {
+    forgetWrites();
+    throw std::runtime_error(said(raised, record_.head().line));
 }
 
 void PythonComponent::forgetWrites() noexcept {

@@ -43,19 +43,17 @@ class PythonComponent final : public Component {
 
     void reserve();
     void declare();
-    void takeTime() noexcept;
+    void takeDt() noexcept;
+    void readMore() noexcept;
     void takeTimes() noexcept;
-    void readPorts() noexcept;
-    void readOthers() noexcept;
-    void writePorts() noexcept;
     void writeOthers() noexcept;
+    [[noreturn]] void fault(const void* raised);
     void forgetWrites() noexcept;
     std::string said(const void* raised, std::int64_t noted) const;
 
     const ComponentTable& table_;
-    HookFunction update_;
+    PortHookFunction update_;
     Record record_;
-    std::uint64_t times_;
     FixedList<ValueInput> inputs_;
     FixedList<ValueOutput> outputs_;
     FixedList<MessageInput> message_inputs_;
@@ -63,8 +61,10 @@ class PythonComponent final : public Component {
     FixedList<QueuePort> queues_;
     FixedList<ParameterField> parameters_;
     FixedList<DerivedField> derived_;
-    bool has_other_inputs_ = false;  // queues, inputs of messages
-    bool has_other_outputs_ = false;
+    std::unique_ptr<void*[]> ports_;    // those of values, as hooks get them
+    bool takes_dt_ = false;             // a hook looks at it
+    bool has_more_ = false;             // hooks look at other times, queues, inputs of messages
+    bool has_other_outputs_ = false;    // of messages
     std::unique_ptr<Record> proposed_;  // what prepare() works on; null without it
 };
 

@@ -2,9 +2,11 @@
 /// Ports of numbers and arrays. In the cycle they go between slots and the component's record.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,72 +22,45 @@ T* placeIn(std::byte* record, std::int64_t offset) noexcept {
     return offset < 0 ? nullptr : reinterpret_cast<T*>(record + offset);
 }
 
-/// An input whose newest value counts.
+// Machine code finds values and stamps there: port_access.py.
+static_assert(AbiProbe::portPlaces() == PortPlaces{0, 8, 16, 0, 8});
+static_assert(offsetof(SlotHeader, sequence) == 0 && offsetof(SlotHeader, time_ns) == 8);
+static_assert(offsetof(LoopClock, time_ns) == 8 && sizeof(std::atomic<std::int64_t>) == 8);
+constexpr std::size_t kSlotValue = 16;
+
+/// Not real-time safe. @throws std::logic_error for a type whose values lie elsewhere in a slot
+inline const TypeInfo& valueTypeOf(const TypeTable& table) {
+    const TypeInfo& type = typeInfoOf(table);
+    if (valueOffset(type) != kSlotValue) throw std::logic_error("a slot of another layout");
+    return type;
+}
+
+/// An input whose newest value counts. Machine code reads it.
 class ValueInput final : public InputBase {
    public:
-    ValueInput(Component* owner, const InputTable& table, std::byte* record)
-        : InputBase(owner, table.name, typeInfoOf(*table.type), emptySlot(typeInfoOf(*table.type))),
-          offset_(valueOffset(type())),
-          field_(record + table.value),
-          flags_(placeIn<bool>(record, table.flags)),
-          copy_(*table.type),
-          age_(placeIn<std::int64_t>(record, table.age)),
-          connected_(placeIn<bool>(record, table.connected)),
-          has_more_(age_ != nullptr || connected_ != nullptr) {}
+    ValueInput(Component* owner, const InputTable& table)
+        : InputBase(owner, table.name, valueTypeOf(*table.type),
+                    emptySlot(valueTypeOf(*table.type))) {}
 
-    /// Brings the newest value into the record. Real-time safe.
-    void read() noexcept {
-        const DataStatus status = readStatus();
-        flags_[0] = status == DataStatus::New;
-        flags_[1] = status != DataStatus::None;
-        copy_.toRecord(field_, reinterpret_cast<const std::byte*>(current()) + offset_);
-        if (has_more_) readMore();
-    }
-
-   private:
-    __attribute__((noinline)) void readMore() noexcept {
-        if (age_ != nullptr) *age_ = age();
-        if (connected_ != nullptr) *connected_ = connected();
-    }
-
-    std::size_t offset_;
-    std::byte* field_;
-    bool* flags_;
-    ValueCopy copy_;
-    std::int64_t* age_;
-    bool* connected_;
-    bool has_more_;
+    /// Takes note of the newest value. Real-time safe.
+    DataStatus read() noexcept { return readStatus(); }
 };
 
-/// An output.
+/// An output. Machine code writes it.
 class ValueOutput final : public OutputBase {
    public:
     ValueOutput(Component* owner, const OutputTable& table, std::byte* record)
         : ValueOutput(owner, table, record, Finite()) {}
-
-    /// Writes the record's value, if a hook has written one. Real-time safe.
-    void write() noexcept {
-        if (!*written_) return;
-        copy_.toPort(reinterpret_cast<std::byte*>(raw_) + offset_, field_);
-        stampWrite();
-        *written_ = false;
-    }
 
     /// Forgets what a hook has written. Real-time safe.
     void forget() noexcept { *written_ = false; }
 
    private:
     ValueOutput(Component* owner, const OutputTable& table, std::byte* record, const Finite& finite)
-        : OutputBase(owner, table.name, table.unit, typeInfoOf(*table.type),
+        : OutputBase(owner, table.name, table.unit, valueTypeOf(*table.type),
                      table.finite != 0 ? &finite : nullptr),
-          copy_(*table.type),
-          offset_(valueOffset(type())),
-          field_(record + table.value),
           written_(placeIn<bool>(record, table.written)) {}
 
-    ValueCopy copy_;
-    std::size_t offset_;
-    const std::byte* field_;
     bool* written_;
 };
 

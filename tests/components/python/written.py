@@ -169,7 +169,7 @@ class Sampling(Component):
         self.on[0] = np.allclose(u, u * (1.0 + 1e-9)) and np.array_equal(m, m)
         self.on[1] = np.all(np.isclose(m, v, atol=1.0)) or np.any(u > 3.0)
         self.on[2] = v in (0.0, 1.0) or math.isclose(v, 1.0, abs_tol=0.5)
-        self.on[3] = np.count_nonzero(m > 0.0) > 5 or any(u.astype(bool)) and all([v > 0, True])
+        self.on[3] = np.count_nonzero(m > 0.0) > 5 or (any(u.astype(bool)) and all([v > 0, True]))
         for i in reversed(range(1, 4)):
             self.n[i] += abs(u[:5]).astype(int)[i] % 7 + sum(POINTS[:3]) > 2
 

@@ -93,7 +93,7 @@ class Culprits:
     def _throttled(self) -> Culprit:
         priority = self._draw.randint(1, 70)
         return Culprit(
-            "throttled", "a limit of CPU time", lambda: run(HOG, priority, 1.3, "below the loop")
+            "throttled", "a limit of CPU time", lambda: run(HOG, priority, 2.2, "below the loop")
         )
 
     def _interrupts(self) -> Culprit:

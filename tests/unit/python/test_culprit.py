@@ -311,7 +311,8 @@ def test_a_cycle_that_waits_for_the_one_before_blames_that() -> None:
     line.run(3 * PERIOD_NS)
     end = line.now + 100 * US
     said = find_culprit(
-        [*line.events, Switch(end, CPU, LOOP, "rtcf-loop", False, LOOP_PRIORITY, 0, "swapper/1", 120)],
+        [*line.events,
+         Switch(end, CPU, LOOP, "rtcf-loop", False, LOOP_PRIORITY, 0, "swapper/1", 120)],
         LOOP, LateCycle(PERIOD_NS, 3 * PERIOD_NS, end, end - 2 * PERIOD_NS),
     )  # fmt: skip
     assert said.kind is Kind.PREVIOUS_CYCLE

@@ -6,10 +6,21 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from rtcf.component.declaration import Description, Member
+
 from rtcf_compile.library.toolchain import compiler
+from rtcf_compile.machine_code import port_access
 from rtcf_compile.machine_code.lowering import Compiled
 from rtcf_compile.machine_code.raises import hash_of
 from rtcf_compile.source.mistake import Mistake
+
+_WITH_PORTS = ("update", "safe")
+# Of values of an earlier writer, and of ages, which records have already.
+_RUNTIME = f"""extern "C" {{
+long {port_access.READ}(void*) {{ return 0; }}
+void {port_access.READ_MORE}(void*, void*, void*) {{}}
+"""
 
 
 class Inside:
@@ -26,7 +37,7 @@ class Inside:
                 Path(files[-1]).write_bytes(content)
             symbols = [compiled.logs.symbol(each) for each in range(len(compiled.logs.calls))]
             logs = folder / "logs.cpp"
-            logs.write_text("".join(f'extern "C" void {each}() {{}}\n' for each in symbols))
+            logs.write_text(_RUNTIME + "".join(f"void {each}() {{}}\n" for each in symbols) + "}\n")
             library = folder / "component.so"
             command = [
                 *compiler(),
@@ -42,15 +53,25 @@ class Inside:
             if done.returncode != 0:
                 raise Mistake(compiled.file, 0, done.stderr.strip()[:300], "look at the compiler")
             self._library = ctypes.CDLL(str(library))
+        self._ports = _Ports(compiled.description)
         self._hooks = {}
         for hook in compiled.hooks:
             function = self._library[compiled.symbol(hook)]
-            function.argtypes, function.restype = [ctypes.c_void_p], ctypes.c_void_p
+            function.argtypes = [ctypes.c_void_p] * (2 if hook in _WITH_PORTS else 1)
+            function.restype = ctypes.c_void_p
             self._hooks[hook] = function
 
     def call(self, hook: str, record: Any) -> str | None:
-        """Run a hook on a record; return what it raised, as the loop would say it."""
-        raised = self._hooks[hook](record.ctypes.data)
+        """Run a hook on a record; return what it raised, as the loop would say it.
+
+        Inputs have what the record says; the record then says what outputs have.
+        """
+        if hook in _WITH_PORTS:
+            self._ports.put(record)
+            raised = self._hooks[hook](record.ctypes.data, self._ports.address)
+            self._ports.take(record)
+        else:
+            raised = self._hooks[hook](record.ctypes.data)
         if not raised:
             return None
         return self._text(raised, int(record["_line"]))
@@ -63,3 +84,73 @@ class Inside:
         if meaning is None:
             return f"{noted}: raised an unknown exception"
         return f"{meaning.line or noted}: {meaning.text}"
+
+
+class _Ports:
+    """Ports of values without a loop: memory as port.hpp and slot.hpp have it."""
+
+    def __init__(self, description: Description) -> None:
+        self._inputs = [_Port(each) for each in port_access.inputs(description)]
+        self._outputs = [_Port(each) for each in port_access.outputs(description)]
+        self._clock = np.zeros(8, np.int64)
+        for each in self._inputs:
+            each.place[port_access.SOURCE // 8] = each.slot.ctypes.data
+            each.place[port_access.CURRENT // 8] = each.slot.ctypes.data
+        for each in self._outputs:
+            each.place[port_access.RAW // 8] = each.slot.ctypes.data
+            each.place[port_access.CLOCK // 8] = self._clock.ctypes.data
+        ports = [each.place.ctypes.data for each in (*self._inputs, *self._outputs)]
+        self._addresses = np.array(ports or [0], np.int64)
+        self.address: int = int(self._addresses.ctypes.data)
+
+    def put(self, record: Any) -> None:
+        """Give inputs what a record says."""
+        for each in self._inputs:
+            is_new, is_valid = (bool(record[f"{each.name}__{flag}"]) for flag in ("new", "valid"))
+            each.sequence = int(is_new) + int(is_valid)
+            each.place[port_access.SEEN // 8] = each.sequence - is_new
+            each.value = record[each.name]
+
+    def take(self, record: Any) -> None:
+        """Say in a record what outputs were written."""
+        for each in self._outputs:
+            if each.sequence:
+                record[each.name] = each.value
+                record[f"{each.name}__written"] = True
+                each.sequence = 0
+
+
+class _Port:
+    """A port and its slot."""
+
+    def __init__(self, member: Member) -> None:
+        self.name = member.name
+        self.place = np.zeros(4, np.int64)
+        self._type = member.type
+        size = port_access.SLOT_VALUE + member.type.count * member.type.scalar.itemsize
+        self.slot = np.zeros((size + 7) // 8, np.int64)
+
+    @property
+    def sequence(self) -> int:
+        """How often it was written."""
+        return int(self.slot[port_access.SEQUENCE // 8])
+
+    @sequence.setter
+    def sequence(self, number: int) -> None:
+        self.slot[port_access.SEQUENCE // 8] = number
+
+    @property
+    def value(self) -> Any:
+        """In the order of a record."""
+        order = "F" if self._type.is_float else "C"
+        return self._elements().reshape(self._type.shape, order=order)
+
+    @value.setter
+    def value(self, value: Any) -> None:
+        self._elements()[:] = np.asarray(value).ravel("F" if self._type.is_float else "C")
+
+    def _elements(self) -> Any:
+        """As the slot has them: matrices of floats by columns."""
+        memory = self.slot.view(np.uint8)[port_access.SLOT_VALUE :]
+        used = self._type.count * self._type.scalar.itemsize
+        return memory[:used].view(self._type.scalar)

@@ -178,6 +178,9 @@ struct LogTable {
 
 /// A hook's machine code. @return null, or what it raised
 using HookFunction = const void* (*)(void* record);
+/// The same of a hook that has ports. `ports`: the inputs of values, and the outputs behind them, in
+/// order of their declaration; it reads those and writes these.
+using PortHookFunction = const void* (*)(void* record, void* const* ports);
 
 /// Members of the record that every component has, at its beginning.
 struct RecordHead {
@@ -211,8 +214,8 @@ struct ComponentTable {
     std::int64_t record_size;
     HookFunction prepare;  ///< null: the class has none
     HookFunction start;    ///< likewise
-    HookFunction update;
-    HookFunction safe;  ///< null: the class has none
+    PortHookFunction update;
+    PortHookFunction safe;  ///< null: the class has none
     std::uint64_t times;
     const InputTable* inputs;
     std::int64_t input_count;
@@ -237,6 +240,6 @@ struct LibraryTable {
 };
 
 /// What the name ends in by which the runtime finds a library's tables.
-#define RTCF_PYTHON_TABLES 1
+#define RTCF_PYTHON_TABLES 2
 
 }  // namespace rtcf::python

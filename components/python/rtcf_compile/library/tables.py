@@ -25,7 +25,7 @@ from rtcf_compile.machine_code.lowering import Compiled
 from rtcf_compile.rewriting.logs import LogCall
 from rtcf_compile.source.mistake import display, source_line
 
-TABLES = 1
+TABLES = 2
 _WHOLE = ("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 SCALARS = {name: i for i, name in enumerate(("bool", *_WHOLE, "float32", "float64"))}
 _LEVELS = {"debug": 1, "info": 2, "warn": 3, "error": 4, "fatal": 5}
@@ -48,7 +48,7 @@ _FUNCTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("copies", _TEXT, ()),
     ("print_state", _TEXT, (_POINTER,)),
 )
-_HOOK = "i8* (i8*)"
+_HOOK, _HOOK_WITH_PORTS = "i8* (i8*)", "i8* (i8*, i8**)"
 _CREATE = "i8* (i8*, i8*)"
 
 
@@ -121,8 +121,9 @@ class _Library:
     def _hook(self, compiled: Compiled, hook: str) -> Value:
         if hook not in compiled.hooks:
             return NULL
-        self.data.add(f"declare i8* @{compiled.symbol(hook)}(i8*)")
-        return pointer_to(compiled.symbol(hook), _HOOK)
+        kind = _HOOK_WITH_PORTS if hook in ("update", "safe") else _HOOK
+        self.data.add(f"declare {kind.replace('(', f'@{compiled.symbol(hook)}(', 1)}")
+        return pointer_to(compiled.symbol(hook), kind)
 
     def _input(self, compiled: Compiled, member: Member) -> Value:
         place, name = _Places(compiled), member.name

@@ -270,34 +270,3 @@ done:
   ret void
 }}
 {_COUNTS}"""
-
-
-def entry(symbol: str, inner: str, record: str, exception: str) -> str:
-    """Return a hook's function as C calls it: null, or what it raised.
-
-    `const void* symbol(void* record)`; `record` and `exception` are what the inner function takes:
-    the component's members, and the place for what it raises.
-    """
-    return f"""
-declare i32 @{inner}(i8**, {exception}, {record})
-
-define i8* @{symbol}({record} %self) {{
-  call void @rtcf_begin_hook()
-  %result = alloca i8*
-  %raised = alloca i8*
-  store i8* null, i8** %result
-  store i8* null, i8** %raised
-  %place = bitcast i8** %raised to {exception}
-  %status = call i32 @{inner}(i8** %result, {exception} %place, {record} %self)
-  call void @rtcf_end_hook()
-  %fine = icmp eq i32 %status, 0
-  %none = icmp eq i32 %status, -2
-  %good = or i1 %fine, %none
-  br i1 %good, label %ended, label %fault
-ended:
-  ret i8* null
-fault:
-  %what = load i8*, i8** %raised
-  ret i8* %what
-}}
-"""

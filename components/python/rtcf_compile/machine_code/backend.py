@@ -20,7 +20,7 @@ from numba.core.compiler_lock import global_compiler_lock
 NO_WRAPPERS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 POINTERS_HAVE_TYPES = llvm.llvm_version_info[0] < 15
 _INLINED = 1000  # instructions
-_POINTER = re.compile(r"(?:i\d+|\[\d+ x i\d+\])\*+")
+_POINTER = re.compile(r"(?:i\d+|float|double|\[\d+ x i\d+\])\*+")
 _RECORD_AND_EXCEPTION = (
     r"\(i8\*\*[^,]*, (?P<exception>\{[^}]*\})\*\*[^,]*, (?P<record>\[[^\]]*\]\*)"
 )

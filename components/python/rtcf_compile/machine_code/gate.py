@@ -5,6 +5,7 @@ Whatever else it would need at run time is refused, with the line that it comes 
 
 from typing import Any
 
+from rtcf_compile.machine_code import port_access
 from rtcf_compile.source.mistake import Mistake
 
 _MATHEMATICS = [
@@ -57,6 +58,7 @@ ALLOWED = {
     *_MATHEMATICS,
     *(f"{name}f" for name in _MATHEMATICS),
     *("memcpy", "memmove", "memset", "bcmp", "memcmp"),
+    *(port_access.READ, port_access.READ_MORE),
 }
 _HEAP = {"aligned_alloc", "free"}
 _MEANING = {

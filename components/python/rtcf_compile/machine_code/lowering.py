@@ -18,7 +18,15 @@ from rtcf.component.declaration import Description
 
 import rtcf_compile.machine_code.numpy_functions
 import rtcf_compile.machine_code.overloads  # noqa: F401, registers them
-from rtcf_compile.machine_code import arena, backend, explain, gate, stack, trial
+from rtcf_compile.machine_code import (
+    arena,
+    backend,
+    explain,
+    gate,
+    port_access,
+    stack,
+    trial,
+)
 from rtcf_compile.machine_code.raises import Raise, raises_in
 from rtcf_compile.rewriting import log_calls
 from rtcf_compile.rewriting.functions import Functions
@@ -104,10 +112,16 @@ def _inner(function: FunctionType, record: Any) -> tuple[str, str]:
 
 def _linked(compiled: Compiled, inner: dict[str, tuple[str, str]], allocator: str) -> Any:
     """Return one module with the entries of these hooks, and nothing that they do not need."""
-    parts, base = [], arena.DECLARATIONS
+    parts, base = [], arena.DECLARATIONS + port_access.DECLARATIONS
+    access = port_access.PortAccess(compiled.description, compiled.used)
     for hook, (name, text) in inner.items():
-        record, exception = backend.taken(text, name)
-        base += arena.entry(compiled.symbol(hook), name, record, exception)
+        base += port_access.entry(
+            compiled.symbol(hook),
+            name,
+            backend.taken(text, name),
+            access if hook in _REALTIME else None,
+            writes_always=hook == "safe",
+        )
         # Ours take their place; numba's count by locked instructions.
         text = _NRT_COUNTS.sub("", text) + backend.pointers(_COUNTS)
         part = backend.parsed(text)

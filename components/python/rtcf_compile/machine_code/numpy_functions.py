@@ -1138,9 +1138,24 @@ def _searchsorted(a: Any, v: Any, side: Any) -> Any:
 # Elements of arrays, and numbers.
 
 
+def _clip_number(a: Any, a_min: Any, a_max: Any) -> Any:
+    # Two comparisons are enough where no bound is NaN; a number that is NaN stays so.
+    if a_min <= a_max:
+        raised = a_min if a_min > a else a
+        return a_max if a_max < raised else raised
+    return np.minimum(np.maximum(a, a_min), a_max)
+
+
+_clip_elements = numba.vectorize(_clip_number)
+
+
 @compiled_as(own.rtcf_clip, arrays=("a", "a_min", "a_max"))
 def _clip(a: Any, a_min: Any, a_max: Any) -> Any:
     low, high = (not isinstance(each, types.NoneType) for each in (a_min, a_max))
+    if all(isinstance(each, types.Float) for each in (a, a_min, a_max)):
+        return _clip_number
+    if low and high and all(_dtype(each) == np.float64 for each in (a, a_min, a_max)):
+        return lambda a, a_min, a_max: _clip_elements(a, a_min, a_max)
     if low and high:
         return lambda a, a_min, a_max: np.minimum(np.maximum(a, a_min), a_max)
     if low:

@@ -18,7 +18,25 @@
 
 namespace rtcf {
 
+/// Where machine code that no C++ compiler makes finds what a port has, in bytes.
+struct PortPlaces {
+    std::size_t source;   ///< in an input: the slot that its writer writes
+    std::size_t current;  ///< in an input: the slot with its value
+    std::size_t seen;     ///< in an input: the source's sequence at the last read
+    std::size_t raw;      ///< in an output: the slot that it writes
+    std::size_t clock;    ///< in an output: that stamps it
+    constexpr bool operator==(const PortPlaces& other) const noexcept {
+        return source == other.source && current == other.current && seen == other.seen &&
+               raw == other.raw && clock == other.clock;
+    }
+};
+
 struct AbiProbe {
+    static constexpr PortPlaces portPlaces() noexcept {
+        return {offsetof(InputBase, source_), offsetof(InputBase, current_),
+                offsetof(InputBase, seen_), offsetof(OutputBase, raw_),
+                offsetof(OutputBase, clock_)};
+    }
     /// @param meaning raised by hand where what is meant changes, but no layout
     static std::uint32_t fingerprint(std::uint32_t meaning) noexcept {
         std::uint64_t hash = detail::stateHash(meaning, detail::stateHash("rtcf"));

@@ -1,0 +1,284 @@
+"""How hooks get at ports of numbers and arrays, as LLVM's assembly (pointers with types, see
+backend.py): the values of inputs go to the record before a hook runs, those of outputs to their
+slots behind it. Ports of messages, and queues, are the runtime's: see python_component.cpp.
+
+The places in ports and slots are those of port.hpp and slot.hpp; value_ports.hpp requires that.
+"""
+
+from collections.abc import Iterator, Sequence
+
+from rtcf.component.declaration import Description, Input, Member, Output
+
+SEQUENCE, SLOT_TIME, SLOT_VALUE = 0, 8, 16  # bytes in a slot
+SOURCE, CURRENT, SEEN = 0, 8, 16  # in an input
+RAW, CLOCK = 0, 8  # in an output
+CLOCK_TIME = 8  # in the loop's clock
+READ, READ_MORE = "rtcf_python_read", "rtcf_python_read_more"
+NONE, OLD, NEW = 0, 1, 2  # what READ returns
+_UNROLLED = 64  # elements
+
+
+def _transpose(size: int) -> str:
+    """Return a function that writes a matrix row by row that lies column by column."""
+    kind = f"i{8 * size}"
+    return f"""
+define internal void @rtcf_transpose_{size}(i8* %to, i8* %from, i64 %rows, i64 %columns) {{
+  %target = bitcast i8* %to to {kind}*
+  %source = bitcast i8* %from to {kind}*
+  br label %row
+row:
+  %i = phi i64 [ 0, %0 ], [ %next_row, %row_done ]
+  br label %element
+element:
+  %j = phi i64 [ 0, %row ], [ %next, %element ]
+  %column = mul i64 %j, %rows
+  %there = add i64 %column, %i
+  %read = getelementptr {kind}, {kind}* %source, i64 %there
+  %value = load {kind}, {kind}* %read
+  %begin = mul i64 %i, %columns
+  %here = add i64 %begin, %j
+  %written = getelementptr {kind}, {kind}* %target, i64 %here
+  store {kind} %value, {kind}* %written
+  %next = add i64 %j, 1
+  %more = icmp ult i64 %next, %columns
+  br i1 %more, label %element, label %row_done
+row_done:
+  %next_row = add i64 %i, 1
+  %more_rows = icmp ult i64 %next_row, %rows
+  br i1 %more_rows, label %row, label %done
+done:
+  ret void
+}}
+"""
+
+
+DECLARATIONS = f"""
+declare i64 @{READ}(i8*)
+declare void @{READ_MORE}(i8*, i8*, i8*)
+declare i8* @memcpy(i8*, i8*, i64)
+{_transpose(4)}{_transpose(8)}"""
+
+
+def inputs(description: Description) -> list[Member]:
+    """Return the inputs in the order in which a hook gets them; outputs follow."""
+    return [each for each in description.of(Input) if each.message is None]
+
+
+def outputs(description: Description) -> list[Member]:
+    """Return the outputs in the order in which a hook gets them."""
+    return [each for each in description.of(Output) if each.message is None]
+
+
+class PortAccess:
+    """The assembly around a hook: of `%record` (i8*) and `%ports` (i8**)."""
+
+    def __init__(self, description: Description, used: set[str]) -> None:
+        fields = description.record.fields
+        assert fields is not None
+        self._places = {name: int(field[1]) for name, field in fields.items()}
+        self._used = used
+        self._inputs, self._outputs = inputs(description), outputs(description)
+
+    def read(self) -> str:
+        """Return the instructions before the hook."""
+        return "\n".join(
+            line for i, each in enumerate(self._inputs) for line in self._read(each, f"i{i}", i)
+        )
+
+    def write(self) -> str:
+        """Return the instructions behind the hook: outputs that it has written."""
+        first = len(self._inputs)
+        return "\n".join(
+            line
+            for i, each in enumerate(self._outputs)
+            for line in self._write(each, f"o{i}", first + i)
+        )
+
+    def _read(self, member: Member, name: str, index: int) -> Iterator[str]:
+        yield from _port(name, index)
+        yield from _place(f"{name}.source.place", f"{name}.port", SOURCE, "i8*")
+        yield f"  %{name}.source = load i8*, i8** %{name}.source.place"
+        yield from _place(f"{name}.sequence.place", f"{name}.source", SEQUENCE, "i64")
+        yield f"  %{name}.sequence = load i64, i64* %{name}.sequence.place"
+        yield from _place(f"{name}.seen.place", f"{name}.port", SEEN, "i64")
+        yield f"  %{name}.seen = load i64, i64* %{name}.seen.place"
+        yield from _place(f"{name}.current.place", f"{name}.port", CURRENT, "i8*")
+        yield f"  %{name}.is_new = icmp ne i64 %{name}.sequence, %{name}.seen"
+        yield f"  br i1 %{name}.is_new, label %{name}.new, label %{name}.old"
+        yield f"{name}.new:"
+        yield f"  store i64 %{name}.sequence, i64* %{name}.seen.place"
+        yield f"  store i8* %{name}.source, i8** %{name}.current.place"
+        yield f"  br label %{name}.read"
+        yield f"{name}.old:"
+        yield f"  %{name}.kept = load i8*, i8** %{name}.current.place"
+        yield f"  %{name}.is_same = icmp eq i8* %{name}.kept, %{name}.source"
+        yield f"  br i1 %{name}.is_same, label %{name}.same, label %{name}.other"
+        yield f"{name}.same:"
+        yield f"  %{name}.has_value = icmp ne i64 %{name}.sequence, 0"
+        yield f"  br label %{name}.read"
+        # The value of an earlier writer.
+        yield f"{name}.other:"
+        yield f"  %{name}.status = call i64 @{READ}(i8* %{name}.port)"
+        yield f"  %{name}.other.new = icmp eq i64 %{name}.status, {NEW}"
+        yield f"  %{name}.other.valid = icmp ne i64 %{name}.status, {NONE}"
+        yield f"  br label %{name}.read"
+        yield f"{name}.read:"
+        blocks = [f"%{name}.{each}" for each in ("new", "same", "other")]
+        for found, kind, values in (
+            ("slot", "i8*", ("source", "source", "kept")),
+            ("fresh", "i1", (None, None, "other.new")),
+            ("valid", "i1", (None, "has_value", "other.valid")),
+        ):
+            constants = ("true", "false", "")
+            pairs = ", ".join(
+                f"[ {f'%{name}.{value}' if value else constant}, {block} ]"
+                for value, constant, block in zip(values, constants, blocks, strict=True)
+            )
+            yield f"  %{name}.{found} = phi {kind} {pairs}"
+        for field, found in (("new", "fresh"), ("valid", "valid")):
+            if f"{member.name}__{field}" in self._used:
+                place = self._places[f"{member.name}__{field}"]
+                yield f"  %{name}.{found}.byte = zext i1 %{name}.{found} to i8"
+                yield from _place(f"{name}.{found}.place", "record", place, "i8")
+                yield f"  store i8 %{name}.{found}.byte, i8* %{name}.{found}.place"
+        yield from _place(f"{name}.from", f"{name}.slot", SLOT_VALUE, "i8")
+        yield from _place(f"{name}.to", "record", self._places[member.name], "i8")
+        yield from _copy(member, name, to_port=False)
+        more = [f"{member.name}__{each}" for each in ("age", "connected")]
+        if not set(more) & self._used:
+            return
+        places = []
+        for field in more:
+            if field in self._used:
+                yield from _place(f"{name}.{field}", "record", self._places[field], "i8")
+            places.append(f"i8* %{name}.{field}" if field in self._used else "i8* null")
+        yield f"  call void @{READ_MORE}(i8* %{name}.port, {', '.join(places)})"
+
+    def _write(self, member: Member, name: str, index: int) -> Iterator[str]:
+        flag = self._places[f"{member.name}__written"]
+        yield from _place(f"{name}.flag", "record", flag, "i8")
+        yield f"  %{name}.written = load i8, i8* %{name}.flag"
+        yield f"  %{name}.is_written = icmp ne i8 %{name}.written, 0"
+        yield f"  br i1 %{name}.is_written, label %{name}.write, label %{name}.done"
+        yield f"{name}.write:"
+        yield from _port(name, index)
+        yield from _place(f"{name}.raw.place", f"{name}.port", RAW, "i8*")
+        yield f"  %{name}.raw = load i8*, i8** %{name}.raw.place"
+        yield from _place(f"{name}.from", "record", self._places[member.name], "i8")
+        yield from _place(f"{name}.to", f"{name}.raw", SLOT_VALUE, "i8")
+        yield from _copy(member, name, to_port=True)
+        yield from _place(f"{name}.sequence.place", f"{name}.raw", SEQUENCE, "i64")
+        yield f"  %{name}.sequence = load i64, i64* %{name}.sequence.place"
+        yield f"  %{name}.next = add i64 %{name}.sequence, 1"
+        yield f"  store i64 %{name}.next, i64* %{name}.sequence.place"
+        yield from _place(f"{name}.clock.place", f"{name}.port", CLOCK, "i8*")
+        yield f"  %{name}.clock = load i8*, i8** %{name}.clock.place"
+        yield from _place(f"{name}.now.place", f"{name}.clock", CLOCK_TIME, "i64")
+        yield f"  %{name}.now = load atomic i64, i64* %{name}.now.place monotonic, align 8"
+        yield from _place(f"{name}.time.place", f"{name}.raw", SLOT_TIME, "i64")
+        yield f"  store i64 %{name}.now, i64* %{name}.time.place"
+        yield f"  store i8 0, i8* %{name}.flag"
+        yield f"  br label %{name}.done"
+        yield f"{name}.done:"
+
+
+def _port(name: str, index: int) -> Iterator[str]:
+    yield f"  %{name}.port.place = getelementptr i8*, i8** %ports, i64 {index}"
+    yield f"  %{name}.port = load i8*, i8** %{name}.port.place"
+
+
+def _place(name: str, base: str, offset: int, kind: str) -> Iterator[str]:
+    """Return the address that many bytes behind another one."""
+    if kind == "i8":
+        yield f"  %{name} = getelementptr i8, i8* %{base}, i64 {offset}"
+        return
+    yield f"  %{name}.byte = getelementptr i8, i8* %{base}, i64 {offset}"
+    yield f"  %{name} = bitcast i8* %{name}.byte to {kind}*"
+
+
+def _copy(member: Member, name: str, to_port: bool) -> Iterator[str]:
+    """Return the instructions that copy a value. Ports have matrices of floats by columns, and
+    records all arrays by rows.
+    """
+    kind = member.type
+    size = kind.scalar.itemsize
+    scalar = {4: "float", 8: "double"}[size] if kind.is_float else f"i{8 * size}"
+    rows, columns = kind.shape if len(kind.shape) == 2 else (1, kind.count)
+    if not kind.is_float or 1 in (rows, columns):
+        if kind.count <= _UNROLLED:
+            yield from _copy_elements(name, range(kind.count), size, scalar)
+            return
+        places = f"i8* %{name}.to, i8* %{name}.from"
+        yield f"  %{name}.copied = call i8* @memcpy({places}, i64 {kind.count * size})"
+        return
+    # A row of one is a column of the other.
+    along, across = (columns, rows) if to_port else (rows, columns)
+    if kind.count > _UNROLLED:
+        yield (
+            f"  call void @rtcf_transpose_{size}"
+            f"(i8* %{name}.to, i8* %{name}.from, i64 {along}, i64 {across})"
+        )
+        return
+    sources = [j * along + i for i in range(along) for j in range(across)]
+    yield from _copy_elements(name, sources, size, scalar)
+
+
+def _copy_elements(name: str, sources: Sequence[int], size: int, kind: str) -> Iterator[str]:
+    """Return instructions that read all elements, by their places, and then write them in order:
+    LLVM makes vectors of them.
+    """
+    for target, source in enumerate(sources):
+        own = f"{name}.{target}"
+        yield from _place(f"{own}.from", f"{name}.from", size * source, kind)
+        yield f"  %{own} = load {kind}, {kind}* %{own}.from"
+    for target in range(len(sources)):
+        own = f"{name}.{target}"
+        yield from _place(f"{own}.to", f"{name}.to", size * target, kind)
+        yield f"  store {kind} %{own}, {kind}* %{own}.to"
+
+
+def entry(
+    symbol: str,
+    inner: str,
+    taken: tuple[str, str],
+    access: PortAccess | None,
+    writes_always: bool = False,
+) -> str:
+    """Return a hook's function as C calls it: null, or what it raised.
+
+    In tables.hpp it is a HookFunction, and with ports a PortHookFunction. `taken`: the types of the
+    record and of the place for what it raises, as the inner function takes them. `writes_always`:
+    outputs are written also if it raised.
+    """
+    record, exception = taken
+    read = access.read() if access else ""
+    write = access.write() if access else ""
+    # Nothing else leads to the record while a hook runs.
+    ports = ", i8** %ports" if access else ""
+    return f"""
+declare i32 @{inner}(i8**, {exception}, {record})
+
+define i8* @{symbol}(i8* noalias %record{ports}) {{
+  call void @rtcf_begin_hook()
+  %result = alloca i8*
+  %raised = alloca i8*
+  store i8* null, i8** %result
+  store i8* null, i8** %raised
+{read}
+  %self = bitcast i8* %record to {record}
+  %place = bitcast i8** %raised to {exception}
+  %status = call i32 @{inner}(i8** %result, {exception} %place, {record} %self)
+  call void @rtcf_end_hook()
+{write if writes_always else ""}
+  %fine = icmp eq i32 %status, 0
+  %none = icmp eq i32 %status, -2
+  %good = or i1 %fine, %none
+  br i1 %good, label %ended, label %fault
+ended:
+{"" if writes_always else write}
+  ret i8* null
+fault:
+  %what = load i8*, i8** %raised
+  ret i8* %what
+}}
+"""
