@@ -88,6 +88,26 @@ def test_it_computes_in_the_loop_what_it_says(daemon: Daemon, client: rtcf.Clien
     assert [float(each) for each in shown] == pytest.approx([x, estimate], rel=1e-5)
 
 
+def test_an_input_keeps_its_value_from_one_writer_to_the_next(
+    client: rtcf.Client, daemon: Daemon
+) -> None:
+    def seen(cycles: int) -> list[str]:
+        client.step(cycles)
+        states = _states(client, "watcher")
+        return [states[each] for each in ("last", "fresh", "valid", "age", "connected")]
+
+    client.load(rtcf.component("py", "Watcher", name="watcher"))
+    assert seen(2) == ["0", "0", "0", "-1", "0"]
+    client.load(rtcf.component("py", "Seldom", name="writer"))
+    assert seen(5) == ["5", "5", "1", "0", "1"]
+    client.unload("writer")
+    assert seen(3) == ["5", "5", "1", "3000000", "0"]
+    client.load(rtcf.component("py", "Seldom", name="next", parameters=["every:=4"]))
+    assert seen(3) == ["5", "5", "1", "6000000", "1"]
+    assert seen(1) == ["4", "6", "1", "0", "1"]
+    assert seen(2) == ["4", "6", "1", "2000000", "1"]
+
+
 def test_a_queue_gets_each_message_of_cycles_that_its_reader_skips(
     client: rtcf.Client, daemon: Daemon
 ) -> None:

@@ -101,6 +101,40 @@ class Observer(Component):
             self.estimate[i] = clamp(self.estimate[i], -bound, bound)
 
 
+class Seldom(Component):
+    """Counts cycles, and writes a few of them."""
+
+    count: Output[int]
+    every: Parameter[int] = Parameter(1, min=1)
+    total: State[int]
+
+    def update(self):
+        """Count."""
+        self.total += 1
+        if self.total % self.every == 0:
+            self.count.write(self.total)
+
+
+class Watcher(Component):
+    """Notes all that an input tells."""
+
+    count: Input[int]
+    last: State[int]
+    fresh: State[int] = State(0, doc="cycles with a new value")
+    valid: State[bool]
+    age: State[int] = State(0, unit="ns")
+    connected: State[bool]
+
+    def update(self):
+        """Note it."""
+        self.last = self.count.value
+        if self.count.new:
+            self.fresh += 1
+        self.valid = self.count.valid
+        self.age = self.count.age
+        self.connected = self.count.connected
+
+
 class Gatherer(Component):
     """Takes each message of a ramp, though it may not run every cycle."""
 

@@ -1,4 +1,4 @@
-// A component made of tables, whose hooks are functions here: what goes between ports and record.
+// A component made of tables, whose hooks are functions here.
 #include "python_component.hpp"
 
 #include <gtest/gtest.h>
@@ -42,14 +42,30 @@ const void* start(void* memory) {
     return nullptr;
 }
 
+// As machine code finds it.
+template <typename T>
+T& placeIn(void* memory, std::size_t offset) {
+    return *reinterpret_cast<T*>(static_cast<std::byte*>(memory) + offset);
+}
+
 // Writes u * gain where u is new, and raises where it is negative.
-const void* update(void* memory) {
+const void* update(void* memory, void* const* ports) {
+    constexpr PortPlaces places = AbiProbe::portPlaces();
     Record& record = *static_cast<Record*>(memory);
     record.head.line = 12;
     ++record.count;
-    record.x = record.u * record.gain;
-    record.is_written = record.is_new;
-    return record.u < 0.0 ? &kLimit : nullptr;
+    const bool is_new = static_cast<ValueInput*>(ports[0])->read() == DataStatus::New;
+    record.u = placeIn<Slot<double>*>(ports[0], places.current)->value;
+    record.is_written = true;
+    if (record.u < 0.0) return &kLimit;
+    if (is_new) {
+        Slot<double>& written = *placeIn<Slot<double>*>(ports[1], places.raw);
+        written.value = record.u * record.gain;
+        ++written.sequence;
+        written.time_ns = placeIn<const LoopClock*>(ports[1], places.clock)->time_ns;
+    }
+    record.is_written = false;
+    return nullptr;
 }
 
 constexpr std::uint64_t hashOf(std::string_view text) { return detail::stateHash(text); }
