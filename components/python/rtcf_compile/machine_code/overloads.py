@@ -28,10 +28,14 @@ _OPTIONS: dict[str, Any] = {
 
 
 def compiled_as(
-    helper: Callable[..., Any], checked: bool = False, arrays: Sequence[str] = ()
+    helper: Callable[..., Any],
+    checked: bool = False,
+    arrays: Sequence[str] = (),
+    in_line: bool = False,
 ) -> Callable[[Callable[..., Any]], None]:
     """Register what chooses a helper's implementation by types; numba wants no annotations.
     `checked` are the indices that it uses; arguments of the names `arrays` may be numbers in rows.
+    `in_line`: always, so that its temporaries may be variables of the caller (stack.py).
     """
 
     def register(choose: Callable[..., Any]) -> None:
@@ -53,7 +57,7 @@ def compiled_as(
                 implementation.__annotations__ = {}
             return implementation
 
-        options: dict[str, Any] = {**_OPTIONS, "boundscheck": checked}
+        options = {**_OPTIONS, "boundscheck": checked, "forceinline": in_line}
         overload(helper, jit_options=options)(typed)
 
     return register
@@ -397,7 +401,7 @@ def plain(function: Any) -> Any:
     return register_jitable(**_OPTIONS)(function)
 
 
-@compiled_as(helpers.rtcf_assign)
+@compiled_as(helpers.rtcf_assign, in_line=True)
 def _assign(target: Any, value: Any) -> Any:
     if not isinstance(target, types.Array):
         raise TypingError(f"RTCF:{words(target)} is set as an array:use =")
@@ -420,11 +424,9 @@ def _assign(target: Any, value: Any) -> Any:
     if target.ndim == 1:
 
         def along(target: Any, value: Any) -> None:
-            if value.shape[0] == 1 or target.strides[0] * value.strides[0] < 0:
-                if shares(target, value):
-                    copying(target, value.copy())
-                else:
-                    copying(target, value)
+            is_apart = value.shape[0] == 1 or target.strides[0] * value.strides[0] < 0
+            if is_apart and shares(target, value):
+                copying(target, value.copy())
             elif _is_from_the_end(target, value):
                 _copying_back(target, value)
             else:
