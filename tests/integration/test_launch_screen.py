@@ -46,6 +46,7 @@ def test_the_end_of_a_loop_has_its_statistics(launching: Launching) -> None:
     ), runner.output()
     with launching.client() as (client, name):
         client.start(name)
+        wait_for(lambda: client.get_statistics(name).duration.count > 20, "more cycles")
     wait_for(lambda: runner.output().count("the loop runs") == 2, "the second start")
     assert runner.end() == DONE
     assert runner.output().count("Performed ") == 2

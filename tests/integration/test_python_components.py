@@ -100,7 +100,7 @@ def test_an_input_keeps_its_value_from_one_writer_to_the_next(
     assert seen(2) == ["0", "0", "0", "-1", "0"]
     client.load(rtcf.component("py", "Seldom", name="writer"))
     assert seen(5) == ["5", "5", "1", "0", "1"]
-    client.unload("writer")
+    client.unload(["writer"])
     assert seen(3) == ["5", "5", "1", "3000000", "0"]
     client.load(rtcf.component("py", "Seldom", name="next", parameters=["every:=4"]))
     assert seen(3) == ["5", "5", "1", "6000000", "1"]
