@@ -314,6 +314,55 @@ def test_a_library_of_another_compiler_counts_as_of_another_source(
     assert python_source.fingerprint(source) != before
 
 
+FREELY = """\
+import enum
+
+from rtcf.component import Component, Derived, Output, Parameter, State
+
+
+class Größenart(enum.IntEnum):
+    LÄUFT = 3
+
+
+class Counts(Component):
+    out: Output[float] = Output(unit="°/s")
+    kp: Parameter[float] = Parameter(1.0, doc="Verstärkung")
+    Δ: Derived[float]
+    mode: State[Größenart]
+
+    def prepare(self):
+        self.Δ = 2.0 * self.kp
+
+    def größe(self, ü):
+        return ü + self.Δ
+
+    def update(self):
+        self.info("größe {} {}", self.größe(0.5), self.mode.name)
+        self.out.write(self.größe(0.5))
+        if self.iteration == 3:
+            raise ValueError("zu groß: ü")
+"""
+
+
+@pytest.mark.parametrize("name", ["θ", "2dof", "_", "f" * 100])
+def test_names_that_are_not_ascii_work_where_ros_has_none(
+    daemon: Daemon, client: rtcf.Client, name: str
+) -> None:
+    source = daemon.folder / f"{name}.py"
+    source.write_text(FREELY)
+    done = daemon.ctl("load", str(source), "Counts")
+    assert done.returncode == 0, done.stderr
+    client.step(2)
+    found = client.get_component("Counts")
+    assert [each.doc for each in found.parameters] == ["Verstärkung"]
+    assert [(each.unit, each.value) for each in found.ports] == [("°/s", "data: 2.5")]
+    wait_for(lambda: "größe 2.5 LÄUFT" in daemon.log(), "the record")
+    client.step(5)
+    wait_for(lambda: client.get_component("Counts").fault, "the fault")
+    fault = client.get_component("Counts").fault
+    assert f'{name}.py:26: `raise ValueError("zu groß: ü")`: ValueError: zu groß: ü' in fault
+
+
 def test_a_source_that_is_wrong_is_refused_in_one_line(own_cache: Path, daemon: Daemon) -> None:
     source = daemon.folder / "counts.py"
     done = daemon.ctl("load", str(source), "Counts")

@@ -5,6 +5,7 @@ the next time.
 import argparse
 import hashlib
 import importlib.util
+import os
 import platform
 import re
 import shutil
@@ -51,8 +52,8 @@ def compiled(
     file = Path(source).resolve()
     if not file.is_file():
         raise NotCompiledError(f"{source}: no such file")
-    place = hashlib.sha256(str(file).encode()).hexdigest()[:8]
-    package = f"{re.sub(r'[^A-Za-z0-9_]', '_', file.stem)}_{place}"
+    place = hashlib.sha256(os.fsencode(file)).hexdigest()[:8]
+    package = f"{_ros_name(file.stem)}_{place}"
     library = compiled_folder() / package / f"{file.stem}.so"
     # Beside the package, not in it: only libraries belong there.
     known = compiled_folder() / f".{package}"
@@ -77,6 +78,12 @@ def compiled(
         each.chmod(0o755)
     known.write_text(print_of_it + (_VERIFIED if verify else ""))
     return package
+
+
+def _ros_name(stem: str) -> str:
+    """Return the beginning of a package's name, of which 64 characters are allowed."""
+    name = re.sub(r"[^A-Za-z0-9_]", "_", stem)[:48]
+    return name if name[:1].isalpha() else f"source_{name}"
 
 
 def looks(source: str) -> Iterator[bool]:

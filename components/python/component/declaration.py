@@ -5,14 +5,15 @@ as one NumPy record, which compiled code sees as one C struct and the interprete
 """
 
 import inspect
-import keyword
 import re
 import typing
+import unicodedata
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
 from rtcf.component.message_type import Leaf, MessageType, is_message, message_type
+from rtcf.component.ros_name import advice, is_member_name
 from rtcf.component.value_type import DeclarationError, ValueType, value_type
 
 # Fields of the record that every component has, beside those of its members.
@@ -232,7 +233,10 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
             "State[…], "
             "what never changes stands without annotation"
         )
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or "__" in name or keyword.iskeyword(name):
+    # Nothing outside the component sees what is derived.
+    if not name.isascii() and annotation.kind is not Derived:
+        raise DeclarationError(f"is no name in ROS, which has ASCII letters alone: {advice(name)}")
+    if "__" in name or name.startswith("_") or (name.isascii() and not is_member_name(name)):
         raise DeclarationError("is no name: a letter, then letters, digits and single _")
     if name in _RESERVED:
         raise DeclarationError("is a word that every component has: take another name")
@@ -355,7 +359,8 @@ def _lines(cls: type) -> dict[str, int]:
         return {}
     found: dict[str, int] = {}
     for number, line in enumerate(source, begin):
-        if match := re.match(r"\s+(\w+)\s*[:=]", line):
+        # As Python has names: the sign of micro is the Greek letter.
+        if match := re.match(r"\s+(\w+)\s*[:=]", unicodedata.normalize("NFKC", line)):
             found.setdefault(match[1], number)
     return found
 

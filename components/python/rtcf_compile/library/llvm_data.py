@@ -38,7 +38,8 @@ class Data:
 
     def text(self, text: str) -> Value:
         """Return the address of a text, which ends by a zero."""
-        return self.bytes(text.encode() + b"\0")
+        # A text of Python may have halves of characters, which are no UTF-8.
+        return self.bytes(text.encode(errors="backslashreplace") + b"\0")
 
     def bytes(self, content: bytes, alignment: int = 1) -> Value:
         """Return the address of bytes."""

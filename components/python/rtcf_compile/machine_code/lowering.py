@@ -5,6 +5,7 @@ emitted for any processor of the architecture: neither the interpreter nor numba
 left.
 """
 
+import inspect
 import re
 import warnings
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ import numba
 from numba.core import errors
 from rtcf.component import Component, describe
 from rtcf.component.declaration import Description
+from rtcf.component.ros_name import class_name_error
 
 import rtcf_compile.machine_code.numpy_functions
 import rtcf_compile.machine_code.overloads  # noqa: F401, registers them
@@ -67,6 +69,10 @@ class Compiled:
 
 def compile_component(cls: type[Component], arena_bytes: int = ARENA) -> Compiled:
     """Compile a class; raise Mistake."""
+    if problem := class_name_error(cls.__name__):
+        file, line = inspect.getsourcefile(cls) or "?", inspect.getsourcelines(cls)[1]
+        what, _, way_out = problem.partition(": ")
+        raise Mistake(file, line, f"{cls.__name__} {what}", way_out)
     description = describe(cls)
     functions = Functions(cls, description, _compiler)
     hooks = functions.hooks()

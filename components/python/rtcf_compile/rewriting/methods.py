@@ -14,13 +14,14 @@ class Method:
 
     name: str
     owner: type
+    place: int  # of its class among the component's
     kind: str
     function: FunctionType | None
 
     @property
     def symbol(self) -> str:
         """Return the name that its compiled function has in other functions."""
-        return f"method_{self.owner.__name__}_{self.name}"
+        return f"method_{self.place}_{self.name}"
 
 
 class Methods:
@@ -50,19 +51,19 @@ class Methods:
         return {name for each in self._classes for name in vars(each) if self.find(name)}
 
     def _first(self, name: str, begin: int) -> Method | None:
-        for each in self._classes[begin:]:
+        for place, each in enumerate(self._classes[begin:], begin):
             if name in vars(each):
-                return _method(name, each, vars(each)[name])
+                return _method(name, each, place, vars(each)[name])
         return None
 
 
-def _method(name: str, owner: type, value: Any) -> Method | None:
+def _method(name: str, owner: type, place: int, value: Any) -> Method | None:
     if inspect.isfunction(value):
-        return Method(name, owner, "method", value)
+        return Method(name, owner, place, "method", value)
     if isinstance(value, staticmethod) and inspect.isfunction(value.__func__):
-        return Method(name, owner, "static method", value.__func__)
+        return Method(name, owner, place, "static method", value.__func__)
     if isinstance(value, property) and inspect.isfunction(value.fget):
-        return Method(name, owner, "property", value.fget)
+        return Method(name, owner, place, "property", value.fget)
     if isinstance(value, staticmethod | classmethod | property):
-        return Method(name, owner, type(value).__name__, None)
+        return Method(name, owner, place, type(value).__name__, None)
     return None

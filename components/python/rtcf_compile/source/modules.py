@@ -29,7 +29,11 @@ class Source:
 def load(file: Path) -> ModuleType:
     """Run a module as Python does and return it; raise Mistake where that fails."""
     file = file.resolve()
-    name = f"rtcf_source_{hashlib.sha256(str(file).encode()).hexdigest()[:8]}_{file.stem}"
+    try:
+        path = str(file).encode()
+    except UnicodeEncodeError:
+        raise Mistake(str(file), 0, "its path is not UTF-8", "rename it") from None
+    name = f"rtcf_source_{hashlib.sha256(path).hexdigest()[:8]}_{file.stem}"
     linecache.checkcache(str(file))
     spec = importlib.util.spec_from_file_location(name, file)
     if spec is None or spec.loader is None or not file.is_file():
@@ -60,13 +64,14 @@ def load(file: Path) -> ModuleType:
 
 
 def components(module: ModuleType) -> list[type[Component]]:
-    """Return the component classes that a module defines, in order."""
+    """Return the component classes that a module defines, in order; `_Name` is none."""
     found = [
         each
         for each in vars(module).values()
         if isinstance(each, type)
         and issubclass(each, Component)
         and each.__module__ == module.__name__
+        and not each.__name__.startswith("_")
     ]
     bases = {base for each in found for base in each.__mro__[1:]}
     # A base without update is there for its subclasses.
