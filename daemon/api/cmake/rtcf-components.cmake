@@ -103,8 +103,8 @@ function(rtcf_add_python_components target)
   list(JOIN includes " " flags)
   add_custom_command(
     OUTPUT ${library}
-    COMMAND ${CMAKE_COMMAND} -E env "CXX=${CMAKE_CXX_COMPILER}" "RTCF_CXXFLAGS=${flags}"
-            ${RTCF_COMPILE} ${compiled} -o ${library}
+    COMMAND ${CMAKE_COMMAND} -E env "CXX=${CMAKE_CXX_COMPILER}" "CXXFLAGS=${CMAKE_CXX_FLAGS}"
+            "RTCF_CXXFLAGS=${flags}" ${RTCF_COMPILE} ${compiled} -o ${library}
     DEPENDS ${compiled} ${arg_DEPENDS} ${RTCF_COMPILE}
     COMMENT "Compiling Python components ${target}"
     VERBATIM)

@@ -132,7 +132,7 @@ def compile_to(library: Path, file: Path) -> "subprocess.CompletedProcess[str]":
 
 
 def test_what_ros_does_not_see_has_any_letters(tmp_path: Path) -> None:
-    (tmp_path / "größen.py").write_text("def mal(α, β):\n    return α * β\n")
+    (tmp_path / "größen.py").write_text("def mal(ä, Δ):\n    return ä * Δ\n")
     file = written(tmp_path, WRITTEN_FREELY, "θ-регулятор")
     (cls,) = modules.components(modules.load(file))
     (machine_code,) = compiled(file)
@@ -178,9 +178,7 @@ def test_a_name_that_ros_forbids_is_refused_with_another(
         ("R" * 100, "has 100 characters: take a name of at most 64"),
     ],
 )
-def test_a_class_that_no_daemon_would_load_is_refused(
-    tmp_path: Path, name: str, what: str
-) -> None:
+def test_a_class_that_no_daemon_would_load_is_refused(tmp_path: Path, name: str, what: str) -> None:
     file = written(tmp_path, DECLARING.format(name=name, declared="u: Input[float]"))
     with pytest.raises(Mistake) as refused:
         compiled(file)

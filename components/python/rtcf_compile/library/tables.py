@@ -24,6 +24,7 @@ from rtcf_compile.machine_code import backend
 from rtcf_compile.machine_code.lowering import Compiled
 from rtcf_compile.rewriting.logs import LogCall
 from rtcf_compile.source.mistake import display, source_line
+from rtcf_compile.source.prefix_map import mapped
 
 TABLES = 2
 _WHOLE = ("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
@@ -88,7 +89,7 @@ class _Library:
         table = self.data.struct(
             about.name,
             about.doc,
-            display(compiled.file),
+            display(mapped(compiled.file)),
             pointer_to(create, _CREATE),
             self.data.bytes(record.tobytes(), 8),
             record.nbytes,
@@ -250,7 +251,7 @@ class _Library:
     def _site(self, level: str, text: str, file: str, line: int, function: str) -> Value:
         return self.data.struct(
             Value("i8", str(_LEVELS[level])),
-            display(file),
+            display(mapped(file)),
             Value("i32", str(line)),
             function,
             text,

@@ -26,6 +26,7 @@ from rtcf_compile.machine_code import (
     explain,
     gate,
     port_access,
+    source_lines,
     stack,
     trial,
 )
@@ -43,6 +44,7 @@ _NRT_COUNTS = re.compile(
     r"|^declare [^\n]*@NRT_(?:incref|decref)\([^\n]*\n",
     re.M | re.S,
 )
+_ADDRESS = re.compile(r"(?<=_)0x[0-9a-f]{6,}|(?<=\.)\d{9,}")
 _COUNTS = "declare void @NRT_incref(i8*)\ndeclare void @NRT_decref(i8*)\n"
 _OPTIONS = {"boundscheck": True, "error_model": "python", **backend.NO_WRAPPERS}
 # What runs in the real-time thread, and beside it.
@@ -106,7 +108,7 @@ def _inner(function: FunctionType, record: Any) -> tuple[str, str]:
     """Return the name of the inner function and the assembly that has it."""
     dispatcher = _compiler(function)
     try:
-        with backend.not_to_run():
+        with backend.not_to_run(), source_lines.emitted():
             dispatcher.compile((record,))
             result = next(iter(dispatcher.overloads.values()))
     except Mistake:
@@ -139,10 +141,14 @@ def _linked(compiled: Compiled, inner: dict[str, tuple[str, str]], allocator: st
         module.link_in(part)
     _keep(module, symbols)
     backend.inline(module)
-    module = backend.parsed(stack.promoted(str(module)))
+    text = stack.promoted(str(module))
+    for hook in inner:
+        text = source_lines.entered(text, compiled.symbol(hook))
+    module = backend.parsed(source_lines.unwound(text))
     module.link_in(backend.parsed(backend.pointers(allocator)))
     _keep(module, symbols)
     backend.optimise(module)
+    _without_addresses(module)
     module.verify()
     return module
 
@@ -152,4 +158,14 @@ def _keep(module: Any, names: set[str]) -> None:
     for function in module.functions:
         if not function.is_declaration:
             function.linkage = "external" if function.name in names else "internal"
+    for variable in module.global_variables:
+        if not variable.is_declaration:
+            variable.linkage = "internal"
     backend.drop_unused(module)
+
+
+def _without_addresses(module: Any) -> None:
+    """Take addresses out of numba's names, so that each compilation gives the same library."""
+    for each in (*module.functions, *module.global_variables):
+        if not each.is_declaration and (plain := _ADDRESS.sub("0", each.name)) != each.name:
+            each.name = plain

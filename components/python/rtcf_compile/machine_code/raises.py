@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 from rtcf.component import Fault
 
+from rtcf_compile.source.prefix_map import mapped
+
 # Not the hashes beside them (.sha1), which are any bytes.
 _CONSTANT = re.compile(
     r'^@"?\.const\.pickledata\.[\d.]+"? = [^\n]*constant \[\d+ x i8\] c"([^"\n]*)"', re.M
@@ -42,7 +44,7 @@ def raises_in(assembly: str, file: str) -> dict[int, Raise]:
         text = _WORDS.get(text, text)
         if exception is not Fault:
             text = f"{exception.__name__}: {text}" if text else exception.__name__
-        there = place is not None and place[1] == file
+        there = place is not None and place[1] == mapped(file)
         found[hash_of(data)] = Raise(file, place[2] if there else 0, text)
     return found
 

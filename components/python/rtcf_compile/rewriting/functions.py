@@ -24,6 +24,8 @@ from rtcf_compile.source.modules import Source, is_own, read
 _OURS = {*helpers.BY_NAME, *numpy_functions.BY_NAME}
 # What makes a compiled function of a Python one, and what stands for a log call.
 Compiler = Callable[[FunctionType], Any]
+# An attribute of rewritten functions: the name of the author's function, as `Observer.update`.
+WRITTEN_NAME = "rtcf_written_name"
 
 
 class Functions:
@@ -253,7 +255,9 @@ def made(tree: ast.FunctionDef, scope: dict[str, Any], source: Source) -> Functi
     code = compile(module, source.file, "exec", dont_inherit=True)
     inner = next(each for each in code.co_consts if isinstance(each, CodeType))
     defaults = source.function.__defaults__ if tree.name == source.tree.name else None
-    return FunctionType(inner, scope, tree.name, defaults)
+    function = FunctionType(inner, scope, tree.name, defaults)
+    vars(function)[WRITTEN_NAME] = source.function.__qualname__.rpartition("<locals>.")[2]
+    return function
 
 
 def _log(number: int, count: int) -> Any:

@@ -15,6 +15,7 @@ from typing import Any
 from rtcf.component import Component, DeclarationError
 
 from rtcf_compile.source.mistake import Mistake
+from rtcf_compile.source.prefix_map import mapped
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ def load(file: Path) -> ModuleType:
     """Run a module as Python does and return it; raise Mistake where that fails."""
     file = file.resolve()
     try:
-        path = str(file).encode()
+        path = mapped(str(file)).encode()
     except UnicodeEncodeError:
         raise Mistake(str(file), 0, "its path is not UTF-8", "rename it") from None
     name = f"rtcf_source_{hashlib.sha256(path).hexdigest()[:8]}_{file.stem}"
