@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 import rtcf
+import yaml
 from daemon_process import BUILD_TREE, DEADLINE_S, Daemon, wait_for
 from rtcfctl.graph import python_source
 
@@ -361,6 +362,75 @@ def test_names_that_are_not_ascii_work_where_ros_has_none(
     wait_for(lambda: client.get_component("Counts").fault, "the fault")
     fault = client.get_component("Counts").fault
     assert f'{name}.py:26: `raise ValueError("zu groß: ü")`: ValueError: zu groß: ü' in fault
+
+
+MODES = """\
+import enum
+
+from rtcf.component import Component, Derived, Output, Parameter
+
+
+class Mode(enum.IntEnum):
+    IDLE = -3
+    RUN = 2**40
+    LÄUFT = 2**40
+    HÄLT = 7
+
+
+class Modes(Component):
+    mode: Parameter[Mode] = Parameter(Mode.HÄLT, doc="state of the drive")
+    twice: Derived[int]
+    out: Output[int]
+
+    def prepare(self):
+        if self.mode is Mode.IDLE:
+            raise ValueError("not idle")
+        self.twice = 2 * self.mode
+
+    def update(self):
+        self.out.write(self.twice if self.mode is Mode.RUN else self.mode)
+"""
+
+
+def test_an_enum_parameter_is_set_by_name_as_in_cpp(daemon: Daemon, client: rtcf.Client) -> None:
+    source = daemon.folder / "modes.py"
+    source.write_text(MODES)
+    assert daemon.ctl("load", str(source), "Modes").returncode == 0
+    (mode,) = client.get_component("Modes").parameters
+    assert (mode.type, mode.doc) == ("enum", "state of the drive")
+    assert list(mode.choices) == ["IDLE", "RUN", "HÄLT", "LÄUFT"]
+    assert mode.value.string_value == "HÄLT"
+
+    def written() -> str:
+        client.step(1)
+        (out,) = client.get_component("Modes").ports
+        return str(out.value)
+
+    assert written() == "data: 7"
+    assert daemon.ctl("set", "Modes", "mode:=RUN").returncode == 0
+    assert written() == f"data: {2**41}"
+    assert _parameters(client, "Modes") == {"mode": "RUN"}
+    assert daemon.ctl("set", "Modes", "mode:=LÄUFT").returncode == 0
+    assert written() == f"data: {2**41}"
+    for given, said in (
+        ("WALK", "mode = WALK is none of IDLE, RUN, HÄLT, LÄUFT"),
+        ("7", "mode"),
+        ("IDLE", 'modes.py:20: `raise ValueError("not idle")`: ValueError: not idle'),
+    ):
+        refused = daemon.ctl("set", "Modes", f"mode:={given}")
+        assert refused.returncode == 1 and said in refused.stderr, refused.stderr
+    assert written() == f"data: {2**41}"
+    done = daemon.ctl("load", str(source), "Modes", "--name", "other", "--param", "mode:=RUN")
+    assert done.returncode == 0, done.stderr
+    assert _parameters(client, "other") == {"mode": "RUN"}
+    graph = daemon.folder / "graph.yaml"
+    assert daemon.ctl("save", str(graph)).returncode == 0
+    saved = yaml.safe_load(graph.read_text())["components"]
+    assert [each["parameters"]["mode"] for each in saved] == ["LÄUFT", "RUN"]
+    graph.write_text(graph.read_text().replace("RUN", "HÄLT"))
+    done = daemon.ctl("apply", str(graph))
+    assert done.returncode == 0, done.stderr
+    assert _parameters(client, "other") == {"mode": "HÄLT"}
 
 
 def test_a_source_that_is_wrong_is_refused_in_one_line(own_cache: Path, daemon: Daemon) -> None:

@@ -258,6 +258,8 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
         raise DeclarationError("may be None: a State alone may; a port says .valid")
     if kind is Parameter and initial is None:
         raise DeclarationError(f"has no default: write {name}: Parameter[…] = Parameter(1.0)")
+    if kind is Parameter and declared.enumeration and {"min", "max"} & set(options):
+        raise DeclarationError("is an enum, which is set by name: leave min and max out")
     if kind is Queue:
         _check_size(name, options.get("size"))
     if kind is Parameter and declared.shape and declared.is_bool:

@@ -83,6 +83,7 @@ def value_type(declared: Any) -> ValueType:
     if isinstance(element, type) and issubclass(element, enum.IntEnum):
         if sizes:
             raise DeclarationError("an array of enums: declare an array of np.int64")
+        _check_members(element)
         return ValueType(np.dtype(np.int64), (), element)
     if isinstance(element, type) and issubclass(element, enum.Enum):
         raise DeclarationError(f"enum {element.__name__}: derive it from enum.IntEnum")
@@ -90,6 +91,15 @@ def value_type(declared: Any) -> ValueType:
     if result.count > _LARGEST:
         raise DeclarationError(f"{result.count} elements: an array has at most {_LARGEST}")
     return result
+
+
+def _check_members(enumeration: type[enum.IntEnum]) -> None:
+    name, limits = enumeration.__name__, np.iinfo(np.int64)
+    if not list(enumeration):
+        raise DeclarationError(f"enum {name} has no members: write `IDLE = 0` in it")
+    for each in enumeration:
+        if not limits.min <= each <= limits.max:
+            raise DeclarationError(f"{name}.{each.name} does not fit 64 bits: take a smaller value")
 
 
 def _scalar(element: Any) -> np.dtype[Any]:

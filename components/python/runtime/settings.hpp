@@ -33,6 +33,13 @@ class ParameterField final : public ParameterBase {
 
     void stage(const ParameterValue& checked) override {
         is_staged_ = true;
+        if (!declaration_.choices.empty()) {
+            for (const Choice& choice : declaration_.choices) {
+                if (choice.name == std::get<std::string>(checked))
+                    std::memcpy(staged_, &choice.value, sizeof choice.value);
+            }
+            return;
+        }
         withScalar(scalar_, [&](auto scalar) {
             using T = decltype(scalar);
             T value{};
@@ -71,6 +78,7 @@ class ParameterField final : public ParameterBase {
             std::memcpy(&scalar, record + table.offset, sizeof scalar);
             describe(declaration, scalar);
         });
+        if (table.choice_count > 0) describeChoices(declaration, table);
         return declaration;
     }
     template <typename T>
@@ -93,6 +101,20 @@ class ParameterField final : public ParameterBase {
             declaration.minimum = std::max(kLowest, declaration.minimum.value_or(kLowest));
         if constexpr (kSmaller)
             declaration.maximum = std::min(kHighest, declaration.maximum.value_or(kHighest));
+    }
+
+    /// A choice by name, as of an enum in C++.
+    static void describeChoices(ParameterDeclaration& declaration, const ParameterTable& table) {
+        const auto initial = std::get<std::int64_t>(declaration.default_value);
+        declaration.type = "enum";
+        for (std::int64_t i = 0; i < table.choice_count; ++i) {
+            const ChoiceTable& choice = table.choices[i];
+            declaration.choices.emplace_back(choice.name, choice.value);
+            // The first of several names of a value is its own.
+            if (choice.value == initial &&
+                !std::holds_alternative<std::string>(declaration.default_value))
+                declaration.default_value = std::string(choice.name);
+        }
     }
 
     using Bytes = std::byte[sizeof(std::int64_t)];

@@ -240,6 +240,12 @@ IN_CLASS = {
         "    g_0: Parameter[float] = Parameter(1.0)",
         "both have a parameter",
     ),
+    "bounds of an enum": ("    v: Parameter[Mode] = Parameter(Mode.OFF, min=0)", "set by name"),
+    "enum without members": ("    v: State[enum.IntEnum('Empty', [])]", "has no members"),
+    "enum of more than 64 bits": (
+        "    v: State[enum.IntEnum('Large', {'A': 2**63})]",
+        "Large.A does not fit 64 bits",
+    ),
     "reserved name": ("    dt: State[float]", "a word that every component has"),
 }
 

@@ -130,6 +130,12 @@ struct OutputTable {
     std::int64_t text_count;
 };
 
+/// An enumerator of an enum parameter.
+struct ChoiceTable {
+    const char* name;
+    std::int64_t value;
+};
+
 /// A parameter, or an element of one that is an array.
 struct ParameterTable {
     const char* name;
@@ -141,6 +147,8 @@ struct ParameterTable {
     std::int64_t has_maximum;
     double minimum;
     double maximum;
+    const ChoiceTable* choices;  ///< of an enum, which is an Int64
+    std::int64_t choice_count;   ///< 0: no enum
 };
 
 struct DerivedTable {

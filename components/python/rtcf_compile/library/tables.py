@@ -201,6 +201,11 @@ class _Library:
         """Return the elements of an array, or the one number."""
         options, offset = member.options, _offset(record, member.name)
         bounds = [options.get(each) for each in ("min", "max")]
+        enumeration = member.type.enumeration
+        # Other names of a value follow its own.
+        named = {each.name: each for each in enumeration or ()}
+        named |= enumeration.__members__ if enumeration else {}
+        table = self._array([self.data.struct(name, int(each)) for name, each in named.items()])
         return [
             self.data.struct(
                 name,
@@ -210,6 +215,7 @@ class _Library:
                 offset + i * member.type.scalar.itemsize,
                 *(int(each is not None) for each in bounds),
                 *(float(each if each is not None else 0.0) for each in bounds),
+                *table,
             )
             for i, name in enumerate(member.elements)
         ]
