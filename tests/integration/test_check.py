@@ -56,6 +56,48 @@ def test_a_violation_is_shown_with_its_stack_and_line(
     assert found["violations"][0]["called"] == called
 
 
+SINE = """\
+import math
+
+from rtcf.component import Component, Output
+
+
+class Sine(Component):
+    out: Output[float]
+
+    def update(self):
+        self.out.write(math.sin(self.dt))
+"""
+ALLOCATES = """\
+#include <stdlib.h>
+double sin(double x) {
+    volatile char* bytes = malloc(64);
+    bytes[0] = 1;
+    free((void*)bytes);
+    return x;
+}
+"""
+
+
+def test_a_violation_below_a_component_in_python_is_shown_with_its_line(tmp_path: Path) -> None:
+    source, package = tmp_path / "sine.py", tmp_path / "lib" / "py"
+    source.write_text(SINE)
+    (tmp_path / "sin.c").write_text(ALLOCATES)
+    compiler = tmp_path / "c++"
+    compiler.write_text(f'#!/bin/sh\nexec g++ "$@" {tmp_path}/sin.o\n')
+    compiler.chmod(0o755)
+    command = ["gcc", "-fno-builtin", "-fPIC", "-c", str(tmp_path / "sin.c")]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    subprocess.run(
+        [str(BUILD_TREE / "bin" / "rtcf-compile"), str(source), "-o", str(package / "sine.so")],
+        env=clean_environment() | {"CXX": str(compiler)}, check=True,
+    )  # fmt: skip
+    done = check("py", "Sine", "--path", str(package.parent), "--cycles", "3")
+    assert done.returncode == 1 and "malloc" in done.stdout, done.stderr
+    assert f"{source}:10" in done.stdout
+    assert "> self.out.write(math.sin(self.dt))" in done.stdout
+
+
 def test_what_a_component_does_with_its_device_is_allowed() -> None:
     done = check("rtcf_test", "Device", "--cycles", "50")
     assert done.stdout == "rtcf_test/Device: clean in 50 cycles\n"
