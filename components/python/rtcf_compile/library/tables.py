@@ -2,6 +2,7 @@
 the same members in the same order.
 """
 
+import enum
 from collections.abc import Sequence
 
 import numpy as np
@@ -203,8 +204,9 @@ class _Library:
         bounds = [options.get(each) for each in ("min", "max")]
         enumeration = member.type.enumeration
         # Other names of a value follow its own.
-        named = {each.name: each for each in enumeration or ()}
-        named |= enumeration.__members__ if enumeration else {}
+        named: dict[str, enum.IntEnum] = {}
+        if enumeration:
+            named = {each.name: each for each in enumeration} | dict(enumeration.__members__)
         table = self._array([self.data.struct(name, int(each)) for name, each in named.items()])
         return [
             self.data.struct(

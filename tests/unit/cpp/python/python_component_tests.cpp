@@ -86,7 +86,8 @@ const InputTable kInput{"u",
 const OutputTable kOutput{
     "x",     "m", &kNumber, nullptr, 0, offsetof(Record, x), offsetof(Record, is_written),
     nullptr, 0,   nullptr,  0};
-const ParameterTable kGain{"gain", "", "", Scalar::Double, offsetof(Record, gain), 1, 0, 0.0, 0.0};
+const ParameterTable kGain{"gain", "",      "", Scalar::Double, offsetof(Record, gain), 1, 0, 0.0,
+                           0.0,    nullptr, 0};
 const StateTable kCount{"count", "", "", &kInteger, offsetof(Record, count)};
 const RaiseTable kRaise{hashOf("limit"), 0, "ValueError: limit"};
 const LineTable kLine{12, "self.x.write(y)"};
@@ -147,6 +148,32 @@ TEST_F(PythonComponents, AParameterCountsFromItsCommitOn) {
     component_.update();
     EXPECT_EQ(written().value, 30.0);
     EXPECT_FALSE(gain.staged());
+}
+
+TEST(PythonParameters, AnEnumIsSetByName) {
+    static constexpr std::array<ChoiceTable, 3> kChoices{{{"IDLE", 0}, {"RUN", -4}, {"GO", -4}}};
+    const ParameterTable parameter{"mode", "",  "",  Scalar::Int64,   offsetof(Record, count), 0,
+                                   0,      0.0, 0.0, kChoices.data(), kChoices.size()};
+    Record fresh = kFresh;
+    fresh.count = -4;
+    ComponentTable table = kTable;
+    table.record = &fresh;
+    table.parameters = &parameter;
+    PythonComponent component(table);
+    ParameterBase& mode = *component.parameters().front();
+    EXPECT_EQ(mode.declaration().type, "enum");
+    EXPECT_EQ(std::get<std::string>(mode.declaration().default_value), "RUN");
+    EXPECT_EQ(mode.declaration().choices.size(), 3U);
+    ParameterValue unknown = std::string("FLY");
+    EXPECT_EQ(mode.check(unknown), "parameter mode = FLY is none of IDLE, RUN, GO");
+    const auto* count = static_cast<const std::int64_t*>(component.states().front().value);
+    EXPECT_EQ(*count, -4);
+    mode.stage(std::string("IDLE"));
+    mode.commit();
+    EXPECT_EQ(*count, 0);
+    mode.stage(std::string("GO"));
+    mode.commit();
+    EXPECT_EQ(*count, -4);
 }
 
 TEST_F(PythonComponents, WhatRaisesWritesNothingAndSaysWhere) {
