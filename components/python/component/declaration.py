@@ -5,10 +5,13 @@ as one NumPy record, which compiled code sees as one C struct and the interprete
 """
 
 import inspect
+import keyword
+import linecache
 import re
 import typing
 import unicodedata
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -55,12 +58,13 @@ class Declarable:
         """Take an initial value, where the kind has one, and options."""
         for option in options:
             if option not in self.allowed:
+                has = ", ".join(self.allowed)
                 raise DeclarationError(
                     f"{type(self).__name__} knows no option {option!r}: "
-                    f"it has {', '.join(self.allowed) or 'none'}"
+                    f"{f'use {has}' if has else 'leave it out'}"
                 )
         if initial is not None and type(self) in (*PORTS, Derived):
-            raise DeclarationError(f"{_a(type(self))} has no initial value")
+            raise DeclarationError(f"{_a(type(self))} has no initial value: leave it out")
         self.initial = initial
         self.options = options
 
@@ -213,7 +217,7 @@ def describe(cls: type) -> Description:
                     lines.get(name, 0),
                     name,
                 )
-            if not isinstance(value, staticmethod | classmethod | property):
+            if not isinstance(value, staticmethod | classmethod | property | cached_property):
                 result.constants[name] = value
     taken: dict[str, str] = {}
     for member in result.of(Parameter):
@@ -229,15 +233,14 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
         raise DeclarationError(f"says no type: write {annotation.__name__}[float]")
     if not isinstance(annotation, Declared):
         raise DeclarationError(
-            "is neither Input, Queue, Output, Parameter, Derived nor State: what is kept is a "
-            "State[…], "
-            "what never changes stands without annotation"
+            f"is neither Input, Queue, Output, Parameter, Derived nor State: write {name}: "
+            f"State[…] for what is kept, {name} = … for a constant"
         )
     # Nothing outside the component sees what is derived.
     if not name.isascii() and annotation.kind is not Derived:
         raise DeclarationError(f"is no name in ROS, which has ASCII letters alone: {advice(name)}")
     if "__" in name or name.startswith("_") or (name.isascii() and not is_member_name(name)):
-        raise DeclarationError("is no name: a letter, then letters, digits and single _")
+        raise DeclarationError("is no name: use a letter, then letters, digits and single _")
     if name in _RESERVED:
         raise DeclarationError("is a word that every component has: take another name")
     kind, message = annotation.kind, _message(annotation)
@@ -248,14 +251,20 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
     options, initial = {}, None
     if isinstance(given, Declarable):
         if type(given) is not kind:
-            raise DeclarationError(f"is declared as {kind.__name__} and as {type(given).__name__}")
+            raise DeclarationError(
+                f"is declared as {kind.__name__} and as {type(given).__name__}: "
+                f"write {kind.__name__}(…)"
+            )
         options, initial = given.options, given.initial
+    elif f"_declared_{name}" in vars(owner) and given is None and not declared.optional:
+        raise DeclarationError("is None: declare State[float | None], or give it a number")
     elif given is not None:
         if kind in (*PORTS, Derived):
-            raise DeclarationError(f"is {_a(kind)} and has no initial value")
+            way_out = "set it in prepare" if kind is Derived else "leave the value out"
+            raise DeclarationError(f"is {_a(kind)} and has no initial value: {way_out}")
         initial = given
     if declared.optional and kind is not State:
-        raise DeclarationError("may be None: a State alone may; a port says .valid")
+        raise DeclarationError("may be None, as a State alone may: use .valid of an Input")
     if kind is Parameter and initial is None:
         raise DeclarationError(f"has no default: write {name}: Parameter[…] = Parameter(1.0)")
     if kind is Parameter and declared.enumeration and {"min", "max"} & set(options):
@@ -263,10 +272,15 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
     if kind is Queue:
         _check_size(name, options.get("size"))
     if kind is Parameter and declared.shape and declared.is_bool:
-        raise DeclarationError("is an array of bools: a parameter is a number or an array of them")
+        raise DeclarationError("is an array of bools: declare single ones, or an array of ints")
     if options.get("texts") is not None:
         _check_texts(message, options["texts"])
     value = _initial(declared, initial)
+    if kind is Parameter:
+        _check_bounds(value, options)
+    for option in ("unit", "doc"):
+        if not isinstance(options.get(option, ""), str):
+            raise DeclarationError(f"has {option}={options[option]!r}: give it a text")
     return Member(
         name, kind, declared, value, options, line, message, declared.optional and initial is None
     )
@@ -292,16 +306,23 @@ def _message(annotation: Declared) -> MessageType | None:
     if not is_message(cls):
         return None
     if annotation.kind not in (Input, Output):
-        raise DeclarationError(f"{cls._type}: a message is carried by an Input or an Output")
+        raise DeclarationError(
+            f"{cls._type}: a message is carried by an Input or an Output: declare one"
+        )
     if len(sizes) > 1 or not all(type(each) is int and each > 0 for each in sizes):
-        raise DeclarationError(f"{cls._type} takes one size, of all its arrays")
+        raise DeclarationError(
+            f"{cls._type} takes one size, of all its arrays: write {cls.__name__}, 6"
+        )
     return message_type(cls, sizes[0] if sizes else None)
 
 
 def _check_texts(message: MessageType | None, texts: Any) -> None:
     known = [".".join(each) for each in message.texts] if message else []
     if not isinstance(texts, dict) or not all(each in known for each in texts):
-        raise DeclarationError(f"texts are {{name: text}} of: {', '.join(known) or 'a message'}")
+        raise DeclarationError(
+            "texts are not of this message: give {name: text} of: "
+            f"{', '.join(known) or 'a message'}"
+        )
 
 
 def _queue_fields(member: Member) -> list[tuple[Any, ...]]:
@@ -321,7 +342,7 @@ def _check_size(name: str, size: Any) -> None:
             f"says not how many it keeps: write {name}: Queue[…] = Queue(size=8)"
         )
     if not isinstance(size, int) or isinstance(size, bool) or not 1 <= size <= 1024:
-        raise DeclarationError(f"keeps 1 to 1024 messages, not {size!r}")
+        raise DeclarationError(f"keeps 1 to 1024 messages, not {size!r}: give a size within")
 
 
 def _a(kind: type) -> str:
@@ -335,18 +356,53 @@ def _initial(declared: ValueType, given: Any) -> np.ndarray[Any, Any]:
             given = next(each for each in declared.enumeration)
         else:
             return np.zeros(declared.shape, declared.scalar)
-    value = np.asarray(given)
+    try:
+        value = np.asarray(given)
+    except ValueError:
+        raise DeclarationError("has rows of different length: make them fit") from None
+    if value.dtype.kind in "USO":
+        raise DeclarationError(f"is {_number(declared)}, not {given!r}: give it a number")
+    if declared.enumeration and value not in list(declared.enumeration):
+        names = ", ".join(each.name for each in declared.enumeration)
+        enumeration = declared.enumeration.__name__
+        raise DeclarationError(f"{given!r} is no {enumeration}: use one of {names}")
     if declared.shape and value.shape == ():
         value = np.full(declared.shape, value)
     if value.shape != declared.shape:
-        raise DeclarationError(f"has shape {declared.shape}, its value {value.shape}")
+        raise DeclarationError(
+            f"has shape {declared.shape}, its value {value.shape}: make them the same"
+        )
     if not np.can_cast(value.dtype, declared.scalar, "same_kind"):
-        raise DeclarationError(f"is {declared.scalar.name}, its value {value.dtype.name}")
+        raise DeclarationError(
+            f"is {_number(declared)}, its value {value.dtype.name}: give it {_number(declared)}"
+        )
     if value.dtype.kind in "iu" and declared.scalar.kind in "iu":
         limits = np.iinfo(declared.scalar)
         if np.any(value < limits.min) or np.any(value > limits.max):
-            raise DeclarationError(f"{given} does not fit {declared.scalar.name}")
+            raise DeclarationError(
+                f"{given} does not fit {declared.scalar.name}: use {limits.min} to {limits.max}"
+            )
     return value.astype(declared.scalar)
+
+
+def _number(declared: ValueType) -> str:
+    """Return a type of numbers in words, as Python's where it is one."""
+    name = declared.scalar.name
+    return {"float64": "a float", "int64": "an int", "bool": "a bool"}.get(name, f"a {name}")
+
+
+def _check_bounds(initial: Any, options: dict[str, Any]) -> None:
+    """Refuse bounds that are no numbers, and a default outside them."""
+    bounds = {each: options[each] for each in ("min", "max") if options.get(each) is not None}
+    for name, value in bounds.items():
+        if not isinstance(value, int | float | np.number):
+            raise DeclarationError(f"has {name}={value!r}: give it a number")
+    low, high = bounds.get("min", -np.inf), bounds.get("max", np.inf)
+    if low > high:
+        raise DeclarationError(f"has min={low} above max={high}: exchange them")
+    if np.any(initial < low) or np.any(initial > high):
+        within = ", ".join(f"{name}={value}" for name, value in bounds.items())
+        raise DeclarationError(f"has a default outside {within}: choose one within")
 
 
 def _first_line(doc: str | None) -> str:
@@ -372,4 +428,6 @@ def _at(error: DeclarationError, cls: type, line: int, name: str) -> Declaration
         file = inspect.getsourcefile(cls) or "?"
     except TypeError:
         file = "?"
-    return DeclarationError(f"{file}:{line}: {cls.__name__}.{name} {error}")
+    source = linecache.getline(file, line).partition(" #")[0].strip()
+    text = f"`{source}`: " if source else ""
+    return DeclarationError(f"{file}:{line}: {text}{cls.__name__}.{name} {error}")

@@ -77,9 +77,12 @@ def value_type(declared: Any) -> ValueType:
         sizes = list(sizes[0])
     for size in sizes:
         if not isinstance(size, int) or isinstance(size, bool) or size < 1:
-            raise DeclarationError(f"a size is a whole number above 0, not {size!r}")
+            given = getattr(size, "__name__", repr(size))
+            raise DeclarationError(
+                f"a size is a whole number above 0, not {given}: write np.float64, 3"
+            )
     if len(sizes) > 2:
-        raise DeclarationError(f"{len(sizes)} dimensions: an array has one or two")
+        raise DeclarationError(f"{len(sizes)} dimensions: declare one or two sizes")
     if isinstance(element, type) and issubclass(element, enum.IntEnum):
         if sizes:
             raise DeclarationError("an array of enums: declare an array of np.int64")
@@ -89,7 +92,7 @@ def value_type(declared: Any) -> ValueType:
         raise DeclarationError(f"enum {element.__name__}: derive it from enum.IntEnum")
     result = ValueType(_scalar(element), tuple(sizes))
     if result.count > _LARGEST:
-        raise DeclarationError(f"{result.count} elements: an array has at most {_LARGEST}")
+        raise DeclarationError(f"{result.count} elements: declare at most {_LARGEST}")
     return result
 
 
@@ -108,7 +111,7 @@ def _scalar(element: Any) -> np.dtype[Any]:
         if issubclass(element, np.generic) and np.dtype(element).name in _CPP:
             return np.dtype(element)
     if element in (list, np.ndarray):
-        raise DeclarationError("an array says its elements and its size: np.float64, 3")
+        raise DeclarationError("an array says its elements and its size: write np.float64, 3")
     name = getattr(element, "__name__", repr(element))
     raise DeclarationError(
         f"{name} is no type of a value: use float, int, bool, an enum.IntEnum, or a NumPy type "

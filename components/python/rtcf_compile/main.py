@@ -42,10 +42,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         classes = _classes(args.sources)
         # numba takes a second to import: only for what is well up to here.
-        from rtcf_compile.library import build
+        from rtcf_compile.library import build, log_text
         from rtcf_compile.machine_code import lowering
 
         compiled = [lowering.compile_component(each) for each in classes]
+        for each in compiled:
+            log_text.check(each.logs)
         if args.verify is not None and not _verified(classes, compiled, args):
             return DIFFERENT
         if args.output is not None:

@@ -126,7 +126,7 @@ IN_UPDATE = {
         "a = self.t.value\n        a = 1.0",
         "a is a message",
     ),
-    "product of wrong shapes": ("self.z[:] = A @ np.zeros(3)", "@ of shapes"),
+    "product of wrong shapes": ("self.z[:] = A @ np.zeros(3)", "@ of sizes"),
     "number set to an array": ("self.y.write(self.z)", "a number is set to"),
     "array set to a matrix": ("self.z[:] = np.eye(2)", "is set to"),
     "int set to a float": ("self.n = 0.5", "a whole number is set to a float"),
@@ -143,7 +143,7 @@ IN_UPDATE = {
         "a constant of the module is set",
     ),
     "number among rows": ("a = np.array([self.z, 1.0])", "an array of arrays and numbers"),
-    "new axis of a matrix": ("a = A[None]", "a new axis of an array of 2"),
+    "new axis of a matrix": ("a = A[None]", "a new axis of a matrix"),
     "constant set by another name": ("a = A\n        a[0, 0] = 2.0", "a constant of the module"),
     "float set to a whole element": (
         "i = np.zeros(2, np.int64)\n        i[self.n] = 0.5",
@@ -225,7 +225,7 @@ IN_CLASS = {
     "size of a variable": ("    v: State[np.float64, -1]", "a size is a whole number"),
     "parameter without default": ("    v: Parameter[float]", "has no default"),
     "initial value of another shape": ("    v: State[np.float64, 3] = State([1.0, 2.0])", "shape"),
-    "initial value of another type": ("    v: State[int] = State(0.5)", "is int64"),
+    "initial value of another type": ("    v: State[int] = State(0.5)", "is an int"),
     "unknown option": ("    v: State[int] = State(unitt='m')", "knows no option"),
     "queue without size": ("    v: Queue[float]", "says not how many it keeps"),
     "queue of no size": ("    v: Queue[float] = Queue(size=0)", "keeps 1 to 1024 messages"),
@@ -323,4 +323,4 @@ def test_a_class_without_update_is_refused(
     assert "write `def update(self):`" in compiled(tmp_path, HEAD, capsys)
     assert "has no component" in compiled(tmp_path, "x = 1\n", capsys)
     assert "mend the syntax" in compiled(tmp_path, "x = = 1\n", capsys)
-    assert "has to run as Python first" in compiled(tmp_path, "import no_such_module\n", capsys)
+    assert "run as Python first" in compiled(tmp_path, "import no_such_module\n", capsys)

@@ -5,7 +5,7 @@ makes them when the component runs.
 import re
 import string
 
-from rtcf_compile.rewriting.logs import LogCall
+from rtcf_compile.rewriting.logs import LogCall, Logs
 from rtcf_compile.source.mistake import Mistake
 
 # Fill and alignment, sign, alternate form, zeros, width, precision, type.
@@ -13,6 +13,12 @@ _BOTH = re.compile(
     r"(?:[^{}]?[<>^])?[+\- ]?#?0?(?P<width>\d*)(?P<precision>\.\d+)?(?P<type>[a-zA-Z]?)"
 )
 _FLOAT, _WHOLE = "eEfFgG", "bcdoxX"
+
+
+def check(logs: Logs) -> None:
+    """Look at all log calls of a component; raise Mistake."""
+    for call in logs.calls:
+        checked(call)
 
 
 def checked(call: LogCall) -> tuple[str, list[str]]:
@@ -42,6 +48,8 @@ def checked(call: LogCall) -> tuple[str, list[str]]:
         if number >= len(types):
             raise _mistake(call, "has more places than arguments", "give an argument for each {}")
         shown[number].add(_is_float(call, form or "", types[number]))
+    if not all(shown):
+        raise _mistake(call, "has fewer places than arguments", "write a {} for each")
     for number, ways in enumerate(shown):
         if len(ways) > 1 and types[number] != "float64":
             raise _mistake(
@@ -67,4 +75,4 @@ def _is_float(call: LogCall, form: str, kind: str) -> bool:
 
 
 def _mistake(call: LogCall, what: str, way_out: str) -> Mistake:
-    return Mistake(call.file, call.line, what, way_out, f'self.{call.level}("{call.text}")')
+    return Mistake(call.file, call.line, what, way_out)

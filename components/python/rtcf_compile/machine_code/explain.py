@@ -1,15 +1,42 @@
-"""numba's errors in one line: where, what, and what to write instead."""
+"""numba's errors in one line: where, what, and what to write instead, without a word of numba's."""
 
 import re
 from types import FunctionType
 from typing import Any
 
+from rtcf_compile.rewriting import helpers, numpy_functions
 from rtcf_compile.source.mistake import Mistake
 
 _MARK = re.compile(r"RTCF:([^:\n]+):([^\n]+?)(?:\x1b|\n|$)")
-# One of our helpers that has no overload for such types.
-_HELPER = re.compile(r"No implementation of function Function\(<function \w+ [^)]*\) found for "
-                     r"signature:\s*>>> \w+\(([^\n]*)\)")  # fmt: skip
+# A function that has no implementation for such types.
+_NONE_FOR = re.compile(
+    r"No implementation of function Function\((?P<function>[^\n]*?)\) found for "
+    r"signature:\s*>>> (?P<name>\w+)\((?P<arguments>[^\n]*)\)"
+)
+_INVALID = re.compile(
+    r"Invalid use of (?P<called>[^\n]*) with parameters \((?P<arguments>[^\n]*?)\)\s*(?:\n|$)"
+)
+_OPERATORS = {
+    **{"add": "+", "sub": "-", "mul": "*", "truediv": "/", "floordiv": "//", "mod": "%"},
+    **{"pow": "**", "and_": "&", "or_": "|", "xor": "^", "lshift": "<<", "rshift": ">>"},
+    **{"iadd": "+=", "isub": "-=", "imul": "*=", "itruediv": "/=", "ifloordiv": "//="},
+    **{"imod": "%=", "iand": "&=", "ior": "|=", "ixor": "^=", "ilshift": "<<=", "irshift": ">>="},
+    **{"eq": "==", "ne": "!=", "lt": "<", "le": "<=", "gt": ">", "ge": ">=", "is_": "is"},
+    **{"neg": "-", "pos": "+", "invert": "~", "not_": "not", "contains": "in"},
+}
+_BITS = ("&", "|", "^", "<<", ">>", "~")
+# A function's name in the source, by what stands for it.
+_NAMES = {
+    own.__name__: f"{'np.linalg' if 'linalg' in of.__module__ else 'np'}.{of.__name__}"
+    for of, own in (*helpers.INSTEAD.items(), *numpy_functions.STANDS_FOR)
+    if (getattr(of, "__module__", None) or "").startswith("numpy")
+}
+_SIMPLE = {
+    **{"float64": "a float", "float32": "a float", "unicode_type": "a text", "none": "None"},
+    **{"bool": "a bool", "boolean": "a bool", "omitted": "nothing", "Literal[str]": "a text"},
+    **{"complex128": "a complex number", "ellipsis": "..."},
+}
+# `{0}` is the first word found, `{kind0}` the type that it says.
 _KNOWN: tuple[tuple[str, str, str], ...] = (
     (
         r"Use of unsupported NumPy function '?(?:numpy\.)?([\w.]+)",
@@ -18,32 +45,47 @@ _KNOWN: tuple[tuple[str, str, str], ...] = (
     ),
     (r"bool\(OptionalType", "may be None, or 0", "write `is not None`"),
     (
-        r"Unknown attribute '(\w+)' of type Module\(<module '(\w+)'",
+        r"Unknown attribute '(\w+)' of type Module\(<module 'numpy([\w.]*)'",
+        "np{1}.{0} is not compiled",
+        "write it as arithmetic on elements",
+    ),
+    (
+        r"Unknown attribute '(\w+)' of type Module\(<module '([\w.]+)'",
         "{1}.{0} is not compiled",
         "write it as arithmetic",
     ),
     (
         r"Unknown attribute '(\w+)' of type ([^\n]*)",
-        "has no {0} that can be compiled",
+        "{kind1} has no {0} that is compiled",
         "use functions of NumPy on numbers and arrays",
     ),
     (
-        r"Cannot unify ([^\n]*) and ([^\n]*) for '(\w+)[\w.]*'",
-        "{2} is once {0}, once {1}",
+        r"Cannot resolve setattr: \((.*)\)\.(\w+) = ",
+        "{kind0} has no {1} to be set",
+        "leave it out, or declare a State for it",
+    ),
+    (
+        r"Cannot unify ([^\n]*) and ([^\n]*) for '([A-Za-z]\w*)[\w.]*'",
+        "{2} is once {kind0}, once {kind1}",
+        "give it one type, as 0.0 for a float",
+    ),
+    (
+        r"Cannot unify ([^\n]*) and ([^\n]*) for '",
+        "is once {kind0}, once {kind1}",
         "give it one type, as 0.0 for a float",
     ),
     (
         r"Can't unify return type from the following types: ([^\n]*)",
-        "returns several types: {0}",
+        "returns several types: {kinds0}",
         "return one type",
     ),
     (
-        r"Untyped global name '(\w+)': [^\n]*(?:class|type) '?([\w.]+)",
-        "{0} is of type {1}",
-        "constants are numbers, tuples of numbers and arrays",
+        r"Untyped global name '(\w+)': [^\n]*(?:class|type) '?(?:[\w.]+)",
+        "{0} is not compiled",
+        "use numbers, tuples of numbers, and arrays",
     ),
     (
-        r"cannot determine Numba type of <class '([\w.]+)'>",
+        r"cannot determine Numba type of <class '(?:\w+\.)*(\w+)'>",
         "a {0} is not compiled",
         "use numbers and arrays",
     ),
@@ -52,12 +94,12 @@ _KNOWN: tuple[tuple[str, str, str], ...] = (
         "has no type",
         "give it a value before it is used",
     ),
+    (r"tuple index out of range", "an index is beyond the elements", "use one from 0 to size - 1"),
     (
-        r"No implementation of function Function\(([^)]*)\) found for signature:\s*>>> (\S[^\n]*)",
-        "{1} is not possible",
-        "the types do not fit: look at dimensions and at bools",
+        r"Can only index|getitem|setitem",
+        "cannot be indexed so",
+        "use an int or a slice as the index",
     ),
-    (r"Can only index|getitem|setitem", "cannot be indexed so", "an index is an int or a slice"),
 )
 
 
@@ -70,17 +112,80 @@ def mistake(error: Any, function: FunctionType) -> Mistake:
     lines = [int(each) for each in re.findall(rf'File "(?:[^"]*/)?{name}", line (\d+)', text)]
     place = getattr(error, "loc", None)
     line = lines[-1] if lines else getattr(place, "line", function.__code__.co_firstlineno)
+    return Mistake(file, line, *_said(text))
+
+
+def _said(text: str) -> tuple[str, str]:
+    """Return what is wrong, and the way out."""
     if found := _MARK.search(text):
-        return Mistake(file, line, found[1].strip(), found[2].strip())
-    if found := _HELPER.search(text):
-        kinds = ", ".join(_plain(each) for each in _arguments(found[1]))
-        return Mistake(file, line, f"is not possible with {kinds}", "give it numbers and arrays")
-    for pattern, what, way_out in _KNOWN:
+        return found[1].strip(), found[2].strip()
+    for pattern, what, way_out in _KNOWN[:2]:
         if found := re.search(pattern, text):
-            words = [_plain(each or "") for each in found.groups()]
-            return Mistake(file, line, what.format(*words), way_out)
-    first = next((each.strip() for each in text.splitlines()[1:] if each.strip()), text[:200])
-    return Mistake(file, line, f"cannot be compiled ({_plain(first)[:120]})", "write it simpler")
+            return what.format(*found.groups()), way_out
+    if found := _NONE_FOR.search(text):
+        return _no_implementation(found["name"], _arguments(found["arguments"]))
+    if found := _INVALID.search(text):
+        kind = kind_of(found["called"])
+        if found["called"] == "getiter":
+            over = ", ".join(kind_of(each) for each in _arguments(found["arguments"]))
+            return f"a loop over {over}", "use range(…) of an int, an array or a tuple"
+        return f"{kind} is no function", "write * to multiply, or [0] for an element"
+    for pattern, what, way_out in _KNOWN[2:]:
+        if found := re.search(pattern, text):
+            words = [each or "" for each in found.groups()]
+            kinds = {f"kind{i}": kind_of(each) for i, each in enumerate(words)}
+            several = {
+                f"kinds{i}": ", ".join(kind_of(one) for one in _arguments(each))
+                for i, each in enumerate(words)
+            }
+            return what.format(*words, **kinds, **several), way_out
+    return "cannot be compiled", "write it in smaller steps, each with a name"
+
+
+def _no_implementation(name: str, arguments: list[str]) -> tuple[str, str]:
+    """Explain a function, or an operator, that takes no such types."""
+    kinds = [kind_of(each.rpartition("=")[2] if "=" in each else each) for each in arguments]
+    named = [each.partition("=")[0] for each in arguments if re.match(r"\w+=", each)]
+    if name == "rtcf_get" and kinds[0] == "several values":
+        what = "values of several types have no variable index"
+        return what, "use a constant index, or values of one type"
+    if name in ("getitem", "static_getitem", "rtcf_get", "setitem", "static_setitem", "rtcf_set"):
+        return f"{kinds[0]} has no index {_index(arguments[1])}", "use ints, slices and arrays"
+    if name in _OPERATORS:
+        return _operator(_OPERATORS[name], kinds)
+    of = " and ".join(kinds)
+    if name.startswith("rtcf_"):
+        done = f"{_NAMES[name]} of {of}" if name in _NAMES else f"is not possible with {of}"
+        way_out = "give it a matrix" if ".linalg." in done else "give it numbers and arrays"
+        return done, way_out
+    if named:
+        return f"{name} has no {named[0]} here", f"leave {named[0]} out"
+    return f"{name} of {of}", "give it numbers and arrays that fit it"
+
+
+def _operator(operator: str, kinds: list[str]) -> tuple[str, str]:
+    joined = f" {operator} ".join(kinds) if len(kinds) > 1 else f"{operator} {kinds[0]}"
+    if any(each.endswith("or None") for each in kinds):
+        return joined, "test it before by `is not None`"
+    if "a text" in kinds:
+        return joined, "use numbers: text is not made in the cycle"
+    if "several values" in kinds:
+        return joined, "make it an array: np.array([…])"
+    if operator == "not":
+        return joined, "use np.any(…) or np.all(…)"
+    if operator in _BITS:
+        return joined, "use ints, bools, or arrays of them; join conditions by `and`, `or`, `not`"
+    return joined, "use numbers and arrays"
+
+
+def _index(text: str) -> str:
+    """Return an index in words."""
+    if re.match(r"(?:Uni)?Tuple\(", text):
+        inner = text.partition("(")[2].rpartition(")")[0]
+        if found := re.fullmatch(r"(.*) x (\d+)", inner):
+            return f"of {found[2]} places"
+        return ", ".join(kind_of(each) for each in _arguments(inner))
+    return kind_of(text)
 
 
 def _arguments(text: str) -> list[str]:
@@ -95,17 +200,40 @@ def _arguments(text: str) -> list[str]:
     return [each.strip() for each in found]
 
 
-def _plain(words: str) -> str:
-    """Return numba's names of types as NumPy has them."""
-    words = re.sub(r"(?:Uni)?Tuple\(.*\)", "several values", words)
-    words = re.sub(r"readonly ", "", words)
-    words = re.sub(r"array\((\w+), (\d)d, \w+\)", r"\2-dimensional array of \1", words)
-    words = re.sub(
-        r"(?:unaligned )?nestedarray\((\w+), \(([\d, ]+?),?\)\)",
-        r"array of \1 of shape (\2)",
-        words,
-    )
-    words = re.sub(r"OptionalType\((\w+)\)", r"\1 or None", words)
-    words = re.sub(r"IntEnum<\w+>?\((\w+)\)?", r"\1", words)
-    words = re.sub(r"Literal\[(\w+)\]\([^)]*\)", r"\1", words)
-    return words.replace("<built-in function ", "").replace(">", "").strip()
+def kind_of(text: str) -> str:
+    """Return numba's name of a type in words."""
+    text = text.strip().strip("'\"")
+    text = re.sub(r"^(?:readonly |unaligned )+", "", text)
+    if text in _SIMPLE:
+        return _SIMPLE[text]
+    if re.match(r"u?int\d+$|Literal\[int\]", text):
+        return "an int"
+    if text.startswith("Literal["):
+        return _SIMPLE.get(text.partition("(")[0], "a constant")
+    if found := re.match(r"OptionalType\((.*)\)$", text):
+        return f"{kind_of(found[1])} or None"
+    if found := re.match(r"array\((?:[^,]*?)(\w+), (\d)d", text):
+        return _array(found[1], int(found[2]))
+    if found := re.match(r"nestedarray\((\w+), \(([\d, ]+?),?\)\)", text):
+        return _array(found[1], found[2].count(",") + 1)
+    if found := re.match(r"IntEnum class<\w+>?\((\w+)", text):
+        return f"the enum {found[1]}"
+    if found := re.match(r"IntEnum<\w+>?\((\w+)", text):
+        return f"a {found[1]}"
+    if re.match(r"(?:Uni)?Tuple\(", text):
+        return "several values"
+    for begin, kind in (
+        ("slice", "a slice"),
+        ("Function", "a function"),
+        ("type(CPUDispatcher", "a function"),
+        ("class(", "a type"),
+        ("range", "a range"),
+    ):
+        if text.startswith(begin):
+            return kind
+    return "a value of another kind"
+
+
+def _array(element: str, dimensions: int) -> str:
+    shape = {1: "a vector", 2: "a matrix"}.get(dimensions, f"an array of {dimensions} dimensions")
+    return f"{shape} of {element}"

@@ -67,7 +67,7 @@ _MEANING = {
     "numba_xx": "BLAS",
     "numba_ez": "LAPACK",
     "numba_raw": "LAPACK",
-    "numba_": "numba's run time",
+    "numba_": "functions that no loop has",
     "Py": "the interpreter",
     "_Py": "the interpreter",
     "printf": "printing",
@@ -86,13 +86,18 @@ def check(module: Any, compiled: Any, hooks: Any, realtime: bool) -> None:
             continue
         if not _is_called(module, name):
             continue
-        what = next((each for begin, each in _MEANING.items() if name.startswith(begin)), name)
-        raise Mistake(
-            compiled.file,
-            0,
-            f"{compiled.description.name}.{'/'.join(hooks)} would need {what} ({name})",
-            "use arithmetic, NumPy on small arrays",
-        )
+        raise _mistake(compiled, hooks, name)
+
+
+def _mistake(compiled: Any, hooks: Any, symbol: str) -> Mistake:
+    """Return the mistake of a hook that needs a function: at the call of NumPy that may be it."""
+    needed = next((each for begin, each in _MEANING.items() if symbol.startswith(begin)), symbol)
+    for file, line, text, name in compiled.other_calls:
+        what = f"{name} is not compiled: it needs {needed}"
+        return Mistake(file, line, what, "write it as arithmetic on elements", text)
+    name = f"{compiled.description.name}.{'/'.join(hooks)}"
+    what = f"{name} needs {needed}"
+    return Mistake(compiled.file, compiled.line, what, "use arithmetic, NumPy on small arrays")
 
 
 def _is_called(module: Any, name: str) -> bool:

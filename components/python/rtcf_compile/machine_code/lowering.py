@@ -63,6 +63,8 @@ class Compiled:
     used: set[str]
     lines: set[int]
     raises: dict[int, Raise] = field(default_factory=dict)
+    line: int = 0  # of update
+    other_calls: list[tuple[str, int, str, str]] = field(default_factory=list)
 
     def symbol(self, hook: str) -> str:
         """Return the name of a hook's C function."""
@@ -88,15 +90,18 @@ def compile_component(cls: type[Component], arena_bytes: int = ARENA) -> Compile
         functions.logs,
         functions.used,
         functions.lines,
+        line=functions.line(),
+        other_calls=functions.other_calls,
     )
+    made = {hook: _inner(hooks[hook], record) for hook in hooks}
+    trial.run(cls, functions.file())
     for thread, allocator in ((_REALTIME, arena.arena(arena_bytes)), (_BESIDE, arena.heap())):
-        inner = {hook: _inner(hooks[hook], record) for hook in thread if hook in hooks}
+        inner = {hook: made[hook] for hook in thread if hook in made}
         if inner:
             module = _linked(result, inner, allocator)
             result.raises |= raises_in(str(module), functions.file())
             gate.check(module, result, inner, realtime=thread is _REALTIME)
             result.objects.append(backend.machine().emit_object(module))
-    trial.run(cls, functions.file())
     return result
 
 
@@ -114,7 +119,7 @@ def _inner(function: FunctionType, record: Any) -> tuple[str, str]:
     except Mistake:
         raise
     except Exception as error:  # numba's own, or what it fails by where it ought to have one
-        raise explain.mistake(error, function) from None
+        raise explain.mistake(error, function) from error
     return result.fndesc.mangled_name, backend.assembly_of(result.library)
 
 

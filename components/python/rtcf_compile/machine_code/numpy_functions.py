@@ -34,7 +34,7 @@ def _needs(kind: Any, what: str, dimensions: tuple[int, ...] = (1, 2)) -> None:
     if isinstance(kind, types.Array) and kind.ndim in dimensions:
         return
     names: dict[tuple[int, ...], str] = {(1,): "a vector", (2,): "a matrix"}
-    raise TypingError(f"RTCF:{what} of {words(kind)}:it takes {names.get(dimensions, 'an array')}")
+    raise TypingError(f"RTCF:{what} of {words(kind)}:give it {names.get(dimensions, 'an array')}")
 
 
 # Making arrays.
@@ -44,7 +44,7 @@ def _leaves(kind: Any) -> tuple[tuple[int, ...], list[Any]]:
     """Return the shape of numbers in rows, and their types."""
     if not isinstance(kind, types.BaseTuple):
         if not isinstance(kind, _Numbers):
-            raise TypingError(f"RTCF:an array of {words(kind)}:it is made of numbers")
+            raise TypingError(f"RTCF:an array of {words(kind)}:make it of numbers")
         return (), [kind]
     found = [_leaves(each) for each in kind.types]
     shapes = {shape for shape, _ in found}
@@ -243,7 +243,7 @@ def _reshape(a: Any, newshape: Any) -> Any:
     if isinstance(newshape, types.Integer):
         return lambda a, newshape: own.rtcf_reshape(a, (newshape,))
     if not isinstance(newshape, types.UniTuple) or newshape.count > 2:
-        raise TypingError(f"RTCF:np.reshape to {words(newshape)}:an array has one or two sizes")
+        raise TypingError(f"RTCF:np.reshape to {words(newshape)}:give one or two sizes")
     if a.layout == "C":
 
         def view(a: Any, newshape: Any) -> Any:
@@ -516,7 +516,7 @@ def _stack(arrays: Any, axis: Any) -> Any:
     if again is not None:
         return again
     if any(each.ndim != 1 for each in arrays.types):
-        raise TypingError("RTCF:np.stack of matrices:an array has one or two dimensions here")
+        raise TypingError("RTCF:np.stack of matrices:use np.vstack, or parts of a larger array")
     below = plain(_joined("arrays", arrays.types, 0))
     beside = plain(_joined("arrays", arrays.types, 1))
 
@@ -1272,7 +1272,7 @@ def _math_isclose(a: Any, b: Any, rel_tol: Any, abs_tol: Any) -> Any:
 @compiled_as(own.rtcf_np_round, arrays=("a",))
 def _np_round(a: Any, decimals: Any) -> Any:
     if not isinstance(a.dtype if isinstance(a, types.Array) else a, types.Float):
-        raise TypingError(f"RTCF:np.round of {words(a)}:it takes floats")
+        raise TypingError(f"RTCF:np.round of {words(a)}:give it floats")
 
     def rounded(a: Any, decimals: Any) -> Any:
         if decimals == 0:

@@ -15,6 +15,7 @@ from numba.extending import intrinsic, lower_builtin, lower_cast, overload, regi
 from numba.np.numpy_support import as_dtype
 
 from rtcf_compile.machine_code import backend
+from rtcf_compile.machine_code.explain import kind_of
 from rtcf_compile.machine_code.sharing import overlaps, shares
 from rtcf_compile.machine_code.tile import ROWS
 from rtcf_compile.rewriting import helpers, numpy_functions
@@ -140,7 +141,7 @@ def _enum(value: Any, cls: Any) -> Any:
             )
         return lambda value, cls: value
     if not isinstance(value, types.Integer):
-        raise TypingError(f"RTCF:{enumeration.__name__} of {words(value)}:it takes an int")
+        raise TypingError(f"RTCF:{enumeration.__name__} of {words(value)}:give it an int")
     test = " or ".join(f"value == {int(each)}" for each in enumeration)
     text = f"""\
 def checked(value, cls):
@@ -229,7 +230,7 @@ def _store(target: Any, value: Any) -> Any:
         return lambda target, value: helpers.rtcf_assign(target, value)
     if value.ndim != target.ndim:
         raise TypingError(
-            f"RTCF:{words(target)} is set to {words(value)}:it takes an array of its shape"
+            f"RTCF:{words(target)} is set to {words(value)}:give it an array of its shape"
         )
 
     def store(target: Any, value: Any) -> None:
@@ -246,7 +247,7 @@ def _to_float(value: Any) -> Any:
         return lambda value: float(value.value)
     if isinstance(value, types.Number | types.Boolean):
         return lambda value: float(value)
-    raise TypingError(f"RTCF:float of {words(value)}:it takes a number")
+    raise TypingError(f"RTCF:float of {words(value)}:give it a number")
 
 
 @compiled_as(helpers.rtcf_float)
@@ -277,9 +278,11 @@ def _bool(value: Any) -> Any:
 @compiled_as(helpers.rtcf_matmul)
 def _matmul(a: Any, b: Any) -> Any:
     if not isinstance(a, types.Array) or not isinstance(b, types.Array):
-        raise TypingError(f"RTCF:@ of {words(a)} and {words(b)}:it takes arrays; use *")
+        raise TypingError(f"RTCF:@ of {words(a)} and {words(b)}:use * for numbers")
     if not isinstance(a.dtype, types.Float) and not isinstance(b.dtype, types.Float):
-        raise TypingError(f"RTCF:@ of {words(a)} and {words(b)}:one of them must be of floats")
+        raise TypingError(
+            f"RTCF:@ of {words(a)} and {words(b)}:make one of them floats: x.astype(float)"
+        )
     if (a.ndim, b.ndim) == (1, 1):
         return _inner_product
     if (a.dtype, b.dtype) != (types.float64, types.float64):
@@ -418,7 +421,7 @@ def _assign(target: Any, value: Any) -> Any:
         )
     if not isinstance(value, types.Array) or value.ndim > target.ndim:
         raise TypingError(
-            f"RTCF:{words(target)} is set to {words(value)}:it takes an array of its shape"
+            f"RTCF:{words(target)} is set to {words(value)}:give it an array of its shape"
         )
     copying = _copying(target.ndim, value.ndim)
     if target.ndim == 1:
@@ -980,7 +983,9 @@ def _checking(helper: Any, function: Any) -> None:
     @compiled_as(helper)
     def _check(value: Any) -> Any:
         if not isinstance(value, types.Number | types.Boolean):
-            raise TypingError(f"RTCF:math.{name} of {words(value)}:it takes a number; arrays: np")
+            raise TypingError(
+                f"RTCF:math.{name} of {words(value)}:give it a number; np.{name} takes arrays"
+            )
 
         def checked(value: Any) -> Any:
             result = function(float(value))
@@ -1051,7 +1056,7 @@ def _to_int(value: Any) -> Any:
     if isinstance(value, types.Integer):
         return lambda value: value
     if not isinstance(value, types.Float | types.Boolean):
-        raise TypingError(f"RTCF:int of {words(value)}:it takes a number")
+        raise TypingError(f"RTCF:int of {words(value)}:give it a number")
 
     def to_int(value: Any) -> Any:
         if math.isnan(value):
@@ -1140,7 +1145,7 @@ def _where(condition: Any, x: Any, y: Any) -> Any:
         isinstance(each, types.Array | types.Number | types.Boolean) for each in given
     ):
         kinds = ", ".join(words(each) for each in given)
-        raise TypingError(f"RTCF:np.where of {kinds}:it takes arrays of one shape, and numbers")
+        raise TypingError(f"RTCF:np.where of {kinds}:give it arrays of one shape, and numbers")
     if not dimensions:
         return lambda condition, x, y: x if condition else y
     dtype = np.result_type(*(as_dtype(types.unliteral(getattr(each, "dtype", each)))
@@ -1286,8 +1291,8 @@ def _cholesky(a: Any) -> Any:
 def words(value: Any) -> str:
     """Return numba's type in the words of NumPy."""
     if isinstance(value, types.Array):
-        dimensions = "a vector" if value.ndim == 1 else f"an array of {value.ndim} dimensions"
-        return f"{dimensions} of {value.dtype}"
+        of = {1: "a vector", 2: "a matrix"}
+        return f"{of.get(value.ndim, f'an array of {value.ndim} dimensions')} of {value.dtype}"
     if isinstance(value, types.Boolean):
         return "a bool"
     if isinstance(value, types.Float):
@@ -1300,4 +1305,4 @@ def words(value: Any) -> str:
         return f"a {value.instance_class.__name__}"
     if isinstance(value, types.Optional):
         return f"{words(value.type)} or None"
-    return "None" if isinstance(value, types.NoneType) else str(value)
+    return kind_of(str(value))

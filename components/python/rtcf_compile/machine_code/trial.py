@@ -3,7 +3,6 @@
 numba knows how many dimensions an array has, not how long they are; NumPy does when it runs.
 """
 
-import re
 import warnings
 from typing import Any
 
@@ -12,11 +11,11 @@ from rtcf.component import Component
 from rtcf.component.declaration import Description, Input, Member, Queue, describe
 from rtcf.component.value_type import ValueType
 
-from rtcf_compile.source.mistake import Mistake
+from rtcf_compile.source import numpy_errors
+from rtcf_compile.source.mistake import Mistake, source_line
 from rtcf_compile.source.processor_time import HOOK_S, TimeLimitError, limited
 
 _CYCLES = 20
-_SHAPES = re.compile(r"matmul|broadcast|shape|dimension|size \d", re.IGNORECASE)
 
 
 def run(cls: type[Component], file: str) -> None:
@@ -32,11 +31,9 @@ def run(cls: type[Component], file: str) -> None:
             pass  # the comparison says where
         except Exception as error:
             # What a component raises of its own is for the loop to see.
-            text = " ".join(str(error).split())
-            if isinstance(error, ValueError) and _SHAPES.search(text):
-                if "matmul" in text:
-                    text = "@ of shapes that do not fit"
-                raise Mistake(file, _line(error, file), text, "make the shapes fit") from None
+            line = _line(error, file)
+            if said := numpy_errors.explained(error, source_line(file, line)):
+                raise Mistake(file, line, *said) from None
 
 
 def _cycles(component: Any, about: Description, draw: Any) -> None:

@@ -18,7 +18,7 @@ from rtcf_compile.rewriting.methods import Method, Methods
 from rtcf_compile.rewriting.products import ARENA, Products
 from rtcf_compile.rewriting.rewrite import Hook
 from rtcf_compile.source.checks import check, resolve
-from rtcf_compile.source.mistake import Mistake, at
+from rtcf_compile.source.mistake import Mistake, at, written
 from rtcf_compile.source.modules import Source, is_own, read
 
 _OURS = {*helpers.BY_NAME, *numpy_functions.BY_NAME}
@@ -45,6 +45,8 @@ class Functions:
         # Which function calls which, and the arrays that are too large for the arena.
         self._calls: dict[FunctionType, set[FunctionType]] = {}
         self._large: dict[FunctionType, Mistake] = {}
+        # File, line, text and name of calls that may be compiled to what no loop has.
+        self.other_calls: list[tuple[str, int, str, str]] = []
 
     def hooks(self) -> dict[str, FunctionType]:
         """Return the hooks that the class has, rewritten but not compiled."""
@@ -95,6 +97,12 @@ class Functions:
         for called in self._calls.get(function, set()) - seen:
             self._check_large(called, seen)
 
+    def line(self) -> int:
+        """Return the line of update."""
+        method = self._methods.find("update")
+        function = method.function if method else None
+        return function.__code__.co_firstlineno if function else 0
+
     def file(self) -> str:
         """Return the file of the class."""
         return inspect.getsourcefile(self._cls) or "?"
@@ -105,7 +113,7 @@ class Functions:
                 source.file,
                 source.tree.lineno,
                 "a hook takes self alone",
-                f"def {source.tree.name}(self):",
+                f"write def {source.tree.name}(self):",
             )
         for node in ast.walk(source.tree):
             value = node.value if isinstance(node, ast.Return) else None
@@ -116,9 +124,12 @@ class Functions:
         if method.function is not None:
             return method.function
         file = inspect.getsourcefile(method.owner) or "?"
+        value = inspect.unwrap(vars(method.owner)[method.name])
+        of = getattr(value, "__func__", value)
+        line = of.__code__.co_firstlineno if inspect.isfunction(of) else 0
         raise Mistake(
             file,
-            inspect.getsourcelines(method.owner)[1],
+            line or inspect.getsourcelines(method.owner)[1],
             f"{method.name} is a {method.kind}",
             "write a method, a static method or a property by `def`",
         )
@@ -132,7 +143,7 @@ class Functions:
         self._hooks[function] = hook
         self.used |= hook.used
         self.lines |= hook.lines
-        self._note_large(hook)
+        self._note_calls(hook)
         scope = self._scope(source, tree, hook.constants)
         for called in hook.called.values():
             if called.kind == "static method":
@@ -155,6 +166,14 @@ class Functions:
         """Note that the function in work calls another."""
         if self._making:
             self._calls.setdefault(self._making[-1], set()).add(function)
+
+    def _note_calls(self, products: Products) -> None:
+        file = products.source.file
+        for node in products.others:
+            self.other_calls.append(
+                (file, node.lineno, written(file, node), written(file, node.func))
+            )
+        self._note_large(products)
 
     def _note_large(self, products: Products) -> None:
         for node in products.large:
@@ -188,7 +207,7 @@ class Functions:
         source.tree.decorator_list = []
         for each in source.tree.args.args:
             each.annotation = None
-        self._note_large(products)
+        self._note_calls(products)
         plain = made(source.tree, self._scope(source, source.tree, products.constants), source)
         own = self._compiler(plain)
         self._making.pop()

@@ -31,6 +31,13 @@ def log_call(number: int, count: int) -> Any:
     return intrinsic(scope["rtcf_log"])
 
 
+def _kind(given: Any) -> str:
+    """Return in words what is no number."""
+    kinds = {types.Array: "arrays", types.UnicodeType: "text", types.StringLiteral: "text"}
+    kinds |= {types.Optional: "what may be None", types.BaseTuple: "several values"}
+    return next((words for kind, words in kinds.items() if isinstance(given, kind)), "others")
+
+
 def _typed(number: int, given: tuple[Any, ...]) -> tuple[Any, Any]:
     logs = _PRESENT[0]
     passed = []
@@ -45,7 +52,8 @@ def _typed(number: int, given: tuple[Any, ...]) -> tuple[Any, Any]:
             passed.append(types.float64)
         else:
             raise TypingError(
-                "RTCF:a log call stores numbers and bools, no arrays:log elements one by one"
+                f"RTCF:a log call stores numbers and bools, not {_kind(each)}:"
+                "log elements one by one, texts within the constant text"
             )
     logs.calls[number].types = [_SCALARS[each] for each in passed]
 

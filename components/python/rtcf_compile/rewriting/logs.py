@@ -37,7 +37,7 @@ class Logs:
                 source.file,
                 node,
                 "a log call has a constant text",
-                f'self.{level}("x {{}}", x)',
+                f'write self.{level}("x {{}}", x)',
             )
         if node.keywords:
             raise at(source.file, node, "a log call has no named arguments", "give them in order")

@@ -1,5 +1,6 @@
 """The methods of a component class as Python finds them: its own, those of bases and mixins."""
 
+import functools
 import inspect
 from dataclasses import dataclass
 from types import FunctionType
@@ -64,6 +65,8 @@ def _method(name: str, owner: type, place: int, value: Any) -> Method | None:
         return Method(name, owner, place, "static method", value.__func__)
     if isinstance(value, property) and inspect.isfunction(value.fget):
         return Method(name, owner, place, "property", value.fget)
-    if isinstance(value, staticmethod | classmethod | property):
+    if isinstance(value, staticmethod | classmethod | property | functools.cached_property):
         return Method(name, owner, place, type(value).__name__, None)
+    if hasattr(value, "__wrapped__"):
+        return Method(name, owner, place, "decorated function", None)
     return None

@@ -13,6 +13,7 @@ from rtcf.component.message_type import MessageType
 from rtcf.component.value_type import ValueType
 
 from rtcf_compile.rewriting.products import Products, call_of, like, loaded
+from rtcf_compile.source.checks import check_index
 from rtcf_compile.source.modules import Source
 
 _INPUT_FIELDS = {"value": "", "new": "__new", "valid": "__valid", "age": "__age"}
@@ -31,6 +32,21 @@ class Ports(Products):
         self.used: set[str] = set()
         self.touched: dict[str, ast.AST] = {}
 
+    def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
+        """`self.z[2]`, whose size is declared."""
+        self._check_index(node)
+        return super().visit_Subscript(node)
+
+    def _check_index(self, node: ast.Subscript) -> None:
+        """Refuse constant indices beyond the declared sizes."""
+        base = node.value
+        is_value = isinstance(base, ast.Attribute) and base.attr == "value"
+        owner = base.value if is_value else base  # type: ignore[attr-defined]
+        if isinstance(owner, ast.Attribute) and self._is_self(owner.value):
+            member = self._description.members.get(owner.attr)
+            if member is not None and member.type.shape and is_value == (member.kind in PORTS):
+                check_index(node, member.type.shape, ast.unparse(base), self.source.file)
+
     def _enum_of(self, node: ast.expr) -> type[enum.IntEnum] | None:
         """Return the enum that a member, or the value of a port, is declared as."""
         is_value = isinstance(node, ast.Attribute) and node.attr == "value"
@@ -48,9 +64,15 @@ class Ports(Products):
         if node.attr not in fields:
             has = ", ".join(f".{each}" for each in fields)
             has += ", .write(…)" if port.kind is Output else ""
-            raise self.mistake(node, f"{a_kind(port)} has no {node.attr}", f"it has {has}")
+            what = f"{a_kind(port)} has no {node.attr}"
+            if port.message and port.message.below((node.attr,)):
+                raise self.mistake(node, what, f"write self.{port.name}.value.{node.attr}")
+            raise self.mistake(node, what, f"use {has}")
+        if isinstance(node.ctx, ast.Store) and port.kind is Input:
+            raise self.mistake(node, "an Input is only read", "write an Output")
         if isinstance(node.ctx, ast.Store):
-            raise self.mistake(node, "a port's value is not set", f"self.{port.name}.write(…)")
+            what = "a port's value is not set"
+            raise self.mistake(node, what, f"write self.{port.name}.write(…)")
         if port.message and node.attr == "value":
             raise self._no_number(node, port.message, ())
         if node.attr != "value":
@@ -109,7 +131,7 @@ class Ports(Products):
         (port, path), (source, place) = mine, theirs
         assert port.message is not None and source.message is not None
         if port.kind is Input:
-            raise self.mistake(target, "is of an Input", "it is only read")
+            raise self.mistake(target, "is of an Input, which is only read", "set an Output")
         try:
             pairs = port.message.pairs(path, source.message, place)
         except TypeError as error:
@@ -180,7 +202,7 @@ class Ports(Products):
         if port is None or port.message is None:
             return None
         if port.kind is Input:
-            raise self.mistake(target, "is of an Input", "it is only read")
+            raise self.mistake(target, "is of an Input, which is only read", "set an Output")
         leaf = port.message.leaf(path)
         if leaf is None:
             raise self._no_number(target, port.message, path)
@@ -195,15 +217,15 @@ class Ports(Products):
         if path in message.others:
             return self.mistake(node, f"{name} is a list of messages", "read it in C++")
         if below := message.below(path):
-            return self.mistake(node, f"{name} is no number", f"it has .{', .'.join(below)}")
+            return self.mistake(node, f"{name} is no number", f"use .{', .'.join(below)}")
         has = ", .".join(message.below(path[:-1]))
-        return self.mistake(node, f"{name} is not there", f"there is .{has}")
+        return self.mistake(node, f"{name} is not there", f"use .{has}")
 
     def _queue(self, node: ast.Attribute, port: Member) -> ast.AST:
         """`self.goals.front`, `.size`, `.age`, `.dropped`, `.connected`."""
         name = port.name
         if isinstance(node.ctx, ast.Store):
-            raise self.mistake(node, "a queue is only read", f"self.{name}.pop() removes one")
+            raise self.mistake(node, "a queue is only read", f"remove one by self.{name}.pop()")
         ring = [
             self._field(f"{name}{each}", ast.Load())
             for each in ("__times" if node.attr == "age" else "", "__oldest", "__count")
@@ -218,7 +240,7 @@ class Ports(Products):
         raise self.mistake(
             node,
             f"{a_kind(port)} has no {node.attr}",
-            "it has .size, .front, .pop(), .age, .dropped, .connected",
+            "use .size, .front, .pop(), .age, .dropped, .connected",
         )
 
     def _pop(self, node: ast.Expr, port: Member) -> ast.stmt:

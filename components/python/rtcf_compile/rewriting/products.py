@@ -24,6 +24,7 @@ _STANDS_FOR = [*INSTEAD.items(), *numpy_functions.STANDS_FOR]
 # Temporaries of a cycle in the real-time thread, bytes.
 ARENA = 64 * 1024
 _NEW = (np.zeros, np.ones, np.empty, np.full, np.eye, np.identity)
+_PLAIN = (*_NEW, np.zeros_like, np.ones_like, np.empty_like, np.full_like, np.arange)
 _DTYPES = {float: np.float64, int: np.int64, bool: np.bool_}
 # Functions of NumPy whose argument of that place is a type of elements.
 _TYPED = {np.zeros: 1, np.ones: 1, np.empty: 1, np.full: 2, np.zeros_like: 1, np.ones_like: 1}
@@ -42,6 +43,8 @@ class Products(ast.NodeTransformer):
         self._lists = self._find_lists()
         self._uncertain = self._find_uncertain()
         self.large: list[ast.AST] = []
+        # Calls that numba may compile to what no loop has.
+        self.others: list[ast.Call] = []
 
     def mistake(self, node: ast.AST, what: str, way_out: str) -> Exception:
         """Return a mistake at a node."""
@@ -56,6 +59,9 @@ class Products(ast.NodeTransformer):
             raise self.mistake(
                 node, "text is not made in the cycle", 'log it: self.info("{}", self.mode.name)'
             )
+        if owner is not None and not isinstance(node.ctx, ast.Load):
+            name = ast.unparse(node.value)
+            raise self.mistake(node, f"{name} is a constant of the module", "declare a State")
         if dataclasses.is_dataclass(owner) and not isinstance(owner, type):
             name = f"constant_{ast.unparse(node).replace('.', '_')}"
             self.constants[name] = getattr(owner, node.attr)
@@ -398,6 +404,12 @@ class Products(ast.NodeTransformer):
             raise self.mistake(
                 node, f"{target.__name__} has an argument too many", "set what it returns: x[:] = …"
             )
+        if isinstance(target, np.ufunc) and len(node.args) < target.nin:
+            what = f"{target.__name__} takes {target.nin} arguments"
+            raise self.mistake(node, what, "give all of them")
+        if target in (max, min, sum) and node.keywords:
+            way_out = f"use np.{target.__name__}, np.argmax or a loop"
+            raise self.mistake(node, f"{target.__name__} has no {node.keywords[0].arg}", way_out)
         if isinstance(node.func, ast.Attribute) and (
             target is None or isinstance(resolve(node.func.value, self.source), np.ndarray)
         ):
@@ -421,10 +433,22 @@ class Products(ast.NodeTransformer):
             and resolve(node.func.value, self.source) is np.linalg
         ):
             raise self.mistake(
-                node, "calls LAPACK, which allocates", "np.linalg has solve, inv and cholesky here"
+                node,
+                "calls LAPACK, which allocates",
+                "use np.linalg.solve, inv, cholesky, det or norm",
             )
+        if self._is_other(node, target):
+            self.others.append(node)
         self.generic_visit(node)
         return node
+
+    def _is_other(self, node: ast.Call, target: Any) -> bool:
+        """Tell whether nothing of ours stands for a function of NumPy, or a method of arrays."""
+        if target is None:
+            return isinstance(node.func, ast.Attribute)
+        if isinstance(target, np.ufunc | type) or any(target is each for each in _PLAIN):
+            return False
+        return (getattr(target, "__module__", None) or "numpy").startswith("numpy")
 
     def _bytes(self, node: ast.Call, target: Any) -> int:
         """Return how large a new array of constant size is."""
@@ -466,7 +490,9 @@ class Products(ast.NodeTransformer):
             bound = signature.bind(*arguments, **named).arguments
         except TypeError:
             name, takes = ast.unparse(node.func), ", ".join(signature.parameters)
-            way_out = 'write kind="stable"' if "kind" in signature.parameters else "write it so"
+            way_out = f"write {name}({takes})"
+            if "kind" in signature.parameters:
+                way_out = 'write kind="stable"'
             raise self.mistake(node, f"{name} takes {takes}", way_out) from None
         given: list[ast.expr] = []
         for name, parameter in signature.parameters.items():
@@ -482,7 +508,7 @@ class Products(ast.NodeTransformer):
     def _argument(self, value: ast.expr, default: Any) -> ast.expr:
         if isinstance(value, ast.Constant) and isinstance(value.value, str):
             if value.value not in numpy_functions.WORDS:
-                raise self.mistake(value, "has no meaning here", "leave it away")
+                raise self.mistake(value, "a text has no meaning here", "give it a number")
             return like(value, ast.Constant(numpy_functions.WORDS[value.value]))
         if default is None and isinstance(value, ast.Constant) and value.value is False:
             return like(value, ast.Constant(None))
@@ -613,6 +639,7 @@ class Products(ast.NodeTransformer):
         """`x[…] = value`: of one element as it is, else by what looks at the index's type."""
         parts = list(_parts(target))
         self._check_constant(target)
+        self._check_index(target)
         if all(_is_view(each) or self._is_whole(each) for each in parts):
             dimensions, is_float = self._known(target.value)
             if any(_is_view(each) for each in parts) or len(parts) < dimensions:
@@ -631,6 +658,9 @@ class Products(ast.NodeTransformer):
         base = self.visit(loaded(target.value))
         index = _index(self.visit(self._arrays(target.slice)))
         return [*before, like(node, ast.Expr(call_of("rtcf_set", base, index, value)))]
+
+    def _check_index(self, node: ast.Subscript) -> None:
+        """Refuse constant indices beyond sizes that are declared: see Ports."""
 
     def _check_constant(self, target: ast.Subscript) -> None:
         """Refuse to set elements of what belongs to the module, and of lists."""

@@ -6,6 +6,7 @@
 
 import ast
 import copy
+import difflib
 from collections.abc import Sequence
 from typing import Any
 
@@ -29,7 +30,7 @@ from rtcf_compile.rewriting.logs import Logs, with_name
 from rtcf_compile.rewriting.methods import Method, Methods
 from rtcf_compile.rewriting.ports import Ports, a_kind
 from rtcf_compile.rewriting.products import call_of, like, loaded
-from rtcf_compile.source.checks import METHODS, resolve
+from rtcf_compile.source.checks import METHODS, check_arguments, resolve
 from rtcf_compile.source.modules import Source
 
 
@@ -54,7 +55,7 @@ class Hook(Ports):
         """Return the rewritten function."""
         tree = self.source.tree
         if not self._self:
-            raise self.mistake(tree, f"{tree.name} has no self", f"def {tree.name}(self):")
+            raise self.mistake(tree, f"{tree.name} has no self", f"write def {tree.name}(self):")
         self._without_aliases(tree)
         body = self.statements(tree.body)
         arguments = ast.arguments(
@@ -91,6 +92,7 @@ class Hook(Ports):
         message, path = self._message(node)
         if message is not None:
             return self._part(node, message, path)
+        self._plain_member(node)
         port = self._member(node.value)
         if port is not None and port.kind in PORTS:
             return self._queue(node, port) if port.kind is Queue else self._port(node, port)
@@ -145,6 +147,7 @@ class Hook(Ports):
                 return like(node, call_of(f"rtcf_log_{number}", component, *arguments))
             if called.attr == "fault":
                 raise self.mistake(node, "ends the hook", "write it as a statement of its own")
+            self._no_function(node, called)
             method = self._methods.find(called.attr)
             if method is not None and called.attr not in HOOKS:
                 return self._call(node, method, node.args)
@@ -186,6 +189,10 @@ class Hook(Ports):
                 f"{method.name} is a {method.kind}",
                 "write a method, a static method or a property by `def`",
             )
+        if isinstance(node, ast.Call):
+            written = like(node, ast.Call(node.func, list(arguments), node.keywords))
+            own = 0 if method.kind == "static method" else 1  # self is not in the source
+            check_arguments(written, method.function, self.source.file, own)
         self.called[method.symbol] = method
         given = [self.visit(each) for each in arguments]
         if method.kind != "static method":
@@ -242,7 +249,7 @@ class Hook(Ports):
             port = self._member(call.func.value)
             if port is not None and port.kind is Output and call.func.attr == "publish":
                 if call.args or call.keywords:
-                    raise self.mistake(call, "takes nothing", f"self.{port.name}.publish()")
+                    raise self.mistake(call, "takes nothing", f"write self.{port.name}.publish()")
                 flag = ast.Assign([self._field(f"{port.name}__written")], ast.Constant(True))
                 return like(node, flag)
             if port is not None and port.kind is Output and call.func.attr == "write":
@@ -256,16 +263,18 @@ class Hook(Ports):
                     raise self.mistake(
                         call,
                         "a message is not written as a whole",
-                        f"self.{port.name}.value.… = …, then self.{port.name}.publish()",
+                        f"set self.{port.name}.value.… = …, then self.{port.name}.publish()",
                     )
                 if len(call.args) != 1 or call.keywords:
-                    raise self.mistake(call, "writes one value", f"self.{port.name}.write(value)")
+                    raise self.mistake(
+                        call, "writes one value", f"write self.{port.name}.write(value)"
+                    )
                 flag = ast.Assign([self._field(f"{port.name}__written")], ast.Constant(True))
                 value = self._set_field(node, port.name, port.type, self.visit(call.args[0]))
                 return [value, like(node, flag)]
             if port is not None and port.kind is Queue and call.func.attr == "pop":
                 if call.args or call.keywords:
-                    raise self.mistake(call, "takes nothing", f"self.{port.name}.pop()")
+                    raise self.mistake(call, "takes nothing", f"write self.{port.name}.pop()")
                 return self._pop(node, port)
             if self._is_self(call.func.value) and call.func.attr == "fault":
                 return self._fault(node, call)
@@ -323,7 +332,9 @@ class Hook(Ports):
                 port = self._member(target.value)
                 port = self._message(target)[0] if port is None else port
                 if port is not None and port.kind is not Output:
-                    raise self.mistake(target, f"is of {a_kind(port)}", "it is only read")
+                    raise self.mistake(
+                        target, f"is of {a_kind(port)}, which is only read", "set an Output"
+                    )
 
     def _settable(self, node: ast.Attribute) -> Member:
         member = self._description.members.get(node.attr)
@@ -341,9 +352,7 @@ class Hook(Ports):
                 raise self.mistake(
                     node, "a property is set", f"call a method: self.set_{node.attr}(…)"
                 )
-            raise self.mistake(
-                node, "is not declared", f"write `{node.attr}: State[float]` in the class"
-            )
+            raise self._undeclared(node)
         if member.kind is Parameter:
             raise self.mistake(node, "a parameter is set from outside", "declare a State for it")
         if member.kind is Derived and self.source.tree.name != "prepare":
@@ -351,9 +360,53 @@ class Hook(Ports):
                 node, "is Derived: prepare alone sets it", "set it in prepare, or declare a State"
             )
         if member.kind in PORTS:
-            way = ".write(…)" if member.kind is Output else "only read"
-            raise self.mistake(node, f"is {a_kind(member)}", f"it is {way}")
+            if member.kind is Output:
+                way_out = f"write self.{node.attr}.write(…)"
+                raise self.mistake(node, f"is {a_kind(member)}", way_out)
+            raise self.mistake(node, f"is {a_kind(member)}, which is only read", "write an Output")
         return member
+
+    def _undeclared(self, node: ast.Attribute) -> Exception:
+        names = [each for each in self._description.members if "__" not in each]
+        words = (*names, *TIME_FIELDS, *LOG_LEVELS, *self._methods.names())
+        way_out = f"write `{node.attr}: State[float]` in the class"
+        if near := difflib.get_close_matches(node.attr, words, 1, 0.75):
+            way_out = f"mend its name (self.{near[0]}), or {way_out}"
+        return self.mistake(node, "is not declared", way_out)
+
+    def _no_function(self, node: ast.Call, called: ast.Attribute) -> None:
+        """Refuse to call a member, a time or a property of `self`."""
+        name = called.attr
+        method = self._methods.find(name)
+        if name in TIME_FIELDS or (method is not None and method.kind == "property"):
+            raise self.mistake(node, f"self.{name} is no function", "leave the ( ) out")
+        member = self._description.members.get(name)
+        if member is not None or name in self._description.constants:
+            way_out = f"write self.{name}[0] for an element, * to multiply"
+            raise self.mistake(node, f"self.{name} is no function", way_out)
+        if name in HOOKS:
+            way_out = "call a method that both use"
+            raise self.mistake(node, f"{name} is a hook, which the loop calls", way_out)
+        if method is None and name not in (*HOOKS, *LOG_LEVELS, "fault"):
+            near = difflib.get_close_matches(name, (*self._methods.names(), *LOG_LEVELS), 1, 0.6)
+            way_out = f"define it: def {name}(self, …):"
+            if near:
+                way_out = f"mend its name (self.{near[0]}), or {way_out}"
+            raise self.mistake(node, f"no method is called {name}", way_out)
+
+    def _plain_member(self, node: ast.Attribute) -> None:
+        """Refuse what ports alone have: `self.kp.value`, `self.f.write(…)`."""
+        owner = node.value
+        if not isinstance(owner, ast.Attribute) or not self._is_self(owner.value):
+            return
+        member = self._description.members.get(owner.attr)
+        if member is None or member.kind in PORTS or member.type.enumeration:
+            return
+        kind, name = a_kind(member), f"self.{owner.attr}"
+        if node.attr in ("value", "get", "new", "valid"):
+            raise self.mistake(node, f"{kind} has no {node.attr}", f"write {name}")
+        if node.attr in ("write", "set", "publish"):
+            raise self.mistake(node, f"{kind} has no {node.attr}", f"write {name} = …")
 
     def _value(self, node: ast.Attribute, name: str, member: Member) -> ast.AST:
         """Return a state's, a parameter's or a derived value."""
@@ -418,7 +471,7 @@ class Hook(Ports):
             return self._call(node, method, [])
         if method is not None:
             raise self.mistake(node, "a method is no value", f"call it: self.{name}(…)")
-        raise self.mistake(node, "is not declared", f"write `{name}: State[float]` in the class")
+        raise self._undeclared(node)
 
     def _owned(self, target: ast.AST) -> list[ast.AST]:
         """Return what is set of `self` by a target; not elements of arrays."""

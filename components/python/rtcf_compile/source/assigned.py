@@ -3,6 +3,7 @@ none, compiled code would go on with whatever is there.
 """
 
 import ast
+import builtins
 from collections.abc import Sequence
 
 from rtcf_compile.source.mistake import at
@@ -156,16 +157,21 @@ class _Flow:
         after = self._used(node, known)
         return after, after
 
+    def _without_value(self, name: str) -> tuple[str, str]:
+        scope = self._source.function.__globals__
+        if callable(scope.get(name, getattr(builtins, name, None))):
+            return f"{name} is a function, and set here", "take another name for the variable"
+        if name in scope:
+            return f"{name} is a constant of the module, and set here", "declare a State"
+        return f"{name} has no value on every way here", (
+            f"set {name} before, where all ways come by"
+        )
+
     def _used(self, node: ast.expr, known: frozenset[str]) -> frozenset[str]:
         """Look at an expression; return the assigned variables after it."""
         if isinstance(node, ast.Name):
             if isinstance(node.ctx, ast.Load) and node.id in self._variables - known:
-                raise at(
-                    self._source.file,
-                    node,
-                    f"{node.id} has no value on every way here",
-                    f"set {node.id} before, where all ways come by",
-                )
+                raise at(self._source.file, node, *self._without_value(node.id))
             return known
         if isinstance(node, ast.NamedExpr):
             return self._used(node.value, known) | {node.target.id}

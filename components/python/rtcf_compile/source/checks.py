@@ -1,16 +1,18 @@
 """What a hook and the functions that it calls may not contain, seen from their trees alone."""
 
 import ast
+import enum
+import inspect
 import math
-from collections.abc import Iterator
-from types import ModuleType
+from collections.abc import Iterator, Sequence
+from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
 
 from rtcf_compile.source.assigned import check_assigned
 from rtcf_compile.source.mistake import Mistake, at
-from rtcf_compile.source.modules import Source
+from rtcf_compile.source.modules import Source, is_own
 
 _REFUSED: dict[type[ast.AST], tuple[str, str]] = {
     ast.ListComp: ("a list allocates", "use a loop that fills an array"),
@@ -24,10 +26,10 @@ _REFUSED: dict[type[ast.AST], tuple[str, str]] = {
     ast.Await: ("the cycle waits for nothing", "keep what is awaited in a State and look again"),
     ast.AsyncFunctionDef: ("the cycle waits for nothing", "use `def`"),
     ast.JoinedStr: ("text is not made in the cycle", 'log with arguments: self.info("x {}", x)'),
-    ast.Global: ("a global variable would be shared by all instances", "declare a State"),
+    ast.Global: ("a global variable is shared by all instances", "declare a State"),
     ast.Nonlocal: ("a variable of another function", "declare a State, or return the value"),
     ast.Try: ("nothing is caught in the cycle", "test for it with `if` before it happens"),
-    ast.With: ("there is nothing to open or lock in the cycle", "do it without `with`"),
+    ast.With: ("there is nothing to open or lock in the cycle", "leave `with` out"),
     ast.Import: ("an import is no machine code", "import at the head of the file"),
     ast.ImportFrom: ("an import is no machine code", "import at the head of the file"),
     ast.Lambda: ("a lambda is not compiled", "define a function in the module"),
@@ -55,6 +57,20 @@ _BUILTINS: dict[str, tuple[str, str]] = {
     "isinstance": ("types are fixed when compiled", "declare ports of that type"),
     "eval": ("no Python runs in the cycle", "write the expression"),
     "exec": ("no Python runs in the cycle", "write the statements"),
+    "type": ("types are fixed when compiled", "leave it out, or convert: float(x), int(x)"),
+    "id": ("values have no identity in the cycle", "compare them: a == b"),
+    "vars": ("names are fixed when compiled", "write self.name"),
+    "dir": ("names are fixed when compiled", "write self.name"),
+    "globals": ("names are fixed when compiled", "write the name"),
+    "locals": ("names are fixed when compiled", "write the name"),
+    "callable": ("types are fixed when compiled", "leave it out"),
+    "hash": ("values have no hash in the cycle", "compare them: a == b"),
+    "next": ("an iterator is no machine code", "use a loop, or an index"),
+    "iter": ("an iterator is no machine code", "use a loop, or an index"),
+    "complex": ("a complex number", "use two floats"),
+    "bytes": ("bytes are not compiled", "use an array of np.uint8"),
+    "bytearray": ("bytes are not compiled", "use an array of np.uint8"),
+    "frozenset": ("a set allocates", "use an array of bools"),
 }
 _GROWS = {
     "append": "use an array of State and a count",
@@ -79,7 +95,14 @@ _MODULES = {
         "compute them from a seed in a State",
     ),
     "os": ("calls the system", "do it in the module, when it is compiled"),
-    "sys": ("is the interpreter's", "there is none in the cycle"),
+    "sys": ("is the interpreter's", "read it in the module, when it is compiled"),
+    "itertools": ("an iterator is no machine code", "write loops with range(…)"),
+    "functools": ("is not compiled", "write the calls"),
+    "collections": ("allocates", "use an array of State and a count"),
+    "contextlib": ("there is nothing to open or lock in the cycle", "leave it out"),
+    "json": ("is not compiled", "read files in the module, when it is compiled"),
+    "copy": ("is not compiled", "copy an array by x.copy(), a message by ="),
+    "scipy": ("is not compiled", "compute constants in the module, write the rest with NumPy"),
     "threading": ("the cycle has one thread", "keep it in a State"),
     "asyncio": ("the cycle waits for nothing", "keep it in a State"),
     "socket": ("calls the system", "use an Input or Output; a device is for C++"),
@@ -89,6 +112,8 @@ _MODULES = {
 }
 # What changes nothing of a function, or only how it is called.
 _DECORATORS = ("property", "staticmethod", "override", "final")
+# Packages whose functions are compiled, or refused one by one.
+_COMPILED = ("builtins", "math", "numpy", "operator", "rtcf", "_operator")
 _LARGEST, _SMALLEST = 2**63 - 1, -(2**63)
 
 
@@ -101,6 +126,9 @@ def check(source: Source) -> None:
     arguments = tree.args
     if arguments.vararg or arguments.kwarg:
         raise Mistake(file, tree.lineno, f"{tree.name} takes any number of arguments", "name them")
+    for default in (*arguments.defaults, *arguments.kw_defaults):
+        if isinstance(default, ast.List | ast.Dict | ast.Set):
+            raise at(file, default, "a default is shared by all calls", "write a number or a tuple")
     known = _names(source)
     for node in _walk(tree):
         if type(node) in _REFUSED:
@@ -115,8 +143,16 @@ def check(source: Source) -> None:
             _module(node, source)
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and node.id not in known:
             raise at(file, node, f"{node.id} is not defined", "declare it, or mend its name")
+        if isinstance(node, ast.Raise):
+            _raised(node, file)
+        if isinstance(node, ast.Slice):
+            _slice(node, file)
+        if isinstance(node, ast.Subscript):
+            _indexed(node, source)
+        if isinstance(node, ast.Attribute) and getattr(node.value, "id", "") == "super":
+            raise at(file, node.value, "super is a call", f"write super().{node.attr}")
         if isinstance(node, ast.While) and _endless(node):
-            raise at(file, node.test, "a loop without end", "bound it: for _ in range(…)")
+            raise Mistake(file, node.lineno, "a loop without end", "bound it: for _ in range(…)")
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod) and _is_text(node.left):
             raise at(file, node, *_REFUSED[ast.JoinedStr])
     check_assigned(source)
@@ -203,6 +239,8 @@ def _call(node: ast.Call, source: Source) -> None:
         raise at(file, node, *_BUILTINS[called.id])
     target = resolve(called, source)
     name = getattr(target, "__name__", "")
+    if target is not None:
+        _called(node, target, source)
     if target is not None and getattr(np, name, None) is target and name in _GROWS:
         raise at(file, node, f"np.{name} makes an array that grows", _GROWS[name])
     if isinstance(called, ast.Attribute) and isinstance(resolve(called.value, source), list):
@@ -217,8 +255,104 @@ def _call(node: ast.Call, source: Source) -> None:
         raise at(file, node, "** takes a dict apart", "write the arguments")
 
 
+def _called(node: ast.Call, target: Any, source: Source) -> None:
+    """Refuse a call of what is no function, or of one that is not compiled."""
+    file, name = source.file, ast.unparse(node.func)
+    if not callable(target):
+        raise at(file, node, f"{name} is no function", f"write {name}[0] for an element")
+    if is_own(target):
+        check_arguments(node, target, source.file)
+        return
+    if isinstance(target, type):
+        if hasattr(target, "_md5sum"):
+            way_out = "set the fields of an Output: self.port.value.x = 1.0"
+            raise at(file, node, "a message is made by an Output alone", way_out)
+        if issubclass(target, enum.Enum) and not issubclass(target, enum.IntEnum):
+            raise at(file, node, f"{name} is no enum of ints", "derive it from enum.IntEnum")
+    root = (getattr(target, "__module__", None) or "numpy").partition(".")[0]
+    if root in _MODULES:
+        raise at(file, node, *_MODULES[root])
+    if isinstance(target, type):
+        known = issubclass(target, np.generic | BaseException | enum.Enum)
+        if not known and root not in ("builtins", "numpy"):
+            what = f"an object of {target.__name__} is not compiled"
+            raise at(file, node, what, "keep its values in State members, write its methods here")
+    elif isinstance(target, FunctionType | BuiltinFunctionType) and root not in _COMPILED:
+        raise at(file, node, f"{name} is not compiled", "write it with NumPy, or call it above")
+
+
+def check_arguments(node: ast.Call, function: FunctionType, file: str, given: int = 0) -> None:
+    """Refuse a call whose arguments a function does not take; `given` are not in the source."""
+    if any(isinstance(each, ast.Starred) for each in node.args):
+        return
+    named = [each.arg for each in node.keywords]
+    if None in named:
+        return
+    signature = inspect.signature(function)
+    try:
+        signature.bind(*[None] * (given + len(node.args)), **dict.fromkeys(map(str, named)))
+    except TypeError:
+        takes = [str(each) for each in signature.parameters.values()][given:]
+        name, words = ast.unparse(node.func), ", ".join(takes)
+        what = f"{name} takes {words}" if words else f"{name} takes no argument"
+        raise at(file, node, what, f"write {name}({words})") from None
+
+
+def _raised(node: ast.Raise, file: str) -> None:
+    """Refuse an exception with more than a constant text."""
+    made = node.exc
+    if not isinstance(made, ast.Call):
+        return
+    plain = all(_is_text(each) for each in made.args) and len(made.args) < 2
+    if any(isinstance(each, ast.JoinedStr) for each in made.args):
+        return  # refused as text
+    if not plain or made.keywords:
+        way_out = "log the values before it by self.error(…)"
+        raise at(file, node, "an exception has one constant text", way_out)
+
+
+def _slice(node: ast.Slice, file: str) -> None:
+    """Refuse a slice that NumPy refuses: a step of 0, a bound that is no int."""
+    for each in (node.lower, node.upper, node.step):
+        value = each.operand if isinstance(each, ast.UnaryOp) else each
+        if isinstance(value, ast.Constant) and not isinstance(value.value, int | None):
+            raise at(file, node, "a bound is no int", "use ints: x[0:2]")
+    if isinstance(node.step, ast.Constant) and node.step.value == 0:
+        raise at(file, node, "a step of 0", "use a step of 1 or more, or of -1")
+
+
+def check_index(node: ast.Subscript, shape: Sequence[int], name: str, file: str) -> None:
+    """Refuse constant indices beyond the sizes of an array or a list."""
+    parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+    words = ("elements",) if len(shape) == 1 else ("rows", "columns")
+    for part, size, word in zip(parts, shape, words, strict=False):
+        try:
+            index = ast.literal_eval(part)
+        except (ValueError, TypeError, SyntaxError):
+            return
+        if type(index) is int and not -size <= index < size:
+            what = f"index {index}, but {name} has {size} {word}"
+            raise at(file, node, what, f"use 0 to {size - 1}, or -1 for the last")
+
+
+def _indexed(node: ast.Subscript, source: Source) -> None:
+    """Refuse constant indices of constants, and of enums, that are not there."""
+    owner = resolve(node.value, source)
+    if isinstance(owner, list | tuple):
+        check_index(node, (len(owner),), ast.unparse(node.value), source.file)
+    elif isinstance(owner, np.ndarray) and owner.ndim in (1, 2):
+        check_index(node, owner.shape, ast.unparse(node.value), source.file)
+    if isinstance(owner, type) and issubclass(owner, enum.Enum):
+        first = next(iter(owner.__members__), "X")
+        what = f"a name of {owner.__name__} is fixed when compiled"
+        raise at(source.file, node, what, f"write {owner.__name__}.{first}")
+
+
 def _module(node: ast.Attribute, source: Source) -> None:
     owner = resolve(node.value, source)
+    if isinstance(owner, type) and issubclass(owner, enum.Enum) and not hasattr(owner, node.attr):
+        has = ", ".join(each.name for each in owner)
+        raise at(source.file, node, f"{owner.__name__} has no {node.attr}", f"use one of {has}")
     if not isinstance(owner, ModuleType):
         return
     name = owner.__name__.partition(".")[0]

@@ -1,7 +1,9 @@
 """A mistake in a component's source: one line that says where, what, and what to write instead."""
 
 import ast
+import io
 import linecache
+import tokenize
 from pathlib import Path
 
 
@@ -23,15 +25,30 @@ class Mistake(Exception):
 
 def at(file: str, node: ast.AST, what: str, way_out: str) -> Mistake:
     """Return a mistake at a node of the source."""
-    text = " ".join(ast.unparse(node).split())
-    if len(text) > 60 or "\n" in ast.unparse(node):
-        text = ""
-    return Mistake(file, getattr(node, "lineno", 0), what, way_out, text)
+    return Mistake(file, getattr(node, "lineno", 0), what, way_out, written(file, node))
+
+
+def written(file: str, node: ast.AST) -> str:
+    """Return a short expression of one line as the source has it; else nothing."""
+    line, begin, end = (
+        getattr(node, each, None) for each in ("lineno", "col_offset", "end_col_offset")
+    )
+    if line is None or begin is None or end is None or node.end_lineno != line:
+        return ""
+    text = linecache.getline(file, line).encode()[begin:end].decode(errors="replace").strip()
+    return text if len(text) <= 60 else ""
 
 
 def source_line(file: str, line: int) -> str:
-    """Return a line of a source file without its indent."""
-    return linecache.getline(file, line).strip()
+    """Return a line of a source file without its indent and its comment."""
+    text = linecache.getline(file, line).strip()
+    try:
+        for each in tokenize.generate_tokens(io.StringIO(text).readline):
+            if each.type == tokenize.COMMENT:
+                return text[: each.start[1]].strip() or text
+    except (tokenize.TokenError, SyntaxError):
+        pass  # a part of a statement, before a comment
+    return text
 
 
 def display(file: str) -> str:

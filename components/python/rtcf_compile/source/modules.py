@@ -6,7 +6,6 @@ import importlib.util
 import inspect
 import linecache
 import sys
-import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 from types import FunctionType, ModuleType
@@ -14,7 +13,8 @@ from typing import Any
 
 from rtcf.component import Component, DeclarationError
 
-from rtcf_compile.source.mistake import Mistake
+from rtcf_compile.source import numpy_errors
+from rtcf_compile.source.mistake import Mistake, source_line
 from rtcf_compile.source.prefix_map import mapped
 
 
@@ -49,16 +49,13 @@ def load(file: Path) -> ModuleType:
             str(error.filename or file), error.lineno or 0, str(error.msg), "mend the syntax"
         ) from None
     except DeclarationError as error:
-        raise Mistake(
-            str(file), _line_in(file, error), str(error), "mend the declaration"
-        ) from None
+        raise Mistake(str(file), _line_in(file, error), *_parts(str(error))) from None
     except Exception as error:
-        raise Mistake(
-            str(file),
-            _line_in(file, error),
-            f"{type(error).__name__}: {error}",
-            "the module has to run as Python first",
-        ) from None
+        line = _line_in(file, error)
+        what = f"{type(error).__name__}: {error}"
+        if found := numpy_errors.explained(error, source_line(str(file), line)):
+            what = found[0]
+        raise Mistake(str(file), line, what, "make the module run as Python first") from None
     finally:
         sys.path.pop(0)
     return module
@@ -89,8 +86,13 @@ def read(function: FunctionType) -> Source:
         raise Mistake(
             file, 0, f"{function.__name__} has no source", "define it in a file"
         ) from None
-    tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
-    ast.increment_lineno(tree, begin - 1)
+    if lines[0][:1].isspace():
+        # The block around a method keeps its columns.
+        block = ast.parse("".join(["if True:\n", *lines])).body[0]
+        tree, above = block.body[0], 2  # type: ignore[attr-defined]
+    else:
+        tree, above = ast.parse("".join(lines)).body[0], 1
+    ast.increment_lineno(tree, begin - above)
     if not isinstance(tree, ast.FunctionDef):
         kind = "is async" if isinstance(tree, ast.AsyncFunctionDef) else "is a lambda"
         raise Mistake(file, begin, f"{function.__name__} {kind}", "write it by `def`")
@@ -107,6 +109,12 @@ def is_own(value: Any) -> bool:
     file = getattr(module, "__file__", None) or ""
     packages = ("/dist-packages/", "/site-packages/", "/lib/python3")
     return bool(file) and not any(each in file for each in packages)
+
+
+def _parts(text: str) -> tuple[str, str]:
+    """Return what is wrong with a declaration, and its way out."""
+    what, _, way_out = text.rpartition(": ")
+    return what, way_out
 
 
 def _line_in(file: Path, error: BaseException) -> int:

@@ -1,0 +1,98 @@
+"""Errors of NumPy about shapes and indices in plain words, with a way out."""
+
+import re
+
+import numpy as np
+
+_BOUNDS = re.compile(r"index (-?\d+) is out of bounds for axis \d with size \d+")
+_FIT = "make the shapes fit"
+# `{0}` is all that was found, `{1}` its first group.
+_KNOWN: tuple[tuple[type[Exception], str, str, str], ...] = (
+    (
+        ValueError,
+        "inhomogeneous|setting an array element with a sequence",
+        "rows of different length make no array",
+        "make them fit",
+    ),
+    (
+        ValueError,
+        "must have same number of dimensions",
+        "vectors and matrices are joined",
+        "make them of one dimension",
+    ),
+    (
+        ValueError,
+        r"matmul: .* \(size (\d+) is different from (\d+)\)",
+        "@ of sizes {2} and {1}, which do not fit",
+        _FIT,
+    ),
+    (
+        ValueError,
+        "matmul: .* does not have enough dimensions",
+        "@ of a number",
+        "use * for numbers",
+    ),
+    (
+        ValueError,
+        r"(solve|inv|det)\d?: .* \(size (\d+) is different from (\d+)\)",
+        "np.linalg.{1} of sizes {3} and {2}, which do not fit",
+        _FIT,
+    ),
+    (
+        ValueError,
+        "truth value of an array",
+        "an array is no condition",
+        "use np.any(…) or np.all(…), & and | in place of and and or",
+    ),
+    (ValueError, "values to unpack.*", "another number of {0}", "make them fit"),
+    (ValueError, "fp and xp .*", "np.interp: {0}", "give xp and fp the same number of points"),
+    (ValueError, r"cannot reshape array of size \d+ into shape .*", "{0}", _FIT),
+    (ValueError, "incompatible dimensions for cross product.*", "{0}", "use three elements"),
+    (ValueError, "slice step cannot be zero", "a step of 0", "use a step of 1 or more, or of -1"),
+    (
+        ValueError,
+        r"all the input array dimensions .* must match exactly, but along dimension \d, (.*)",
+        "arrays to join do not fit: {1}",
+        _FIT,
+    ),
+    (
+        np.linalg.LinAlgError,
+        r"(\d)-dimensional array given.*",
+        "np.linalg of a vector",
+        "use a square matrix",
+    ),
+    (np.linalg.LinAlgError, "must be square", "the matrix is not square", "use a square matrix"),
+    (
+        IndexError,
+        "boolean index did not match .*; (.*)",
+        "a mask of another size: {1}",
+        "make the sizes the same",
+    ),
+    (TypeError, "slice indices must be integers.*", "a bound is no int", "use int(…)"),
+    (
+        ValueError,
+        "diag requires an array of at least two.*",
+        "the trace of a vector",
+        "give it a matrix",
+    ),
+    (ValueError, ".*(?:broadcast|shape|dimension|aligned).*", "{0}", _FIT),
+)
+# A number set to an array is explained by the types.
+_BY_TYPES = re.compile(r"has shape \(\), not ")
+
+
+def explained(error: BaseException, source: str) -> tuple[str, str] | None:
+    """Return what is wrong in a line and the way out, if any input leads there; None for other
+    errors.
+    """
+    text = " ".join(str(error).split())
+    if _BY_TYPES.search(text):
+        return None
+    if isinstance(error, IndexError) and (found := _BOUNDS.search(text)):
+        if re.search(rf"(?<![\w.]){found[1]}(?![\w.])", source) is None:
+            return None  # a variable index may depend on the input
+        return found[0], "use an index within"
+    for kind, pattern, what, way_out in _KNOWN:
+        if isinstance(error, kind) and (found := re.search(pattern, text, re.IGNORECASE)):
+            return what.format(found[0], *found.groups()), way_out
+    return None

@@ -1,0 +1,623 @@
+"""Mistakes that engineers who know Python and NumPy make in a component: what they write, and the
+words that the compiler's message has.
+
+`# here` marks the line that the message names, where it is not the only one.
+"""
+
+MODULE = """\
+import asyncio
+import contextlib
+import enum
+import functools
+import itertools
+import logging
+import math
+import random
+import time
+from collections import deque, namedtuple
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PoseArray, PoseStamped, Twist
+from rtcf.component import Component, Derived, Input, Output, Parameter, Queue, State
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+A = np.eye(2)
+B = np.ones((3, 2))
+TABLE = [1.0, 2.0, 3.0]
+LIMITS = (0.5, 1.5)
+GAINS = {"kp": 1.0}
+NAMES = ["arm", "leg"]
+POINTS = [[1.0, 2.0], [3.0]]
+HISTORY = deque(maxlen=4)
+TOTAL = 0.0
+log = logging.getLogger(__name__)
+
+
+class Mode(enum.IntEnum):
+    OFF = 0
+    RUN = 1
+
+
+class Colour(enum.Enum):
+    RED = "red"
+
+
+@dataclass
+class Gains:
+    kp: float = 1.0
+
+
+class Filter:
+    def __init__(self, size):
+        self.size = size
+
+    def step(self, x):
+        return x / self.size
+
+
+FILTER = Filter(3.0)
+SHARED = Gains()
+
+
+def limited(x, low, high=1.0):
+    return min(max(x, low), high)
+
+
+"""
+
+MEMBERS = """\
+class Faulty(Component):
+    u: Input[float]
+    w: Input[np.float64, 2]
+    t: Input[Twist]
+    y: Output[float]
+    x: Output[np.float64, 2]
+    p: Output[PoseStamped]
+    q: Queue[float] = Queue(size=4)
+    kp: Parameter[float] = Parameter(1.0)
+    gains: Parameter[np.float64, 2] = Parameter([1.0, 2.0])
+    d: Derived[float]
+    n: State[int]
+    f: State[float]
+    on: State[bool]
+    z: State[np.float64, 2]
+    m: State[np.float64, 2, 2]
+    c: State[np.int64, 3]
+    o: State[float | None]
+    mode: State[Mode]
+    LIMIT = 2.0
+"""
+
+# In update.
+UPDATE: dict[str, tuple[str, str]] = {
+    # Shapes.
+    "vector of another size added": ("self.z[:] = self.z + np.zeros(3)", "(2,)"),
+    "vector of another size assigned": ("self.z[:] = np.ones(3)", "(3,)"),
+    "state set to another size": ("self.z = np.ones(3)", "(3,)"),
+    "output written in another size": ("self.x.write(np.zeros(3))", "(3,)"),
+    "matrix written to a vector": ("self.x.write(self.m)", "matrix"),
+    "vector written to a number": ("self.y.write(self.w.value)", "vector"),
+    "list written to a number": ("self.y.write([1.0])", "several"),
+    "number of values of a list": ("self.x.write([1.0, 2.0, 3.0])", "(3,)"),
+    "inner sizes of a product": ("self.z[:] = B @ np.ones(3)", "sizes 2 and 3"),
+    "product in the wrong order": ("self.z[:] = self.z @ B", "sizes 2 and 3"),
+    "product of numbers": ("self.f = self.kp @ self.f", "@"),
+    "product of a number and a vector": ("self.z[:] = self.kp @ self.z", "@"),
+    "dot of other sizes": ("self.f = np.dot(self.z, np.ones(3))", "(3,)"),
+    "solve of other sizes": ("self.z[:] = np.linalg.solve(self.m, np.ones(3))", "sizes 2 and 3"),
+    "inverse of a vector": ("self.m[:] = np.linalg.inv(self.z)", "matri"),
+    "inverse of a rectangle": ("self.m[:] = np.linalg.inv(B)", "square"),
+    "determinant of a vector": ("self.f = np.linalg.det(self.z)", "matri"),
+    "trace of a vector": ("self.f = np.trace(self.z)", "matri"),
+    "reshape to another size": ("self.m[:] = self.z.reshape(2, 2)", "reshape"),
+    "reshape to three sizes": ("a = self.m.reshape(1, 2, 2)", "one or two"),
+    "hstack of other heights": ("a = np.hstack((self.m, B))", "fit"),
+    "ragged array": ("a = np.array([[1.0, 2.0], [3.0]])", "rows"),
+    "ragged constant": ("a = np.array(POINTS)", "rows"),
+    "axis beyond the dimensions": ("self.f = np.sum(self.z, axis=1)", "axis"),
+    "axis of a matrix too large": ("self.z[:] = self.m.sum(axis=2)", "axis"),
+    "axis as text": ("self.z[:] = self.m.sum(axis='x')", "text"),
+    "row of another size": ("self.m[0] = np.ones(3)", "(3,)"),
+    "column of another size": ("self.m[:, 0] = np.ones(3)", "(3,)"),
+    "mask of another size": ("self.z[self.c > 0] = 0.0", "mask"),
+    "where of other sizes": ("self.z[:] = np.where(self.c > 0, 1.0, self.z)", "shape"),
+    "comparison of other sizes": ("a = np.any(self.z > self.c)", "shape"),
+    "unpacked into too many": ("a, b, c = self.z", "3"),
+    "unpacked into too few": ("(a,) = self.z", "1"),
+    "unpacked number": ("a, b = self.kp", "float"),
+    "interp of other sizes": ("self.f = np.interp(self.f, self.z, self.c)", "points"),
+    "concatenate of other dimensions": ("a = np.concatenate((self.z, self.m))", "vectors"),
+    "concatenate without parentheses": ("a = np.concatenate(self.z, self.z)", "arrays"),
+    # Indices.
+    "constant index beyond the size": ("self.f = self.z[2]", "2 elements"),
+    "constant index before the first": ("self.f = self.z[-3]", "2 elements"),
+    "constant index of an input": ("self.f = self.w.value[5]", "2 elements"),
+    "constant index of a parameter": ("self.f = self.gains[2]", "2 elements"),
+    "constant row beyond the size": ("self.f = self.m[2, 0]", "2 rows"),
+    "constant column beyond the size": ("self.f = self.m[0, 2]", "2 columns"),
+    "constant index of a constant": ("self.f = TABLE[3]", "3 elements"),
+    "constant index of a tuple": ("self.f = LIMITS[2]", "2 elements"),
+    "constant index set": ("self.c[3] = 1", "3 elements"),
+    "float as index": ("self.f = self.z[0.5]", "float"),
+    "quotient as index": ("self.f = self.z[self.n / 2]", "float"),
+    "text as index": ("self.f = self.z['a']", "text"),
+    "bool as index": ("self.f = self.z[self.on]", "bool"),
+    "three indices": ("self.f = self.m[0, 0, 0]", "matri"),
+    "two indices of a vector": ("self.f = self.z[0, 0]", "vector"),
+    "index of a number": ("self.f = self.kp[0]", "float"),
+    "index of an int": ("self.n = self.n[0]", "int"),
+    "index of a port": ("self.f = self.w[0]", "Input"),
+    "index called": ("self.f = self.z(0)", "[0]"),
+    "step of 0": ("self.z[:] = self.z[::0]", "step"),
+    "float slice": ("self.z[:] = self.z[0.0:2]", "no int"),
+    "index of None": ("self.f = self.z[self.o]", "None"),
+    "tuple at a variable place": ("self.f = (1.0, 2, True)[self.n]", "types"),
+    # Types.
+    "float to an int": ("self.n = self.f", "float"),
+    "quotient to an int": ("self.n = self.n / 2", "float"),
+    "float added to an int": ("self.n += 0.5", "float"),
+    "float to elements of ints": ("self.c[:] = np.zeros(3)", "int64"),
+    "float added to elements of ints": ("self.c += 0.5", "float"),
+    "element of ints divided": ("self.c[0] /= 2", "float"),
+    "int to a bool": ("self.on = self.n", "int"),
+    "text to a number": ("self.f = 'fast'", "text"),
+    "number from text": ("self.f = float('1.0')", "text"),
+    "text in arithmetic": ("self.f = self.f + '1'", "text"),
+    "mode as text": ("self.mode = 'RUN'", "Mode"),
+    "mode by its name in brackets": ("self.mode = Mode['RUN']", "Mode"),
+    "mode set to a float": ("self.mode = 1.0", "Mode"),
+    "mode of a float": ("self.mode = Mode(self.f)", "Mode"),
+    "member that an enum has not": ("self.mode = Mode.STOP", "STOP"),
+    "mode counted up": ("self.mode += 0.5", "Mode"),
+    "modes in a loop": ("for each in Mode:\n    self.n += each", "Mode"),
+    "number of modes": ("self.n = len(Mode)", "Mode"),
+    "None to a number": ("self.f = None", "None"),
+    "None to an array": ("self.z = None", "None"),
+    "None written": ("self.y.write(None)", "None"),
+    "truth of None": ("if self.o:\n    self.n = 1", "None"),
+    "truth of an array": ("if self.z:  # here\n    self.n = 1", "any"),
+    "truth of a comparison of arrays": ("if self.z > 0.0:  # here\n    self.n = 1", "any"),
+    "chained comparison of arrays": ("a = 0.0 < self.z < 1.0", "any"),
+    "arrays joined by and": ("a = self.z > 0.0 and self.z < 1.0", "any"),
+    "negated array": ("a = not self.z", "any"),
+    "array in a while": ("while self.z > 0.0:  # here\n    self.z -= 1.0", "any"),
+    "float of a vector": ("self.f = float(self.z)", "vector"),
+    "int of a vector": ("self.n = int(self.z)", "vector"),
+    "bool of a vector": ("self.on = bool(self.z)", "np.any"),
+    "math of a vector": ("self.z[:] = math.sin(self.z)", "vector"),
+    "comparison with and in one": ("self.on = self.z & self.on", "&"),
+    "bits of a float": ("self.n = self.f & 1", "&"),
+    "shift of a float": ("self.n = self.f << 1", "<<"),
+    "inverted float": ("self.f = ~self.f", "~"),
+    "range of a float": ("for i in range(self.kp):  # here\n    self.n += i", "range"),
+    "loop over a number": ("for i in self.n:  # here\n    self.n += 1", "int"),
+    "loop over a float": ("for i in self.kp:  # here\n    self.n += 1", "float"),
+    "length of a number": ("self.n = len(self.kp)", "float"),
+    "sum of a number": ("self.f = sum(self.kp)", "float"),
+    "two types of a variable": (
+        "a = 0.0\nif self.on:\n    a = self.z\nself.y.write(a)  # here",
+        "a is",
+    ),
+    "number or nothing": ("a = self.f if self.on else self.z  # here\nself.f = a", "float"),
+    "matrix in the place of a vector": (
+        "a = self.z\nif self.on:\n    a = self.m\nself.f = a[0]  # here",
+        "a",
+    ),
+    "complex root": ("a = np.sqrt(-1 + 0j)", "complex"),
+    "complex function": ("self.f = complex(self.f, 1.0)", "complex"),
+    "type complex": ("a = np.zeros(2, dtype=complex)", "type of a number"),
+    "type object": ("a = np.zeros(2, dtype=object)", "type of a number"),
+    "type as unknown text": ("a = np.zeros(2, dtype='real')", "type of a number"),
+    "type of text": ("a = np.array(['a', 'b'])", "text"),
+    "size that is known late": ("a = np.zeros(self.kp)", "float"),
+    "size as a float": ("a = np.zeros(2.0)", "float"),
+    "bytes": ("a = b'1'", "bytes"),
+    "big int": ("self.n = 10**19", "int64"),
+    "none of the operators": ("self.f = self.o + 'a'", "text"),
+    "list minus list": ("a = [1.0, 2.0] - [1.0, 1.0]", "list"),
+    "negated list": ("a = -[1.0, 2.0]", "np.array"),
+    "list times a float": ("a = [1.0, 2.0] * self.kp", "list"),
+    "tuple minus tuple": ("a = (1.0, 2.0) - (1.0, 1.0)", "np.array"),
+    "tuple times a float": ("a = (1.0, 2.0) * self.kp", "np.array"),
+    "tuple element set": ("a = (1.0, 2.0)\na[0] = 2.0  # here", "several"),
+    "elements of a constant tuple": ("LIMITS[0] = 1.0", "LIMITS"),
+    # NumPy's functions.
+    "einsum": ("a = np.einsum('ij,j->i', self.m, self.z)", "np.einsum"),
+    "fft": ("a = np.fft.fft(self.z)", "fft"),
+    "eig": ("a, b = np.linalg.eig(self.m)", "LAPACK"),
+    "svd": ("a = np.linalg.svd(self.m)", "LAPACK"),
+    "pinv": ("a = np.linalg.pinv(self.m)", "LAPACK"),
+    "lstsq": ("a = np.linalg.lstsq(self.m, self.z)", "LAPACK"),
+    "qr": ("a = np.linalg.qr(self.m)", "LAPACK"),
+    "kron": ("a = np.kron(self.m, self.m)", "np.kron"),
+    "convolve": ("a = np.convolve(self.z, self.z)", "np.convolve"),
+    "correlate": ("a = np.correlate(self.z, self.z)", "np.correlate"),
+    "tensordot": ("a = np.tensordot(self.m, self.m)", "np.tensordot"),
+    "gradient": ("a = np.gradient(self.z)", "np.gradient"),
+    "polyfit": ("a = np.polyfit(self.z, self.z, 1)", "np.polyfit"),
+    "meshgrid": ("a, b = np.meshgrid(self.z, self.z)", "np.meshgrid"),
+    "unique": ("a = np.unique(self.c)", "np.unique"),
+    "nonzero": ("self.n = np.nonzero(self.c)[0][0]", "np.nonzero"),
+    "tile": ("a = np.tile(self.z, 2)", "np.tile"),
+    "repeat": ("a = np.repeat(self.z, 2)", "np.repeat"),
+    "percentile": ("a = np.percentile(self.z, 50)", "np.percentile"),
+    "vectorize": ("a = np.vectorize(limited)(self.z)", "np.vectorize"),
+    "apply_along_axis": ("a = np.apply_along_axis(np.sum, 0, self.m)", "np.apply_along_axis"),
+    "block": ("a = np.block([[self.m, self.m]])", "np.block"),
+    "matrix class": ("a = np.matrix([[1.0, 2.0]])", "np.matrix"),
+    "loadtxt": ("a = np.loadtxt('gains.txt')", "np.loadtxt"),
+    "save": ("np.save('z.npy', self.z)", "np.save"),
+    "append to an array": ("self.z = np.append(self.z, self.f)", "grows"),
+    "delete of an array": ("self.z = np.delete(self.z, 0)", "grows"),
+    "insert into an array": ("self.z = np.insert(self.z, 0, 1.0)", "grows"),
+    "resize": ("a = np.resize(self.z, 3)", "grows"),
+    "method that arrays have not": ("self.z.push(1.0)", "push"),
+    "method of arrays that is not there": ("a = self.z.tobytes()", "tobytes"),
+    "unsorted kind": ("a = np.argsort(self.z)", "stable"),
+    "out of a function": ("np.sin(self.z, out=self.z)", "sin"),
+    "out of a sum": ("np.sum(self.m, axis=0, out=self.z)", "np.sum"),
+    "keyword that a function has not": ("a = np.zeros(2, size=3)", "size"),
+    "keyword misspelt": ("a = np.linspace(0.0, 1.0, n=5)", "np.linspace"),
+    "argument missing": ("a = np.clip()", "np.clip"),
+    "argument too many": ("a = np.dot(self.z, self.z, self.z)", "np.dot"),
+    "argument missing of math": ("self.f = math.atan2(self.f)", "atan2"),
+    "function misspelt": ("self.f = np.squrt(self.f)", "squrt"),
+    "constant misspelt": ("self.f = np.PI", "PI"),
+    "function of math misspelt": ("self.f = math.sinus(self.f)", "sinus"),
+    "function without its call": ("self.f = np.sum", "function"),
+    "own function without its call": ("self.f = limited", "function"),
+    "number called": ("self.f = self.kp(1.0)", "no function"),
+    "constant called": ("self.f = A(0)", "no function"),
+    "norm of a text": ("self.f = np.linalg.norm(self.z, 'max')", "max"),
+    "random vector": ("self.z[:] = np.random.randn(2)", "replay"),
+    "random generator": ("rng = np.random.default_rng(1)", "replay"),
+    "errstate": (
+        "with np.errstate(all='ignore'):  # here\n    self.f = 1.0 / self.f",
+        "open or lock",
+    ),
+    "printoptions": ("np.set_printoptions(precision=3)", "np.set_printoptions"),
+    "itertools": (
+        "for a, b in itertools.product((1, 2), (3, 4)):  # here\n    self.n += a",
+        "itertools",
+    ),
+    "functools": ("a = functools.reduce(limited, (1.0, 2.0))", "functools"),
+    # Statements.
+    "list that grows": ("values = []\nvalues.append(1.0)  # here", "grows"),
+    "list comprehension": ("a = [2.0 * each for each in self.z]", "list"),
+    "dict": ("a = {'kp': 1.0}", "dict"),
+    "dict of the module": ("self.f = GAINS['kp']", "GAINS"),
+    "dict call": ("a = dict(kp=1.0)", "dict"),
+    "set of numbers": ("a = set()", "set"),
+    "set comprehension": ("a = {each for each in self.z}", "set"),
+    "list call": ("a = list(self.z)", "list"),
+    "sorted": ("a = sorted(self.z)", "np.sort"),
+    "sorted by a key": ("a = max(self.z, key=abs)", "key"),
+    "any of a generator": ("a = any(each > 0.0 for each in self.z)", "generator"),
+    "map": ("a = map(abs, self.z)", "map"),
+    "deque": ("HISTORY.append(self.f)", "HISTORY"),
+    "deque of its own": ("a = deque()", "deque"),
+    "f-string": ("name = f'{self.f:.2f}'", "text"),
+    "texts added": ("name = 'a' + 'b'\nself.info(name)  # here", "constant text"),
+    "f-string in a log": ("self.info(f'f {self.f}')", "text"),
+    "percent in a log": ("self.info('f %f' % self.f)", "text"),
+    "log as logging has it": ("self.info('f %f', self.f)", "place"),
+    "log of an array": ("self.info('z {}', self.z)", "array"),
+    "log of text": ("self.info('mode {}', 'fast')", "text"),
+    "log of None": ("self.info('o {}', self.o)", "None"),
+    "log without a text": ("self.info(self.f)", "constant text"),
+    "log without arguments": ("self.info()", "constant text"),
+    "log by name": ("self.info('f {f}', f=self.f)", "named"),
+    "log with too many places": ("self.info('f {} {}', self.f)", "places"),
+    "log of an int as a text": ("self.info('n {:s}', self.n)", "{:s}"),
+    "logging": ("logging.info('x')", "logging"),
+    "logger of the module": ("log.info('x')", "log"),
+    "warning of another name": ("self.warning('x')", "warn"),
+    "print": ("print(self.f)", "print"),
+    "open": ("with open('log.txt', 'a') as file:  # here\n    file.write('x')", "open or lock"),
+    "input": ("a = input()", "Input"),
+    "sleep": ("time.sleep(0.1)", "clock"),
+    "time": ("a = time.monotonic()", "clock"),
+    "random": ("a = random.gauss(0.0, 1.0)", "replay"),
+    "try and except": (
+        "try:  # here\n    self.f = 1.0 / self.f\nexcept ZeroDivisionError:\n    self.f = 0.0",
+        "caught",
+    ),
+    "assertion with a text made": ("assert self.f > 0.0, f'{self.f}'", "text"),
+    "exception with a value": ("raise ValueError(self.f)", "constant text"),
+    "exception with a text made": ("raise ValueError(f'f is {self.f}')", "text"),
+    "global": ("global TOTAL\nTOTAL += 1.0", "TOTAL"),
+    "global without its word": ("TOTAL += 1.0", "TOTAL"),
+    "del of a variable": ("a = 1.0\ndel a  # here", "deleted"),
+    "del of a state": ("del self.f", "deleted"),
+    "lambda": ("f = lambda x: 2.0 * x\nself.f = f(self.f)", "lambda"),
+    "closure": ("def scaled(x):  # here\n    return self.kp * x", "function in a function"),
+    "class in a method": ("class Point:  # here\n    x = 1.0", "class in a hook"),
+    "import": ("import scipy", "import"),
+    "from import": ("from math import sin", "import"),
+    "yield": ("yield self.f", "generator"),
+    "returned value": ("return self.f", "returns nothing"),
+    "with": ("with contextlib.nullcontext():  # here\n    self.n += 1", "open or lock"),
+    "star in a call": ("self.f = limited(*self.z)", "*"),
+    "two stars in a call": ("self.f = limited(**GAINS)", "**"),
+    "star in an assignment": ("a, *b = self.z", "*"),
+    "function that takes stars": (
+        "def every(*values):  # here\n    return values[0]\n---\nself.f = every(1.0, 2.0)",
+        "any number",
+    ),
+    "function that takes two stars": (
+        "def options(**values):  # here\n    return 1.0\n---\nself.f = options(a=1.0)",
+        "any number",
+    ),
+    "recursion": (
+        "def again(n):  # here\n    return again(n - 1) if n > 0 else 0\n---\n"
+        "self.n = again(self.n)",
+        "calls itself",
+    ),
+    "endless loop": ("while True:  # here\n    self.n += 1", "without end"),
+    "variable of a branch": ("if self.on:\n    a = 1.0\nself.f = a  # here", "no value"),
+    "variable misspelt": ("error = 1.0\nself.f = eror  # here", "eror"),
+    "variable read before it is set": ("self.f = a\na = 1.0", "no value"),
+    "function before it is set": ("sum = sum(self.z)", "sum"),
+    "name that is shadowed": ("abs = abs(self.f)", "abs"),
+    "walrus in a comparison": (
+        "self.n = self.n + (a := 2) * a * (self.n if self.on else (b := 1))",
+        ":=",
+    ),
+    "match of a sequence": (
+        "match self.z:\n    case [a, b]:  # here\n        self.n = 1",
+        "pattern",
+    ),
+    "match of a class": ("match self.f:\n    case float():  # here\n        self.n = 1", "pattern"),
+    "match of a dict": ("match self.f:\n    case {'a': 1}:  # here\n        self.n = 1", "pattern"),
+    "eval": ("self.f = eval('1.0')", "Python"),
+    "getattr": ("self.f = getattr(self, 'kp')", "names"),
+    "setattr": ("setattr(self, 'f', 1.0)", "names"),
+    "hasattr": ("a = hasattr(self, 'f')", "names"),
+    "isinstance": ("a = isinstance(self.f, float)", "types"),
+    "vars": ("a = vars(self)", "vars"),
+    "id": ("a = id(self.z)", "id"),
+    "next": ("a = next(self.z)", "next"),
+    "object of a class": ("a = Filter(3.0)", "Filter"),
+    "object of the module": ("self.f = FILTER.step(self.f)", "FILTER"),
+    "dataclass made": ("a = Gains(2.0)", "Gains"),
+    "dataclass set": ("SHARED.kp = 2.0", "SHARED"),
+    "own function with too few arguments": ("self.f = limited(self.f)", "limited"),
+    "own function with too many arguments": ("self.f = limited(1.0, 2.0, 3.0, 4.0)", "limited"),
+    "own function with an unknown name": ("self.f = limited(1.0, 2.0, top=3.0)", "limited"),
+    # Members.
+    "member misspelt": ("self.f = self.kd", "kd"),
+    "member that is not declared": ("self.sum = 0.0", "sum"),
+    "member that is not declared, counted": ("self.count += 1", "count"),
+    "parameter set": ("self.kp = 2.0", "parameter"),
+    "element of a parameter set": ("self.gains[0] = 2.0", "parameter"),
+    "parameter's value": ("self.f = self.kp.value", "value"),
+    "state's value": ("self.f.value = 1.0", "value"),
+    "state written": ("self.f.write(1.0)", "write"),
+    "input without its value": ("self.f = 2.0 * self.u", "Input"),
+    "input written": ("self.u.write(1.0)", "Input"),
+    "input's value set": ("self.u.value = 1.0", "Input"),
+    "input read": ("self.f = self.u.read()", "read"),
+    "input's field misspelt": ("self.on = self.u.is_new", "is_new"),
+    "output without write": ("self.y = self.f", "Output"),
+    "output's value set": ("self.y.value = self.f", "write"),
+    "output written without a value": ("self.y.write()", "one value"),
+    "output written with two values": ("self.x.write(1.0, 2.0)", "one value"),
+    "output published with a value": ("self.p.publish(1.0)", "takes nothing"),
+    "output sent": ("self.y.send(1.0)", "send"),
+    "write as a value": ("a = self.y.write(1.0)", "no value"),
+    "queue as a value": ("self.f = self.q", "Queue"),
+    "queue's length": ("self.n = len(self.q)", "Queue"),
+    "queue in a loop": ("for each in self.q:  # here\n    self.f += each", "Queue"),
+    "queue's value": ("self.f = self.q.value", "Queue"),
+    "queue popped as a value": ("self.f = self.q.pop()", "front"),
+    "queue filled": ("self.q.put(1.0)", "Queue"),
+    "derived value set": ("self.d = 1.0", "prepare"),
+    "constant of the class set": ("self.LIMIT = 3.0", "LIMIT"),
+    "time set": ("self.time = 0", "loop"),
+    "time called": ("a = self.time()", "time"),
+    "period misspelt": ("self.f = self.Ts", "Ts"),
+    "self passed on": ("self.f = limited(self, 1.0)", "self"),
+    "self kept": ("me = self", "self"),
+    "method without self": ("self.f = helper(self.f)", "helper"),
+    "method that is not there": ("self.f = self.helper(self.f)", "helper"),
+    "method of the base that is not there": ("super().reset()", "reset"),
+    "super without its call": ("super.update()", "super"),
+    "update called": ("self.update()", "hook"),
+    "fault with a value": ("self.fault('f is {}', self.f)", "constant text"),
+    "fault with a text made": ("self.fault(f'f is {self.f}')", "text"),
+    "fault as a value": ("a = self.fault('x')", "statement"),
+    # Messages.
+    "message's field misspelt": ("self.f = self.t.value.linear.X", "linear.X"),
+    "message without its value": ("self.f = self.t.linear.x", "Input"),
+    "part of a message as a number": ("self.f = self.t.value.linear", "number"),
+    "message of an input set": ("self.t.value.linear.x = 1.0", "Input"),
+    "message made": ("a = Twist()", "Twist"),
+    "message made and written": ("self.p.write(PoseStamped())", "Output"),
+    "message of another type": ("self.p.write(self.t.value)", "Twist"),
+    "part of another type": ("self.p.value.pose.position = self.t.value", "Twist"),
+    "message added": ("self.f = self.t.value + self.t.value", "number"),
+    "message in a list": ("a = [self.t.value]", "number"),
+    "text of a message set": ("self.p.value.header.frame_id = 'base'", "text"),
+    "text of a message read": ("a = self.p.value.header.frame_id", "text"),
+    "time of a message by its parts": ("self.n = self.p.value.header.stamp.secs", "secs"),
+    "time of a message set to now": ("self.p.value.header.stamp = rospy.Time.now()", "rospy"),
+    "number set to a vector of a message": ("self.p.value.pose.position = self.z", "number"),
+    "element of a message's vector": ("self.f = self.t.value.linear[0]", "number"),
+    "float to a message's int": ("self.p.value.header.seq = 0.5", "float"),
+}
+
+# In the class, before `update`.
+CLASS: dict[str, tuple[str, str]] = {
+    "text as a state": ("v: State[str]", "str"),
+    "list as a state": ("v: State[list]", "list"),
+    "list of floats as a state": ("v: State[list[float]]", "list"),
+    "dict as a state": ("v: State[dict]", "dict"),
+    "array without a size": ("v: State[np.ndarray]", "size"),
+    "size in another bracket": ("v: State[np.float64][3]", "State"),
+    "size of 0": ("v: State[np.float64, 0]", "size"),
+    "size as a float": ("v: State[np.float64, 2.0]", "size"),
+    "three sizes": ("v: State[np.float64, 2, 2, 2]", "size"),
+    "size before the type": ("v: State[3, np.float64]", "size"),
+    "complex state": ("v: State[complex]", "complex"),
+    "any as a state": ("v: State[Any]", "Any"),
+    "enum of texts as a state": ("v: State[Colour]", "Colour"),
+    "class as a state": ("v: State[Filter]", "Filter"),
+    "dataclass as a state": ("v: State[Gains]", "Gains"),
+    "optional port": ("v: Input[float | None]", "None"),
+    "plain annotation": ("v: float", "State"),
+    "plain annotation with a value": ("v: float = 0.0", "State"),
+    "member without an annotation": ("v = State(0.0)", "annotation"),
+    "port without an annotation": ("v = Output()", "annotation"),
+    "kind without a type": ("v: Input", "type"),
+    "kind in parentheses": ("v: State(float)", "State"),
+    "text port": (
+        "v: Input[String]\n\ndef safe(self):\n    self.n = self.v.value.data  # here",
+        "text",
+    ),
+    "message as a state": ("v: State[Twist]", "Input or an Output"),
+    "message as a parameter": ("v: Parameter[Twist] = Parameter(0)", "Input or an Output"),
+    "message in a queue": ("v: Queue[Twist] = Queue(size=2)", "Input or an Output"),
+    "message without its size": ("v: Input[JointState]", "size"),
+    "list of messages": ("v: Output[PoseArray, 3]", "PoseArray"),
+    "parameter without a default": ("v: Parameter[float]", "default"),
+    "default of another type": ("v: Parameter[int] = Parameter(0.5)", "float"),
+    "default as text": ("v: Parameter[float] = Parameter('1.0')", "a float"),
+    "default of another size": ("v: Parameter[np.float64, 3] = Parameter([1.0, 2.0])", "(2,)"),
+    "default outside its bounds": ("v: Parameter[float] = Parameter(2.0, max=1.0)", "1.0"),
+    "default as a keyword": ("v: Parameter[float] = Parameter(default=1.0)", "default"),
+    "bounds in the wrong order": ("v: Parameter[float] = Parameter(1.0, min=2.0, max=0.0)", "min"),
+    "bound as text": ("v: Parameter[float] = Parameter(1.0, min='0')", "min"),
+    "bounds of a state": ("v: State[float] = State(0.0, min=0.0)", "min"),
+    "initial value of an input": ("v: Input[float] = Input(1.0)", "initial"),
+    "initial value of an output": ("v: Output[float] = 0.0", "initial"),
+    "initial value of another size": ("v: State[np.float64, 2] = State(np.zeros(3))", "(3,)"),
+    "ragged initial value": ("v: State[np.float64, 2, 2] = State([[1.0], [1.0, 2.0]])", "rows"),
+    "None as an initial value": ("v: State[float] = None", "None"),
+    "another kind as a value": ("v: State[float] = Output()", "State"),
+    "queue without its size": ("v: Queue[float] = Queue()", "size"),
+    "queue that is too large": ("v: Queue[float] = Queue(size=5000)", "1024"),
+    "unit that is no text": ("v: Output[float] = Output(unit=1)", "unit"),
+    "name with two underscores": ("v__w: State[float]", "name"),
+    "private name": ("_v: State[float]", "name"),
+    "word of every component": ("time: State[float]", "time"),
+    "log's word": ("info: State[float]", "info"),
+    "initial value that does not fit": ("v: State[np.uint8] = State(300)", "uint8"),
+    "mode that is none": ("v: State[Mode] = State(5)", "Mode"),
+    "element name taken": ("gains_0: Parameter[float] = Parameter(1.0)", "gains_0"),
+    "size by a variable of another member": ("v: State[np.float64, n]", "n"),
+    "dict as a constant": (
+        "LIMITS = {'a': 1.0}\n\ndef safe(self):\n    self.f = self.LIMITS['a']  # here",
+        "dict",
+    ),
+    "update with an argument": ("def safe(self, dt):  # here\n    self.f = dt", "self"),
+    "start without self": ("def start():  # here\n    pass", "self"),
+    "start that is async": ("async def start(self):  # here\n    pass", "async"),
+    "start that waits": ("async def start(self):  # here\n    await asyncio.sleep(1)", "async"),
+    "hook that is a generator": ("def start(self):\n    yield 1  # here", "generator"),
+    "constructor": (
+        "def __init__(self):  # here\n    super().__init__()\n    self.k = 1.0",
+        "__init__",
+    ),
+    "class method": (
+        "@classmethod\ndef made(cls):\n    return 1\n\n"
+        "def start(self):\n    self.n = self.made()  # here",
+        "classmethod",
+    ),
+    "cached property": (
+        "@functools.cached_property\ndef k(self):\n    return 1.0\n\n"
+        "def start(self):\n    self.f = self.k  # here",
+        "k",
+    ),
+    "decorated method": (
+        "@functools.lru_cache\ndef k(self):\n    return 1.0\n\n"
+        "def start(self):\n    self.f = self.k()  # here",
+        "decorat",
+    ),
+    "decorated hook": ("@functools.lru_cache\ndef start(self):  # or\n    self.f = 1.0", "decorat"),
+    "property called": (
+        "@property\ndef k(self):\n    return 1.0\n\n"
+        "def start(self):\n    self.f = self.k()  # here",
+        "k",
+    ),
+    "property set": (
+        "@property\ndef k(self):\n    return 1.0\n\ndef start(self):\n    self.k = 1.0  # here",
+        "property",
+    ),
+    "method without its call": (
+        "def k(self):\n    return 1.0\n\ndef start(self):\n    self.f = self.k  # here",
+        "call",
+    ),
+    "method with too few arguments": (
+        "def k(self, x):\n    return x\n\ndef start(self):\n    self.f = self.k()  # here",
+        "k",
+    ),
+    "method with too many arguments": (
+        "def k(self):\n    return 1.0\n\ndef start(self):\n    self.f = self.k(1.0)  # here",
+        "k",
+    ),
+    "method with a star": (
+        "def k(self, *x):  # here\n    return 1.0\n\ndef start(self):\n    self.f = self.k(1.0)",
+        "any number",
+    ),
+    "method with a keyword alone": (
+        "def k(self, *, x):\n    return x\n\ndef start(self):\n    self.f = self.k(2.0)  # here",
+        "k",
+    ),
+    "method that calls itself": (
+        "def k(self, x):\n    return self.k(x)\n\ndef start(self):\n    self.f = self.k(1.0)",
+        "itself",
+    ),
+    "method that returns two types": (
+        "def k(self):\n    if self.on:\n        return 1.0\n    return self.z\n\n"
+        "def start(self):\n    self.f = self.k()  # here",
+        "return",
+    ),
+    "method that returns nothing": (
+        "def k(self):\n    self.n += 1\n\ndef start(self):\n    self.f = self.k()  # here",
+        "None",
+    ),
+    "mutable default": (
+        "def k(self, x=[]):  # here\n    return x\n\ndef start(self):\n    self.f = self.k()",
+        "shared",
+    ),
+    "default of a dict": (
+        "def k(self, x={}):  # here\n    return 1.0\n\ndef start(self):\n    self.f = self.k()",
+        "shared",
+    ),
+    "input in prepare": ("def prepare(self):\n    self.d = self.u.value  # here", "prepare"),
+    "state in prepare": ("def prepare(self):\n    self.f = self.kp  # here", "prepare"),
+    "period in prepare": ("def prepare(self):\n    self.d = self.kp * self.dt  # here", "prepare"),
+    "output in prepare": ("def prepare(self):\n    self.y.write(1.0)  # here", "prepare"),
+    "value returned by start": ("def start(self):\n    return True  # here", "returns"),
+    "hook of another class": (
+        "update_rate = 10\n\ndef start(self):\n    self.update_rate = 20  # here",
+        "constant",
+    ),
+    "nonlocal": (
+        "def start(self):\n    n = 0\n    def more():  # here\n        nonlocal n\n"
+        "        n += 1\n    more()",
+        "function in a function",
+    ),
+}
+
+# At the head of the module, before the class.
+HEAD: dict[str, tuple[str, str]] = {
+    "syntax": ("x = (1.0", "("),
+    "colon forgotten": ("if TOTAL == 0.0\n    TOTAL = 1.0", ":"),
+    "indent": ("def f():\nreturn 1.0  # here", "indent"),
+    "equals in a condition": ("if TOTAL = 0.0:  # here\n    pass", "="),
+    "module that is not there": ("import controll", "controll"),
+    "name that is not there": ("from rtcf.component import Inputs", "Inputs"),
+    "name not imported": ("LIMIT = pi / 2.0", "pi"),
+    "division by zero": ("GAIN = 1.0 / TOTAL", "division"),
+    "shapes of constants": ("C = A @ B", "sizes 2 and 3"),
+    "index of a constant": ("FIRST = TABLE[3]", "range"),
+    "file that is not there": ("DATA = np.loadtxt('no_such_table.csv')", "no_such_table"),
+    "unknown option": ("OPTION = State(0.0, units='m')", "units"),
+    "declaration without brackets": ("SPEED = Input(float)", "initial"),
+    "message that is not there": ("from geometry_msgs.msg import Twists", "Twists"),
+    "attribute of NumPy": ("C = np.eyes(2)", "eyes"),
+}
