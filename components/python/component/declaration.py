@@ -180,6 +180,8 @@ class Description:
                 ]
             elif member.kind is Output:
                 fields.append((f"{member.name}__written", np.bool_))
+        # Last: compiled code and the runtime find it from the end.
+        fields.append(("_raised", np.int64, (2,)))
         return np.dtype(fields, align=True)
 
 

@@ -117,7 +117,7 @@ bool PythonComponent::prepare(const Values& /*proposed*/) {
     if (proposed_ == nullptr) return true;
     for (const ParameterField& parameter : parameters_) parameter.propose(proposed_->bytes());
     const void* const raised = table_.prepare(proposed_->bytes());
-    if (raised != nullptr) return fail("{}", said(raised, proposed_->head().line));
+    if (raised != nullptr) return fail("{}", said(raised, *proposed_));
     for (DerivedField& each : derived_) each.stage(proposed_->bytes());
     return true;
 }
@@ -128,7 +128,7 @@ bool PythonComponent::start() {
     takeTimes();
     const void* const raised = table_.start(record_.bytes());
     forgetWrites();  // a cycle alone writes
-    return raised == nullptr || fail("{}", said(raised, record_.head().line));
+    return raised == nullptr || fail("{}", said(raised, record_));
 }
 
 // A cycle takes as long as the rest: what few components have, or none in a good cycle, is not in
@@ -177,7 +177,7 @@ __attribute__((noinline)) void PythonComponent::writeOthers() noexcept {
 
 __attribute__((noinline, cold)) void PythonComponent::fault(const void* raised) {
     forgetWrites();
-    throw std::runtime_error(said(raised, record_.head().line));
+    throw std::runtime_error(said(raised, record_));
 }
 
 void PythonComponent::forgetWrites() noexcept {
@@ -186,16 +186,20 @@ void PythonComponent::forgetWrites() noexcept {
 }
 
 /// "my.py:12: `x = 1 / y`: ZeroDivisionError: division by zero". Not real-time safe: the loop ends.
-std::string PythonComponent::said(const void* raised, std::int64_t noted) const {
+std::string PythonComponent::said(const void* raised, Record& record) const {
     Raised what{};
     std::memcpy(&what, raised, sizeof what);
     const std::uint64_t hash = hashOf(what);
-    const char* text = "raised an unknown exception";
-    std::int64_t line = noted;
+    std::string text = "raised an unknown exception";
+    std::int64_t line = record.head().line;
+    RaisedValues values{};
+    std::memcpy(&values, record.bytes() + table_.record_size - sizeof values, sizeof values);
     for (std::int64_t i = 0; i < table_.raise_count; ++i) {
         const RaiseTable& each = table_.raises[i];
         if (each.hash != hash) continue;
-        text = each.text;
+        text = each.has_values == 0
+                   ? each.text
+                   : fmt::format(fmt::runtime(each.text), values.first, values.second);
         if (each.line != 0) line = each.line;
     }
     for (std::int64_t i = 0; i < table_.line_count; ++i) {

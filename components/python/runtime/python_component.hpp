@@ -49,7 +49,7 @@ class PythonComponent final : public Component {
     void writeOthers() noexcept;
     [[noreturn]] void fault(const void* raised);
     void forgetWrites() noexcept;
-    std::string said(const void* raised, std::int64_t noted) const;
+    std::string said(const void* raised, Record& record) const;
 
     const ComponentTable& table_;
     PortHookFunction update_;

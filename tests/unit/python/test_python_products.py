@@ -95,4 +95,4 @@ def test_shapes_that_do_not_fit_are_a_fault(text: str, inside: Any) -> None:
     cls, compiled = inside
     record, _ = filled(cls)
     record["which"] = len(PRODUCTS) + WRONG.index(text)
-    assert "@ of shapes that do not fit" in compiled.call("update", record)
+    assert "which do not fit" in compiled.call("update", record)

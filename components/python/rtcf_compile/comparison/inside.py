@@ -74,16 +74,17 @@ class Inside:
             raised = self._hooks[hook](record.ctypes.data)
         if not raised:
             return None
-        return self._text(raised, int(record["_line"]))
+        return self._text(raised, int(record["_line"]), record["_raised"].tolist())
 
-    def _text(self, raised: int, noted: int) -> str:
+    def _text(self, raised: int, noted: int, values: list[int]) -> str:
         begin = ctypes.cast(raised, ctypes.POINTER(ctypes.c_void_p))[0]
         place = raised + ctypes.sizeof(ctypes.c_void_p)
         size = ctypes.cast(place, ctypes.POINTER(ctypes.c_int32))[0]
         meaning = self._compiled.raises.get(hash_of(ctypes.string_at(begin or 0, size)))
         if meaning is None:
             return f"{noted}: raised an unknown exception"
-        return f"{meaning.line or noted}: {meaning.text}"
+        text = meaning.text.format(*values) if meaning.has_values else meaning.text
+        return f"{meaning.line or noted}: {text}"
 
 
 class _Ports:

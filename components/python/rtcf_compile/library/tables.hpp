@@ -169,6 +169,7 @@ struct RaiseTable {
     std::uint64_t hash;  ///< FNV-1a of 64 bits
     std::int64_t line;
     const char* text;
+    std::int64_t has_values;  ///< 1: a text with two {}, for RaisedValues
 };
 
 /// A line of the Python source that may be the one that a hook noted.
@@ -200,6 +201,12 @@ struct RecordHead {
     double dt;
     double frequency;
     std::int64_t line;  ///< that a hook noted last
+};
+
+/// The last member of the record: the numbers that an exception names, as index and size.
+struct RaisedValues {
+    std::int64_t first;
+    std::int64_t second;
 };
 
 /// Which of the record's times hooks look at; bits of ComponentTable::times.

@@ -103,7 +103,7 @@ class _Library:
             *self._array([self._state(m, record) for m in _of(compiled, State)]),
             *self._array(
                 [
-                    self.data.struct(_signed(key), each.line, each.text)
+                    self.data.struct(_signed(key), each.line, each.text, int(each.has_values))
                     for key, each in compiled.raises.items()
                 ]
             ),

@@ -19,9 +19,15 @@ _LISTS = 40  # of blocks of 128 bytes to 128 KiB
 
 
 # What entries call, for as long as none of this is linked.
-DECLARATIONS = "declare void @rtcf_begin_hook()\ndeclare void @rtcf_end_hook()\n"
+DECLARATIONS = """
+declare void @rtcf_begin_hook()
+declare void @rtcf_end_hook()
+@rtcf_raised_values = external global [2 x i64]
+"""
 
 _COUNTS = """
+@rtcf_raised_values = global [2 x i64] zeroinitializer
+
 define i8* @NRT_MemInfo_alloc_aligned(i64 %bytes, i32 %alignment) {
   %block = call i8* @NRT_MemInfo_alloc_safe_aligned(i64 %bytes, i32 %alignment)
   ret i8* %block

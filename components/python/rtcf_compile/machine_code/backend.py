@@ -13,7 +13,7 @@ from unittest import mock
 import llvmlite.binding as llvm
 import numba
 from numba import types
-from numba.core import codegen, cpu
+from numba.core import cgutils, codegen, cpu
 from numba.core.compiler_lock import global_compiler_lock
 
 # Options of functions that neither Python nor C calls by numba's ways.
@@ -44,7 +44,10 @@ def not_to_run() -> Iterator[None]:
         module = description.lookup_module()
         return cpu._dynfunc.make_function(module, name, "", 0, environment, (library,))
 
+    from rtcf_compile.machine_code.raised_values import check_bounds
+
     with (
+        mock.patch.object(cgutils, "do_boundscheck", check_bounds),
         mock.patch.object(cpu.CPUContext, "get_executable", executable),
         mock.patch.object(codegen.JITCPUCodegen, "_add_module", lambda self, module: None),
         mock.patch.object(codegen.JITCodeLibrary, "_finalize_specific", lambda self: None),

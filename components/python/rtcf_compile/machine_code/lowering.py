@@ -26,6 +26,7 @@ from rtcf_compile.machine_code import (
     explain,
     gate,
     port_access,
+    raised_values,
     source_lines,
     stack,
     trial,
@@ -127,11 +128,13 @@ def _linked(compiled: Compiled, inner: dict[str, tuple[str, str]], allocator: st
     """Return one module with the entries of these hooks, and nothing that they do not need."""
     parts, base = [], arena.DECLARATIONS + port_access.DECLARATIONS
     access = port_access.PortAccess(compiled.description, compiled.used)
+    values = compiled.description.record.itemsize - 16  # its last member
     for hook, (name, text) in inner.items():
         base += port_access.entry(
             compiled.symbol(hook),
             name,
             backend.taken(text, name),
+            values,
             access if hook in _REALTIME else None,
             writes_always=hook == "safe",
         )
@@ -152,6 +155,9 @@ def _linked(compiled: Compiled, inner: dict[str, tuple[str, str]], allocator: st
     module = backend.parsed(source_lines.unwound(text))
     module.link_in(backend.parsed(backend.pointers(allocator)))
     _keep(module, symbols)
+    for variable in module.global_variables:
+        if variable.name == raised_values.NAME:
+            variable.linkage = "internal"  # each object has its own
     backend.optimise(module)
     _without_addresses(module)
     module.verify()

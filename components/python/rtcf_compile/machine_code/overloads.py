@@ -16,6 +16,7 @@ from numba.np.numpy_support import as_dtype
 
 from rtcf_compile.machine_code import backend
 from rtcf_compile.machine_code.explain import kind_of
+from rtcf_compile.machine_code.raised_values import note
 from rtcf_compile.machine_code.sharing import overlaps, shares
 from rtcf_compile.machine_code.tile import ROWS
 from rtcf_compile.rewriting import helpers, numpy_functions
@@ -235,7 +236,8 @@ def _store(target: Any, value: Any) -> Any:
 
     def store(target: Any, value: Any) -> None:
         if target.shape != value.shape:
-            raise ValueError("an array is set to one of another shape")
+            note(target.size, value.size)
+            raise ValueError("\x1ean array of {} elements is set to one of another shape, of {}")
         helpers.rtcf_assign(target, value)
 
     return store
@@ -293,7 +295,8 @@ def _matmul(a: Any, b: Any) -> Any:
         def times_vector(a: Any, b: Any) -> Any:
             rows, count = a.shape
             if count != b.shape[0]:
-                raise ValueError("@ of shapes that do not fit")
+                note(count, b.shape[0])
+                raise ValueError("\x1e@ of sizes {} and {}, which do not fit")
             result = np.empty(rows)
             row(b, 0, b.strides[0], a, a.strides[1], a.strides[0], count, result, 0, rows)
             return result
@@ -305,7 +308,8 @@ def _matmul(a: Any, b: Any) -> Any:
         def vector_times(a: Any, b: Any) -> Any:
             count, columns = b.shape
             if a.shape[0] != count:
-                raise ValueError("@ of shapes that do not fit")
+                note(a.shape[0], count)
+                raise ValueError("\x1e@ of sizes {} and {}, which do not fit")
             result = np.empty(columns)
             row(a, 0, a.strides[0], b, b.strides[0], b.strides[1], count, result, 0, columns)
             return result
@@ -315,7 +319,8 @@ def _matmul(a: Any, b: Any) -> Any:
     def matrix(a: Any, b: Any) -> Any:
         count, columns = b.shape
         if a.shape[1] != count:
-            raise ValueError("@ of shapes that do not fit")
+            note(a.shape[1], count)
+            raise ValueError("\x1e@ of sizes {} and {}, which do not fit")
         result = np.empty((a.shape[0], columns))
         down, across = b.strides
         for i in range(a.shape[0]):
@@ -328,7 +333,8 @@ def _matmul(a: Any, b: Any) -> Any:
 
 def _inner_product(a: Any, b: Any) -> Any:
     if a.shape[0] != b.shape[0]:
-        raise ValueError("@ of shapes that do not fit")
+        note(a.shape[0], b.shape[0])
+        raise ValueError("\x1e@ of sizes {} and {}, which do not fit")
     total = 0.0
     for k in range(a.shape[0]):
         total += a[k] * b[k]
@@ -337,7 +343,8 @@ def _inner_product(a: Any, b: Any) -> Any:
 
 def _plain_times_vector(a: Any, b: Any) -> Any:
     if a.shape[1] != b.shape[0]:
-        raise ValueError("@ of shapes that do not fit")
+        note(a.shape[1], b.shape[0])
+        raise ValueError("\x1e@ of sizes {} and {}, which do not fit")
     result = np.zeros(a.shape[0])
     for i in range(a.shape[0]):
         for k in range(a.shape[1]):
@@ -347,7 +354,8 @@ def _plain_times_vector(a: Any, b: Any) -> Any:
 
 def _plain_vector_times(a: Any, b: Any) -> Any:
     if a.shape[0] != b.shape[0]:
-        raise ValueError("@ of shapes that do not fit")
+        note(a.shape[0], b.shape[0])
+        raise ValueError("\x1e@ of sizes {} and {}, which do not fit")
     result = np.zeros(b.shape[1])
     for k in range(a.shape[0]):
         for j in range(b.shape[1]):
@@ -357,7 +365,8 @@ def _plain_vector_times(a: Any, b: Any) -> Any:
 
 def _plain_matrix(a: Any, b: Any) -> Any:
     if a.shape[1] != b.shape[0]:
-        raise ValueError("@ of shapes that do not fit")
+        note(a.shape[1], b.shape[0])
+        raise ValueError("\x1e@ of sizes {} and {}, which do not fit")
     result = np.zeros((a.shape[0], b.shape[1]))
     for i in range(a.shape[0]):
         for k in range(a.shape[1]):
@@ -491,14 +500,16 @@ def _copying(of_target: int, of_value: int) -> Any:
     def vector(target: Any, value: Any) -> None:
         step = 0 if value.shape[0] == 1 else 1
         if step and target.shape[0] != value.shape[0]:
-            raise ValueError("an array is set to one of another shape")
+            note(target.shape[0], value.shape[0])
+            raise ValueError("\x1ean array of size {} is set to one of size {}")
         for i in range(target.shape[0]):
             target[i] = value[i * step]
 
     def rows(target: Any, value: Any) -> None:
         step = 0 if value.shape[0] == 1 else 1
         if step and target.shape[1] != value.shape[0]:
-            raise ValueError("an array is set to one of another shape")
+            note(target.shape[1], value.shape[0])
+            raise ValueError("\x1ean array of size {} is set to one of size {}")
         for i in range(target.shape[0]):
             for j in range(target.shape[1]):
                 target[i, j] = value[j * step]
@@ -522,6 +533,16 @@ def _copying(of_target: int, of_value: int) -> Any:
 def _get(base: Any, index: Any) -> Any:
     if any(isinstance(each, types.IntEnumMember) for each in index.types):
         return _by_values("base, index", "helpers.rtcf_get(base, ({}))", index)
+    if isinstance(base, types.UniTuple) and isinstance(index[0], types.Integer):
+        size = base.count
+
+        def element(base: Any, index: Any) -> Any:
+            if index[0] < -size or index[0] >= size:
+                note(index[0], size)
+                raise IndexError("\x1eindex {} is out of bounds for size {}")
+            return base[index[0]]
+
+        return element
     if not isinstance(base, types.Array):
         return lambda base, index: base[index[0]]
     kinds = _kinds(base, index)
@@ -727,7 +748,8 @@ def _places_of(index: Any, size: Any) -> Any:
 
         def true_ones(index: Any, size: Any) -> Any:
             if index.shape[0] != size:
-                raise IndexError("a mask has another size than the array")
+                note(index.shape[0], size)
+                raise IndexError("\x1ea mask of {} elements for {}")
             count = 0
             for i in range(size):
                 if index[i]:
@@ -749,7 +771,8 @@ def _places_of(index: Any, size: Any) -> Any:
             if place < 0:
                 place += size
             if place < 0 or place >= size:
-                raise IndexError("index is out of bounds")
+                note(index[k], size)
+                raise IndexError("\x1eindex {} is out of bounds for size {}")
             places[k] = place
         return places
 
@@ -1107,10 +1130,11 @@ def _items(values: Any, count: Any) -> Any:
     text = f"""\
 def items(values, count):
     if values.shape[0] != {n}:
-        raise ValueError("another number of values than of names")
+        note(values.shape[0], {n})
+        raise ValueError("\x1e{{}} values for {{}} names")
     return ({elements},)
 """
-    scope: dict[str, Any] = {}
+    scope: dict[str, Any] = {"note": note}
     exec(text, scope)
     return scope["items"]
 
@@ -1224,7 +1248,8 @@ def _eliminate(a: Any, b: Any) -> Any:
     def eliminate(a: Any, b: Any) -> Any:
         n = a.shape[0]
         if a.shape[1] != n or b.shape[0] != n:
-            raise ValueError("solve of shapes that do not fit")
+            note(n, b.shape[0])
+            raise ValueError("\x1esolve of sizes {} and {}, which do not fit")
         width = b.shape[1]
         matrix, x = np.empty((n, n)), np.empty((n, width))
         for i in range(n):

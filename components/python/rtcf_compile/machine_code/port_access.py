@@ -241,14 +241,16 @@ def entry(
     symbol: str,
     inner: str,
     taken: tuple[str, str],
+    values: int,
     access: PortAccess | None,
     writes_always: bool = False,
 ) -> str:
     """Return a hook's function as C calls it: null, or what it raised.
 
     In tables.hpp it is a HookFunction, and with ports a PortHookFunction. `taken`: the types of the
-    record and of the place for what it raises, as the inner function takes them. `writes_always`:
-    outputs are written also if it raised.
+    record and of the place for what it raises, as the inner function takes them. `values`: where
+    the record has the numbers that an exception names. `writes_always`: outputs are written also if
+    it raised.
     """
     record, exception = taken
     read = access.read() if access else ""
@@ -278,6 +280,10 @@ ended:
 {"" if writes_always else write}
   ret i8* null
 fault:
+  %values = load [2 x i64], [2 x i64]* @rtcf_raised_values
+  %there = getelementptr i8, i8* %record, i64 {values}
+  %head = bitcast i8* %there to [2 x i64]*
+  store [2 x i64] %values, [2 x i64]* %head, align 8
   %what = load i8*, i8** %raised
   ret i8* %what
 }}

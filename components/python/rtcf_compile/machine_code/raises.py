@@ -15,6 +15,8 @@ from rtcf_compile.source.prefix_map import mapped
 _CONSTANT = re.compile(
     r'^@"?\.const\.pickledata\.[\d.]+"? = [^\n]*constant \[\d+ x i8\] c"([^"\n]*)"', re.M
 )
+# What a text begins with that names two numbers: see raised_values.py.
+WITH_VALUES = "\x1e"
 _WORDS = {
     "division by zero": "division by zero",
     "Allocation failed (probably too large).": "temporaries are more than the arena has; "
@@ -29,6 +31,7 @@ class Raise:
     file: str
     line: int
     text: str
+    has_values: bool = False  # a text with two {}
 
 
 def raises_in(assembly: str, file: str) -> dict[int, Raise]:
@@ -41,11 +44,12 @@ def raises_in(assembly: str, file: str) -> dict[int, Raise]:
         except (pickle.UnpicklingError, ValueError, TypeError, EOFError):
             continue  # numba's own: an environment
         text = str(arguments[0]) if arguments else ""
-        text = _WORDS.get(text, text)
+        has_values = text.startswith(WITH_VALUES)
+        text = _WORDS.get(text, text.removeprefix(WITH_VALUES) if has_values else text)
         if exception is not Fault:
             text = f"{exception.__name__}: {text}" if text else exception.__name__
         there = place is not None and place[1] == mapped(file)
-        found[hash_of(data)] = Raise(file, place[2] if there else 0, text)
+        found[hash_of(data)] = Raise(file, place[2] if there else 0, text, has_values)
     return found
 
 

@@ -545,10 +545,18 @@ class Products(ast.NodeTransformer):
         parts = list(_parts(node))
         if isinstance(node.ctx, ast.Load) and any(_is_new(each) for each in parts):
             return self._with_new_axis(node, parts)
+        is_load, of_tuple = isinstance(node.ctx, ast.Load), self._is_tuple(node)
         self.generic_visit(node)
-        if isinstance(node.ctx, ast.Load) and any(self._may_select(each) for each in parts):
+        if is_load and (of_tuple or any(self._may_select(each) for each in parts)):
             return like(node, call_of("rtcf_get", node.value, _index(node.slice)))
         return node
+
+    def _is_tuple(self, node: ast.Subscript) -> bool:
+        """Tell whether it is an element of a tuple, or of a list, at a variable place."""
+        if isinstance(node.slice, ast.Constant | ast.Slice | ast.UnaryOp):
+            return False
+        known = self._is_list(node.value) or isinstance(node.value, ast.Tuple)
+        return known or isinstance(resolve(node.value, self.source), tuple)
 
     def _arrays(self, node: ast.expr) -> ast.expr:
         """Return an index, or an operand, with arrays in the place of lists."""

@@ -69,15 +69,30 @@ class Hook(Ports):
 
     def visit(self, node: ast.AST) -> Any:
         """Note the line before a statement that calls something: what it calls has other lines."""
-        new = super().visit(node)
         calls = (ast.Call, ast.Subscript, ast.BinOp)
         simple = (ast.Expr, ast.Assign, ast.AugAssign, ast.Return)
-        if isinstance(node, simple) and any(isinstance(each, calls) for each in ast.walk(node)):
+        is_simple = isinstance(node, simple)
+        raises = is_simple and any(map(self._may_raise, ast.walk(node)))
+        if isinstance(node, ast.If):
+            parts = list(ast.walk(node.test))
+            tests_none = any(isinstance(each, ast.Is | ast.IsNot) for each in parts)
+            raises = not tests_none and any(map(self._may_raise, parts))
+        new = super().visit(node)
+        if raises or (is_simple and any(isinstance(each, calls) for each in ast.walk(node))):
             self.lines.add(node.lineno)
             target = ast.Attribute(ast.Name(self._self, ast.Load()), "_line", ast.Store())
             mark = like(node, ast.Assign([target], ast.Constant(node.lineno)))
             return [mark, *(new if isinstance(new, list) else [new])]
         return new
+
+    def _may_raise(self, node: ast.AST) -> bool:
+        """Tell whether it is `self.goals.front`, or a state that may be None."""
+        if not isinstance(node, ast.Attribute):
+            return False
+        if node.attr == "front":
+            return True
+        member = self._description.members.get(node.attr) if self._is_self(node.value) else None
+        return member is not None and member.type.optional
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
         """`self` alone is no value."""

@@ -1,5 +1,6 @@
 """Errors of NumPy about shapes and indices in plain words, with a way out."""
 
+import ast
 import re
 
 import numpy as np
@@ -86,7 +87,7 @@ def explained(error: BaseException, source: str) -> tuple[str, str] | None:
     errors.
     """
     text = " ".join(str(error).split())
-    if _BY_TYPES.search(text):
+    if _BY_TYPES.search(text) or _has_variable_slice(source):
         return None
     if isinstance(error, IndexError) and (found := _BOUNDS.search(text)):
         if re.search(rf"(?<![\w.]){found[1]}(?![\w.])", source) is None:
@@ -96,3 +97,16 @@ def explained(error: BaseException, source: str) -> tuple[str, str] | None:
         if isinstance(error, kind) and (found := re.search(pattern, text, re.IGNORECASE)):
             return what.format(found[0], *found.groups()), way_out
     return None
+
+
+def _has_variable_slice(source: str) -> bool:
+    """Tell whether sizes in a line depend on variables; constants have names in capitals."""
+    for text in (source, f"{source} pass"):
+        try:
+            tree = ast.parse(text)
+        except SyntaxError:
+            continue
+        slices = [each for each in ast.walk(tree) if isinstance(each, ast.Slice)]
+        names = [each for part in slices for each in ast.walk(part) if isinstance(each, ast.Name)]
+        return any(not each.id.isupper() for each in names)
+    return False

@@ -1,0 +1,119 @@
+"""Mistakes that show when the component runs: the machine code names line, index and sizes."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rtcf_compile.comparison.inside import Inside
+from rtcf_compile.machine_code.lowering import compile_component
+from rtcf_compile.source.modules import components, load
+
+HEAD = """\
+import numpy as np
+from rtcf.component import Component, Input, Queue, State
+
+TABLE = [1.0, 2.0]
+LIMITS = (0.5, 1.5, 2.5)
+
+
+class Faulty(Component):
+    n: Input[int]
+    q: Queue[float] = Queue(size=2)
+    f: State[float]
+    z: State[np.float64, 3]
+    m: State[np.float64, 3, 4]
+    o: State[float | None]
+
+    def update(self):
+        n = self.n.value
+"""
+
+# What is done for an n, from 100 on in this order; what the fault says.
+FAULTS = {
+    "index of a vector": (
+        "self.f = self.z[n]",
+        "IndexError: index {n} is out of bounds for size 3",
+    ),
+    "negative index": ("self.f = self.z[-n]", "IndexError: index -{n} is out of bounds for size 3"),
+    "index that is set": (
+        "self.z[n - 99] = 1.0",
+        "IndexError: index 3 is out of bounds for size 3",
+    ),
+    "column of a matrix": (
+        "self.f = self.m[0, n]",
+        "IndexError: index {n} is out of bounds for size 4",
+    ),
+    "index of a list": ("self.f = TABLE[n]", "IndexError: index {n} is out of bounds for size 2"),
+    "index in a loop": (
+        "for i in range(n):\n                self.f += LIMITS[i]",
+        "IndexError: index 3 is out of bounds for size 3",
+    ),
+    "indices in an array": (
+        "self.f = self.z[np.array([0, n])][0]",
+        "IndexError: index {n} is out of bounds for size 3",
+    ),
+    "mask of another size": (
+        "self.f = self.z[np.ones(n) > 0.0][0]",
+        "IndexError: a mask of {n} elements for 3",
+    ),
+    "vector of another size": (
+        "self.z[:] = np.ones(n)",
+        "ValueError: an array of size 3 is set to one of size {n}",
+    ),
+    "product": (
+        "self.z[:] = self.m @ np.ones(n)",
+        "ValueError: @ of sizes 4 and {n}, which do not fit",
+    ),
+    "product of vectors": (
+        "self.f = self.z @ np.ones(n)",
+        "ValueError: @ of sizes 3 and {n}, which do not fit",
+    ),
+    "unpacked": ("a, b = np.ones(n)", "ValueError: {n} values for 2 names"),
+    "division": ("self.f = 1 / (n - n)", "ZeroDivisionError: division by zero"),
+    "queue": ("self.f = self.q.front", "IndexError: front of an empty queue"),
+    "number that is not known": ("self.f = self.o", "TypeError: None is no number"),
+}
+
+
+@pytest.fixture(scope="module")
+def component(tmp_path_factory: pytest.TempPathFactory) -> tuple[Inside, np.dtype[np.void], str]:
+    """One component that makes all mistakes, one by one."""
+    source = HEAD
+    for number, (text, _) in enumerate(FAULTS.values(), 100):
+        source += f"        if n == {number}:\n            {text}\n"
+    file: Path = tmp_path_factory.mktemp("faults") / "faulty.py"
+    file.write_text(source)
+    (cls,) = components(load(file))
+    compiled = compile_component(cls)
+    return Inside(compiled), compiled.description.record, source
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_names_line_and_sizes(
+    name: str, component: tuple[Inside, np.dtype[np.void], str]
+) -> None:
+    inside, dtype, source = component
+    number = 100 + list(FAULTS).index(name)
+    record = np.zeros((), dtype)
+    record["n"] = number
+    text, words = FAULTS[name]
+    said = inside.call("update", record)
+    lines = source.splitlines()
+    first = lines.index(f"        if n == {number}:") + 2
+    assert said is not None
+    line, _, rest = said.partition(": ")
+    assert int(line) - first in range(text.count("\n") + 1), said
+    assert rest == words.format(n=number)
+
+
+def test_a_text_of_the_component_with_braces_stays_as_it_is(tmp_path: Path) -> None:
+    file = tmp_path / "faulty.py"
+    file.write_text(
+        f"{HEAD}        if n == 100:\n            raise IndexError('index {{}} of {{}}')\n"
+    )
+    (cls,) = components(load(file))
+    compiled = compile_component(cls)
+    record = np.zeros((), compiled.description.record)
+    record["n"] = 100
+    said = Inside(compiled).call("update", record)
+    assert said is not None and said.endswith(": IndexError: index {} of {}")
