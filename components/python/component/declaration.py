@@ -44,6 +44,11 @@ class Declared:
     kind: "type[Declarable]"
     declared: object
 
+    def __getitem__(self, size: object) -> Any:
+        """Refuse `State[float][3]`."""
+        kind = self.kind.__name__
+        raise DeclarationError(f"{kind} has two brackets: write {kind}[np.float64, 3]")
+
 
 class Declarable:
     """Base of Input, Output, Parameter and State."""

@@ -5,7 +5,7 @@ from types import FunctionType
 from typing import Any
 
 from rtcf_compile.rewriting import helpers, numpy_functions
-from rtcf_compile.source.mistake import Mistake
+from rtcf_compile.source.mistake import Mistake, source_line
 
 _MARK = re.compile(r"RTCF:([^:\n]+):([^\n]+?)(?:\x1b|\n|$)")
 # A function that has no implementation for such types.
@@ -112,18 +112,18 @@ def mistake(error: Any, function: FunctionType) -> Mistake:
     lines = [int(each) for each in re.findall(rf'File "(?:[^"]*/)?{name}", line (\d+)', text)]
     place = getattr(error, "loc", None)
     line = lines[-1] if lines else getattr(place, "line", function.__code__.co_firstlineno)
-    return Mistake(file, line, *_said(text))
+    return Mistake(file, line, *_said(text, source_line(file, line)))
 
 
-def _said(text: str) -> tuple[str, str]:
-    """Return what is wrong, and the way out."""
+def _said(text: str, source: str) -> tuple[str, str]:
+    """Return what is wrong in a line, and the way out."""
     if found := _MARK.search(text):
         return found[1].strip(), found[2].strip()
     for pattern, what, way_out in _KNOWN[:2]:
         if found := re.search(pattern, text):
             return what.format(*found.groups()), way_out
     if found := _NONE_FOR.search(text):
-        return _no_implementation(found["name"], _arguments(found["arguments"]))
+        return _no_implementation(found["name"], _arguments(found["arguments"]), source)
     if found := _INVALID.search(text):
         kind = kind_of(found["called"])
         if found["called"] == "getiter":
@@ -142,7 +142,7 @@ def _said(text: str) -> tuple[str, str]:
     return "cannot be compiled", "write it in smaller steps, each with a name"
 
 
-def _no_implementation(name: str, arguments: list[str]) -> tuple[str, str]:
+def _no_implementation(name: str, arguments: list[str], source: str) -> tuple[str, str]:
     """Explain a function, or an operator, that takes no such types."""
     kinds = [kind_of(each.rpartition("=")[2] if "=" in each else each) for each in arguments]
     named = [each.partition("=")[0] for each in arguments if re.match(r"\w+=", each)]
@@ -150,6 +150,8 @@ def _no_implementation(name: str, arguments: list[str]) -> tuple[str, str]:
         what = "values of several types have no variable index"
         return what, "use a constant index, or values of one type"
     if name in ("getitem", "static_getitem", "rtcf_get", "setitem", "static_setitem", "rtcf_set"):
+        if kinds[0] in ("a float", "an int", "a bool", "None"):
+            return f"{kinds[0]} has no elements", "write it without [ ]"
         return f"{kinds[0]} has no index {_index(arguments[1])}", "use ints, slices and arrays"
     if name in _OPERATORS:
         return _operator(_OPERATORS[name], kinds)
@@ -158,9 +160,15 @@ def _no_implementation(name: str, arguments: list[str]) -> tuple[str, str]:
         done = f"{_NAMES[name]} of {of}" if name in _NAMES else f"is not possible with {of}"
         way_out = "give it a matrix" if ".linalg." in done else "give it numbers and arrays"
         return done, way_out
+    if as_written := re.search(rf"[\w.]*\b{name}(?= ?\()", source):
+        name = as_written[0]
     if named:
         return f"{name} has no {named[0]} here", f"leave {named[0]} out"
-    return f"{name} of {of}", "give it numbers and arrays that fit it"
+    short = name.rpartition(".")[2]
+    if short in ("zeros", "ones", "empty", "full", "eye", "identity", "arange"):
+        return f"{name} of {of}", "make its sizes ints: int(…)"
+    way_out = "give it an array or a tuple" if short in ("len", "sum", "min", "max") else ""
+    return f"{name} of {of}", way_out or "give it numbers and arrays that fit it"
 
 
 def _operator(operator: str, kinds: list[str]) -> tuple[str, str]:

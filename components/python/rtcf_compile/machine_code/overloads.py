@@ -142,7 +142,11 @@ def _enum(value: Any, cls: Any) -> Any:
             )
         return lambda value, cls: value
     if not isinstance(value, types.Integer):
-        raise TypingError(f"RTCF:{enumeration.__name__} of {words(value)}:give it an int")
+        first = next(iter(enumeration))
+        raise TypingError(
+            f"RTCF:{enumeration.__name__} of {words(value)}:"
+            f"give it a member, as {enumeration.__name__}.{first.name}"
+        )
     test = " or ".join(f"value == {int(each)}" for each in enumeration)
     text = f"""\
 def checked(value, cls):

@@ -212,7 +212,7 @@ class Ports(Products):
         name = ".".join((message.name, *path))
         if path in message.texts:
             return self.mistake(
-                node, f"{name} is text", 'declare it: Output(texts={"header.frame_id": "base"})'
+                node, f"{name} is text", f'declare it: Output(texts={{"{".".join(path)}": "…"}})'
             )
         if path in message.others:
             return self.mistake(node, f"{name} is a list of messages", "read it in C++")

@@ -25,6 +25,7 @@ _STANDS_FOR = [*INSTEAD.items(), *numpy_functions.STANDS_FOR]
 ARENA = 64 * 1024
 _NEW = (np.zeros, np.ones, np.empty, np.full, np.eye, np.identity)
 _PLAIN = (*_NEW, np.zeros_like, np.ones_like, np.empty_like, np.full_like, np.arange)
+_PLAIN_METHODS = ("copy", "fill", "flatten", "item", "view")
 _DTYPES = {float: np.float64, int: np.int64, bool: np.bool_}
 # Functions of NumPy whose argument of that place is a type of elements.
 _TYPED = {np.zeros: 1, np.ones: 1, np.empty: 1, np.full: 2, np.zeros_like: 1, np.ones_like: 1}
@@ -445,7 +446,7 @@ class Products(ast.NodeTransformer):
     def _is_other(self, node: ast.Call, target: Any) -> bool:
         """Tell whether nothing of ours stands for a function of NumPy, or a method of arrays."""
         if target is None:
-            return isinstance(node.func, ast.Attribute)
+            return isinstance(node.func, ast.Attribute) and node.func.attr not in _PLAIN_METHODS
         if isinstance(target, np.ufunc | type) or any(target is each for each in _PLAIN):
             return False
         return (getattr(target, "__module__", None) or "numpy").startswith("numpy")

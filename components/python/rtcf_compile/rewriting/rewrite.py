@@ -60,7 +60,7 @@ class Hook(Ports):
         body = self.statements(tree.body)
         arguments = ast.arguments(
             posonlyargs=[],
-            args=[ast.arg(each.arg) for each in tree.args.args],
+            args=[ast.arg(each.arg) for each in (*tree.args.posonlyargs, *tree.args.args)],
             kwonlyargs=[],
             kw_defaults=[],
             defaults=tree.args.defaults,

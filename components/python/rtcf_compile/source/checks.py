@@ -5,6 +5,7 @@ import enum
 import inspect
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import Any
 
@@ -126,6 +127,9 @@ def check(source: Source) -> None:
     arguments = tree.args
     if arguments.vararg or arguments.kwarg:
         raise Mistake(file, tree.lineno, f"{tree.name} takes any number of arguments", "name them")
+    if arguments.kwonlyargs:
+        what = f"{tree.name} takes {arguments.kwonlyargs[0].arg} by its name alone"
+        raise Mistake(file, tree.lineno, what, "leave the * out")
     for default in (*arguments.defaults, *arguments.kw_defaults):
         if isinstance(default, ast.List | ast.Dict | ast.Set):
             raise at(file, default, "a default is shared by all calls", "write a number or a tuple")
@@ -263,6 +267,9 @@ def _called(node: ast.Call, target: Any, source: Source) -> None:
     if is_own(target):
         check_arguments(node, target, source.file)
         return
+    if getattr(target, "__module__", "") == "math":
+        with suppress(ValueError):  # some have no signature
+            check_arguments(node, target, source.file)
     if isinstance(target, type):
         if hasattr(target, "_md5sum"):
             way_out = "set the fields of an Output: self.port.value.x = 1.0"
@@ -289,11 +296,13 @@ def check_arguments(node: ast.Call, function: FunctionType, file: str, given: in
     if None in named:
         return
     signature = inspect.signature(function)
+    if any(each.kind is each.KEYWORD_ONLY for each in signature.parameters.values()):
+        return  # refused where it is defined
     try:
         signature.bind(*[None] * (given + len(node.args)), **dict.fromkeys(map(str, named)))
     except TypeError:
-        takes = [str(each) for each in signature.parameters.values()][given:]
-        name, words = ast.unparse(node.func), ", ".join(takes)
+        takes = list(signature.parameters.values())[given:]
+        name, words = ast.unparse(node.func), str(inspect.Signature(takes))[1:-1]
         what = f"{name} takes {words}" if words else f"{name} takes no argument"
         raise at(file, node, what, f"write {name}({words})") from None
 

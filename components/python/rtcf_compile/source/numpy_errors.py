@@ -5,7 +5,6 @@ import re
 
 import numpy as np
 
-_BOUNDS = re.compile(r"index (-?\d+) is out of bounds for axis \d with size \d+")
 _FIT = "make the shapes fit"
 # `{0}` is all that was found, `{1}` its first group.
 _KNOWN: tuple[tuple[type[Exception], str, str, str], ...] = (
@@ -89,10 +88,6 @@ def explained(error: BaseException, source: str) -> tuple[str, str] | None:
     text = " ".join(str(error).split())
     if _BY_TYPES.search(text) or _has_variable_slice(source):
         return None
-    if isinstance(error, IndexError) and (found := _BOUNDS.search(text)):
-        if re.search(rf"(?<![\w.]){found[1]}(?![\w.])", source) is None:
-            return None  # a variable index may depend on the input
-        return found[0], "use an index within"
     for kind, pattern, what, way_out in _KNOWN:
         if isinstance(error, kind) and (found := re.search(pattern, text, re.IGNORECASE)):
             return what.format(found[0], *found.groups()), way_out
