@@ -212,6 +212,27 @@ def test_libraries_do_not_name_the_folder_that_they_are_built_in(tmp_path: Path)
     assert contents[0] == contents[1]
 
 
+def test_lines_of_faults_are_known_where_paths_are_mapped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = tmp_path / "faulty.py"
+    source.write_text(
+        "from rtcf.component import Component, Input\n\n\nclass Faulty(Component):\n"
+        "    u: Input[float]\n\n    def update(self):\n        if self.u.value > 1.0:\n"
+        '            raise ValueError("too much")\n'
+    )
+    (cls,) = modules.components(modules.load(source))
+
+    def faults() -> set[tuple[str, int, str]]:
+        raises = lowering.compile_component(cls).raises.values()
+        return {(each.file, each.line, each.text) for each in raises}
+
+    plain = faults()
+    assert plain == {(str(source), 9, "ValueError: too much")}
+    monkeypatch.setenv("CXXFLAGS", f"-g -ffile-prefix-map={tmp_path}=/usr/src/regler")
+    assert faults() == plain
+
+
 def test_two_bases_of_one_name_are_told_apart_by_their_lines(tmp_path: Path) -> None:
     declared = "(Component):\n    n: State[float]\n    out: Output[float]\n\n"
     imported = "from rtcf.component import Component, Output, State\n"
