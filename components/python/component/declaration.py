@@ -5,7 +5,6 @@ as one NumPy record, which compiled code sees as one C struct and the interprete
 """
 
 import inspect
-import keyword
 import linecache
 import re
 import typing

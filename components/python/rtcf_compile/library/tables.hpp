@@ -187,8 +187,8 @@ struct LogTable {
 
 /// A hook's machine code. @return null, or what it raised
 using HookFunction = const void* (*)(void* record);
-/// The same of a hook that has ports. `ports`: the inputs of values, and the outputs behind them, in
-/// order of their declaration; it reads those and writes these.
+/// The same of a hook that has ports. `ports`: the inputs of values, and the outputs behind them,
+/// in order of their declaration; it reads those and writes these.
 using PortHookFunction = const void* (*)(void* record, void* const* ports);
 
 /// Members of the record that every component has, at its beginning.
