@@ -34,7 +34,7 @@ _NAMES = {
 _SIMPLE = {
     **{"float64": "a float", "float32": "a float", "unicode_type": "a text", "none": "None"},
     **{"bool": "a bool", "boolean": "a bool", "omitted": "nothing", "Literal[str]": "a text"},
-    **{"complex128": "a complex number", "ellipsis": "..."},
+    **{"complex128": "a complex number", "...": "..."},
 }
 # `{0}` is the first word found, `{kind0}` the type that it says.
 _KNOWN: tuple[tuple[str, str, str], ...] = (
@@ -44,6 +44,11 @@ _KNOWN: tuple[tuple[str, str, str], ...] = (
         "write it as arithmetic on elements",
     ),
     (r"bool\(OptionalType", "may be None, or 0", "write `is not None`"),
+    (
+        r"Casting ([^\n]*) to (\w+) directly",
+        "np.{1} of {kind0}",
+        "give it a number, or write x.astype(np.{1}) of an array",
+    ),
     (
         r"Unknown attribute '(\w+)' of type Module\(<module 'numpy([\w.]*)'",
         "np{1}.{0} is not compiled",
@@ -236,6 +241,8 @@ def kind_of(text: str) -> str:
         ("type(CPUDispatcher", "a function"),
         ("class(", "a type"),
         ("range", "a range"),
+        ("Module", "a module"),
+        ("Ellipsis", "..."),
     ):
         if text.startswith(begin):
             return kind

@@ -537,6 +537,8 @@ def _copying(of_target: int, of_value: int) -> Any:
 def _get(base: Any, index: Any) -> Any:
     if any(isinstance(each, types.IntEnumMember) for each in index.types):
         return _by_values("base, index", "helpers.rtcf_get(base, ({}))", index)
+    if isinstance(base, types.BaseTuple) and index.count != 1:
+        raise TypingError("RTCF:several values have one index:use x[i][k] for rows")
     if isinstance(base, types.UniTuple) and isinstance(index[0], types.Integer):
         size = base.count
 

@@ -4,7 +4,7 @@ import ast
 import enum
 import inspect
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import Any
@@ -267,9 +267,6 @@ def _called(node: ast.Call, target: Any, source: Source) -> None:
     if is_own(target):
         check_arguments(node, target, source.file)
         return
-    if getattr(target, "__module__", "") == "math":
-        with suppress(ValueError):  # some have no signature
-            check_arguments(node, target, source.file)
     if isinstance(target, type):
         if hasattr(target, "_md5sum"):
             way_out = "set the fields of an Output: self.port.value.x = 1.0"
@@ -277,6 +274,11 @@ def _called(node: ast.Call, target: Any, source: Source) -> None:
         if issubclass(target, enum.Enum) and not issubclass(target, enum.IntEnum):
             raise at(file, node, f"{name} is no enum of ints", "derive it from enum.IntEnum")
     root = (getattr(target, "__module__", None) or "numpy").partition(".")[0]
+    if target in (max, min) and not node.args:
+        raise at(file, node, f"{name} of nothing", "give it values")
+    if isinstance(target, BuiltinFunctionType) and root in ("math", "builtins"):
+        with suppress(ValueError):  # some have no signature
+            check_arguments(node, target, source.file)
     if root in _MODULES:
         raise at(file, node, *_MODULES[root])
     if isinstance(target, type):
@@ -288,7 +290,9 @@ def _called(node: ast.Call, target: Any, source: Source) -> None:
         raise at(file, node, f"{name} is not compiled", "write it with NumPy, or call it above")
 
 
-def check_arguments(node: ast.Call, function: FunctionType, file: str, given: int = 0) -> None:
+def check_arguments(
+    node: ast.Call, function: Callable[..., Any], file: str, given: int = 0
+) -> None:
     """Refuse a call whose arguments a function does not take; `given` are not in the source."""
     if any(isinstance(each, ast.Starred) for each in node.args):
         return
@@ -301,8 +305,13 @@ def check_arguments(node: ast.Call, function: FunctionType, file: str, given: in
     try:
         signature.bind(*[None] * (given + len(node.args)), **dict.fromkeys(map(str, named)))
     except TypeError:
-        takes = list(signature.parameters.values())[given:]
-        name, words = ast.unparse(node.func), str(inspect.Signature(takes))[1:-1]
+        takes = [
+            each.replace(kind=each.POSITIONAL_OR_KEYWORD)
+            if each.kind is each.POSITIONAL_ONLY
+            else each
+            for each in signature.parameters.values()
+        ][given:]
+        name, words = ast.unparse(node.func), ", ".join(map(str, takes))
         what = f"{name} takes {words}" if words else f"{name} takes no argument"
         raise at(file, node, what, f"write {name}({words})") from None
 
@@ -310,8 +319,10 @@ def check_arguments(node: ast.Call, function: FunctionType, file: str, given: in
 def _raised(node: ast.Raise, file: str) -> None:
     """Refuse an exception with more than a constant text."""
     made = node.exc
-    if not isinstance(made, ast.Call):
+    if made is None or isinstance(made, ast.Name):
         return
+    if not isinstance(made, ast.Call):
+        raise at(file, node, "is no exception", 'write raise ValueError("constant text")')
     plain = all(_is_text(each) for each in made.args) and len(made.args) < 2
     if any(isinstance(each, ast.JoinedStr) for each in made.args):
         return  # refused as text
@@ -348,6 +359,9 @@ def _indexed(node: ast.Subscript, source: Source) -> None:
     """Refuse constant indices of constants, and of enums, that are not there."""
     owner = resolve(node.value, source)
     if isinstance(owner, list | tuple):
+        if isinstance(node.slice, ast.Tuple):
+            what = f"{ast.unparse(node.value)} is no array"
+            raise at(source.file, node, what, "make it one by np.array(…), or use x[i][k]")
         check_index(node, (len(owner),), ast.unparse(node.value), source.file)
     elif isinstance(owner, np.ndarray) and owner.ndim in (1, 2):
         check_index(node, owner.shape, ast.unparse(node.value), source.file)

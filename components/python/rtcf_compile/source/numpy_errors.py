@@ -86,7 +86,8 @@ def explained(error: BaseException, source: str) -> tuple[str, str] | None:
     errors.
     """
     text = " ".join(str(error).split())
-    if _BY_TYPES.search(text) or _has_variable_slice(source):
+    by_input = isinstance(error, ValueError | IndexError) and _has_variable_slice(source)
+    if _BY_TYPES.search(text) or by_input:
         return None
     for kind, pattern, what, way_out in _KNOWN:
         if isinstance(error, kind) and (found := re.search(pattern, text, re.IGNORECASE)):
