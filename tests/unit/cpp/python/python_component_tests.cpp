@@ -26,8 +26,9 @@ struct Record {
     double gain;
     std::int64_t count;
     bool is_new, is_valid, is_connected, is_written;
+    RaisedValues raised;
 };
-constexpr Record kFresh{{}, 0.0, 0, 0.0, 2.5, 0, false, false, false, false};
+constexpr Record kFresh{{}, 0.0, 0, 0.0, 2.5, 0, false, false, false, false, {}};
 
 struct Raised {
     const char* bytes;
@@ -57,6 +58,7 @@ const void* update(void* memory, void* const* ports) {
     const bool is_new = static_cast<ValueInput*>(ports[0])->read() == DataStatus::New;
     record.u = placeIn<Slot<double>*>(ports[0], places.current)->value;
     record.is_written = true;
+    record.raised = {7, 3};
     if (record.u < 0.0) return &kLimit;
     if (is_new) {
         Slot<double>& written = *placeIn<Slot<double>*>(ports[1], places.raw);
@@ -89,7 +91,7 @@ const OutputTable kOutput{
 const ParameterTable kGain{"gain", "",      "", Scalar::Double, offsetof(Record, gain), 1, 0, 0.0,
                            0.0,    nullptr, 0};
 const StateTable kCount{"count", "", "", &kInteger, offsetof(Record, count)};
-const RaiseTable kRaise{hashOf("limit"), 0, "ValueError: limit"};
+const RaiseTable kRaise{hashOf("limit"), 0, "IndexError: index {} beyond size {}", 1};
 const LineTable kLine{12, "self.x.write(y)"};
 const ComponentTable kTable{"Gain",  "doc",    "gain.py", nullptr, &kFresh, sizeof(Record),
                             nullptr, &start,   &update,   nullptr, 0,       &kInput,
@@ -185,7 +187,7 @@ TEST_F(PythonComponents, WhatRaisesWritesNothingAndSaysWhere) {
     } catch (const std::runtime_error& error) {
         said = error.what();
     }
-    EXPECT_EQ(said, "gain.py:12: `self.x.write(y)`: ValueError: limit");
+    EXPECT_EQ(said, "gain.py:12: `self.x.write(y)`: IndexError: index 7 beyond size 3");
     EXPECT_EQ(written().sequence, 0U);
     source_->value = 1.0;
     component_.update();
