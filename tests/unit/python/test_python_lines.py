@@ -59,6 +59,12 @@ extern "C" {
 int frames = 0;
 void* stack[32];
 void rtcf_log_Regler_0(std::int64_t, double) { frames = backtrace(stack, 32); }
+std::int64_t rtcf_python_read(void*) { return 0; }
+// An input that nobody has written, and an output, as port.hpp has them.
+std::int64_t slot[3] = {}, time_base[5] = {};
+void* input[4] = {slot, slot};
+void* output[4] = {slot, time_base};
+void* ports[2] = {input, output};
 }
 """
 
@@ -159,7 +165,7 @@ def test_a_stack_leads_through_it(source: Path, tmp_path: Path) -> None:
     run("g++", "-shared", "-fPIC", tmp_path / "logged.cpp", *files, "-lm", "-o", library)
     loaded = ctypes.CDLL(str(library))
     record = ctypes.create_string_buffer(4096)
-    assert loaded.rtcf_Regler_update(record) == 0
+    assert loaded.rtcf_Regler_update(record, (ctypes.c_void_p * 2).in_dll(loaded, "ports")) == 0
     count = ctypes.c_int.in_dll(loaded, "frames").value
     stack = (ctypes.c_void_p * 32).in_dll(loaded, "stack")
     base = ctypes.cast(loaded.rtcf_Regler_update, ctypes.c_void_p).value or 0

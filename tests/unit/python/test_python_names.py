@@ -163,7 +163,8 @@ def test_a_name_that_ros_forbids_is_refused_with_another(
     tmp_path: Path, declared: str, name: str, advice: str
 ) -> None:
     file = written(tmp_path, DECLARING.format(name="Plain", declared=declared))
-    what = f"{file}:6: Plain.{name} is no name in ROS, which has ASCII letters alone: {advice}"
+    what = f"{file}:6: `{declared}`: Plain.{name} is no name in ROS, which has ASCII letters alone"
+    what += f": {advice}"
     with pytest.raises(DeclarationError) as refused:
         compiled(file)
     assert str(refused.value) == what
