@@ -214,7 +214,7 @@ def test_a_disk_that_takes_nothing_is_named_and_left_as_it_was(
     assert running.ctl("incident", "take").returncode == 0
     full = "No space left on device"
     for verb, what in {
-        "record --duration 0.5 -o": f"{full}: no cycle was written, and the file is removed",
+        "record --duration 0.5 -o": f"{full}: no cycle was written",
         "trace --cycles 100 -o": f" is not written: {full}",
         "incident export --to": f" is not written: {full}",
     }.items():
@@ -225,6 +225,16 @@ def test_a_disk_that_takes_nothing_is_named_and_left_as_it_was(
         assert line.startswith(f"rtcfctl: {to}"), line
         assert line.endswith(what), line
         assert [each.name for each in full_disk.iterdir()] == ["filler"], verb
+
+
+def test_a_disk_that_takes_no_cycle_is_left_as_it_was(running: Daemon, full_disk: Path) -> None:
+    # Room for a file's head alone.
+    subprocess.run(["mount", "-o", "remount,size=8k", full_disk], check=True)
+    done = running.ctl("record", "--duration", "0.5", "-o", str(full_disk / "out"))
+    assert done.returncode == 1
+    end = "No space left on device: no cycle was written, and the file is removed"
+    assert done.stderr == f"rtcfctl: {full_disk / 'out'}: {end}\n"
+    assert [each.name for each in full_disk.iterdir()] == ["filler"]
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="a disk of its own takes root")
@@ -249,7 +259,7 @@ def test_where_there_is_no_room_at_all_it_is_said_in_one_line(running: Daemon) -
     done = running.ctl("record", "-o", "/dev/full", "--force")
     assert done.returncode == 1
     assert done.stderr.splitlines() == [
-        "rtcfctl: /dev/full: No space left on device: what was written before can be read"
+        "rtcfctl: /dev/full: No space left on device: no cycle was written"
     ]
 
 

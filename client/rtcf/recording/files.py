@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import BinaryIO, TypeVar
 
 from rtcf_shared.errors import RtcfError
+from rtcf_shared.whole_file import whole_file
 
 from rtcf.closing import Closing
 from rtcf.recording.mcap_writer import McapWriter
@@ -82,10 +83,17 @@ class Files(Closing):
         number = len(self.paths)
         stem, suffix = self._first.stem, self._first.suffix
         path = self._first.with_name(f"{stem}-{number}{suffix}") if number else self._first
-        self._file = _opened(path, self._force)
+        try:
+            # It has its name from its head on: at any time a file of that name can be read.
+            with whole_file(path, force=self._force) as part:
+                self._file = part.open("wb")
+                self._writer = _begun(self._file, path)
+        except FileExistsError:
+            raise ValueError(f"{path} is there already: --force writes over it") from None
+        except OSError as error:
+            raise ValueError(f"{path}: {error.strerror}") from None
         self.paths.append(path)
         self._begun_ns = 0
-        self._writer = McapWriter(self._file)
         self._recorder = Recorder(self._writer, self._runner)
 
     def _finish(self) -> None:
@@ -113,6 +121,17 @@ class Files(Closing):
         return "no cycle was written, and the file is removed"
 
 
+def _begun(file: BinaryIO, path: Path) -> McapWriter:
+    try:
+        writer = McapWriter(file)
+        file.flush()
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            file.close()
+        raise RtcfError(f"{path}: {error.strerror}: no cycle was written") from None
+    return writer
+
+
 def _has_cycles(path: Path) -> bool:
     from rtcf.recording.reader import read_recording  # for a full disk alone
 
@@ -126,12 +145,3 @@ def _has_cycles(path: Path) -> bool:
         return True  # it cannot be read, which says nothing about its content
     except (RtcfError, ValueError):
         return False
-
-
-def _opened(path: Path, force: bool) -> BinaryIO:
-    try:
-        return path.open("wb" if force else "xb")
-    except FileExistsError:
-        raise ValueError(f"{path} is there already: --force writes over it") from None
-    except OSError as error:
-        raise ValueError(f"{path}: {error.strerror}") from None
