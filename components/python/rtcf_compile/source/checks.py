@@ -245,7 +245,7 @@ def _call(node: ast.Call, source: Source) -> None:
     name = getattr(target, "__name__", "")
     if target is not None:
         _called(node, target, source)
-    if target is not None and getattr(np, name, None) is target and name in _GROWS:
+    if name in _GROWS and getattr(np, name, None) is target:
         raise at(file, node, f"np.{name} makes an array that grows", _GROWS[name])
     if isinstance(called, ast.Attribute) and isinstance(resolve(called.value, source), list):
         name = ast.unparse(called.value)
