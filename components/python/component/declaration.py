@@ -242,7 +242,7 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
             f"is neither Input, Queue, Output, Parameter, Derived nor State: write {name}: "
             f"State[…] for what is kept, {name} = … for a constant"
         )
-    # Nothing outside the component sees what is derived.
+    # Derived members have no name outside the component.
     if not name.isascii() and annotation.kind is not Derived:
         raise DeclarationError(f"is no name in ROS, which has ASCII letters alone: {advice(name)}")
     if "__" in name or name.startswith("_") or (name.isascii() and not is_member_name(name)):

@@ -65,7 +65,7 @@ class MessageType:
         return next((each for each in self.leaves if each.path == path), None)
 
     def type_of(self, path: tuple[str, ...]) -> str | None:
-        """Return the message type of a part; None for what is no message."""
+        """Return the message type of a part; None for numbers and texts."""
         return dict(self.parts).get(path) if path else self.name
 
     def pairs(

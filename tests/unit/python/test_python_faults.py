@@ -28,7 +28,7 @@ class Faulty(Component):
         n = self.n.value
 """
 
-# What is done for an n, from 100 on in this order; what the fault says.
+# A statement for each n, from 100 on in this order, and the text of its fault.
 FAULTS = {
     "index of a vector": (
         "self.f = self.z[n]",

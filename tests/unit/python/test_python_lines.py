@@ -104,7 +104,7 @@ def line(text: str, source: str = SOURCE) -> int:
 
 
 def places(library: Path, function: str) -> str:
-    """Return addr2line's answer for all instructions of a function, with what is inlined."""
+    """Return addr2line's answer for all instructions of a function, inlined ones too."""
     listing = run("objdump", "-d", f"--disassemble={function}", library)
     addresses = re.findall(r"^ +([0-9a-f]+):\t", listing, re.M)
     assert addresses

@@ -25,7 +25,7 @@ _OPERATORS = {
     **{"neg": "-", "pos": "+", "invert": "~", "not_": "not", "contains": "in"},
 }
 _BITS = ("&", "|", "^", "<<", ">>", "~")
-# A function's name in the source, by what stands for it.
+# Functions' names in the source, by the helpers in their place.
 _NAMES = {
     own.__name__: f"{'np.linalg' if 'linalg' in of.__module__ else 'np'}.{of.__name__}"
     for of, own in (*helpers.INSTEAD.items(), *numpy_functions.STANDS_FOR)
@@ -121,7 +121,7 @@ def mistake(error: Any, function: FunctionType) -> Mistake:
 
 
 def _said(text: str, source: str) -> tuple[str, str]:
-    """Return what is wrong in a line, and the way out."""
+    """Return the mistake of a line, and the way out."""
     if found := _MARK.search(text):
         return found[1].strip(), found[2].strip()
     for pattern, what, way_out in _KNOWN[:2]:

@@ -25,7 +25,7 @@ _DWARF, _FORM = 4, 3
 
 @contextmanager
 def emitted() -> Iterator[None]:
-    """Have numba note lines in what it compiles, and mapped paths in what is raised."""
+    """Have numba note lines in machine code, and mapped paths in exceptions."""
     raises = callconv.CPUCallConv.set_static_user_exc
 
     def init(lower: Any) -> None:
@@ -125,7 +125,7 @@ class _Lines:
         function.set_metadata("dbg", self._scope)
 
     def mark_location(self, builder: Any, line: int) -> None:
-        """Give what is added from here on a line."""
+        """Set the line of the instructions that follow."""
         place = self._lower.loc
         if getattr(place, "filename", None) != self._file:
             line = self._lower.func_ir.loc.line  # of a function that numba has inlined

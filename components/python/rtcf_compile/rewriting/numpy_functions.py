@@ -85,7 +85,7 @@ def rtcf_reshape(a: Any, newshape: Any) -> Any:
 def rtcf_vector_as(a: Any, shape: Any) -> Any:
     """Return a vector as a row or a column."""
     if np.ndim(a) != 1:
-        raise ValueError("a new axis of what is no vector")
+        raise ValueError("a new axis of an array that is no vector")
     return np.reshape(a, shape)
 
 

@@ -575,7 +575,7 @@ class Products(ast.NodeTransformer):
         """`v[:, None]`, `v[None, :]`: a vector as a column, or as a row."""
         others = [each for each in parts if not _is_new(each)]
         if len(parts) > 2 or len(others) > 1 or not all(_is_view(each) for each in others):
-            raise self.mistake(node, "a new axis of what is no vector", "use np.reshape")
+            raise self.mistake(node, "a new axis of an array that is no vector", "use np.reshape")
         is_row = _is_new(parts[0])
         shape = ast.Tuple(
             [ast.Constant(each) for each in ((1, -1) if is_row else (-1, 1))], ast.Load()

@@ -260,7 +260,7 @@ def _call(node: ast.Call, source: Source) -> None:
 
 
 def _called(node: ast.Call, target: Any, source: Source) -> None:
-    """Refuse a call of what is no function, or of one that is not compiled."""
+    """Refuse a call of an object that is no function, or of a function that is not compiled."""
     file, name = source.file, ast.unparse(node.func)
     if not callable(target):
         raise at(file, node, f"{name} is no function", f"write {name}[0] for an element")

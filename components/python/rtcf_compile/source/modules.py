@@ -112,7 +112,7 @@ def is_own(value: Any) -> bool:
 
 
 def _parts(text: str) -> tuple[str, str]:
-    """Return what is wrong with a declaration, and its way out."""
+    """Return the error of a declaration, and its way out."""
     what, _, way_out = text.rpartition(": ")
     return what, way_out
 

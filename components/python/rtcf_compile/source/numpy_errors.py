@@ -82,7 +82,7 @@ _BY_TYPES = re.compile(r"has shape \(\), not ")
 
 
 def explained(error: BaseException, source: str) -> tuple[str, str] | None:
-    """Return what is wrong in a line and the way out, if any input leads there; None for other
+    """Return the mistake of a line and the way out, if any input leads there; None for other
     errors.
     """
     text = " ".join(str(error).split())
