@@ -214,7 +214,8 @@ def _measured_fault_ns() -> int:
         return time.monotonic_ns() - begin
 
     with mmap.mmap(-1, _FAULTS * mmap.PAGESIZE, mmap.MAP_PRIVATE) as memory:
-        memory.madvise(mmap.MADV_NOHUGEPAGE)
+        with contextlib.suppress(OSError):  # of a kernel without huge pages
+            memory.madvise(mmap.MADV_NOHUGEPAGE)
         means = []
         for _ in range(4):
             memory.madvise(mmap.MADV_DONTNEED)
