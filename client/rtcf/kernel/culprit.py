@@ -126,6 +126,10 @@ class _Cause(NamedTuple):
     group: str = ""  # in words, of threads with one name
 
 
+_LESS_URGENT = (
+    "though the loop is more urgent: preemption was off, its priority was higher meanwhile, or a "
+    "limit of CPU time held the loop"
+)
 _OWN = _Cause(Kind.UNKNOWN, "")  # the loop's thread has its CPU, in the cycle
 _NOTHING_ELSE = _Cause(
     Kind.UNKNOWN,
@@ -226,6 +230,7 @@ class _State:
     name: str = ""
     priority: int = 0  # when it got the CPU, and when it gave it back
     last_priority: int = 0
+    passed_over: bool = False  # a less urgent thread than the loop's got the CPU after it
     own_priority: int | None = None
     nested: list[Enter] = field(default_factory=list)  # interrupts, the innermost last
     runnable: bool = False  # the loop's thread waits for the CPU
@@ -265,10 +270,12 @@ class _State:
             )
         self.current, self.name = event.next, event.next_name
         self.priority = self.last_priority = event.next_priority
+        self.passed_over = False
         back = next(self.later, None)
         if back is not None and back.previous == event.next:
             # Meanwhile it may have changed both.
             self.name, self.last_priority = back.previous_name, back.previous_priority
+            self.passed_over = self._is_below(back.next_priority) and back.next != self.thread
         if event.next == self.thread:
             self.own_priority = event.next_priority
             self.runnable = self.throttled = False
@@ -311,25 +318,22 @@ class _State:
             return _Cause(Kind.INTERRUPT, self.nested[-1].name)
         if self.current == self.thread:
             return _PREVIOUS if before_begin and self.woke_ns < cycle.deadline_ns else _OWN
-        if self.throttled:
+        is_less_urgent = self._is_below(self.priority) and self._is_below(self.last_priority)
+        if self.throttled or (self.runnable and is_less_urgent and self.passed_over):
             limit = "a limit of CPU time (cgroup, sched_rt_runtime_us or fair server)"
             who = "the CPU was idle" if self.current == _IDLE else f"{self._who()} ran"
             return _Cause(Kind.THROTTLED, f"{limit}: {who}", f"{limit}: others ran")
         if self.runnable and self.current != _IDLE:
-            return _Cause(Kind.THREAD, self._who(), f"threads {self.name}")
+            doubt = f", {_LESS_URGENT}" if is_less_urgent else ""
+            return _Cause(Kind.THREAD, self._who() + doubt, f"threads {self.name}{doubt}")
         if self.runnable or before_begin:
             return _LATE_TIMER
         return _WAITED if self.waits_for_page else _BLOCKED
 
     def _who(self) -> str:
-        words = [f"pid {self.current}"]
-        priority = self.priority
-        if not self.throttled and self._is_below(priority):
-            priority = self.last_priority
-        # It was more urgent in between only, if neither of them explains its turn.
-        if self.throttled or not self._is_below(priority):
-            words.append(_in_words(priority))
-        return f"thread {self.name} ({', '.join(words)})"
+        explains = not self._is_below(self.priority) or self._is_below(self.last_priority)
+        priority = _in_words(self.priority if explains else self.last_priority)
+        return f"thread {self.name} (pid {self.current}, {priority})"
 
 
 def _in_words(priority: int) -> str:

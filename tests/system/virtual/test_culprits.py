@@ -19,6 +19,7 @@ from machine import wait_for
 
 SEED = 25
 TRIALS = 100
+DOUBT = "though the loop is more urgent"  # of several causes that cannot be told apart
 TRACEFS = Path("/sys/kernel/tracing")
 RT_LIMIT = Path("/proc/sys/kernel/sched_rt_runtime_us")
 # Takes the CPU once, and ends. Its arguments: priority, time (s), name.
@@ -30,7 +31,6 @@ os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
 until = time.monotonic() + seconds
 while time.monotonic() < until:
     pass
-os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 """
 # One interrupt of the timer wakes so many threads below the loop. Its argument: how many.
 SLEEPERS = """
@@ -185,10 +185,11 @@ def test_culprits_are_named_right_in_95_of_100(loop: Loop, tmp_path: Path, limit
         ]
         if not words:
             verdict = "on time"
-        elif any(trial.culprit.named in each for each in words):
+        elif any(trial.culprit.named in each and DOUBT not in each for each in words):
             verdict = "right"
         else:
-            verdict = "unknown" if all("unknown" in each for each in words) else "wrong"
+            is_unknown = all("unknown" in each or DOUBT in each for each in words)
+            verdict = "unknown" if is_unknown else "wrong"
         verdicts[verdict] += 1
         print(verdict, trial.culprit.kind, repr(trial.culprit.named), sorted(set(words)))
     print(verdicts)

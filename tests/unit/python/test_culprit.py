@@ -247,7 +247,12 @@ def test_what_delays_the_beginning_is_named(kind: str, name: str, taken_us: int)
     [
         (120, 9, "thread hog (pid 4711, real-time priority 90)"),
         (9, 120, "thread hog (pid 4711, real-time priority 90)"),
-        (120, 120, "thread hog (pid 4711)"),
+        (
+            120,
+            120,
+            "thread hog (pid 4711, nice 0), though the loop is more urgent: preemption was off, "
+            "its priority was higher meanwhile, or a limit of CPU time held the loop",
+        ),
     ],
 )
 def test_a_thread_is_named_as_it_was_when_it_gave_the_cpu_back(
@@ -269,6 +274,27 @@ def test_a_thread_is_named_as_it_was_when_it_gave_the_cpu_back(
     late = LateCycle(deadline, begin, line.now, line.now - deadline - PERIOD_NS)
     said = find_culprit(line.events, LOOP, late)
     assert (said.kind, said.words) == (Kind.THREAD, words)
+
+
+@pytest.mark.parametrize("then", [0, 4712])
+def test_a_loop_that_is_passed_over_was_throttled_before(then: int) -> None:
+    """It woke while a thread ran that had the CPU already."""
+    line, _ = begun()
+    line.idle()
+    line.switch(4711, "builder", 120, runnable=False)
+    deadline = line.now
+    line.interrupt("vector", "interrupt local timer", US)
+    line.wake()
+    line.run(PERIOD_NS)
+    line.switch(then, "other" if then else "swapper/1", 120, runnable=True)
+    line.run(PERIOD_NS)
+    line.loop(runnable=True)
+    begin = line.now
+    line.run(10 * US)
+    late = LateCycle(deadline, begin, line.now, line.now - deadline - PERIOD_NS)
+    said = find_culprit(line.events, LOOP, late)
+    assert said.kind is Kind.THROTTLED
+    assert "a limit of CPU time" in said.words
 
 
 def test_page_faults_take_as_long_as_on_this_machine() -> None:
