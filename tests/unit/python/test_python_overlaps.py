@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rtcf_compile.comparison import verify
 from rtcf_compile.comparison.inside import Inside
 from rtcf_compile.machine_code import lowering
 from rtcf_compile.source import modules
@@ -32,6 +33,32 @@ PARTS = [
     for begin in range(SIZE)
     for end in (range(begin + 1, SIZE + 1) if step > 0 else (-SIZE - 1, *range(begin)))
 ]
+
+
+ROWS = """\
+import numpy as np
+from rtcf.component import Component, Input, State
+
+
+class Rows(Component):
+    matrix: Input[np.float64, 3, 3]
+    i: Input[int]
+    k: State[np.float64, 3, 3]
+
+    def update(self):
+        i = self.i.value % 3
+        self.k = self.matrix.value
+        self.k[i] = self.k[:, 2]
+        self.k[:, i] = self.k[2]
+        self.k[i, 1:] = self.k[1:, 1]
+"""
+
+
+def test_rows_are_set_from_columns_as_numpy_does(tmp_path: Path) -> None:
+    file = tmp_path / "rows.py"
+    file.write_text(ROWS)
+    (cls,) = modules.components(modules.load(file))
+    assert verify.compare(cls, lowering.compile_component(cls), 300).differences == []
 
 
 def test_a_part_is_set_from_another_as_numpy_does(tmp_path: Path) -> None:

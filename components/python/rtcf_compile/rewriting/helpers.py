@@ -54,10 +54,13 @@ def rtcf_get(base: Any, index: Any) -> Any:
 
 def rtcf_set(base: Any, index: Any, value: Any) -> None:
     """Set what NumPy takes for base[index]: an element, a view, or what a mask or an array of
-    numbers selects. The arrays may share memory: the value is copied, as NumPy does in all cases
-    but of an array of numbers.
+    numbers selects. The arrays may share memory, also where NumPy would not have it: the value for
+    an array of numbers is copied.
     """
-    new = np.array(value)
+    new = np.asarray(value)
+    parts = index if isinstance(index, tuple) else (index,)
+    if any(isinstance(each, np.ndarray) and each.dtype.kind in "iu" for each in parts):
+        new = new.copy()
     if new.dtype.kind == "f" and base.dtype.kind != "f":
         raise TypeError(f"elements are {base.dtype.name}, not {new.dtype.name}")
     base[index] = new
