@@ -155,7 +155,13 @@ class Products(ast.NodeTransformer):
             calls = isinstance(each, ast.Call) and any(
                 _is_before(each, other) and not _contains(each, other) for other in found
             )
-            if early or (calls and resolve(each.func, self.source) is None):  # type: ignore[attr-defined]
+            # A member that a method sets is read before.
+            reads = isinstance(each, ast.Attribute) and any(
+                _is_before(each, other) and self._changes(other.value, True) for other in found
+            )
+            reads = reads and not any(_contains(each, other) for other in found)
+            calls = calls and resolve(each.func, self.source) is None  # type: ignore[attr-defined]
+            if early or reads or calls:
                 raise self.mistake(
                     node, "a := after what it may change", "write it as a statement before"
                 )
@@ -245,7 +251,7 @@ class Products(ast.NodeTransformer):
             and isinstance(node.ops[0], ast.In | ast.NotIn)
             and isinstance(contained, ast.Tuple | ast.List | ast.Set)
             and contained.elts
-            and not any(isinstance(each, ast.Call) for each in ast.walk(node.left))
+            and not any(map(self._acts, (node.left, contained)))
         ):
             tests: list[ast.expr] = [
                 ast.Compare(copy.deepcopy(node.left), [ast.Eq()], [each]) for each in contained.elts
@@ -349,7 +355,7 @@ class Products(ast.NodeTransformer):
             count = self._constant(times)
             if not isinstance(count, int) or not isinstance(values, ast.List) or count < 1:
                 raise self.mistake(node, "repeats a list by a variable", "write its elements")
-            if any(isinstance(each, ast.Call) for each in ast.walk(values)):
+            if self._acts(values):
                 raise self.mistake(node, "repeats calls", "give their values names before")
             elements = [copy.deepcopy(each) for _ in range(count) for each in values.elts]
             return self.visit(like(node, ast.List(elements, ast.Load())))  # type: ignore[no-any-return]
@@ -649,21 +655,24 @@ class Products(ast.NodeTransformer):
         parts = list(_parts(target))
         self._check_constant(target)
         self._check_index(target)
+        before: list[ast.stmt] = []
+        value = node.value
+        reads_members = any(_reads_members(each) for each in parts)
+        if any(map(self._acts, parts)) or (reads_members and self._changes(value)):
+            # Python computes the value before the index.
+            name = f"rtcf_value_{node.lineno}_{node.col_offset}"
+            before = [like(node, ast.Assign([ast.Name(name, ast.Store())], self.visit(value)))]
+            value = like(node, ast.Name(name, ast.Load()))
         if all(_is_view(each) or self._is_whole(each) for each in parts):
             dimensions, is_float = self._known(target.value)
             if any(_is_view(each) for each in parts) or len(parts) < dimensions:
-                read = self.visit(loaded(target))
-                return like(node, ast.Expr(call_of("rtcf_assign", read, self.visit(node.value))))
+                assigned = call_of("rtcf_assign", self.visit(loaded(target)), self.visit(value))
+                return [*before, like(node, ast.Expr(assigned))]
             if len(parts) == dimensions and is_float:
+                node.value = value
                 self.generic_visit(node)
-                return node
-        before: list[ast.stmt] = []
-        value = self.visit(node.value)
-        if any(isinstance(each, ast.Call) for part in parts for each in ast.walk(part)):
-            # Python computes the value before the index.
-            name = f"rtcf_value_{node.lineno}_{node.col_offset}"
-            before = [like(node, ast.Assign([ast.Name(name, ast.Store())], value))]
-            value = ast.Name(name, ast.Load())
+                return [*before, node]
+        value = self.visit(value)
         base = self.visit(loaded(target.value))
         index = _index(self.visit(self._arrays(target.slice)))
         return [*before, like(node, ast.Expr(call_of("rtcf_set", base, index, value)))]
@@ -725,7 +734,7 @@ class Products(ast.NodeTransformer):
 
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST | list[ast.stmt]:
         """`x += value`, `x[1:3] += value`, `x @= m`."""
-        before, target = self._steady(node.target)
+        before, target = self._steady(node.target, node.value)
         in_parts = isinstance(target, ast.Subscript)
         if in_parts or isinstance(node.op, ast.MatMult | ast.Pow):
             value: ast.expr = ast.BinOp(loaded(target), node.op, node.value)
@@ -737,21 +746,67 @@ class Products(ast.NodeTransformer):
         new = self.visit(like(node, ast.Assign([target], like(node, value))))
         return [*before, *(new if isinstance(new, list) else [new])]
 
-    def _steady(self, target: ast.expr) -> tuple[list[ast.stmt], ast.expr]:
+    def _steady(self, target: ast.expr, value: ast.expr) -> tuple[list[ast.stmt], ast.expr]:
         """Return a target that may be evaluated twice with one effect, and the statements before
-        it: calls in its indices.
+        it: parts of its indices that change something, or that the value may change.
         """
         before: list[ast.stmt] = []
+        changes = self._changes(value)
+
+        def named(node: ast.expr) -> ast.expr:
+            name = f"rtcf_index_{node.lineno}_{node.col_offset}"
+            before.append(like(node, ast.Assign([ast.Name(name, ast.Store())], node)))
+            return like(node, ast.Name(name, ast.Load()))
+
+        class Parts(ast.NodeTransformer):
+            def visit_Call(self, node: ast.Call) -> ast.AST:
+                return named(node)
+
+            def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+                return named(node) if resolve(node, source) is None else node
+
+            def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
+                return named(node)
 
         class Calls(ast.NodeTransformer):
             def visit_Call(self, node: ast.Call) -> ast.AST:
-                name = f"rtcf_index_{node.lineno}_{node.col_offset}"
-                before.append(like(node, ast.Assign([ast.Name(name, ast.Store())], node)))
-                return like(node, ast.Name(name, ast.Load()))
+                return named(node)
 
+            def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
+                node.value = self.visit(node.value)
+                if (changes and _reads_members(node.slice)) or is_acting(node.slice):
+                    node.slice = Parts().visit(node.slice)
+                return node
+
+        source, is_acting = self.source, self._acts
         if isinstance(target, ast.Subscript):
             target = Calls().visit(copy.deepcopy(target))
         return self.statements(before), target
+
+    def _acts(self, node: ast.expr) -> bool:
+        """Tell whether an expression has a call or a property: it is to be computed once."""
+        return any(isinstance(each, ast.Call) or self._is_property(each) for each in ast.walk(node))
+
+    def _changes(self, node: ast.expr, surely: bool = False) -> bool:
+        """Tell whether an expression may change members: it calls what is no function of NumPy or
+        of Python, or has a property.
+        """
+        calls = [each for each in ast.walk(node) if isinstance(each, ast.Call)]
+        targets = [resolve(each.func, self.source) for each in calls]
+        return any(each is None or is_own(each) for each in targets) or any(
+            self._is_property(each, surely) for each in ast.walk(node)
+        )
+
+    def _is_property(self, node: ast.AST, surely: bool = False) -> bool:
+        """Tell whether a method computes what a name stands for. Not known here, where all of
+        self's may be one.
+        """
+        return (
+            not surely
+            and isinstance(node, ast.Attribute)
+            and isinstance(node.value, ast.Name)
+            and node.value.id == "self"
+        )
 
 
 def _parts(node: ast.Subscript) -> list[ast.expr]:
@@ -764,6 +819,11 @@ def _is_new(index: ast.AST) -> bool:
 
 def _is_view(index: ast.AST) -> bool:
     return isinstance(index, ast.Slice) or _is_ellipsis(index)
+
+
+def _reads_members(index: ast.expr) -> bool:
+    """Tell whether an index depends on more than variables and constants."""
+    return any(isinstance(each, ast.Attribute | ast.Subscript) for each in ast.walk(index))
 
 
 def _has_walrus(node: ast.AST) -> bool:

@@ -409,6 +409,14 @@ class Hook(Ports):
                 way_out = f"mend its name (self.{near[0]}), or {way_out}"
             raise self.mistake(node, f"no method is called {name}", way_out)
 
+    def _is_property(self, node: ast.AST, surely: bool = False) -> bool:
+        if not isinstance(node, ast.Attribute):
+            return False
+        if _is_super(node.value):
+            return True
+        method = self._methods.find(node.attr) if self._is_self(node.value) else None
+        return method is not None and method.kind == "property"
+
     def _plain_member(self, node: ast.Attribute) -> None:
         """Refuse what ports alone have: `self.kp.value`, `self.f.write(…)`."""
         owner = node.value

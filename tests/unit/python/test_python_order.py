@@ -1,0 +1,132 @@
+"""Compiled code computes the parts of a statement once, and in Python's order, where methods and
+properties change what other parts read.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rtcf_compile.comparison import verify
+from rtcf_compile.comparison.inside import Inside
+from rtcf_compile.machine_code import lowering
+from rtcf_compile.source import modules
+from rtcf_compile.source.mistake import Mistake
+
+HEAD = """\
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+from rtcf.component import Component, State
+
+
+class Places(enum.IntEnum):
+    SECOND = 1
+
+
+@dataclass(frozen=True)
+class Sizes:
+    last: int = 3
+
+
+SIZES = Sizes()
+
+
+class Order(Component):
+    head: State[int]
+    found: State[bool]
+    which: State[int]
+    row: State[np.float64, 4]
+    counts: State[np.int64, 4]
+    table: State[np.float64, 3, 4]
+
+    def advance(self, by):
+        self.head = (self.head * 3 + by) % 4
+        return self.head + by
+
+    @property
+    def next(self):
+        self.head = (self.head + 1) % 4
+        return self.head
+
+    def update(self):
+"""
+STATEMENTS = [
+    "self.row[self.head] = self.advance(2)",
+    "self.row[self.head] += self.advance(2)",
+    "self.counts[self.head] -= self.advance(1)",
+    "self.counts[self.advance(1) % 4] = self.advance(1)",
+    "self.counts[self.next] += self.next",
+    "self.counts[self.next] = self.next",
+    "self.table[self.head % 3, self.head] = self.advance(1)",
+    "self.table[self.head % 3, self.head :] = self.advance(1)",
+    "self.table[self.head % 3, : self.head] += self.next",
+    "self.table[self.head % 3] = self.next",
+    "self.table[self.next % 3][self.next] -= self.next",
+    "self.row[self.counts[0] % 4] = self.next",
+    "self.row[self.next], self.row[self.next] = self.next, self.next",
+    "self.row[SIZES.last] = self.next",
+    "self.row[SIZES.last] += self.next",
+    "self.row[Places.SECOND] = self.next",
+    "self.table[Places.SECOND] -= self.next",
+    "self.found = self.next in (1, 2)",
+    "self.found = self.next not in (self.next, self.advance(1))",
+    "self.found = 0 < self.next < self.next",
+]
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Any]:
+    """Return the class and its machine code."""
+    lines = [HEAD]
+    for number, text in enumerate(STATEMENTS):
+        lines.append(f"        if self.which == {number}:\n            {text}\n")
+    file: Path = tmp_path_factory.mktemp("order") / "order.py"
+    file.write_text("".join(lines))
+    (cls,) = modules.components(modules.load(file))
+    return cls, lowering.compile_component(cls)
+
+
+@pytest.mark.parametrize("text", STATEMENTS)
+def test_a_statement_does_what_it_does_in_python(text: str, both: tuple[Any, Any]) -> None:
+    cls, compiled = both
+    component, inside = cls(), Inside(compiled)
+    component._record["which"] = STATEMENTS.index(text)
+    record = component._record.copy()
+    for _ in range(20):
+        component.update()
+        assert inside.call("update", record) is None
+        for name in ("head", "found", "row", "counts", "table"):
+            assert (record[name] == component._record[name]).all(), name
+
+
+def test_the_comparison_runs_them_as_python_does(both: tuple[Any, Any]) -> None:
+    component, changed = both[0](), verify._interpreted(both[0])()
+    for which in range(len(STATEMENTS)):
+        for _ in range(5):
+            for each in (component, changed):
+                each._record["which"] = which
+                each.update()
+            assert component._record.tobytes() == changed._record.tobytes(), STATEMENTS[which]
+
+
+@pytest.mark.parametrize(
+    ("text", "way_out"),
+    [
+        ("self.counts[0] = self.head + (now := self.advance(1)) + now", "a statement before"),
+        ("self.counts[:] = np.array([self.next] * 4)", "give their values names before"),
+    ],
+)
+def test_another_order_is_refused(text: str, way_out: str, tmp_path: Path) -> None:
+    file = tmp_path / "order.py"
+    file.write_text(f"{HEAD}        {text}\n")
+    (cls,) = modules.components(modules.load(file))
+    with pytest.raises(Mistake, match=way_out):
+        lowering.compile_component(cls)
+
+
+def test_a_walrus_after_a_member_that_stays_is_taken(tmp_path: Path) -> None:
+    file = tmp_path / "order.py"
+    file.write_text(f"{HEAD}        self.head = self.head + (now := abs(self.counts[0])) + now\n")
+    (cls,) = modules.components(modules.load(file))
+    assert verify.compare(cls, lowering.compile_component(cls), 50).differences == []
