@@ -1,10 +1,12 @@
 """Where Python's numbers have no value it raises; compiled code raises there, too."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from rtcf_compile.comparison import verify
 from rtcf_compile.comparison.inside import Inside
 from rtcf_compile.machine_code import lowering
 from rtcf_compile.source import modules
@@ -19,9 +21,10 @@ ONE = [
     *(f"math.{name}(x)" for name in ("sin", "cos", "tan", "asin", "acos", "atan")),
     *(f"math.{name}(x)" for name in ("sinh", "cosh", "tanh", "asinh", "acosh", "atanh")),
     *("x ** 2", "x ** 0.5", "x ** -1", "x ** -2.0", "0.0 ** x", "(-2.0) ** x", "2 ** n", "n ** n"),
+    *("x ** 0", "n ** 0", "n ** -1", "2 ** -2"),
 ]
 TWO = ["x ** y", "math.pow(x, y)", "math.fmod(x, y)", "math.log(x, y)"]
-WHOLE = ("int", "round", "math.floor", "math.ceil", "math.trunc", "2 ** n", "n ** n")
+WHOLE = ("int", "round", "math.floor", "math.ceil", "math.trunc", "2 ** n", "n ** n", "n ** 0")
 HEAD = """\
 import math
 
@@ -90,3 +93,64 @@ def test_it_says_so(text: str, inside: Any) -> None:
     record = cls()._record
     record["which"], record["x"] = ONE.index(text), math.nan
     assert "ValueError: cannot convert float NaN to integer" in compiled.call("update", record)
+
+
+ARRAYS = """\
+import numpy as np
+from rtcf.component import Component, Input, State
+
+
+class Powers(Component):
+    which: State[int]
+    a: State[np.float64, 3]
+    k: State[np.int64, 3]
+    low: Input[float]
+    high: Input[float]
+    out: State[np.float64, 3]
+
+    def update(self):
+"""
+OF_ARRAYS = [
+    *("self.a ** 0", "self.a ** 2", "self.a ** -1", "self.a ** -2", "self.a ** self.k"),
+    *("self.a ** self.which", "2.0 ** self.k", "self.k ** 2", "self.k ** 0"),
+    *("self.k ** -1", "self.k ** self.k", "2 ** self.k"),
+]
+
+
+def test_powers_of_arrays_are_those_of_numpy(tmp_path: Path) -> None:
+    lines = ARRAYS.splitlines()
+    for number, text in enumerate(OF_ARRAYS):
+        lines += [f"        if self.which == {number}:", f"            self.out[:] = {text}"]
+    file = tmp_path / "powers.py"
+    file.write_text("\n".join(lines) + "\n")
+    (cls,) = modules.components(modules.load(file))
+    compiled = Inside(lowering.compile_component(cls))
+    for number, text in enumerate(OF_ARRAYS):
+        for numbers in ((0, 0, 0), (0, 1, 2), (3, -2, 0), (-1, -3, 5)):
+            component = cls()
+            record = component._record
+            record["which"], record["a"], record["k"] = number, numbers, numbers
+            found = record.copy()
+            said, expected = compiled.call("update", found), None
+            with np.errstate(all="ignore"):
+                try:
+                    component.update()
+                except ValueError as error:
+                    expected = error
+            assert (said is None) == (expected is None), f"{text} of {numbers}: {said}"
+            assert np.array_equal(found["out"], record["out"], equal_nan=True), text
+
+
+def test_a_bound_that_is_nan_gives_nan_in_the_comparison_too(tmp_path: Path) -> None:
+    file = tmp_path / "bounds.py"
+    file.write_text(ARRAYS + "        self.out[:] = np.clip(self.a, self.low.value, 1.0)\n"
+                    "        self.out[0] = np.clip(0.5, -1.0, self.high.value)\n")  # fmt: skip
+    (cls,) = modules.components(modules.load(file))
+    compiled = lowering.compile_component(cls)
+    component = cls()
+    component.low.put(math.nan)
+    component.high.put(math.nan)
+    record = component._record.copy()
+    assert Inside(compiled).call("update", record) is None
+    assert np.isnan(record["out"]).all()
+    assert verify.compare(cls, compiled, 1000, edges=0.5).differences == []

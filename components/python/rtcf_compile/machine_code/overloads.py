@@ -1048,7 +1048,7 @@ def _fmod(x: Any, y: Any) -> Any:
 def _pow(base: Any, exponent: Any) -> Any:
     numbers = types.Number | types.Boolean
     if not isinstance(base, numbers) or not isinstance(exponent, numbers):
-        return lambda base, exponent: base**exponent
+        return _power_of_arrays(base, exponent)
     if not isinstance(base, types.Float) and not isinstance(exponent, types.Float):
 
         def whole(base: Any, exponent: Any) -> Any:
@@ -1071,6 +1071,38 @@ def _pow(base: Any, exponent: Any) -> Any:
         return result
 
     return power
+
+
+def _power_of_arrays(base: Any, exponent: Any) -> Any:
+    """Return what computes it of floats, where 0 to a negative power is infinite, or of ints."""
+    kinds = [getattr(each, "dtype", each) for each in (base, exponent)]
+    if isinstance(kinds[1], types.Float):
+        return lambda base, exponent: base**exponent
+    if isinstance(kinds[0], types.Float):
+        return lambda base, exponent: base ** (exponent * 1.0)
+
+    if not isinstance(exponent, types.Array):
+
+        def of_all(base: Any, exponent: Any) -> Any:
+            if exponent < 0:
+                raise ValueError("ints to a negative power: make them floats")
+            return base**exponent
+
+        return of_all
+
+    def of_each(base: Any, exponent: Any) -> Any:
+        if np.any(exponent < 0):
+            raise ValueError("ints to a negative power: make them floats")
+        return base**exponent
+
+    return of_each
+
+
+@compiled_as(helpers.rtcf_negative_pow)
+def _negative_pow(base: Any, exponent: Any) -> Any:
+    if isinstance(base, types.Number | types.Boolean):
+        return lambda base, exponent: helpers.rtcf_pow(float(base), float(exponent))
+    return lambda base, exponent: helpers.rtcf_pow(base, exponent)
 
 
 @compiled_as(helpers.rtcf_math_pow)

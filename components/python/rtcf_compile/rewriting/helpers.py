@@ -152,6 +152,13 @@ def rtcf_pow(base: Any, exponent: Any) -> Any:
     return base**exponent
 
 
+def rtcf_negative_pow(base: Any, exponent: Any) -> Any:
+    """Return base ** exponent for a constant exponent below 0: a float, also of an int."""
+    if isinstance(base, np.ndarray):
+        return base**exponent
+    return rtcf_pow(float(base), float(exponent))
+
+
 def rtcf_math_pow(base: Any, exponent: Any) -> Any:
     """Return math.pow(base, exponent), which raises where it has no value."""
     return rtcf_pow(float(base), float(exponent))
@@ -367,6 +374,7 @@ BY_NAME = {
             rtcf_is,
         ),
         *(rtcf_items, rtcf_front, rtcf_age, rtcf_after, rtcf_pow, rtcf_round, rtcf_index),
+        rtcf_negative_pow,
         *IN_PLACE.values(),
         *OF_LISTS.values(),
         *INSTEAD.values(),

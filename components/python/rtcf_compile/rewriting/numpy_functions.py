@@ -303,8 +303,13 @@ def rtcf_searchsorted(a: Any, v: Any, side: Any = None) -> Any:
 
 @_stands_for(np.clip, method="clip")
 def rtcf_clip(a: Any, a_min: Any, a_max: Any) -> Any:
-    """Return numbers within bounds; one that is None is none."""
-    return np.clip(a, a_min, a_max)
+    """Return numbers within bounds; one that is None is none, one that is NaN gives NaN. To older
+    versions of NumPy's a single NaN is no bound.
+    """
+    if a_min is None and a_max is None:
+        return np.clip(a, a_min, a_max)
+    raised = a if a_min is None else np.maximum(a, a_min)
+    return raised if a_max is None else np.minimum(raised, a_max)
 
 
 @_stands_for(any)
@@ -475,7 +480,7 @@ def rtcf_matrix_power(a: Any, n: Any) -> Any:
 
 
 def rtcf_whole_pow(base: Any, exponent: Any) -> Any:
-    """Return a constant whole power, as a product: squares of squares."""
+    """Return a constant whole power above 0, as a product: squares of squares."""
     result = None
     while exponent > 0:
         if exponent % 2:
@@ -483,7 +488,7 @@ def rtcf_whole_pow(base: Any, exponent: Any) -> Any:
         exponent //= 2
         if exponent:
             base = base * base
-    return 1 + 0 * base if result is None else result
+    return result
 
 
 # The C library decides about the last place of these, in the loop as here.

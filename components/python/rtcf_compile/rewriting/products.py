@@ -309,7 +309,7 @@ class Products(ast.NodeTransformer):
             return like(node, call_of("rtcf_matmul", node.left, node.right))
         # A constant power is a product, which has a value everywhere.
         if isinstance(node.op, ast.Pow):
-            power = "rtcf_whole_pow" if _is_power(node.right) else "rtcf_pow"
+            power = _power(node.right)
             return like(node, call_of(power, node.left, node.right))
         return node
 
@@ -880,8 +880,13 @@ def _sliced(node: ast.expr) -> ast.expr:
     return like(node, call_of("slice", *bounds[: 3 if node.step else 2]))
 
 
-def _is_power(node: ast.AST) -> bool:
-    return isinstance(node, ast.Constant) and type(node.value) is int and node.value >= 0
+def _power(exponent: ast.expr) -> str:
+    """Return the helper for a power with that exponent."""
+    is_negative = isinstance(exponent, ast.UnaryOp) and isinstance(exponent.op, ast.USub)
+    number = exponent.operand if is_negative else exponent  # type: ignore[attr-defined]
+    if not isinstance(number, ast.Constant) or type(number.value) is not int or number.value == 0:
+        return "rtcf_pow"
+    return "rtcf_negative_pow" if is_negative else "rtcf_whole_pow"
 
 
 def _is_ellipsis(node: ast.AST) -> bool:
