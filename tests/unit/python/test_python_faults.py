@@ -117,3 +117,53 @@ def test_a_text_of_the_component_with_braces_stays_as_it_is(tmp_path: Path) -> N
     record["n"] = 100
     said = Inside(compiled).call("update", record)
     assert said is not None and said.endswith(": IndexError: index {} of {}")
+
+
+BASE = """\
+import numpy as np
+from rtcf.component import Component, Input, State
+
+
+class _Base(Component):
+    n: Input[int]
+    z: State[np.float64, 3]
+
+    def update(self):
+        self.z[0] = self.element()
+
+    def element(self):
+        return self.z[self.n.value] + 1.0 / self.n.value
+"""
+CALLING = """\
+from {module} import _Base
+
+
+class Calling(_Base):
+    def update(self):
+        self.z[1] = 0.0
+        super().update()
+"""
+INHERITING = """\
+from {module} import _Base
+
+
+class Inheriting(_Base):
+    pass
+"""
+
+
+@pytest.mark.parametrize(("text", "line"), [(CALLING, 7), (INHERITING, 4)])
+def test_a_line_is_of_the_file_of_the_class(
+    text: str, line: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    module = f"base_at_{line}"
+    (tmp_path / f"{module}.py").write_text(BASE)
+    file = tmp_path / "child.py"
+    file.write_text(text.format(module=module))
+    (cls,) = components(load(file))
+    inside = Inside(compile_component(cls))
+    for number, said in ((0, "ZeroDivisionError: division by zero"), (9, "IndexError: index 9 ")):
+        record = cls()._record
+        record["n"], record["n__valid"] = number, True
+        assert (inside.call("update", record) or "").startswith(f"{line}: {said}")

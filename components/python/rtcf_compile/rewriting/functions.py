@@ -68,7 +68,7 @@ class Functions:
                 source = read(self._plain(method))
                 check(source)
                 self._hook_form(source)
-                found[hook] = self._method(source, method)
+                found[hook] = self._method(source, method, is_hook=True)
                 if hook == "prepare":
                     self._check_prepare(source.function, set())
                 elif hook in ("update", "safe"):
@@ -134,11 +134,14 @@ class Functions:
             "write a method, a static method or a property by `def`",
         )
 
-    def _method(self, source: Source, method: Method) -> FunctionType:
+    def _method(self, source: Source, method: Method, is_hook: bool = False) -> FunctionType:
         function = source.function
         check(source)
         self._begin(function, source)
-        hook = Hook(source, self.description, self._methods, method.owner, self.logs)
+        # Lines are those of one file: a base's hook in another one has the line of the class.
+        is_here = source.file == self.file()
+        line = 0 if is_here or not is_hook else inspect.getsourcelines(self._cls)[1]
+        hook = Hook(source, self.description, self._methods, method.owner, self.logs, is_here, line)
         tree = hook.function()
         self._hooks[function] = hook
         self.used |= hook.used

@@ -44,9 +44,16 @@ class Hook(Ports):
         methods: Methods,
         owner: type,
         logs: Logs,
+        is_noted: bool = True,
+        entry_line: int = 0,
     ) -> None:
-        """Rewrite a method that a class defines, for one that has these members and methods."""
+        """Rewrite a method that a class defines, for one that has these members and methods.
+
+        `is_noted`: its lines are noted while it runs, as it is in the file of the component.
+        `entry_line`: a line that is noted before it runs.
+        """
         super().__init__(source, description)
+        self._is_noted, self._entry_line = is_noted, entry_line
         self._methods, self._owner, self._logs = methods, owner, logs
         self.called: dict[str, Method] = {}
         self.lines: set[int] = set()
@@ -58,6 +65,8 @@ class Hook(Ports):
             raise self.mistake(tree, f"{tree.name} has no self", f"write def {tree.name}(self):")
         self._without_aliases(tree)
         body = self.statements(tree.body)
+        if self._entry_line:
+            body.insert(0, self._mark(tree, self._entry_line))
         arguments = ast.arguments(
             posonlyargs=[],
             args=[ast.arg(each.arg) for each in (*tree.args.posonlyargs, *tree.args.args)],
@@ -78,12 +87,18 @@ class Hook(Ports):
             tests_none = any(isinstance(each, ast.Is | ast.IsNot) for each in parts)
             raises = not tests_none and any(map(self._may_raise, parts))
         new = super().visit(node)
+        if not self._is_noted:
+            return new
         if raises or (is_simple and any(isinstance(each, calls) for each in ast.walk(node))):
-            self.lines.add(node.lineno)
-            target = ast.Attribute(ast.Name(self._self, ast.Load()), "_line", ast.Store())
-            mark = like(node, ast.Assign([target], ast.Constant(node.lineno)))
+            mark = self._mark(node, node.lineno)
             return [mark, *(new if isinstance(new, list) else [new])]
         return new
+
+    def _mark(self, node: ast.stmt, line: int) -> ast.stmt:
+        """Return the statement that notes a line."""
+        self.lines.add(line)
+        target = ast.Attribute(ast.Name(self._self, ast.Load()), "_line", ast.Store())
+        return like(node, ast.Assign([target], ast.Constant(line)))
 
     def _may_raise(self, node: ast.AST) -> bool:
         """Tell whether it is `self.goals.front`, or a state that may be None."""
