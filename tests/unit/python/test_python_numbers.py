@@ -154,3 +154,23 @@ def test_a_bound_that_is_nan_gives_nan_in_the_comparison_too(tmp_path: Path) -> 
     assert Inside(compiled).call("update", record) is None
     assert np.isnan(record["out"]).all()
     assert verify.compare(cls, compiled, 1000, edges=0.5).differences == []
+
+
+def test_sums_of_unsigned_ints_are_ints(tmp_path: Path) -> None:
+    body = """\
+        self.k[0] = self.small.value.sum()
+        self.k[1] = np.sum(self.table.value)
+        self.out[:] = np.sum(self.table.value, axis=1)
+"""
+    file = tmp_path / "sums.py"
+    ports = "    small: Input[np.uint8, 4]\n    table: Input[np.uint32, 3, 2]\n"
+    file.write_text(ARRAYS.replace("    low:", f"{ports}    low:") + body)
+    (cls,) = modules.components(modules.load(file))
+    component = cls()
+    component.small.put(np.array([255, 255, 255, 255], np.uint8))
+    component.table.put(np.full((3, 2), 2**32 - 1, np.uint32))
+    record = component._record.copy()
+    assert Inside(lowering.compile_component(cls)).call("update", record) is None
+    component.update()
+    for name in ("k", "out"):
+        assert np.array_equal(record[name], component._record[name])

@@ -633,12 +633,11 @@ def _sum_of(a: Any) -> Any:
     if isinstance(a.dtype, types.Float):
         zero = _dtype(a).type(0)
         return lambda a: zero + _halves(a, 0, a.shape[0], zero)
-    whole = np.uint64(0) if _dtype(a).kind == "u" else np.int64(0)
 
-    def in_order(a: Any) -> Any:
-        result = whole
+    def unsigned(a: Any) -> Any:
+        result = np.uint64(0)
         for i in range(a.shape[0]):
-            result += whole.dtype.type(a[i])
+            result += np.uint64(a[i])
         return result
 
     def wide(a: Any) -> Any:
@@ -647,7 +646,7 @@ def _sum_of(a: Any) -> Any:
             result += np.int64(a[i])
         return result
 
-    return wide if whole.dtype.kind == "i" else in_order
+    return unsigned if _dtype(a).kind == "u" else wide
 
 
 @plain
