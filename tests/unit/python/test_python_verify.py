@@ -154,6 +154,21 @@ def test_an_error_larger_than_rounding_is_a_difference() -> None:
     assert not verify._is_rounding(np.float64(2.0), np.float64(1.0), [])
 
 
+def test_an_infinite_element_says_nothing_about_the_others() -> None:
+    theirs = np.array([1.0, np.inf, np.nan, 5.0])
+    nearby = [np.array([1.0 + 4e-16, np.inf, np.nan, 5.0]), theirs]
+    assert verify._is_rounding(theirs + np.array([2e-15, 0.0, 0.0, 1e-15]), theirs, nearby)
+    assert not verify._is_rounding(theirs + np.array([2e-15, 0.0, 0.0, 1e-13]), theirs, nearby)
+    assert not verify._is_rounding(theirs + np.array([1e-14, 0.0, 0.0, 0.0]), theirs, nearby)
+    assert not verify._is_rounding(np.array([1.0, 7.0, np.nan, 5.0]), theirs, nearby)
+
+
+def test_float32_is_rounded_otherwise_by_numpy(tmp_path: Path) -> None:
+    body = "    def update(self):\n        self.out.write(self.a.value * 0.1)"
+    file = written(tmp_path, body, "np.float32, 8", "np.float64, 8")
+    assert main.main([file, "--verify", "3000"]) == main.DONE
+
+
 @pytest.mark.parametrize(
     ("body", "kind", "said"),
     [

@@ -41,7 +41,7 @@ from rtcf_compile.source.processor_time import HOOK_S, TimeLimitError, loop_line
 LARGEST_ULP = 4
 MOST_DIFFERENCES = 10
 # Changes of the last place of the values read, so many, explain a difference so much larger.
-_TRIES, _ROUNDING = 8, 16.0
+_TRIES, _ROUNDING = 16, 16.0
 _HELPERS = {**helpers.BY_NAME, **numpy_functions.BY_NAME}
 _ANEW = 200  # cycles from one start to the next
 _EDGES = (0.0, -0.0, 1.0, -1.0, 1e-300, -1e-300, 1e-3, 1e3, 1e12, -1e12, 1e300, np.inf, np.nan)
@@ -263,16 +263,25 @@ class _Comparing:
         """Return what the interpreter makes of values a last place apart from those of the hook."""
         found = []
         theirs = self._component._record
-        for _ in range(_TRIES):
+        names = [
+            name
+            for name in theirs.dtype.names
+            if theirs[name].dtype.kind == "f" and not name.startswith("_")
+        ]
+        towards: dict[str, Any] = {}
+        for number in range(_TRIES):
             _bytes(theirs)[:] = _bytes(self._record)
-            for name in theirs.dtype.names:
-                if theirs[name].dtype.kind == "f" and not name.startswith("_"):
-                    towards = self._draw.choice((-np.inf, np.inf), theirs[name].shape)
-                    towards = towards.astype(theirs[name].dtype)
-                    theirs[name] = np.nextafter(theirs[name], towards)
+            for name in names:
+                # Each way is tried with its opposite: a float32 may be rounded to the same by one.
+                towards[name] = -towards[name] if number % 2 else self._towards(theirs[name])
+                theirs[name] = np.nextafter(theirs[name], towards[name])
             if self._raised(hook) is None:
                 found.append(theirs.copy())
         return found
+
+    def _towards(self, values: Any) -> Any:
+        """Return infinities of either sign, one for each of some values."""
+        return self._draw.choice((-np.inf, np.inf), values.shape).astype(values.dtype)
 
     def _raised(self, hook: str) -> Exception | None:
         try:
@@ -313,10 +322,15 @@ def _is_rounding(mine: Any, theirs: Any, nearby: list[Any]) -> bool:
         return False
     ours, pythons = np.asarray(mine, np.float64), np.asarray(theirs, np.float64)
     others = np.asarray(nearby, np.float64)
-    if not all(np.isfinite(each).all() for each in (ours, pythons, others)):
-        return False
-    spread = np.abs(others - pythons).max(axis=0)
-    return bool((np.abs(ours - pythons) <= _ROUNDING * spread).all())
+    # An element that is the same, as infinity or NaN, tells nothing about the others.
+    pairs = zip(np.ravel(mine), np.ravel(theirs), strict=True)
+    same = np.reshape([ulp(*pair) <= LARGEST_ULP for pair in pairs], ours.shape)
+    finite = np.isfinite(ours) & np.isfinite(pythons) & np.isfinite(others).all(axis=0)
+    with np.errstate(all="ignore"):
+        spread = np.abs(others - pythons).max(axis=0)
+        apart = np.abs(ours - pythons)
+    near = finite & (apart <= _ROUNDING * spread)
+    return bool((same | near).all())
 
 
 def _farthest(mine: Any, theirs: Any) -> tuple[str, Any, Any]:
