@@ -72,6 +72,9 @@ STATEMENTS = [
     "self.found = self.next in (1, 2)",
     "self.found = self.next not in (self.next, self.advance(1))",
     "self.found = 0 < self.next < self.next",
+    "now = self.row; now += 2; now **= 2",
+    "now = self.counts[1:]; now += 2; now **= self.head % 2",
+    "now = self.head; now **= 2; self.counts[0] = now",
 ]
 
 

@@ -1001,6 +1001,18 @@ for _helper in helpers.IN_PLACE.values():
     _changing(_helper, getattr(operator, _helper.__name__.removeprefix("rtcf_in_place_")))
 
 
+@compiled_as(helpers.rtcf_changed)
+def _changed(target: Any, value: Any) -> Any:
+    if not isinstance(target, types.Array):
+        return lambda target, value: value
+
+    def changed(target: Any, value: Any) -> Any:
+        helpers.rtcf_assign(target, value)
+        return target
+
+    return changed
+
+
 def _checking(helper: Any, function: Any) -> None:
     """Register a function of one number: as CPython has it, what gives a NaN of a number is outside
     its domain, and what gives infinity of a finite one too, unless it only grows so large.

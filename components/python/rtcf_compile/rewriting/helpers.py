@@ -92,6 +92,14 @@ IN_PLACE: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 }
 
 
+def rtcf_changed(target: Any, value: Any) -> Any:
+    """Return a value; an array that has it now, where the target is one."""
+    if not isinstance(target, np.ndarray):
+        return value
+    np.copyto(target, value, casting="same_kind")
+    return target
+
+
 def _of_lists(operation: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
     def of_lists(left: Any, right: Any) -> Any:
         """Return an operation of an array and a list."""
@@ -374,7 +382,7 @@ BY_NAME = {
             rtcf_is,
         ),
         *(rtcf_items, rtcf_front, rtcf_age, rtcf_after, rtcf_pow, rtcf_round, rtcf_index),
-        rtcf_negative_pow,
+        *(rtcf_negative_pow, rtcf_changed),
         *IN_PLACE.values(),
         *OF_LISTS.values(),
         *INSTEAD.values(),

@@ -157,7 +157,8 @@ class Products(ast.NodeTransformer):
             )
             # A member that a method sets is read before.
             reads = isinstance(each, ast.Attribute) and any(
-                _is_before(each, other) and self._changes(other.value, True) for other in found
+                _is_before(each, other) and self._changes(other.value, True)  # type: ignore[attr-defined]
+                for other in found
             )
             reads = reads and not any(_contains(each, other) for other in found)
             calls = calls and resolve(each.func, self.source) is None  # type: ignore[attr-defined]
@@ -738,6 +739,9 @@ class Products(ast.NodeTransformer):
         in_parts = isinstance(target, ast.Subscript)
         if in_parts or isinstance(node.op, ast.MatMult | ast.Pow):
             value: ast.expr = ast.BinOp(loaded(target), node.op, node.value)
+            # An array is changed, whatever names it has.
+            if isinstance(target, ast.Name) and isinstance(node.op, ast.Pow):
+                value = call_of("rtcf_changed", loaded(target), value)
         elif type(node.op) in IN_PLACE:
             value = call_of(IN_PLACE[type(node.op)].__name__, loaded(target), node.value)
         else:

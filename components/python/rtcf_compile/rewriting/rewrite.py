@@ -94,7 +94,7 @@ class Hook(Ports):
             return [mark, *(new if isinstance(new, list) else [new])]
         return new
 
-    def _mark(self, node: ast.stmt, line: int) -> ast.stmt:
+    def _mark(self, node: ast.AST, line: int) -> ast.stmt:
         """Return the statement that notes a line."""
         self.lines.add(line)
         target = ast.Attribute(ast.Name(self._self, ast.Load()), "_line", ast.Store())
