@@ -128,8 +128,15 @@ def test_another_order_is_refused(text: str, way_out: str, tmp_path: Path) -> No
         lowering.compile_component(cls)
 
 
-def test_a_walrus_after_a_member_that_stays_is_taken(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "text",
+    [
+        "self.head = self.head + (now := abs(self.counts[0])) + now",
+        "self.counts[:] = np.array([self.head] * 4)",
+    ],
+)
+def test_members_that_stay_are_read_in_any_order(text: str, tmp_path: Path) -> None:
     file = tmp_path / "order.py"
-    file.write_text(f"{HEAD}        self.head = self.head + (now := abs(self.counts[0])) + now\n")
+    file.write_text(f"{HEAD}        {text}\n")
     (cls,) = modules.components(modules.load(file))
     assert verify.compare(cls, lowering.compile_component(cls), 50).differences == []

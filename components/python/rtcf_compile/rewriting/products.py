@@ -356,7 +356,7 @@ class Products(ast.NodeTransformer):
             count = self._constant(times)
             if not isinstance(count, int) or not isinstance(values, ast.List) or count < 1:
                 raise self.mistake(node, "repeats a list by a variable", "write its elements")
-            if self._acts(values):
+            if self._acts(values, surely=True):
                 raise self.mistake(node, "repeats calls", "give their values names before")
             elements = [copy.deepcopy(each) for _ in range(count) for each in values.elts]
             return self.visit(like(node, ast.List(elements, ast.Load())))  # type: ignore[no-any-return]
@@ -787,9 +787,11 @@ class Products(ast.NodeTransformer):
             target = Calls().visit(copy.deepcopy(target))
         return self.statements(before), target
 
-    def _acts(self, node: ast.expr) -> bool:
+    def _acts(self, node: ast.expr, surely: bool = False) -> bool:
         """Tell whether an expression has a call or a property: it is to be computed once."""
-        return any(isinstance(each, ast.Call) or self._is_property(each) for each in ast.walk(node))
+        return any(
+            isinstance(each, ast.Call) or self._is_property(each, surely) for each in ast.walk(node)
+        )
 
     def _changes(self, node: ast.expr, surely: bool = False) -> bool:
         """Tell whether an expression may change members: it calls what is no function of NumPy or
