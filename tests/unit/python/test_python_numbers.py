@@ -147,7 +147,7 @@ def test_a_bound_that_is_nan_gives_nan_in_the_comparison_too(tmp_path: Path) -> 
                     "        self.out[0] = np.clip(0.5, -1.0, self.high.value)\n")  # fmt: skip
     (cls,) = modules.components(modules.load(file))
     compiled = lowering.compile_component(cls)
-    component = cls()
+    component: Any = cls()
     component.low.put(math.nan)
     component.high.put(math.nan)
     record = component._record.copy()
@@ -166,7 +166,7 @@ def test_sums_of_unsigned_ints_are_ints(tmp_path: Path) -> None:
     ports = "    small: Input[np.uint8, 4]\n    table: Input[np.uint32, 3, 2]\n"
     file.write_text(ARRAYS.replace("    low:", f"{ports}    low:") + body)
     (cls,) = modules.components(modules.load(file))
-    component = cls()
+    component: Any = cls()
     component.small.put(np.array([255, 255, 255, 255], np.uint8))
     component.table.put(np.full((3, 2), 2**32 - 1, np.uint32))
     record = component._record.copy()

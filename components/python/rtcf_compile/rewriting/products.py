@@ -794,8 +794,8 @@ class Products(ast.NodeTransformer):
         )
 
     def _changes(self, node: ast.expr, surely: bool = False) -> bool:
-        """Tell whether an expression may change members: it calls what is no function of NumPy or
-        of Python, or has a property.
+        """Tell whether an expression may change members: it calls other functions
+        than those of NumPy and Python, or has a property.
         """
         calls = [each for each in ast.walk(node) if isinstance(each, ast.Call)]
         targets = [resolve(each.func, self.source) for each in calls]
