@@ -240,7 +240,7 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
     if not isinstance(annotation, Declared):
         raise DeclarationError(
             f"is neither Input, Queue, Output, Parameter, Derived nor State: write {name}: "
-            f"State[…] for what is kept, {name} = … for a constant"
+            f"State[…] for a value that is kept, {name} = … for a constant"
         )
     # Derived members have no name outside the component.
     if not name.isascii() and annotation.kind is not Derived:

@@ -8,7 +8,7 @@ _WORDS = {"ß": "ss", "ẞ": "SS"}
 
 
 def class_name_error(name: str) -> str:
-    """Return what keeps rtcfd from loading a class of that name, and the way out; "" if nothing."""
+    """Return why rtcfd loads no class of that name, and the way out; "" if it does."""
     if not name.isascii():
         return f"is no name in ROS, which has ASCII letters alone: {advice(name)}"
     if len(name) > _LONGEST:

@@ -131,8 +131,7 @@ bool PythonComponent::start() {
     return raised == nullptr || fail("{}", said(raised, record_));
 }
 
-// A cycle takes as long as the rest: what few components have, or none in a good cycle, is not in
-// line.
+// Work that few components have, or no good cycle, is not in line.
 
 void PythonComponent::update() {
     takeDt();

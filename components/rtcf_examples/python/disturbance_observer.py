@@ -1,4 +1,4 @@
-"""A disturbance observer for a drive: what force acts on it beside the commanded one (Ohnishi,
+"""A disturbance observer for a drive: the force on it beside the commanded one (Ohnishi,
 Shibata and Murakami, Motion control for advanced mechatronics, 1996).
 """
 

@@ -109,7 +109,7 @@ class Culprits:
         )
 
     def _gap(self) -> Culprit:
-        """Return what the kernel does not see: an SMI looks like a component that takes long."""
+        """Return a time that the kernel does not see: an SMI looks like a slow component."""
         return self._stumble("unknown", "unknown", spin_us=self._draw.randint(1000, 10_000))
 
     def _stumble(self, kind: str, named: str, **values: int) -> Culprit:

@@ -1,5 +1,5 @@
-"""Mistakes that engineers who know Python and NumPy make in a component: what they write, and the
-words that the compiler's message has.
+"""Mistakes that engineers who know Python and NumPy make in a component: their code, and words
+of the compiler's message.
 
 `# here` marks the line that the message names, where it is not the only one.
 """

@@ -1,5 +1,5 @@
 """Compiled code computes the parts of a statement once, and in Python's order, where methods and
-properties change what other parts read.
+properties change values that other parts read.
 """
 
 from pathlib import Path

@@ -62,9 +62,9 @@ class Inside:
             self._hooks[hook] = function
 
     def call(self, hook: str, record: Any) -> str | None:
-        """Run a hook on a record; return what it raised, as the loop would say it.
+        """Run a hook on a record; return its exception in the loop's words.
 
-        Inputs have what the record says; the record then says what outputs have.
+        Inputs have the values of the record, which then has those of the outputs.
         """
         if hook in _WITH_PORTS:
             self._ports.put(record)
@@ -105,7 +105,7 @@ class _Ports:
         self.address: int = int(self._addresses.ctypes.data)
 
     def put(self, record: Any) -> None:
-        """Give inputs what a record says."""
+        """Give inputs the values of a record."""
         for each in self._inputs:
             is_new, is_valid = (bool(record[f"{each.name}__{flag}"]) for flag in ("new", "valid"))
             each.sequence = int(is_new) + int(is_valid)
@@ -113,7 +113,7 @@ class _Ports:
             each.value = record[each.name]
 
     def take(self, record: Any) -> None:
-        """Say in a record what outputs were written."""
+        """Put the values of written outputs into a record."""
         for each in self._outputs:
             if each.sequence:
                 record[each.name] = each.value

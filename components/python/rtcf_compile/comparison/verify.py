@@ -31,7 +31,7 @@ from rtcf.component.value_type import ValueType
 
 from rtcf_compile.comparison.inside import Inside
 from rtcf_compile.machine_code.lowering import Compiled
-from rtcf_compile.rewriting import helpers, numpy_functions
+from rtcf_compile.rewriting.functions import HELPERS, drop_types
 from rtcf_compile.rewriting.functions import made as made_of
 from rtcf_compile.rewriting.products import Products
 from rtcf_compile.source.mistake import display, source_line
@@ -42,7 +42,6 @@ LARGEST_ULP = 4
 MOST_DIFFERENCES = 10
 # Changes of the last place of the values read, so many, explain a difference so much larger.
 _TRIES, _ROUNDING = 16, 16.0
-_HELPERS = {**helpers.BY_NAME, **numpy_functions.BY_NAME}
 _ANEW = 200  # cycles from one start to the next
 _EDGES = (0.0, -0.0, 1.0, -1.0, 1e-300, -1e-300, 1e-3, 1e3, 1e12, -1e12, 1e300, np.inf, np.nan)
 # Python raises where IEEE 754 goes on to infinity or NaN.
@@ -483,18 +482,15 @@ def _with_helpers(
     products = Products(source)
     tree = source.tree
     tree.body = products.statements(tree.body)
-    tree.returns = None
-    tree.decorator_list = []
-    for each in tree.args.args:
-        each.annotation = None
-    scope = {**function.__globals__, **_HELPERS, **products.constants}
+    drop_types(tree)
+    scope = {**function.__globals__, **HELPERS, **products.constants}
     for name, value in scope.items():
         if isinstance(value, type) and copies and value in copies:
             scope[name] = copies[value]
     known[function] = _in_class(tree, scope, source, owner)
     for name in function.__code__.co_names:
         value = scope.get(name)
-        if isinstance(value, FunctionType) and is_own(value) and name not in _HELPERS:
+        if isinstance(value, FunctionType) and is_own(value) and name not in HELPERS:
             scope[name] = _with_helpers(value, known)
     return known[function]
 

@@ -122,7 +122,6 @@ struct OutputTable {
     const TypeTable* type;        ///< null: a message
     const MessageTable* message;  ///< null: no message
     std::int64_t finite;          ///< 1: declared Finite
-    std::int64_t value;           ///< in the record
     std::int64_t written;         ///< in the record, a bool
     const LeafTable* leaves;
     std::int64_t leaf_count;

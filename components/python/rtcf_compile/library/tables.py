@@ -159,7 +159,6 @@ class _Library:
             None if member.message else self._type(member.type),
             self._message(member.message),
             int(bool(options.get("finite"))),
-            _NOWHERE if member.message else place.of(name),
             place.of(f"{name}__written"),
             *self._leaves(compiled, member),
             *self._array(self._texts(member)),

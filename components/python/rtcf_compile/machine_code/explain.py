@@ -1,4 +1,4 @@
-"""numba's errors in one line: where, what, and what to write instead, without a word of numba's."""
+"""numba's errors in one line: place, mistake and way out, without a word of numba's."""
 
 import re
 from types import FunctionType

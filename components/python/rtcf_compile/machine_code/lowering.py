@@ -128,14 +128,13 @@ def _linked(compiled: Compiled, inner: dict[str, tuple[str, str]], allocator: st
     """Return one module with the entries of these hooks, and nothing that they do not need."""
     parts, base = [], arena.DECLARATIONS + port_access.DECLARATIONS
     access = port_access.PortAccess(compiled.description, compiled.used)
-    values = compiled.description.record.itemsize - 16  # its last member
     for hook, (name, text) in inner.items():
         base += port_access.entry(
             compiled.symbol(hook),
             name,
             backend.taken(text, name),
-            values,
-            access if hook in _REALTIME else None,
+            access,
+            has_ports=hook in _REALTIME,
             writes_always=hook == "safe",
         )
         # Ours take their place; numba's count by locked instructions.

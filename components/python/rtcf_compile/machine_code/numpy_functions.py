@@ -377,7 +377,7 @@ def _flatten(a: Any) -> Any:
 
 def _joined(name: str, parts: Any, along: Any) -> Any:
     """Return a function that copies arrays one after the other: vectors (along None), matrices
-    below each other (0) or side by side (1). Rows and columns are what vectors become there.
+    below each other (0) or side by side (1). Vectors become rows and columns there.
     """
     result = np.result_type(*(_dtype(each) for each in parts))
     count = len(parts)

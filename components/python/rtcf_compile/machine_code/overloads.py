@@ -79,7 +79,7 @@ def _some(value: Any) -> Any:
 
 @intrinsic
 def _unwrapped(typing, value):  # type: ignore[no-untyped-def]
-    """What may be None, and is not."""
+    """An optional value that is not None."""
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         return context.cast(builder, arguments[0], value, value.type)
@@ -89,7 +89,7 @@ def _unwrapped(typing, value):  # type: ignore[no-untyped-def]
 
 @overload(_some)
 def _value_of(value):  # type: ignore[no-untyped-def]
-    """What may be None; raises where it is."""
+    """An optional value; raises where it is None."""
 
     def some(value):  # type: ignore[no-untyped-def]
         if value is None:
@@ -117,7 +117,7 @@ def _member(typing, value, cls):  # type: ignore[no-untyped-def]
 
 @lower_builtin(operator.is_, types.Optional, types.IntEnumMember)
 def _maybe_is(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-    """`x is Mode.RUN` of what may be None."""
+    """`x is Mode.RUN` of an optional value."""
     optional, member = signature.args
     if optional.type != member:
         return context.get_constant(types.boolean, False)
@@ -462,7 +462,7 @@ def _assign(target: Any, value: Any) -> Any:
 @plain
 def _is_from_the_end(target: Any, value: Any) -> Any:
     """Tell whether NumPy copies a vector from its last element to its first: where it would
-    otherwise set what it has yet to read. It looks at the addresses alone, not at the strides.
+    otherwise set elements before it reads them. It looks at addresses alone, not at strides.
     """
     n = target.shape[0]
     if n == 0 or value.shape[0] != n:

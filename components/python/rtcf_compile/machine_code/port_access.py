@@ -14,7 +14,7 @@ SOURCE, CURRENT, SEEN = 0, 8, 16  # in an input
 RAW, CLOCK = 0, 8  # in an output
 CLOCK_TIME = 8  # in the loop's clock
 READ, READ_MORE = "rtcf_python_read", "rtcf_python_read_more"
-NONE, OLD, NEW = 0, 1, 2  # what READ returns
+NONE, OLD, NEW = 0, 1, 2  # the results of READ
 _UNROLLED = 64  # elements
 
 
@@ -77,6 +77,7 @@ class PortAccess:
         assert fields is not None
         self._places = {name: int(field[1]) for name, field in fields.items()}
         self._used = used
+        self.raised = self._places["_raised"]  # the numbers that an exception names
         self._inputs, self._outputs = inputs(description), outputs(description)
 
     def read(self) -> str:
@@ -96,12 +97,9 @@ class PortAccess:
 
     def _read(self, member: Member, name: str, index: int) -> Iterator[str]:
         yield from _port(name, index)
-        yield from _place(f"{name}.source.place", f"{name}.port", SOURCE, "i8*")
-        yield f"  %{name}.source = load i8*, i8** %{name}.source.place"
-        yield from _place(f"{name}.sequence.place", f"{name}.source", SEQUENCE, "i64")
-        yield f"  %{name}.sequence = load i64, i64* %{name}.sequence.place"
-        yield from _place(f"{name}.seen.place", f"{name}.port", SEEN, "i64")
-        yield f"  %{name}.seen = load i64, i64* %{name}.seen.place"
+        yield from _loaded(f"{name}.source", f"{name}.port", SOURCE, "i8*")
+        yield from _loaded(f"{name}.sequence", f"{name}.source", SEQUENCE, "i64")
+        yield from _loaded(f"{name}.seen", f"{name}.port", SEEN, "i64")
         yield from _place(f"{name}.current.place", f"{name}.port", CURRENT, "i8*")
         yield f"  %{name}.is_new = icmp ne i64 %{name}.sequence, %{name}.seen"
         yield f"  br i1 %{name}.is_new, label %{name}.new, label %{name}.old"
@@ -155,29 +153,26 @@ class PortAccess:
         yield f"  call void @{READ_MORE}(i8* %{name}.port, {', '.join(places)})"
 
     def _write(self, member: Member, name: str, index: int) -> Iterator[str]:
-        flag = self._places[f"{member.name}__written"]
-        yield from _place(f"{name}.flag", "record", flag, "i8")
-        yield f"  %{name}.written = load i8, i8* %{name}.flag"
+        yield from _loaded(
+            f"{name}.written", "record", self._places[f"{member.name}__written"], "i8"
+        )
         yield f"  %{name}.is_written = icmp ne i8 %{name}.written, 0"
         yield f"  br i1 %{name}.is_written, label %{name}.write, label %{name}.done"
         yield f"{name}.write:"
         yield from _port(name, index)
-        yield from _place(f"{name}.raw.place", f"{name}.port", RAW, "i8*")
-        yield f"  %{name}.raw = load i8*, i8** %{name}.raw.place"
+        yield from _loaded(f"{name}.raw", f"{name}.port", RAW, "i8*")
         yield from _place(f"{name}.from", "record", self._places[member.name], "i8")
         yield from _place(f"{name}.to", f"{name}.raw", SLOT_VALUE, "i8")
         yield from _copy(member, name, to_port=True)
-        yield from _place(f"{name}.sequence.place", f"{name}.raw", SEQUENCE, "i64")
-        yield f"  %{name}.sequence = load i64, i64* %{name}.sequence.place"
+        yield from _loaded(f"{name}.sequence", f"{name}.raw", SEQUENCE, "i64")
         yield f"  %{name}.next = add i64 %{name}.sequence, 1"
         yield f"  store i64 %{name}.next, i64* %{name}.sequence.place"
-        yield from _place(f"{name}.clock.place", f"{name}.port", CLOCK, "i8*")
-        yield f"  %{name}.clock = load i8*, i8** %{name}.clock.place"
+        yield from _loaded(f"{name}.clock", f"{name}.port", CLOCK, "i8*")
         yield from _place(f"{name}.now.place", f"{name}.clock", CLOCK_TIME, "i64")
         yield f"  %{name}.now = load atomic i64, i64* %{name}.now.place monotonic, align 8"
         yield from _place(f"{name}.time.place", f"{name}.raw", SLOT_TIME, "i64")
         yield f"  store i64 %{name}.now, i64* %{name}.time.place"
-        yield f"  store i8 0, i8* %{name}.flag"
+        yield f"  store i8 0, i8* %{name}.written.place"
         yield f"  br label %{name}.done"
         yield f"{name}.done:"
 
@@ -194,6 +189,12 @@ def _place(name: str, base: str, offset: int, kind: str) -> Iterator[str]:
         return
     yield f"  %{name}.byte = getelementptr i8, i8* %{base}, i64 {offset}"
     yield f"  %{name} = bitcast i8* %{name}.byte to {kind}*"
+
+
+def _loaded(name: str, base: str, offset: int, kind: str) -> Iterator[str]:
+    """Return a value that many bytes behind an address, and its own address as `name.place`."""
+    yield from _place(f"{name}.place", base, offset, kind)
+    yield f"  %{name} = load {kind}, {kind}* %{name}.place"
 
 
 def _copy(member: Member, name: str, to_port: bool) -> Iterator[str]:
@@ -241,22 +242,21 @@ def entry(
     symbol: str,
     inner: str,
     taken: tuple[str, str],
-    values: int,
-    access: PortAccess | None,
+    access: PortAccess,
+    has_ports: bool,
     writes_always: bool = False,
 ) -> str:
-    """Return a hook's function as C calls it: null, or what it raised.
+    """Return a hook's function for C, which returns null or the exception.
 
     In tables.hpp it is a HookFunction, and with ports a PortHookFunction. `taken`: the types of the
-    record and of the place for what it raises, as the inner function takes them. `values`: where
-    the record has the numbers that an exception names. `writes_always`: outputs are written also if
-    it raised.
+    record and of the exception's place, as the inner function takes them. `writes_always`: outputs
+    are written also after an exception.
     """
     record, exception = taken
-    read = access.read() if access else ""
-    write = access.write() if access else ""
+    read = access.read() if has_ports else ""
+    write = access.write() if has_ports else ""
     # Nothing else leads to the record while a hook runs.
-    ports = ", i8** %ports" if access else ""
+    ports = ", i8** %ports" if has_ports else ""
     return f"""
 declare i32 @{inner}(i8**, {exception}, {record})
 
@@ -281,10 +281,10 @@ ended:
   ret i8* null
 fault:
   %values = load [2 x i64], [2 x i64]* @rtcf_raised_values
-  %there = getelementptr i8, i8* %record, i64 {values}
+  %there = getelementptr i8, i8* %record, i64 {access.raised}
   %head = bitcast i8* %there to [2 x i64]*
   store [2 x i64] %values, [2 x i64]* %head, align 8
-  %what = load i8*, i8** %raised
-  ret i8* %what
+  %exception = load i8*, i8** %raised
+  ret i8* %exception
 }}
 """

@@ -2,7 +2,7 @@
 
 An exception of compiled code is constant bytes. Its text has places {} for the numbers, and the
 code stores these into a variable of the module just before it raises: nothing is done where nothing
-is raised. The hook's entry copies them to the record (arena.py), where the runtime finds them.
+is raised. The hook's entry copies them to the record (port_access.py), for the runtime.
 """
 
 from typing import Any

@@ -15,7 +15,7 @@ from rtcf_compile.source.prefix_map import mapped
 _CONSTANT = re.compile(
     r'^@"?\.const\.pickledata\.[\d.]+"? = [^\n]*constant \[\d+ x i8\] c"([^"\n]*)"', re.M
 )
-# What a text begins with that names two numbers: see raised_values.py.
+# The beginning of texts that name two numbers: see raised_values.py.
 WITH_VALUES = "\x1e"
 _WORDS = {
     "division by zero": "division by zero",

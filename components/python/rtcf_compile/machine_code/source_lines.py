@@ -1,7 +1,7 @@
 """Debug information: the lines of the Python source that machine code was made of.
 
-Only functions of the component's author have lines. Whatever numba and our helpers add belongs to
-the line that calls it, as LLVM gives calls' lines to what it inlines. Variables have none, so that
+Only functions of the component's author have lines. Code of numba and of our helpers belongs to the
+line that calls it, as LLVM gives inlined code the line of the call. Variables have none, so that
 the machine code is the same as without. `strip` and dh_strip remove it.
 """
 

@@ -21,7 +21,8 @@ from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import Mistake, at, written
 from rtcf_compile.source.modules import Source, is_own, read
 
-_OURS = {*helpers.BY_NAME, *numpy_functions.BY_NAME}
+# Functions of ours in rewritten ones, by name.
+HELPERS = {**helpers.BY_NAME, **numpy_functions.BY_NAME}
 # What makes a compiled function of a Python one, and what stands for a log call.
 Compiler = Callable[[FunctionType], Any]
 # An attribute of rewritten functions: the name of the author's function, as `Observer.update`.
@@ -45,7 +46,7 @@ class Functions:
         # Which function calls which, and the arrays that are too large for the arena.
         self._calls: dict[FunctionType, set[FunctionType]] = {}
         self._large: dict[FunctionType, Mistake] = {}
-        # File, line, text and name of calls that may be compiled to what no loop has.
+        # File, line, text and name of calls that numba may compile to functions no loop has.
         self.other_calls: list[tuple[str, int, str, str]] = []
 
     def hooks(self) -> dict[str, FunctionType]:
@@ -206,10 +207,7 @@ class Functions:
         check(source)
         products = Products(source)
         source.tree.body = products.statements(source.tree.body)
-        source.tree.returns = None
-        source.tree.decorator_list = []
-        for each in source.tree.args.args:
-            each.annotation = None
+        drop_types(source.tree)
         self._note_calls(products)
         plain = made(source.tree, self._scope(source, source.tree, products.constants), source)
         own = self._compiler(plain)
@@ -222,8 +220,7 @@ class Functions:
     ) -> dict[str, Any]:
         scope = {
             **source.function.__globals__,
-            **helpers.BY_NAME,
-            **numpy_functions.BY_NAME,
+            **HELPERS,
             **{name: frozen(value) for name, value in constants.items()},
         }
         scope["rtcf_fault"] = Fault
@@ -231,7 +228,7 @@ class Functions:
         for node in ast.walk(tree):
             if isinstance(node, ast.Name) and node.id in scope and node.id not in variables:
                 value = scope[node.id] = frozen(scope[node.id])
-                if is_own(value) and node.id not in _OURS:
+                if is_own(value) and node.id not in HELPERS:
                     scope[node.id] = self._own_function(value)
                 else:
                     _constant(node, value, source)
@@ -239,6 +236,14 @@ class Functions:
                 what = "a function of another module"
                 raise at(source.file, node, what, "import it by its name")
         return scope
+
+
+def drop_types(tree: ast.FunctionDef) -> None:
+    """Drop annotations and decorators, which mean nothing in a rewritten function."""
+    tree.returns = None
+    tree.decorator_list = []
+    for each in tree.args.args:
+        each.annotation = None
 
 
 def frozen(value: Any) -> Any:

@@ -37,12 +37,12 @@ class Methods:
         ]
 
     def find(self, name: str, behind: type | None = None) -> Method | None:
-        """Return what self.name is, or super().name in a class."""
+        """Return the method self.name, or super().name in a class."""
         begin = 0 if behind is None else self._classes.index(behind) + 1
         return self._first(name, begin)
 
     def find_of(self, owner: Any, name: str) -> Method | None:
-        """Return what Owner.name is, of a class among the bases; None for others."""
+        """Return the method Owner.name of a base; None for other classes."""
         if owner not in self._classes:
             return None
         return self._first(name, self._classes.index(owner))

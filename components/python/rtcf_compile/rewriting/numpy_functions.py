@@ -24,12 +24,12 @@ STANDS_FOR: list[tuple[Function, Function]] = []
 METHODS: dict[str, Function] = {}
 
 
-# Words among arguments: what None and True mean to the functions below.
+# Words among arguments, by their numbers for the functions below: None and True.
 WORDS = {"left": None, "right": True, "stable": None, "fro": None}
 
 
 def _stands_for(*functions: Function, method: str = "") -> Callable[[Function], Function]:
-    """Register what stands for functions, and for a method of arrays."""
+    """Register a helper in the place of functions, and of a method of arrays."""
 
     def register(own: Function) -> Function:
         STANDS_FOR.extend((each, own) for each in functions)

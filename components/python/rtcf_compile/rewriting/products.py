@@ -44,7 +44,7 @@ class Products(ast.NodeTransformer):
         self._lists = self._find_lists()
         self._uncertain = self._find_uncertain()
         self.large: list[ast.AST] = []
-        # Calls that numba may compile to what no loop has.
+        # Calls that numba may compile to functions no loop has.
         self.others: list[ast.Call] = []
 
     def mistake(self, node: ast.AST, what: str, way_out: str) -> Exception:
@@ -88,7 +88,7 @@ class Products(ast.NodeTransformer):
         return super().visit(node)
 
     def visit_NamedExpr(self, node: ast.NamedExpr) -> ast.AST:
-        """`y := x` where it is not always computed, or after what depends on it."""
+        """`y := x` that is not always computed, or comes after a use of y."""
         raise self.mistake(node, "a := within an expression", "write it as a statement before")
 
     def _before(self, node: ast.stmt) -> list[ast.stmt] | None:
@@ -164,7 +164,7 @@ class Products(ast.NodeTransformer):
             calls = calls and resolve(each.func, self.source) is None  # type: ignore[attr-defined]
             if early or reads or calls:
                 raise self.mistake(
-                    node, "a := after what it may change", "write it as a statement before"
+                    node, "a := after a value that it may change", "write it as a statement before"
                 )
         return found, new
 
@@ -275,7 +275,7 @@ class Products(ast.NodeTransformer):
 
     def _may_be_none(self, node: ast.expr) -> bool:
         """Tell whether a comparison has to look for None: of a variable that is given, or set to
-        what may be None. Types are not known here.
+        an optional value. Types are not known here.
         """
         return isinstance(node, ast.Name) and node.id in self._uncertain
 
@@ -610,7 +610,7 @@ class Products(ast.NodeTransformer):
 
     def _steps(self, node: ast.Assign) -> list[ast.stmt] | None:
         """Return single assignments in the place of one to several targets, values first; None for
-        what is a single one, or one of variables alone.
+        a single assignment, or one of variables alone.
         """
         place = f"{node.lineno}_{node.col_offset}"
         if len(node.targets) > 1:
@@ -682,7 +682,7 @@ class Products(ast.NodeTransformer):
         """Refuse constant indices beyond sizes that are declared: see Ports."""
 
     def _check_constant(self, target: ast.Subscript) -> None:
-        """Refuse to set elements of what belongs to the module, and of lists."""
+        """Refuse to set elements of constants of the module, and of lists."""
         base: ast.expr = target
         while isinstance(base, ast.Subscript | ast.Attribute):
             base = base.value
@@ -804,8 +804,8 @@ class Products(ast.NodeTransformer):
         )
 
     def _is_property(self, node: ast.AST, surely: bool = False) -> bool:
-        """Tell whether a method computes what a name stands for. Not known here, where all of
-        self's may be one.
+        """Tell whether a name is a property. The class is not known here: all names of self may
+        be one.
         """
         return (
             not surely

@@ -353,7 +353,7 @@ class Hook(Ports):
         return super().visit_AugAssign(node)
 
     def _check_elements(self, target: ast.expr) -> None:
-        """Refuse to set elements of what is not a State, an Output or a variable."""
+        """Refuse to set elements of members that are neither State nor Output."""
         while isinstance(target, ast.Subscript):
             target = target.value
             if isinstance(target, ast.Attribute) and self._is_self(target.value):
@@ -433,7 +433,7 @@ class Hook(Ports):
         return method is not None and method.kind == "property"
 
     def _plain_member(self, node: ast.Attribute) -> None:
-        """Refuse what ports alone have: `self.kp.value`, `self.f.write(…)`."""
+        """Refuse attributes of ports on other members: `self.kp.value`, `self.f.write(…)`."""
         owner = node.value
         if not isinstance(owner, ast.Attribute) or not self._is_self(owner.value):
             return

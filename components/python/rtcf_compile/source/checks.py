@@ -111,7 +111,7 @@ _MODULES = {
     "logging": ("formats and writes", 'log by self.info("x {}", x)'),
     "rospy": ("is not real-time", "use an Input or Output: ROS is connected to ports"),
 }
-# What changes nothing of a function, or only how it is called.
+# Decorators that change nothing of a function, or only its calls.
 _DECORATORS = ("property", "staticmethod", "override", "final")
 # Packages whose functions are compiled, or refused one by one.
 _COMPILED = ("builtins", "math", "numpy", "operator", "rtcf", "_operator")

@@ -18,7 +18,7 @@
 
 namespace rtcf {
 
-/// Where machine code that no C++ compiler makes finds what a port has, in bytes.
+/// Offsets of a port's members, in bytes, for machine code that no C++ compiler makes.
 struct PortPlaces {
     std::size_t source;   ///< in an input: the slot that its writer writes
     std::size_t current;  ///< in an input: the slot with its value

@@ -85,9 +85,8 @@ const InputTable kInput{"u",
                         nullptr,
                         0,
                         {LogLevel::Warn, "gain.py", 3, "update", "too large"}};
-const OutputTable kOutput{
-    "x",     "m", &kNumber, nullptr, 0, offsetof(Record, x), offsetof(Record, is_written),
-    nullptr, 0,   nullptr,  0};
+const OutputTable kOutput{"x",     "m", &kNumber, nullptr, 0, offsetof(Record, is_written),
+                          nullptr, 0,   nullptr,  0};
 const ParameterTable kGain{"gain", "",      "", Scalar::Double, offsetof(Record, gain), 1, 0, 0.0,
                            0.0,    nullptr, 0};
 const StateTable kCount{"count", "", "", &kInteger, offsetof(Record, count)};
