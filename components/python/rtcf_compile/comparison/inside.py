@@ -11,11 +11,10 @@ from rtcf.component.declaration import Description, Member
 
 from rtcf_compile.library.toolchain import compiler
 from rtcf_compile.machine_code import port_access
-from rtcf_compile.machine_code.lowering import Compiled
+from rtcf_compile.machine_code.lowering import REALTIME, Compiled
 from rtcf_compile.machine_code.raises import hash_of
 from rtcf_compile.source.mistake import Mistake
 
-_WITH_PORTS = ("update", "safe")
 # Of values of an earlier writer, and of ages, which records have already.
 _RUNTIME = f"""extern "C" {{
 long {port_access.READ}(void*) {{ return 0; }}
@@ -57,7 +56,7 @@ class Inside:
         self._hooks = {}
         for hook in compiled.hooks:
             function = self._library[compiled.symbol(hook)]
-            function.argtypes = [ctypes.c_void_p] * (2 if hook in _WITH_PORTS else 1)
+            function.argtypes = [ctypes.c_void_p] * (2 if hook in REALTIME else 1)
             function.restype = ctypes.c_void_p
             self._hooks[hook] = function
 
@@ -66,7 +65,7 @@ class Inside:
 
         Inputs have the values of the record, which then has those of the outputs.
         """
-        if hook in _WITH_PORTS:
+        if hook in REALTIME:
             self._ports.put(record)
             raised = self._hooks[hook](record.ctypes.data, self._ports.address)
             self._ports.take(record)

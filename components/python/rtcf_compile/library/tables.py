@@ -22,7 +22,7 @@ from rtcf.component.value_type import ValueType
 from rtcf_compile.library import log_text, messages
 from rtcf_compile.library.llvm_data import NULL, Data, Value, pointer_to
 from rtcf_compile.machine_code import backend
-from rtcf_compile.machine_code.lowering import Compiled
+from rtcf_compile.machine_code.lowering import REALTIME, Compiled
 from rtcf_compile.rewriting.logs import LogCall
 from rtcf_compile.source.mistake import display, source_line
 from rtcf_compile.source.prefix_map import mapped
@@ -123,7 +123,7 @@ class _Library:
     def _hook(self, compiled: Compiled, hook: str) -> Value:
         if hook not in compiled.hooks:
             return NULL
-        kind = _HOOK_WITH_PORTS if hook in ("update", "safe") else _HOOK
+        kind = _HOOK_WITH_PORTS if hook in REALTIME else _HOOK
         self.data.add(f"declare {kind.replace('(', f'@{compiled.symbol(hook)}(', 1)}")
         return pointer_to(compiled.symbol(hook), kind)
 

@@ -48,8 +48,8 @@ _NRT_COUNTS = re.compile(
 _ADDRESS = re.compile(r"(?<=_)0x[0-9a-f]{6,}|(?<=\.)\d{9,}")
 _COUNTS = "declare void @NRT_incref(i8*)\ndeclare void @NRT_decref(i8*)\n"
 _OPTIONS = {"boundscheck": True, "error_model": "python", **backend.NO_WRAPPERS}
-# What runs in the real-time thread, and beside it.
-_REALTIME, _BESIDE = ("update", "safe"), ("prepare", "start")
+# Hooks of the real-time thread, which have ports, and those beside it.
+REALTIME, _BESIDE = ("update", "safe"), ("prepare", "start")
 
 
 @dataclass
@@ -96,12 +96,12 @@ def compile_component(cls: type[Component], arena_bytes: int = ARENA) -> Compile
     )
     made = {hook: _inner(hooks[hook], record) for hook in hooks}
     trial.run(cls, functions.file())
-    for thread, allocator in ((_REALTIME, arena.arena(arena_bytes)), (_BESIDE, arena.heap())):
+    for thread, allocator in ((REALTIME, arena.arena(arena_bytes)), (_BESIDE, arena.heap())):
         inner = {hook: made[hook] for hook in thread if hook in made}
         if inner:
             module = _linked(result, inner, allocator)
             result.raises |= raises_in(str(module), functions.file())
-            gate.check(module, result, inner, realtime=thread is _REALTIME)
+            gate.check(module, result, inner, realtime=thread is REALTIME)
             result.objects.append(backend.machine().emit_object(module))
     return result
 
@@ -134,7 +134,7 @@ def _linked(compiled: Compiled, inner: dict[str, tuple[str, str]], allocator: st
             name,
             backend.taken(text, name),
             access,
-            has_ports=hook in _REALTIME,
+            has_ports=hook in REALTIME,
             writes_always=hook == "safe",
         )
         # Ours take their place; numba's count by locked instructions.

@@ -281,6 +281,19 @@ def _bool(value: Any) -> Any:
     raise TypingError(f"RTCF:a bool is set to {words(value)}:compare it: x != 0")
 
 
+def plain(function: Any) -> Any:
+    """Return a function that compiled ones call, compiled as they are."""
+    function.__annotations__ = {}
+    return register_jitable(**_OPTIONS)(function)
+
+
+@plain
+def _require_fit(columns: Any, rows: Any) -> None:
+    if columns != rows:
+        note(columns, rows)
+        raise ValueError("\x1e@ of sizes {} and {}, which do not fit")
+
+
 @compiled_as(helpers.rtcf_matmul)
 def _matmul(a: Any, b: Any) -> Any:
     if not isinstance(a, types.Array) or not isinstance(b, types.Array):
@@ -298,9 +311,7 @@ def _matmul(a: Any, b: Any) -> Any:
 
         def times_vector(a: Any, b: Any) -> Any:
             rows, count = a.shape
-            if count != b.shape[0]:
-                note(count, b.shape[0])
-                raise ValueError("\x1e@ of sizes {} and {}, which do not fit")
+            _require_fit(count, b.shape[0])
             result = np.empty(rows)
             row(b, 0, b.strides[0], a, a.strides[1], a.strides[0], count, result, 0, rows)
             return result
@@ -311,9 +322,7 @@ def _matmul(a: Any, b: Any) -> Any:
 
         def vector_times(a: Any, b: Any) -> Any:
             count, columns = b.shape
-            if a.shape[0] != count:
-                note(a.shape[0], count)
-                raise ValueError("\x1e@ of sizes {} and {}, which do not fit")
+            _require_fit(a.shape[0], count)
             result = np.empty(columns)
             row(a, 0, a.strides[0], b, b.strides[0], b.strides[1], count, result, 0, columns)
             return result
@@ -322,9 +331,7 @@ def _matmul(a: Any, b: Any) -> Any:
 
     def matrix(a: Any, b: Any) -> Any:
         count, columns = b.shape
-        if a.shape[1] != count:
-            note(a.shape[1], count)
-            raise ValueError("\x1e@ of sizes {} and {}, which do not fit")
+        _require_fit(a.shape[1], count)
         result = np.empty((a.shape[0], columns))
         down, across = b.strides
         for i in range(a.shape[0]):
@@ -336,9 +343,7 @@ def _matmul(a: Any, b: Any) -> Any:
 
 
 def _inner_product(a: Any, b: Any) -> Any:
-    if a.shape[0] != b.shape[0]:
-        note(a.shape[0], b.shape[0])
-        raise ValueError("\x1e@ of sizes {} and {}, which do not fit")
+    _require_fit(a.shape[0], b.shape[0])
     total = 0.0
     for k in range(a.shape[0]):
         total += a[k] * b[k]
@@ -346,9 +351,7 @@ def _inner_product(a: Any, b: Any) -> Any:
 
 
 def _plain_times_vector(a: Any, b: Any) -> Any:
-    if a.shape[1] != b.shape[0]:
-        note(a.shape[1], b.shape[0])
-        raise ValueError("\x1e@ of sizes {} and {}, which do not fit")
+    _require_fit(a.shape[1], b.shape[0])
     result = np.zeros(a.shape[0])
     for i in range(a.shape[0]):
         for k in range(a.shape[1]):
@@ -357,9 +360,7 @@ def _plain_times_vector(a: Any, b: Any) -> Any:
 
 
 def _plain_vector_times(a: Any, b: Any) -> Any:
-    if a.shape[0] != b.shape[0]:
-        note(a.shape[0], b.shape[0])
-        raise ValueError("\x1e@ of sizes {} and {}, which do not fit")
+    _require_fit(a.shape[0], b.shape[0])
     result = np.zeros(b.shape[1])
     for k in range(a.shape[0]):
         for j in range(b.shape[1]):
@@ -368,9 +369,7 @@ def _plain_vector_times(a: Any, b: Any) -> Any:
 
 
 def _plain_matrix(a: Any, b: Any) -> Any:
-    if a.shape[1] != b.shape[0]:
-        note(a.shape[1], b.shape[0])
-        raise ValueError("\x1e@ of sizes {} and {}, which do not fit")
+    _require_fit(a.shape[1], b.shape[0])
     result = np.zeros((a.shape[0], b.shape[1]))
     for i in range(a.shape[0]):
         for k in range(a.shape[1]):
@@ -409,12 +408,6 @@ def _row_of_any() -> Any:
             along_nothing(factors, first, step, matrix, down, across, count, out, place, width)
 
     return row
-
-
-def plain(function: Any) -> Any:
-    """Return a function that compiled ones call, compiled as they are."""
-    function.__annotations__ = {}
-    return register_jitable(**_OPTIONS)(function)
 
 
 @compiled_as(helpers.rtcf_assign, in_line=True)
