@@ -28,6 +28,7 @@ TIME_FIELDS = {
     "frequency": np.dtype(np.float64),
 }
 HOOKS = ("prepare", "start", "update", "safe")
+REALTIME_HOOKS = ("update", "safe")  # in the real-time thread
 LOG_LEVELS = ("debug", "info", "warn", "error", "fatal")
 _RESERVED = {*TIME_FIELDS, *HOOKS, *LOG_LEVELS, "configure", "stop", "cleanup", "fault"}
 

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rtcf.component.declaration import Description, Member
+from rtcf.component.declaration import REALTIME_HOOKS, Description, Member
 
 from rtcf_compile.library.toolchain import compiler
 from rtcf_compile.machine_code import port_access
-from rtcf_compile.machine_code.lowering import REALTIME, Compiled
+from rtcf_compile.machine_code.lowering import Compiled
 from rtcf_compile.machine_code.raises import hash_of
 from rtcf_compile.source.mistake import Mistake
 
@@ -56,7 +56,7 @@ class Inside:
         self._hooks = {}
         for hook in compiled.hooks:
             function = self._library[compiled.symbol(hook)]
-            function.argtypes = [ctypes.c_void_p] * (2 if hook in REALTIME else 1)
+            function.argtypes = [ctypes.c_void_p] * (2 if hook in REALTIME_HOOKS else 1)
             function.restype = ctypes.c_void_p
             self._hooks[hook] = function
 
@@ -65,7 +65,7 @@ class Inside:
 
         Inputs have the values of the record, which then has those of the outputs.
         """
-        if hook in REALTIME:
+        if hook in REALTIME_HOOKS:
             self._ports.put(record)
             raised = self._hooks[hook](record.ctypes.data, self._ports.address)
             self._ports.take(record)

@@ -18,6 +18,7 @@ from typing import Any, Protocol
 import numpy as np
 from rtcf.component import Component
 from rtcf.component.declaration import (
+    REALTIME_HOOKS,
     Derived,
     Input,
     Member,
@@ -310,7 +311,7 @@ class _Comparing:
             for each in self._compiled.description.of(Input)
             if not each.message and not each.type.shape
         ]
-        if hook not in ("update", "safe") or not inputs:
+        if hook not in REALTIME_HOOKS or not inputs:
             return ""
         return " with " + ", ".join(f"{each} = {self._record[each]:g}" for each in inputs[:3])
 

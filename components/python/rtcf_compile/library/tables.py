@@ -7,6 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from rtcf.component.declaration import (
+    HOOKS,
+    REALTIME_HOOKS,
     TIME_FIELDS,
     Derived,
     Input,
@@ -22,7 +24,7 @@ from rtcf.component.value_type import ValueType
 from rtcf_compile.library import log_text, messages
 from rtcf_compile.library.llvm_data import NULL, Data, Value, pointer_to
 from rtcf_compile.machine_code import backend
-from rtcf_compile.machine_code.lowering import REALTIME, Compiled
+from rtcf_compile.machine_code.lowering import Compiled
 from rtcf_compile.rewriting.logs import LogCall
 from rtcf_compile.source.mistake import display, source_line
 from rtcf_compile.source.prefix_map import mapped
@@ -94,7 +96,7 @@ class _Library:
             pointer_to(create, _CREATE),
             self.data.bytes(record.tobytes(), 8),
             record.nbytes,
-            *(self._hook(compiled, hook) for hook in ("prepare", "start", "update", "safe")),
+            *(self._hook(compiled, hook) for hook in HOOKS),
             sum(2**i for i, name in enumerate(TIME_FIELDS) if f"_{name}" in compiled.used),
             *self._array([self._input(compiled, m) for m in _of(compiled, Input, Queue)]),
             *self._array([self._output(compiled, m) for m in _of(compiled, Output)]),
@@ -123,7 +125,7 @@ class _Library:
     def _hook(self, compiled: Compiled, hook: str) -> Value:
         if hook not in compiled.hooks:
             return NULL
-        kind = _HOOK_WITH_PORTS if hook in REALTIME else _HOOK
+        kind = _HOOK_WITH_PORTS if hook in REALTIME_HOOKS else _HOOK
         self.data.add(f"declare {kind.replace('(', f'@{compiled.symbol(hook)}(', 1)}")
         return pointer_to(compiled.symbol(hook), kind)
 

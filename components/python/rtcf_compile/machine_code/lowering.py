@@ -15,7 +15,7 @@ from typing import Any
 import numba
 from numba.core import errors
 from rtcf.component import Component, describe
-from rtcf.component.declaration import Description
+from rtcf.component.declaration import HOOKS, REALTIME_HOOKS, Description
 from rtcf.component.ros_name import class_name_error
 
 import rtcf_compile.machine_code.numpy_functions
@@ -48,8 +48,7 @@ _NRT_COUNTS = re.compile(
 _ADDRESS = re.compile(r"(?<=_)0x[0-9a-f]{6,}|(?<=\.)\d{9,}")
 _COUNTS = "declare void @NRT_incref(i8*)\ndeclare void @NRT_decref(i8*)\n"
 _OPTIONS = {"boundscheck": True, "error_model": "python", **backend.NO_WRAPPERS}
-# Hooks of the real-time thread, which have ports, and those beside it.
-REALTIME, _BESIDE = ("update", "safe"), ("prepare", "start")
+_BESIDE = tuple(each for each in HOOKS if each not in REALTIME_HOOKS)
 
 
 @dataclass
@@ -96,12 +95,12 @@ def compile_component(cls: type[Component], arena_bytes: int = ARENA) -> Compile
     )
     made = {hook: _inner(hooks[hook], record) for hook in hooks}
     trial.run(cls, functions.file())
-    for thread, allocator in ((REALTIME, arena.arena(arena_bytes)), (_BESIDE, arena.heap())):
+    for thread, allocator in ((REALTIME_HOOKS, arena.arena(arena_bytes)), (_BESIDE, arena.heap())):
         inner = {hook: made[hook] for hook in thread if hook in made}
         if inner:
             module = _linked(result, inner, allocator)
             result.raises |= raises_in(str(module), functions.file())
-            gate.check(module, result, inner, realtime=thread is REALTIME)
+            gate.check(module, result, inner, realtime=thread is REALTIME_HOOKS)
             result.objects.append(backend.machine().emit_object(module))
     return result
 
@@ -134,7 +133,7 @@ def _linked(compiled: Compiled, inner: dict[str, tuple[str, str]], allocator: st
             name,
             backend.taken(text, name),
             access,
-            has_ports=hook in REALTIME,
+            has_ports=hook in REALTIME_HOOKS,
             writes_always=hook == "safe",
         )
         # Ours take their place; numba's count by locked instructions.

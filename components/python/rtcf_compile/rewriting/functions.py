@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from rtcf.component import Component, Fault
-from rtcf.component.declaration import HOOKS, Description
+from rtcf.component.declaration import HOOKS, REALTIME_HOOKS, Description
 
 from rtcf_compile.rewriting import helpers, numpy_functions
 from rtcf_compile.rewriting.logs import Logs
@@ -72,7 +72,7 @@ class Functions:
                 found[hook] = self._method(source, method, is_hook=True)
                 if hook == "prepare":
                     self._check_prepare(source.function, set())
-                elif hook in ("update", "safe"):
+                elif hook in REALTIME_HOOKS:
                     self._check_large(source.function, set())
         return found
 
