@@ -95,12 +95,10 @@ def rtcf_ravel(a: Any) -> Any:
     return np.ravel(a)
 
 
+@_stands_for(method="flatten")
 def rtcf_flatten(a: Any) -> Any:
     """Return a copy of an array's elements in a row."""
     return np.array(np.ravel(a))
-
-
-METHODS["flatten"] = rtcf_flatten
 
 
 @_stands_for(np.concatenate)
@@ -270,20 +268,16 @@ def rtcf_sort(a: Any, axis: Any = -1) -> Any:
     return np.sort(a, axis)
 
 
+@_stands_for(method="sort")
 def rtcf_sort_in_place(a: Any, axis: Any = -1) -> None:
     """Sort an array, NaN last."""
     a.sort(axis)
 
 
-METHODS["sort"] = rtcf_sort_in_place
-
-
+@_stands_for(method="fill")
 def rtcf_fill(a: Any, value: Any) -> None:
     """Set all elements of an array."""
     helpers.rtcf_assign(a, value)
-
-
-METHODS["fill"] = rtcf_fill
 
 
 @_stands_for(np.argsort, method="argsort")
@@ -324,12 +318,10 @@ def rtcf_is_all(values: Any) -> Any:
     return bool(np.all(np.ravel(values)))
 
 
+@_stands_for(method="astype")
 def rtcf_astype(a: Any, dtype: Any) -> Any:
     """Return an array with elements of another type; floats become ints towards 0."""
     return a.astype(dtype)
-
-
-METHODS["astype"] = rtcf_astype
 
 
 @_stands_for(abs)
