@@ -12,6 +12,7 @@ import pytest
 from rtcf_compile import main
 from rtcf_compile.comparison import inside, verify, watched
 from rtcf_compile.machine_code import lowering
+from rtcf_compile.rewriting.functions import HELPERS
 from rtcf_compile.source import modules as source
 
 FOLDER = Path(__file__).parents[2] / "components" / "python"
@@ -139,8 +140,8 @@ def test_other_rounding_of_a_sum_is_no_difference(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # In another order than that of compiled code.
-    backwards = {name: lambda a, *_: np.sum(a[::-1]) for name in verify._HELPERS if "sum" in name}
-    monkeypatch.setattr(verify, "_HELPERS", verify._HELPERS | backwards)
+    backwards = {name: lambda a, *_: np.sum(a[::-1]) for name in HELPERS if "sum" in name}
+    monkeypatch.setattr(verify, "HELPERS", HELPERS | backwards)
     assert main.main([written(tmp_path, SUM, "np.float64, 64", "float"), "--verify", "1000"]) == 0
     said = capsys.readouterr().out
     assert re.search(r"1000 cycles, .*[1-9]\d* farther by rounding: the same", said)
