@@ -34,7 +34,7 @@ def log_call(number: int, count: int) -> Any:
 def _kind(given: Any) -> str:
     """Return the words for an argument that is no number."""
     kinds = {types.Array: "arrays", types.UnicodeType: "text", types.StringLiteral: "text"}
-    kinds |= {types.Optional: "an optional value", types.BaseTuple: "several values"}
+    kinds |= {types.Optional: "what may be None", types.BaseTuple: "several values"}
     return next((words for kind, words in kinds.items() if isinstance(given, kind)), "others")
 
 
