@@ -1,12 +1,12 @@
 """Recordings that pages may open: those that were named at the start, and those of one folder."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rtcf.recording.reader import Recording, RecordingError
+from rtcf.recording.reader import RecordedColumn, Recording, RecordingError
 
 from rtcf_scope import wire
 from rtcf_scope.chunk import ELEMENTS, split_element
@@ -41,14 +41,18 @@ class Recordings:
     def columns(self, name: str, traces: list[str]) -> bytes:
         """Return the values of traces as bytes of wire; raises RecordingError."""
         with self._open(name) as recording:
-            cycles = recording.cycles
-            every = max(1, -(-len(cycles) // MOST_CYCLES))
-            stamps = recording.stamps_ns
+            numbers, durations, latencies = recording.read_cycles(
+                ("iteration", "duration_ns", "latency_ns")
+            ).values()
+            cycles, stamps = numbers.values, numbers.stamps_ns
             if not len(cycles):
                 raise RecordingError(f"{name} has no cycles")
-            found = [(stamps - stamps[0]) / 1e9, cycles, recording.latencies_ns / 1e3,
-                     recording.durations_ns / 1e3]  # fmt: skip
-            found += [_placed(recording, trace, stamps) for trace in traces]
+            every = max(1, -(-len(cycles) // MOST_CYCLES))
+            found = [(stamps - stamps[0]) / 1e9, cycles, latencies.values / 1e3,
+                     durations.values / 1e3]  # fmt: skip
+            named = {split_element(trace)[0] for trace in traces}
+            signals = recording.read(named & recording.signals.keys())
+            found += [_placed(signals, trace, stamps) for trace in traces]
             columns = np.array([each[::every] for each in found], "<f8")
         return wire.head(wire.RECORDED, 0, columns.shape[1], len(columns)) + columns.tobytes()
 
@@ -65,13 +69,13 @@ class Recordings:
         return Recording(file)
 
 
-def _placed(recording: Recording, trace: str, stamps: Any) -> Any:
+def _placed(signals: Mapping[str, RecordedColumn], trace: str, stamps: Any) -> Any:
     """Return a trace's values at all cycles: NaN where it has none."""
     signal, index = split_element(trace)
     values = np.full(len(stamps), np.nan)
-    if signal not in recording.signals:
+    if signal not in signals:
         return values
-    column = recording.read(signal)
+    column = signals[signal]
     each = column.values.reshape(len(column.values), math.prod(column.values.shape[1:]))
     if index < each.shape[1]:
         if len(each) == len(values):

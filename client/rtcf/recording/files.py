@@ -86,7 +86,7 @@ class Files(Closing):
         try:
             # It has its name from its head on: at any time a file of that name can be read.
             with whole_file(path, force=self._force) as part:
-                self._file = part.open("wb")
+                self._file = part.open("wb", buffering=0)
                 self._writer = _begun(self._file, path)
         except FileExistsError:
             raise ValueError(f"{path} is there already: --force writes over it") from None
