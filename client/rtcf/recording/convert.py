@@ -93,7 +93,7 @@ def _write_csv(recording: Recording, file: BinaryIO) -> Iterator[int]:
     recording.read_cycles("iteration")  # refused before a line is written
     writer.writerow(head)
     for chunk in range(recording.chunks):
-        first, *others = recording.read_cycles(_CYCLE, chunk).values()
+        first, *others = recording.read_cycles(_CYCLE, chunk=chunk).values()
         columns = [as_list(first.values), as_list(first.stamps_ns)]
         columns += [as_list(other.values) for other in others]
         for column in recording.read(recording.signals, chunk=chunk).values():

@@ -197,6 +197,16 @@ class Recording(Closing):
         return len(self._chunks)
 
     @property
+    def begin_ns(self) -> int:
+        """The stamp of the first message; 0 = there is none."""
+        return self._chunks[0].start_ns if self._chunks else 0
+
+    @property
+    def end_ns(self) -> int:
+        """The stamp of the last message; 0 = there is none."""
+        return self._chunks[-1].end_ns if self._chunks else 0
+
+    @property
     def cycles(self) -> "NDArray[np.int64]":
         """The numbers of all cycles, in the order in which they were recorded."""
         return self.read_cycles("iteration").values
@@ -256,23 +266,31 @@ class Recording(Closing):
         return columns[0] if isinstance(name, str) else dict(zip(names, columns, strict=True))
 
     @overload
-    def read_cycles(self, name: str, chunk: int | None = None) -> RecordedColumn: ...
+    def read_cycles(
+        self, name: str, begin_ns: int | None = None, end_ns: int | None = None,
+        chunk: int | None = None,
+    ) -> RecordedColumn: ...  # fmt: skip
 
     @overload
     def read_cycles(
-        self, name: Iterable[str], chunk: int | None = None
-    ) -> dict[str, RecordedColumn]: ...
+        self, name: Iterable[str], begin_ns: int | None = None, end_ns: int | None = None,
+        chunk: int | None = None,
+    ) -> dict[str, RecordedColumn]: ...  # fmt: skip
 
     def read_cycles(
-        self, name: str | Iterable[str], chunk: int | None = None
+        self,
+        name: str | Iterable[str],
+        begin_ns: int | None = None,
+        end_ns: int | None = None,
+        chunk: int | None = None,
     ) -> RecordedColumn | dict[str, RecordedColumn]:
-        """Return `iteration`, `duration_ns` or `latency_ns` of all cycles, or of those in one
-        chunk; of several of these, by name."""
+        """Return `iteration`, `duration_ns` or `latency_ns` of cycles, as `read` does of signals."""
         if not self.cycle_topic:
             raise RecordingError(f"{self.path} tells no cycles: rtcfctl record has not written it")
         names = [name] if isinstance(name, str) else list(name)
+        leaves = [(self.cycle_topic, _CYCLE[each]) for each in names]
         with self._whole_only():
-            columns = self._read([(self.cycle_topic, _CYCLE[each]) for each in names], chunk=chunk)
+            columns = self._read(leaves, begin_ns, end_ns, chunk)
         return columns[0] if isinstance(name, str) else dict(zip(names, columns, strict=True))
 
     def messages(self, chunk: int) -> list[tuple[RecordedTopic, int, bytes]]:
