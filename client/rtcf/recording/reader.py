@@ -145,18 +145,9 @@ class _Records:
 class _Cycles:
     """The cycles of a channel's messages in a chunk."""
 
-    low: "NDArray[np.uint32]"  # the lower bits of their numbers
+    low: "NDArray[np.uint32]"  # the low 32 bits of their numbers, which the messages have
     stamps_ns: "NDArray[np.int64]"
     numbers: "NDArray[np.int64]"
-
-    def __eq__(self, other: object) -> bool:
-        import numpy as np
-
-        return (
-            isinstance(other, _Cycles)
-            and np.array_equal(self.low, other.low)
-            and np.array_equal(self.stamps_ns, other.stamps_ns)
-        )
 
 
 class Recording(Closing):
@@ -408,25 +399,23 @@ class Recording(Closing):
         cycles."""
         import numpy as np
 
-        all_cycles: _Cycles | None = None
+        every: _Cycles | None = None
         if self.cycle_topic in records.runs:
-            low, stamps = _low(records, self.cycle_topic)
             numbers = _column(records, self.cycle_topic, _CYCLE["iteration"])
-            all_cycles = _Cycles(low, stamps, numbers)
+            every = _Cycles(*_low(records, self.cycle_topic), numbers)
         found = {}
         for channel in channels:
             if channel not in records.runs:
                 continue
             low, stamps = _low(records, channel)
-            own = _Cycles(low, stamps, low.astype("i8"))
-            if all_cycles is not None and own == all_cycles:
-                own = all_cycles
-            elif all_cycles is not None:
-                # Messages tell the low 32 bits.
-                order = np.argsort(all_cycles.low, kind="stable")
-                place = np.searchsorted(all_cycles.low[order], low).clip(max=len(order) - 1)
-                own = _Cycles(low, stamps, all_cycles.numbers[order][place])
-            found[channel] = own
+            if every is None:
+                found[channel] = _Cycles(low, stamps, low.astype("i8"))
+            elif np.array_equal(low, every.low) and np.array_equal(stamps, every.stamps_ns):
+                found[channel] = every
+            else:
+                order = np.argsort(every.low, kind="stable")
+                place = np.searchsorted(every.low[order], low).clip(max=len(order) - 1)
+                found[channel] = _Cycles(low, stamps, every.numbers[order][place])
         return found
 
     def _records(self, number: int) -> _Records:
