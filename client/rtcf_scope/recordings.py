@@ -1,17 +1,18 @@
 """Recordings that pages may open: those that were named at the start, and those of one folder."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rtcf.recording.reader import Recording, RecordingError
+from numpy.typing import NDArray
+from rtcf.recording.reader import RecordedColumn, Recording, RecordingError
 
 from rtcf_scope import wire
 from rtcf_scope.chunk import ELEMENTS, split_element
 
-MOST_CYCLES = 4_000_000  # 128 MiB with three traces; above, each n-th cycle is told
+MOST_VALUES = 16_000_000  # 128 MB; instead of more, minima and maxima are told
 
 
 class Recordings:
@@ -36,21 +37,32 @@ class Recordings:
                 ]  # fmt: skip
                 signals += [{"name": each, "unit": signal.unit} for each in names]
             return {"name": name, "whole": recording.whole, "signals": signals,
-                    "cycles": len(recording.cycles)}  # fmt: skip
+                    "cycles": len(recording.cycles),
+                    "seconds": (recording.end_ns - recording.begin_ns) / 1e9}  # fmt: skip
 
-    def columns(self, name: str, traces: list[str]) -> bytes:
-        """Return the values of traces as bytes of wire; raises RecordingError."""
+    def columns(
+        self, name: str, traces: list[str], begin_s: float = -math.inf, end_s: float = math.inf
+    ) -> bytes:
+        """Return the values of traces as bytes of wire, from `begin_s` to before `end_s` after the
+        first cycle; raises RecordingError."""
         with self._open(name) as recording:
-            cycles = recording.cycles
-            every = max(1, -(-len(cycles) // MOST_CYCLES))
-            stamps = recording.stamps_ns
-            if not len(cycles):
-                raise RecordingError(f"{name} has no cycles")
-            found = [(stamps - stamps[0]) / 1e9, cycles, recording.latencies_ns / 1e3,
-                     recording.durations_ns / 1e3]  # fmt: skip
-            found += [_placed(recording, trace, stamps) for trace in traces]
-            columns = np.array([each[::every] for each in found], "<f8")
-        return wire.head(wire.RECORDED, 0, columns.shape[1], len(columns)) + columns.tobytes()
+            span = (_stamp(recording, begin_s), _stamp(recording, end_s))
+            numbers, durations, latencies = recording.read_cycles(
+                ("iteration", "duration_ns", "latency_ns"), *span
+            ).values()
+            stamps = numbers.stamps_ns
+            if not len(stamps):
+                then = "" if span == (None, None) else " then"
+                raise RecordingError(f"{name} has no cycles{then}")
+            found = [(stamps - recording.begin_ns) / 1e9, numbers.values, latencies.values / 1e3,
+                     durations.values / 1e3]  # fmt: skip
+            named = {split_element(trace)[0] for trace in traces}
+            signals = recording.read(named & recording.signals.keys(), *span)
+            found += [_placed(signals, trace, stamps) for trace in traces]
+        columns = _with_gaps(np.array(found, "<f8"))
+        columns, each = _windows(columns, MOST_VALUES // len(columns))
+        head = wire.head(wire.RECORDED, 0, columns.shape[1], len(columns), hit=each)
+        return head + columns.tobytes()
 
     def _known(self) -> dict[str, Path]:
         found = {} if self._folder is None else {
@@ -65,13 +77,13 @@ class Recordings:
         return Recording(file)
 
 
-def _placed(recording: Recording, trace: str, stamps: Any) -> Any:
+def _placed(signals: Mapping[str, RecordedColumn], trace: str, stamps: Any) -> Any:
     """Return a trace's values at all cycles: NaN where it has none."""
     signal, index = split_element(trace)
     values = np.full(len(stamps), np.nan)
-    if signal not in recording.signals:
+    if signal not in signals:
         return values
-    column = recording.read(signal)
+    column = signals[signal]
     each = column.values.reshape(len(column.values), math.prod(column.values.shape[1:]))
     if index < each.shape[1]:
         if len(each) == len(values):
@@ -80,3 +92,33 @@ def _placed(recording: Recording, trace: str, stamps: Any) -> Any:
         place = np.searchsorted(stamps, column.stamps_ns).clip(max=len(stamps) - 1)
         values[place] = each[:, index]
     return values
+
+
+def _stamp(recording: Recording, seconds: float) -> int | None:
+    """Return the stamp (ns) so long after the first cycle; none if that is infinite."""
+    return recording.begin_ns + round(seconds * 1e9) if math.isfinite(seconds) else None
+
+
+def _with_gaps(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return columns with a cycle of NaN where cycles are missing, at the time of the last one."""
+    gaps = np.flatnonzero(np.diff(columns[1]) != 1) + 1
+    if not len(gaps):
+        return columns
+    missing = np.full((len(columns), len(gaps)), np.nan)
+    missing[0] = columns[0, gaps - 1]
+    return np.insert(columns, gaps, missing, axis=1)
+
+
+def _windows(columns: NDArray[np.float64], most: int) -> tuple[NDArray[np.float64], int]:
+    """Return the minima and maxima of windows of cycles by turns, and the length of these; the
+    columns and 1 if they have at most so many cycles."""
+    count = columns.shape[1]
+    if count <= most:
+        return columns, 1
+    each = math.ceil(2 * count / most)
+    windows = math.ceil(count / each)
+    padded = np.pad(columns, ((0, 0), (0, windows * each - count)), "edge")
+    parts = padded.reshape(len(columns), windows, each)
+    found = np.empty((len(columns), 2 * windows))
+    found[:, 0::2], found[:, 1::2] = np.fmin.reduce(parts, 2), np.fmax.reduce(parts, 2)
+    return found, each

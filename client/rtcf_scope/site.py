@@ -3,6 +3,7 @@
 import asyncio
 import io
 import json
+import math
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -158,7 +159,15 @@ class Site:
     async def _recorded(self, request: web.Request) -> web.StreamResponse:
         traces: list[str] = request.query.getall("trace", [])
         try:
-            data = await self._ask(self._recordings.columns, request.match_info["name"], traces)
+            begin, end = (
+                float(request.query.get(name, value))
+                for name, value in (("begin", -math.inf), ("end", math.inf))
+            )
+        except ValueError:
+            return refused("begin and end are numbers of seconds")
+        name = request.match_info["name"]
+        try:
+            data = await self._ask(self._recordings.columns, name, traces, begin, end)
         except RtcfError as error:
             return refused(error)
         return web.Response(body=data, content_type="application/octet-stream")

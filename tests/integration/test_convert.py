@@ -150,6 +150,7 @@ def test_refused_in_a_line_and_nothing_is_left(running: Daemon, recorded: Path) 
     there.write_text("mine")
     itself = recorded.with_name("itself.csv")
     itself.symlink_to(recorded)
+    itself.with_suffix(".mcap").symlink_to(recorded)
     before = set(recorded.parent.iterdir())
     for source, to, words, code, reason in (
         (
@@ -163,6 +164,8 @@ def test_refused_in_a_line_and_nothing_is_left(running: Daemon, recorded: Path) 
         (recorded, itself, ("--force",), 2, "is the recording itself: write to another file"),
         (recorded, Path("no/where.csv"), (), 2, "No such file or directory"),
         (there, Path("run.csv"), (), 1, "is no MCAP file"),
+        (recorded, Path("run.csv"), ("--repair",), 2, "end its name in .mcap"),
+        (recorded, itself.with_suffix(".mcap"), ("--repair", "--force"), 2, "recording itself"),
         (recorded.with_name("none"), Path("run.csv"), (), 1, "No such file or directory"),
     ):
         done = running.ctl("convert", str(source), str(recorded.parent / to), *words)

@@ -128,15 +128,37 @@ def test_mcaps_own_reader_reads_it(running: Daemon, tmp_path: Path, mcap_python:
         assert found["counts"]["/wave/phase"] == len(recording.cycles)
 
 
-def test_a_file_whose_writer_was_killed_can_be_read(running: Daemon, tmp_path: Path) -> None:
+_COUNT = """
+import sys
+from mcap.reader import make_reader
+with open(sys.argv[1], "rb") as file:
+    print(sum(channel.topic == "/wave/phase" for _, channel, _ in make_reader(file).iter_messages()))
+"""
+
+
+def test_a_file_whose_writer_was_killed_can_be_read(
+    running: Daemon, tmp_path: Path, mcap_python: Path
+) -> None:
     file = tmp_path / "run.mcap"
     process = _begun(running, file)
     process.kill()
     process.wait()
     with rtcf.read_recording(file) as recording:
         assert not recording.whole
-        assert len(recording.cycles) > 0
+        count = len(recording.cycles)
+        assert count > 0
         assert np.all(np.diff(recording.cycles) == 1)
+    others = [mcap_python, "-c", _COUNT, file]
+    done = subprocess.run(others, capture_output=True, text=True, env=clean_environment())
+    assert (done.stdout, done.returncode) == (f"{count}\n", 0), done.stderr
+    whole = tmp_path / "whole.mcap"
+    done = running.ctl("convert", "--repair", str(file), str(whole))
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(f"{whole}: {count} cycles, ")
+    assert "its last second may be missing" in done.stdout
+    with rtcf.read_recording(whole) as recording:
+        assert recording.whole
+        assert len(recording.cycles) == count
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(file.read_bytes()[:-10])
     with rtcf.read_recording(cut) as recording:

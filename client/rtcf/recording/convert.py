@@ -1,4 +1,4 @@
-"""Recordings as files of other programs: CSV, and bags of ROS 1."""
+"""Recordings as files of other programs: CSV, and bags of ROS 1; and as they should have ended."""
 
 import csv
 import io
@@ -12,6 +12,7 @@ from rtcf_shared.arrays import as_list
 from rtcf_shared.whole_file import whole_file
 
 from rtcf.recording import bags
+from rtcf.recording.mcap_writer import McapWriter
 from rtcf.recording.reader import RecordedColumn, RecordedTopic, Recording, RecordingError
 
 if TYPE_CHECKING:
@@ -47,6 +48,40 @@ def convert(
         return written
 
 
+def repair(recording: Recording, to: Path, *, force: bool = False) -> tuple[int, int]:
+    """Write a recording that was cut off into a file that is ended in order, for other readers.
+
+    Return how many cycles are in it, and how many damaged chunks are not.  A file that is there is
+    written over if `force`.  Raises ValueError of a file name, and RecordingError.
+    """
+    if to.suffix != ".mcap":
+        raise ValueError(f"{to}: end its name in .mcap, as a repaired recording is one")
+    if to.exists() and to.samefile(recording.path):
+        raise ValueError(f"{to} is the recording itself: write to another file")
+    cycles = damaged = 0
+    with _new_file(to, force) as file:
+        writer = McapWriter(file)
+        for name, values in recording.metadata.items():
+            writer.metadata(name, values)
+        for topic in recording.topics:
+            number = writer.channel(topic.name, topic.ros_type, topic.definition, topic.metadata)
+            if number != topic.number:
+                raise RecordingError(
+                    f"{recording.path} has a topic number {topic.number} after {number - 1}: "
+                    "rtcfctl record has not written it"
+                )
+        for chunk in range(recording.chunks):
+            try:
+                packed, counts = recording.packed_chunk(chunk)
+            except RecordingError:
+                damaged += 1
+                continue
+            writer.packed_chunk(packed, counts)
+            cycles += counts.get(recording.cycle_topic, 0)
+        writer.close()
+    return cycles, damaged
+
+
 def _write_csv(recording: Recording, file: BinaryIO) -> Iterator[int]:
     """Write a line for each cycle; cells of what was not there then are empty."""
     text = io.TextIOWrapper(file, encoding="utf-8", newline="", write_through=True)
@@ -58,11 +93,11 @@ def _write_csv(recording: Recording, file: BinaryIO) -> Iterator[int]:
     recording.read_cycles("iteration")  # refused before a line is written
     writer.writerow(head)
     for chunk in range(recording.chunks):
-        first, *others = (recording.read_cycles(name, chunk) for name in _CYCLE)
+        first, *others = recording.read_cycles(_CYCLE, chunk=chunk).values()
         columns = [as_list(first.values), as_list(first.stamps_ns)]
         columns += [as_list(other.values) for other in others]
-        for name in recording.signals:
-            columns += _cells(recording.read(name, chunk=chunk), first)
+        for column in recording.read(recording.signals, chunk=chunk).values():
+            columns += _cells(column, first)
         writer.writerows(zip(*columns, strict=True))
         yield len(first.values)
     text.detach()

@@ -86,7 +86,7 @@ class Files(Closing):
         try:
             # It has its name from its head on: at any time a file of that name can be read.
             with whole_file(path, force=self._force) as part:
-                self._file = part.open("wb")
+                self._file = part.open("wb", buffering=0)
                 self._writer = _begun(self._file, path)
         except FileExistsError:
             raise ValueError(f"{path} is there already: --force writes over it") from None
@@ -138,7 +138,7 @@ def _has_cycles(path: Path) -> bool:
     try:
         with read_recording(path) as recording:
             return any(
-                len(recording.read_cycles("iteration", chunk).values) > 0
+                len(recording.read_cycles("iteration", chunk=chunk).values) > 0
                 for chunk in range(recording.chunks)
             )
     except OSError:

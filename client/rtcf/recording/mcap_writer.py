@@ -1,9 +1,15 @@
 """Writes MCAP files of ROS 1 messages, many of one channel at a time.
 
-The format is that of https://mcap.dev/spec: version 0, profile `ros1`.  Every chunk is
-followed by its index, so that a file whose writer was killed opens up to its last chunk.
+The format is that of https://mcap.dev/spec: version 0, profile `ros1`.  A chunk holds whole columns:
+all messages of a channel follow each other.  It has no index of its messages, which would be larger
+than they are.
+
+At any time the file is a valid one: it ends in a footer without a summary, which the next chunk
+overwrites last.  Readers open it up to its last chunk, even where the writer was killed.  A pipe
+has its footer at its end alone.
 """
 
+import contextlib
 import struct
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,6 +24,17 @@ HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = ra
 STATISTICS, METADATA, METADATA_INDEX, SUMMARY_OFFSET, DATA_END = 0x0B, 0x0C, 0x0D, 0x0E, 0x0F
 MESSAGE_HEAD = 31  # bytes of a message's record before its data
 _LIBRARY = "rtcf"
+_FOOTER = struct.Struct("<QQI")
+
+
+def record(opcode: int, content: bytes) -> bytes:
+    """Return a record."""
+    return struct.pack("<BQ", opcode, len(content)) + content
+
+
+# Of a file without a summary.
+END = record(DATA_END, bytes(4)) + record(FOOTER, bytes(_FOOTER.size)) + MAGIC
+FOOTER_SIZE = len(record(FOOTER, bytes(_FOOTER.size)))
 
 
 @dataclass(frozen=True)
@@ -30,9 +47,21 @@ class Column:
     data: "NDArray[Any]"  # bytes, a row each
 
 
+@dataclass(frozen=True)
+class Chunk:
+    """Records, compressed; times in ns."""
+
+    start: int
+    end: int
+    size: int  # bytes, uncompressed
+    crc: int  # of them
+    compression: str
+    packed: bytes
+
+
 @dataclass
 class _Summary:
-    """What the end of the file repeats of it."""
+    """The parts of the file that its end repeats."""
 
     schemas: list[bytes] = field(default_factory=list)
     channels: list[bytes] = field(default_factory=list)
@@ -44,15 +73,18 @@ class _Summary:
 
 
 class McapWriter:
-    """One file; owned by who records.  All methods raise OSError."""
+    """One file, unbuffered; owned by its recorder.  All methods raise OSError, and
+    leave the file as it was before them then."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
-        self._at = 0
+        self._seeks = file.seekable()  # else it has an end once it is closed
+        self._at = 0  # the file is valid up to there
+        self._pending = bytearray()  # behind it
         self._summary = _Summary()
         self._compress = _compressor()
-        self._write(MAGIC)
-        self._record(HEADER, _text("ros1") + _text(_LIBRARY))
+        self._pending += MAGIC + record(HEADER, _text("ros1") + _text(_LIBRARY))
+        self._commit(END)
 
     @property
     def size(self) -> int:
@@ -62,55 +94,82 @@ class McapWriter:
     def channel(
         self, topic: str, ros_type: str, definition: str, metadata: Mapping[str, str]
     ) -> int:
-        """Add a topic of a type; return its number."""
+        """Add a topic of a type; return its number.  Its first messages follow in the next
+        chunk."""
         number = len(self._summary.channels) + 1
         schema = _text(ros_type) + _text("ros1msg") + _bytes(definition.encode())
         self._summary.schemas.append(struct.pack("<H", number) + schema)
-        self._record(SCHEMA, self._summary.schemas[-1])
+        self._pending += record(SCHEMA, self._summary.schemas[-1])
         channel = struct.pack("<HH", number, number) + _text(topic) + _text("ros1")
         pairs = b"".join(_text(key) + _text(value) for key, value in metadata.items())
         self._summary.channels.append(channel + _bytes(pairs))
-        self._record(CHANNEL, self._summary.channels[-1])
+        self._pending += record(CHANNEL, self._summary.channels[-1])
         return number
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Add what somebody may want to know of the file."""
+        """Add facts about the file."""
         pairs = b"".join(_text(key) + _text(value) for key, value in values.items())
-        at = self._at
-        self._record(METADATA, _text(name) + _bytes(pairs))
-        self._summary.metadata.append(struct.pack("<QQ", at, self._at - at) + _text(name))
+        metadata = record(METADATA, _text(name) + _bytes(pairs))
+        self._summary.metadata.append(
+            struct.pack("<QQ", self._at + len(self._pending), len(metadata)) + _text(name)
+        )
+        self._pending += metadata
 
     def chunk(self, columns: Sequence[Column]) -> None:
-        """Write messages, with their index, and see that the system has them."""
-        import numpy as np
-
-        columns = [column for column in columns if len(column.times)]
-        if not columns:
-            return
-        parts, offset = [], 0
-        indexes: dict[int, bytes] = {}
+        """Write messages, and see that the system has them."""
+        merged: dict[tuple[int, int], list[Column]] = {}
         for column in columns:
-            rows = _rows(column)
-            offsets = offset + np.arange(len(rows), dtype="<u8") * rows.itemsize
-            entries = np.empty(len(rows), [("time", "<u8"), ("offset", "<u8")])
-            entries["time"], entries["offset"] = column.times, offsets
-            indexes[column.channel] = indexes.get(column.channel, b"") + entries.tobytes()
+            if len(column.times):
+                key = column.channel, column.data.shape[1]
+                merged.setdefault(key, []).append(column)
+        if not merged:
+            return
+        parts = []
+        counts: dict[int, int] = {}
+        for (channel, _), several in merged.items():
+            rows = _rows(several)
             parts.append(rows.tobytes())
-            offset += rows.nbytes
-            counts = self._summary.counts
-            counts[column.channel] = counts.get(column.channel, 0) + len(rows)
-        start = min(int(column.times.min()) for column in columns)
-        end = max(int(column.times.max()) for column in columns)
-        first = not self._summary.chunks
-        self._summary.start = start if first else min(start, self._summary.start)
-        self._summary.end = max(end, self._summary.end)
-        self._write_chunk(start, end, b"".join(parts), indexes)
-        self._file.flush()
+            counts[channel] = counts.get(channel, 0) + len(rows)
+        start = min(int(column.times.min()) for part in merged.values() for column in part)
+        end = max(int(column.times.max()) for part in merged.values() for column in part)
+        records = b"".join(parts)
+        name, packed = self._compress(records)
+        self.packed_chunk(Chunk(start, end, len(records), zlib.crc32(records), name, packed), counts)
+
+    def packed_chunk(self, chunk: Chunk, counts: Mapping[int, int]) -> None:
+        """Write a chunk that is compressed already, with `counts` messages by channel."""
+        head = struct.pack("<QQQI", chunk.start, chunk.end, chunk.size, chunk.crc)
+        name = _text(chunk.compression)
+        packed = record(
+            CHUNK, head + name + struct.pack("<Q", len(chunk.packed)) + chunk.packed
+        )
+        mark = len(self._pending)
+        at = self._at + mark
+        self._pending += packed
+        try:
+            self._commit(END)
+        except OSError:
+            del self._pending[mark:]
+            raise
+        # No index of messages: an empty map of their places, 0 bytes long.
+        summary = self._summary
+        summary.chunks.append(
+            struct.pack("<QQQQ", chunk.start, chunk.end, at, len(packed))
+            + _bytes(b"")
+            + struct.pack("<Q", 0)
+            + name
+            + struct.pack("<QQ", len(chunk.packed), chunk.size)
+        )
+        first = len(summary.chunks) == 1
+        summary.start = chunk.start if first else min(chunk.start, summary.start)
+        summary.end = max(chunk.end, summary.end)
+        for channel, count in counts.items():
+            summary.counts[channel] = summary.counts.get(channel, 0) + count
 
     def close(self) -> None:
         """End the file in order; the caller closes it."""
-        self._record(DATA_END, struct.pack("<I", 0))
-        start = self._at
+        self._pending += record(DATA_END, bytes(4))
+        start = self._at + len(self._pending)
         summary = self._summary
         groups: list[tuple[int, Iterable[bytes]]] = [
             (SCHEMA, summary.schemas),
@@ -121,38 +180,49 @@ class McapWriter:
         ]
         offsets = []
         for opcode, records in groups:
-            at = self._at
-            for record in records:
-                self._record(opcode, record)
-            if self._at > at:
-                offsets.append(struct.pack("<BQQ", opcode, at, self._at - at))
-        offset_start = self._at
+            at = self._at + len(self._pending)
+            for each in records:
+                self._pending += record(opcode, each)
+            length = self._at + len(self._pending) - at
+            if length:
+                offsets.append(struct.pack("<BQQ", opcode, at, length))
+        offset_start = self._at + len(self._pending)
         for offset in offsets:
-            self._record(SUMMARY_OFFSET, offset)
-        self._record(FOOTER, struct.pack("<QQI", start, offset_start, 0))
-        self._write(MAGIC)
-        self._file.flush()
+            self._pending += record(SUMMARY_OFFSET, offset)
+        self._commit(record(FOOTER, _FOOTER.pack(start, offset_start, 0)) + MAGIC)
 
-    def _write_chunk(
-        self, start: int, end: int, records: bytes, indexes: Mapping[int, bytes]
-    ) -> None:
-        name, packed = self._compress(records)
-        at = self._at
-        head = struct.pack("<QQQI", start, end, len(records), zlib.crc32(records))
-        self._record(CHUNK, head + _text(name) + struct.pack("<Q", len(packed)) + packed)
-        length = self._at - at
-        places = []
-        index_start = self._at
-        for channel, index in indexes.items():
-            places.append(struct.pack("<HQ", channel, self._at))
-            self._record(MESSAGE_INDEX, struct.pack("<H", channel) + _bytes(index))
-        self._summary.chunks.append(
-            struct.pack("<QQQQ", start, end, at, length)
-            + _bytes(b"".join(places))
-            + struct.pack("<Q", self._at - index_start)
-            + _text(name)
-            + struct.pack("<QQ", len(packed), len(records))
-        )
+    def _commit(self, end: bytes) -> None:
+        """Write what is pending, and the end of the file behind it.
+
+        The begin, which takes the place of the end before, comes last: until then readers find that
+        end.
+        """
+        if not self._seeks:
+            self._write(None, bytes(self._pending) + (b"" if end is END else end))
+            self._at += len(self._pending)
+            self._pending.clear()
+            return
+        data = memoryview(bytes(self._pending) + end)
+        begin = len(END) if self._at else 0
+        try:
+            self._write(self._at + begin, data[begin:])
+            if begin:
+                self._write(self._at, data[:begin])
+        except OSError:
+            if self._at:  # the file ends as it did before
+                with contextlib.suppress(OSError):
+                    self._write(self._at, END)
+                    self._file.truncate(self._at + len(END))
+            raise
+        self._at += len(self._pending)
+        self._pending.clear()
+
+    def _write(self, at: int | None, data: "memoryview | bytes") -> None:
+        if at is not None:
+            self._file.seek(at)
+        while len(data):
+            data = data[self._file.write(data) :]
+        self._file.flush()
 
     def _statistics(self) -> bytes:
         summary = self._summary
@@ -169,21 +239,31 @@ class McapWriter:
             summary.end,
         ) + _bytes(counts)
 
-    def _record(self, opcode: int, content: bytes) -> None:
-        self._write(struct.pack("<BQ", opcode, len(content)) + content)
 
-    def _write(self, data: bytes) -> None:
-        self._file.write(data)
-        self._at += len(data)
-
-
-def _rows(column: Column) -> "NDArray[Any]":
-    """Return the records of messages, one after the other."""
+def _rows(columns: Sequence[Column]) -> "NDArray[Any]":
+    """Return the records of messages of one channel and size, one after the other."""
     import numpy as np
 
-    size = column.data.shape[1]
-    rows = np.empty(
-        len(column.times),
+    size = columns[0].data.shape[1]
+    rows = np.empty(sum(len(column.times) for column in columns), message_type(size))
+    rows["opcode"] = MESSAGE
+    rows["length"] = MESSAGE_HEAD - 9 + size
+    rows["channel"] = columns[0].channel
+    at = 0
+    for column in columns:
+        part = rows[at : at + len(column.times)]
+        part["sequence"] = column.sequences & 0xFFFFFFFF
+        part["log_time"] = part["publish_time"] = column.times
+        part["data"] = column.data
+        at += len(part)
+    return rows
+
+
+def message_type(size: int) -> Any:
+    """Return NumPy's type of a message's record with `size` bytes of data."""
+    import numpy as np
+
+    return np.dtype(
         [
             ("opcode", "u1"),
             ("length", "<u8"),
@@ -192,15 +272,8 @@ def _rows(column: Column) -> "NDArray[Any]":
             ("log_time", "<u8"),
             ("publish_time", "<u8"),
             ("data", "u1", (size,)),
-        ],
+        ]
     )
-    rows["opcode"] = MESSAGE
-    rows["length"] = MESSAGE_HEAD - 9 + size
-    rows["channel"] = column.channel
-    rows["sequence"] = column.sequences & 0xFFFFFFFF
-    rows["log_time"] = rows["publish_time"] = column.times
-    rows["data"] = column.data
-    return rows
 
 
 def _compressor() -> Any:

@@ -3,10 +3,13 @@
 import contextlib
 import os
 import struct
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+import zlib
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from rtcf_shared.arrays import as_list
 from rtcf_shared.errors import RtcfError
@@ -23,6 +26,13 @@ if TYPE_CHECKING:
 
 _RECORD = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQI")
+_MESSAGE = struct.Struct("<BQH")
+_AHEAD = 2  # chunks that are unpacked while others are read
+# Of the messages of cycles.
+_CYCLE = {
+    name: ros_layout.Leaf(name, "<i8", None, offset)
+    for name, offset in (("iteration", 16), ("duration_ns", 24), ("latency_ns", 32))
+}
 # Of a file that is damaged.
 _NONSENSE = (ArithmeticError, LookupError, MemoryError, RuntimeError, ValueError, struct.error)
 
@@ -61,14 +71,83 @@ class RecordedTopic:
     metadata: dict[str, str]
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Chunk:
     at: int  # of its records, compressed or not
     length: int
     compression: str
     start_ns: int
     end_ns: int
-    offsets: dict[int, int] = field(default_factory=dict)  # of a channel's index, in the file
+    size: int  # of its records, uncompressed
+    crc: int  # of them; 0 = not told
+
+
+@dataclass(frozen=True)
+class _Run:
+    """Messages of one channel and size that follow each other."""
+
+    at: int  # bytes of the chunk before them
+    count: int
+    size: int  # of a message's record
+
+
+class _Records:
+    """The records of a chunk."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+        self.runs: dict[int, list[_Run]] = {}  # by channel
+        at, guess = 0, 1
+        while at + mcap.MESSAGE_HEAD <= len(data):
+            opcode, length, channel = _MESSAGE.unpack_from(data, at)
+            size = _RECORD.size + length
+            if opcode == mcap.MESSAGE:
+                guess = self._count(at, size, guess)
+                self.runs.setdefault(channel, []).append(_Run(at, guess, size))
+                size *= guess
+            at += size
+
+    def field(self, run: _Run, offset: int, kind: str, count: int | None = None) -> "NDArray[Any]":
+        """Return one field of the records of a run, or `count` of them that follow each other."""
+        import numpy as np
+
+        each = ros_layout.size_of(kind)
+        if offset + each * (1 if count is None else count) > run.size:
+            raise ValueError(f"a message of {run.size - mcap.MESSAGE_HEAD} bytes is too short")
+        shape, strides = ((run.count,), (run.size,)) if count is None else (
+            (run.count, count), (run.size, each)
+        )  # fmt: skip
+        fields: NDArray[Any] = np.ndarray(shape, kind, self.data, run.at + offset, strides)
+        return fields
+
+    def _count(self, at: int, size: int, guess: int) -> int:
+        """Return how many messages of one channel and size follow each other; perhaps `guess`."""
+        import numpy as np
+
+        most, count = (len(self.data) - at) // size, 1
+        if most == 0:
+            raise ValueError("a message is longer than its chunk")
+        head = _MESSAGE.unpack_from(self.data, at)
+        while count < most:
+            run = _Run(at + count * size, min(guess + 1, most - count), size)
+            heads = (self.field(run, *each) for each in ((0, "u1"), (1, "<u8"), (9, "<u2")))
+            others = np.logical_or.reduce(
+                [found != one for found, one in zip(heads, head, strict=True)]
+            )
+            if others.any():
+                return count + int(others.argmax())
+            count += run.count
+            guess *= 2
+        return count
+
+
+@dataclass(frozen=True, eq=False)
+class _Cycles:
+    """The cycles of a channel's messages in a chunk."""
+
+    low: "NDArray[np.uint32]"  # the low 32 bits of their numbers, which the messages have
+    stamps_ns: "NDArray[np.int64]"
+    numbers: "NDArray[np.int64]"
 
 
 class Recording(Closing):
@@ -85,8 +164,9 @@ class Recording(Closing):
         self.metadata: dict[str, dict[str, str]] = {}
         self._channels: dict[int, RecordedTopic] = {}
         self._chunks: list[_Chunk] = []
-        self._cycle_channel = 0
-        self._cache: tuple[int, bytes] = (-1, b"")
+        self.cycle_topic = 0  # its number; 0 = none
+        self._declared: dict[int, int] = {}  # chunks before a channel
+        self._cache: tuple[int, _Records] | None = None
         try:
             self._file = self.path.open("rb")
         except OSError as error:
@@ -106,6 +186,16 @@ class Recording(Closing):
     def chunks(self) -> int:
         """How many parts the file has, one after the other, that are read at once each."""
         return len(self._chunks)
+
+    @property
+    def begin_ns(self) -> int:
+        """The stamp of the first message; 0 = there is none."""
+        return self._chunks[0].start_ns if self._chunks else 0
+
+    @property
+    def end_ns(self) -> int:
+        """The stamp of the last message; 0 = there is none."""
+        return self._chunks[-1].end_ns if self._chunks else 0
 
     @property
     def cycles(self) -> "NDArray[np.int64]":
@@ -131,53 +221,126 @@ class Recording(Closing):
         """Return all values of a signal."""
         return self.read(name).values
 
+    @overload
+    def read(
+        self, name: str, begin_ns: int | None = None, end_ns: int | None = None,
+        chunk: int | None = None,
+    ) -> RecordedColumn: ...  # fmt: skip
+
+    @overload
+    def read(
+        self, name: Iterable[str], begin_ns: int | None = None, end_ns: int | None = None,
+        chunk: int | None = None,
+    ) -> dict[str, RecordedColumn]: ...  # fmt: skip
+
     def read(
         self,
-        name: str,
+        name: str | Iterable[str],
         begin_ns: int | None = None,
         end_ns: int | None = None,
         chunk: int | None = None,
-    ) -> RecordedColumn:
+    ) -> RecordedColumn | dict[str, RecordedColumn]:
         """Return the values of a signal whose stamps are from `begin_ns` to before `end_ns`, or
-        those in one chunk; of the file no more than that is read."""
-        signal = self.signals.get(name)
-        if signal is None:
-            known = ", ".join(list(self.signals)[:8])
-            raise RecordingError(f"{self.path} has no signal {name}; it has {known or 'none'}")
-        with self._whole_only():
-            return self._read(signal.channel, signal.leaf, begin_ns, end_ns, chunk)
+        those in one chunk; of several signals, by name.
 
-    def read_cycles(self, name: str, chunk: int | None = None) -> RecordedColumn:
-        """Return `iteration`, `duration_ns` or `latency_ns` of all cycles, or of those in one
-        chunk."""
-        if not self._cycle_channel:
-            raise RecordingError(f"{self.path} tells no cycles: rtcfctl record has not written it")
+        Each chunk is read once, and others not at all.  Signals of the same cycles share these
+        arrays.
+        """
+        names = [name] if isinstance(name, str) else list(dict.fromkeys(name))
+        for each in names:
+            if each not in self.signals:
+                known = ", ".join(list(self.signals)[:8])
+                raise RecordingError(f"{self.path} has no signal {each}; it has {known or 'none'}")
+        leaves = [(self.signals[each].channel, self.signals[each].leaf) for each in names]
         with self._whole_only():
-            return self._read(self._cycle_channel, self._leaf_of_cycles(name), chunk=chunk)
+            columns = self._read(leaves, begin_ns, end_ns, chunk)
+        return columns[0] if isinstance(name, str) else dict(zip(names, columns, strict=True))
+
+    @overload
+    def read_cycles(
+        self, name: str, begin_ns: int | None = None, end_ns: int | None = None,
+        chunk: int | None = None,
+    ) -> RecordedColumn: ...  # fmt: skip
+
+    @overload
+    def read_cycles(
+        self, name: Iterable[str], begin_ns: int | None = None, end_ns: int | None = None,
+        chunk: int | None = None,
+    ) -> dict[str, RecordedColumn]: ...  # fmt: skip
+
+    def read_cycles(
+        self,
+        name: str | Iterable[str],
+        begin_ns: int | None = None,
+        end_ns: int | None = None,
+        chunk: int | None = None,
+    ) -> RecordedColumn | dict[str, RecordedColumn]:
+        """Return `iteration`, `duration_ns` or `latency_ns` of cycles, as `read` does of signals."""
+        if not self.cycle_topic:
+            raise RecordingError(f"{self.path} tells no cycles: rtcfctl record has not written it")
+        names = [name] if isinstance(name, str) else list(name)
+        leaves = [(self.cycle_topic, _CYCLE[each]) for each in names]
+        with self._whole_only():
+            columns = self._read(leaves, begin_ns, end_ns, chunk)
+        return columns[0] if isinstance(name, str) else dict(zip(names, columns, strict=True))
 
     def messages(self, chunk: int) -> list[tuple[RecordedTopic, int, bytes]]:
         """Return the messages of a chunk as ROS 1 serialises them, with their stamps (ns), in the
         order of these."""
-        found = []
+        found: list[tuple[int, int, int, RecordedTopic]] = []
         with self._whole_only():
-            for number in self._chunks[chunk].offsets:
-                topic = self._channels[number]
-                index = as_list(self._index(self._chunks[chunk], number))
-                found += [(time, at, topic) for time, at in index]
-            found.sort(key=lambda each: each[:2])
             records = self._records(chunk)
-            return [(topic, time, self._data(records, at)) for time, at, topic in found]
+            for channel, runs in records.runs.items():
+                for run in runs:
+                    stamps = as_list(records.field(run, 15, "<i8"))
+                    places = range(run.at, run.at + run.count * run.size, run.size)
+                    found += [
+                        (stamp, at, at + run.size, self._channels[channel])
+                        for stamp, at in zip(stamps, places, strict=True)
+                    ]
+            found.sort(key=lambda each: each[:2])
+            data = records.data
+            return [
+                (topic, stamp, data[at + mcap.MESSAGE_HEAD : end])
+                for stamp, at, end, topic in found
+            ]
+
+    def packed_chunk(self, chunk: int) -> tuple[mcap.Chunk, dict[int, int]]:
+        """Return a chunk as it stands in the file, and how many messages of each channel it has.
+
+        Raises RecordingError if it is damaged.
+        """
+        with self._whole_only():
+            found = self._chunks[chunk]
+            records = self._records(chunk)
+            if found.crc and zlib.crc32(records.data) != found.crc:
+                raise ValueError("the checksum of a chunk is another")
+            counts = {
+                channel: sum(run.count for run in runs) for channel, runs in records.runs.items()
+            }
+            times = found.start_ns, found.end_ns
+            return mcap.Chunk(*times, found.size, found.crc, found.compression,
+                              self._packed(found)), counts  # fmt: skip
+
+    @property
+    def topics(self) -> list[RecordedTopic]:
+        """The outputs, states and cycles that have messages, in the order of their numbers."""
+        return [self._channels[number] for number in sorted(self._channels)]
 
     def to_pandas(self, names: Iterable[str] | None = None) -> Any:
         """Return a pandas.DataFrame of signals that are numbers, by cycle."""
         import pandas
 
-        columns = {}
-        for name in self.signals if names is None else names:
-            column = self.read(name)
+        columns = self.read(self.signals if names is None else names)
+        indexes: dict[int, Any] = {}  # one for all signals of the same cycles
+        series = {}
+        for name, column in columns.items():
             if column.values.ndim == 1:
-                columns[name] = pandas.Series(column.values, index=column.cycles)
-        return pandas.DataFrame(columns)
+                key = id(column.cycles)
+                if key not in indexes:
+                    indexes[key] = pandas.Index(column.cycles)
+                series[name] = pandas.Series(column.values, index=indexes[key])
+        return pandas.DataFrame(series)
 
     @contextlib.contextmanager
     def _whole_only(self) -> Iterator[None]:
@@ -186,89 +349,113 @@ class Recording(Closing):
         except _NONSENSE as error:
             raise RecordingError(f"{self.path} is damaged: {error}") from None
 
-    def _leaf_of_cycles(self, path: str) -> ros_layout.Leaf:
-        offsets = {"iteration": 16, "duration_ns": 24, "latency_ns": 32}
-        return ros_layout.Leaf(path, "<i8", None, offsets[path])
-
     def _read(
         self,
-        channel: int,
-        leaf: ros_layout.Leaf,
+        leaves: Sequence[tuple[int, ros_layout.Leaf]],
         begin_ns: int | None = None,
         end_ns: int | None = None,
         chunk: int | None = None,
-    ) -> RecordedColumn:
+    ) -> list[RecordedColumn]:
+        """Return the columns of leaves of channels' messages."""
         import numpy as np
 
-        shape = () if leaf.count is None else (leaf.count,)
-        size = ros_layout.size_of(leaf.format) * (1 if leaf.count is None else leaf.count)
-        cycles, stamps, values = [], [], []
-        for number in range(self.chunks) if chunk is None else (chunk,):
-            part = self._chunks[number]
-            if channel not in part.offsets:
-                continue
-            if (end_ns is not None and part.start_ns >= end_ns) or (
-                begin_ns is not None and part.end_ns < begin_ns
-            ):
-                continue
-            index = self._index(part, channel)
-            keep = np.ones(len(index), bool)
-            if begin_ns is not None:
-                keep &= index["time"] >= begin_ns
-            if end_ns is not None:
-                keep &= index["time"] < end_ns
-            index = index[keep]
-            records = np.frombuffer(self._records(number), "u1")
-            at = index["offset"].astype("i8")[:, None]
-            low = records[at + 11 + np.arange(4)].reshape(-1).view("<u4").astype("i8")
-            cycles.append(self._cycles_of(part, records, low))
-            stamps.append(index["time"].astype("i8"))
-            data = records[at + mcap.MESSAGE_HEAD + leaf.offset + np.arange(size)]
-            values.append(data.reshape(-1).view(leaf.format).reshape(len(index), *shape))
-        none = np.zeros((0, *shape), leaf.format)
-        return RecordedColumn(
-            np.concatenate(cycles or [np.zeros(0, "i8")]),
-            np.concatenate(stamps or [np.zeros(0, "i8")]),
-            np.concatenate(values or [none]),
-        )
+        cycles: dict[int, list[_Cycles]] = {channel: [] for channel, _ in leaves}
+        values: list[list[NDArray[Any]]] = [[] for _ in leaves]
+        numbers = [
+            number
+            for number in (range(self.chunks) if chunk is None else (chunk,))
+            if (end_ns is None or self._chunks[number].start_ns < end_ns)
+            and (begin_ns is None or self._chunks[number].end_ns >= begin_ns)
+        ]
+        for records in self._several(numbers):
+            keep: dict[int, Any] = {}
+            kept: dict[int, tuple[Any, _Cycles]] = {}  # by the object, which channels share
+            for channel, found in self._cycles(records, cycles).items():
+                if id(found) not in kept:
+                    kept[id(found)] = _between(found, begin_ns, end_ns)
+                keep[channel], those = kept[id(found)]
+                cycles[channel].append(those)
+            for (channel, leaf), column in zip(leaves, values, strict=True):
+                if channel in keep:
+                    column.append(_column(records, channel, leaf)[keep[channel]])
+        shared: dict[tuple[int, ...], tuple[NDArray[np.int64], NDArray[np.int64]]] = {}
+        columns = []
+        for (channel, leaf), column in zip(leaves, values, strict=True):
+            parts = cycles[channel]
+            key = tuple(map(id, parts))
+            if key not in shared:
+                none = np.zeros(0, "i8")
+                shared[key] = (
+                    np.concatenate([none, *(part.numbers for part in parts)]),
+                    np.concatenate([none, *(part.stamps_ns for part in parts)]),
+                )
+            shape = () if leaf.count is None else (leaf.count,)
+            empty = np.zeros((0, *shape), leaf.format)
+            columns.append(RecordedColumn(*shared[key], np.concatenate([empty, *column])))
+        return columns
 
-    def _cycles_of(
-        self, chunk: _Chunk, records: "NDArray[Any]", low: "NDArray[Any]"
-    ) -> "NDArray[np.int64]":
-        """Return the numbers of cycles of which messages tell the low 32 bits."""
+    def _cycles(self, records: _Records, channels: Iterable[int]) -> dict[int, _Cycles]:
+        """Return the cycles of those channels that have messages; one object for those of the same
+        cycles."""
         import numpy as np
 
-        if self._cycle_channel not in chunk.offsets:
-            return low
-        at = self._index(chunk, self._cycle_channel)["offset"].astype("i8")[:, None]
-        leaf = self._leaf_of_cycles("iteration")
-        data = records[at + mcap.MESSAGE_HEAD + leaf.offset + np.arange(8)]
-        numbers = np.unique(data.reshape(-1).view(leaf.format))
-        numbers = numbers[np.argsort(numbers & 0xFFFFFFFF, kind="stable")]
-        place = np.searchsorted(numbers & 0xFFFFFFFF, low).clip(max=len(numbers) - 1)
-        found: NDArray[np.int64] = numbers[place]
+        every: _Cycles | None = None
+        if self.cycle_topic in records.runs:
+            numbers = _column(records, self.cycle_topic, _CYCLE["iteration"])
+            every = _Cycles(*_low(records, self.cycle_topic), numbers)
+        found = {}
+        for channel in channels:
+            if channel not in records.runs:
+                continue
+            low, stamps = _low(records, channel)
+            if every is None:
+                found[channel] = _Cycles(low, stamps, low.astype("i8"))
+            elif np.array_equal(low, every.low) and np.array_equal(stamps, every.stamps_ns):
+                found[channel] = every
+            else:
+                order = np.argsort(every.low, kind="stable")
+                place = np.searchsorted(every.low[order], low).clip(max=len(order) - 1)
+                found[channel] = _Cycles(low, stamps, every.numbers[order][place])
         return found
 
-    def _index(self, chunk: _Chunk, channel: int) -> "NDArray[Any]":
-        import numpy as np
-
-        self._file.seek(chunk.offsets[channel])
-        _, length = _RECORD.unpack(self._file.read(_RECORD.size))
-        content = self._file.read(length)
-        return np.frombuffer(content, [("time", "<u8"), ("offset", "<u8")], offset=6)
-
-    def _records(self, number: int) -> bytes:
-        if self._cache[0] != number:
+    def _records(self, number: int) -> _Records:
+        if self._cache is None or self._cache[0] != number:
+            self._cache = None  # its memory is free before the next one needs some
             chunk = self._chunks[number]
-            self._file.seek(chunk.at)
-            self._cache = (number, self._unpacked(chunk.compression, self._file.read(chunk.length)))
+            packed = self._packed(chunk)
+            self._cache = (number, _Records(self._unpacked(chunk, packed)))
         return self._cache[1]
 
-    def _unpacked(self, compression: str, data: bytes) -> bytes:
-        if compression == "":
+    def _several(self, numbers: Sequence[int]) -> Iterator[_Records]:
+        """Give the records of chunks; the next ones are unpacked meanwhile."""
+        if len(numbers) < 2:
+            yield from map(self._records, numbers)
+            return
+        with ThreadPoolExecutor(_AHEAD) as pool:
+            waiting: deque[Future[bytes]] = deque()
+            try:
+                for number in numbers:
+                    chunk = self._chunks[number]
+                    waiting.append(pool.submit(self._unpacked, chunk, self._packed(chunk)))
+                    if len(waiting) > _AHEAD:
+                        yield _Records(waiting.popleft().result())
+                while waiting:
+                    yield _Records(waiting.popleft().result())
+            finally:
+                for each in waiting:
+                    each.cancel()
+
+    def _packed(self, chunk: _Chunk) -> bytes:
+        self._file.seek(chunk.at)
+        return self._file.read(chunk.length)
+
+    def _unpacked(self, chunk: _Chunk, data: bytes) -> bytes:
+        if chunk.compression == "":
             return data
-        if compression != "zstd":
-            raise RecordingError(f"{self.path}: chunks compressed by {compression} are not read")
+        if chunk.compression != "zstd":
+            raise RecordingError(
+                f"{self.path}: chunks compressed by {chunk.compression} are not read"
+            )
         try:
             import zstandard
         except ImportError:
@@ -288,7 +475,6 @@ class Recording(Closing):
             raise RecordingError(f"{self.path} is no MCAP file")
         schemas: dict[int, tuple[str, str]] = {}
         at = len(mcap.MAGIC)
-        chunk: _Chunk | None = None
         while at + _RECORD.size <= size:
             self._file.seek(at)
             opcode, length = _RECORD.unpack(self._file.read(_RECORD.size))
@@ -296,14 +482,10 @@ class Recording(Closing):
             if at > size:
                 break
             if opcode == mcap.DATA_END:
-                self.whole = True
+                self.whole = self._has_summary(size)
                 break
             if opcode == mcap.CHUNK:
-                chunk = self._chunk(content_at)
-                self._chunks.append(chunk)
-            elif opcode == mcap.MESSAGE_INDEX and chunk is not None:
-                (channel,) = struct.unpack("<H", self._file.read(2))
-                chunk.offsets[channel] = content_at - _RECORD.size
+                self._chunks.append(self._chunk(content_at))
             elif opcode == mcap.SCHEMA:
                 reader = Fields(self._file.read(length))
                 (number,) = reader.numbers("<H")
@@ -316,6 +498,7 @@ class Recording(Closing):
                 self._channels[number] = RecordedTopic(
                     number, topic, *schemas[schema], reader.pairs()
                 )
+                self._declared[number] = len(self._chunks)
             elif opcode == mcap.METADATA:
                 reader = Fields(self._file.read(length))
                 name = reader.text()
@@ -323,11 +506,18 @@ class Recording(Closing):
         self._find_signals()
 
     def _chunk(self, at: int) -> _Chunk:
-        start, end, _, _ = _CHUNK_HEAD.unpack(self._file.read(_CHUNK_HEAD.size))
+        start, end, size, crc = _CHUNK_HEAD.unpack(self._file.read(_CHUNK_HEAD.size))
         (length,) = struct.unpack("<I", self._file.read(4))
         compression = self._file.read(length).decode()
-        (size,) = struct.unpack("<Q", self._file.read(8))
-        return _Chunk(self._file.tell(), size, compression, start, end)
+        (packed,) = struct.unpack("<Q", self._file.read(8))
+        return _Chunk(self._file.tell(), packed, compression, start, end, size, crc)
+
+    def _has_summary(self, size: int) -> bool:
+        """Tell whether the file ends as a writer that closes it ends it."""
+        self._file.seek(max(size - mcap.FOOTER_SIZE - len(mcap.MAGIC), 0))
+        opcode, length = _RECORD.unpack(self._file.read(_RECORD.size))
+        (start,) = struct.unpack("<Q", self._file.read(8))
+        return opcode == mcap.FOOTER and length == mcap.FOOTER_SIZE - _RECORD.size and start > 0
 
     def _find_signals(self) -> None:
         outputs = {
@@ -337,7 +527,7 @@ class Recording(Closing):
         }
         for number, channel in self._channels.items():
             if channel.metadata.get("kind") == "cycle":
-                self._cycle_channel = number
+                self.cycle_topic = number
                 continue
             sample = self._sample(number)
             if sample is None:
@@ -353,17 +543,50 @@ class Recording(Closing):
                 self.signals[full] = RecordedSignal(full, unit, number, leaf)
 
     def _sample(self, channel: int) -> bytes | None:
-        for number, chunk in enumerate(self._chunks):
-            if channel in chunk.offsets:
-                offset = int(self._index(chunk, channel)["offset"][0])
-                return self._data(self._records(number), offset)
+        """Return one message of a channel."""
+        for number in range(self._declared[channel], self.chunks):
+            records = self._records(number)
+            for run in records.runs.get(channel, ()):
+                return records.data[run.at + mcap.MESSAGE_HEAD : run.at + run.size]
         return None
 
-    @staticmethod
-    def _data(records: bytes, at: int) -> bytes:
-        """Return the message of a record."""
-        (_, length) = _RECORD.unpack_from(records, at)
-        return records[at + mcap.MESSAGE_HEAD : at + _RECORD.size + length]
+
+def _low(records: _Records, channel: int) -> "tuple[NDArray[np.uint32], NDArray[np.int64]]":
+    """Return the sequence numbers and stamps (ns) of messages."""
+    import numpy as np
+
+    runs = records.runs[channel]
+    return (
+        np.concatenate([records.field(run, 11, "<u4") for run in runs]),
+        np.concatenate([records.field(run, 15, "<i8") for run in runs]),
+    )
+
+
+def _column(records: _Records, channel: int, leaf: ros_layout.Leaf) -> "NDArray[Any]":
+    """Return the values of a leaf of messages."""
+    import numpy as np
+
+    offset = mcap.MESSAGE_HEAD + leaf.offset
+    return np.concatenate(
+        [
+            records.field(run, offset, leaf.format, leaf.count)
+            for run in records.runs[channel]
+        ]
+    )
+
+
+def _between(found: _Cycles, begin_ns: int | None, end_ns: int | None) -> tuple[Any, _Cycles]:
+    """Return which of some cycles have stamps from `begin_ns` to before `end_ns`, and these."""
+    import numpy as np
+
+    if begin_ns is None and end_ns is None:
+        return slice(None), found
+    keep = np.ones(len(found.stamps_ns), bool)
+    if begin_ns is not None:
+        keep &= found.stamps_ns >= begin_ns
+    if end_ns is not None:
+        keep &= found.stamps_ns < end_ns
+    return keep, _Cycles(found.low[keep], found.stamps_ns[keep], found.numbers[keep])
 
 
 def read_recording(path: str | os.PathLike[str]) -> Recording:

@@ -11,7 +11,7 @@ from rtcf.v1 import ports_pb2
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_CHUNK = 1024 * 1024  # bytes of messages, about
+_CHUNK = 4 * 1024 * 1024  # bytes of messages, about
 _LAYOUT = """MultiArrayLayout layout
 {kind}[] data
 ================================================================================
@@ -69,11 +69,13 @@ class Recorder:
 
     def add(self, batch: PortBatch) -> list[str]:
         """Take a batch; return a line for each state that no message can hold."""
-        notes = self._enter(batch.schema) if batch.schema is not self._schema else []
         self.lost += batch.lost
+        if not len(batch):
+            return []
+        # Topics begin with their first messages.
+        notes = self._enter(batch.schema) if batch.schema is not self._schema else []
         self.cycles += len(batch)
-        if len(batch):
-            self._take(batch)
+        self._take(batch)
         if self._bytes >= _CHUNK:
             self.flush()
         return notes

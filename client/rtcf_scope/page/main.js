@@ -169,6 +169,7 @@ async function slow() {
       } catch (error) { trouble("graph", error.message); }
     }
   }
+  if (scope.mode === "recording") recordings.look();
   for (const pane of scope.panes) pane.tell();
   ({ measurements, spectrum, cycles, events }[drawer] ?? { show() {} }).show();
   $("span").textContent = scaled(scope.view.span, "s");

@@ -13,8 +13,9 @@ export async function ask(path, options = {}) {
 
 export const query = (words) => new URLSearchParams(words).toString();
 
-export async function recorded(name, traces) {
+export async function recorded(name, traces, begin, end) { // s after its first cycle; all without
   const words = new URLSearchParams(traces.map((each) => ["trace", each]));
+  if (begin !== undefined) { words.set("begin", begin); words.set("end", end); }
   const response = await fetch(`/api/recordings/${encodeURIComponent(name)}/columns?${words}`);
   if (!response.ok) throw new Error((await response.json()).refused);
   return decode(await response.arrayBuffer());

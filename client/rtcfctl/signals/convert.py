@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import rtcf
-from rtcf.recording.convert import convert
+from rtcf.recording.convert import convert, repair
 
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import counted
@@ -17,20 +17,36 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
         "convert", parents=[common], help="a recording, or an incident, as CSV or as a bag"
     )
     converting.add_argument("recording", metavar="FILE", type=Path, help="of rtcfctl record")
-    converting.add_argument("to", metavar="TO", type=Path, help="a file, .csv or .bag")
+    converting.add_argument(
+        "to", metavar="TO", type=Path, help="a file, .csv or .bag; with --repair .mcap"
+    )
+    converting.add_argument(
+        "--repair",
+        action="store_true",
+        help="as a recording that is ended in order, of one whose writer was killed",
+    )
     converting.add_argument("--force", action="store_true", help="write over a file that is there")
     converting.set_defaults(run=run)
 
 
 def run(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Convert one file."""
+    damaged = 0
     with rtcf.read_recording(args.recording) as recording:
-        written = convert(recording, args.to, force=args.force, on_progress=output.progress)
+        if args.repair:
+            written, damaged = repair(recording, args.to, force=args.force)
+        else:
+            written = convert(recording, args.to, force=args.force, on_progress=output.progress)
         size = args.to.stat().st_size
         whole = recording.whole
     if not output.for_people:
-        output.data({"file": str(args.to), "written": written, "bytes": size, "whole": whole})
+        output.data(
+            {"file": str(args.to), "written": written, "bytes": size, "whole": whole}
+            | ({"damaged": damaged} if args.repair else {})
+        )
         return
     what = counted(written, "message" if args.to.suffix == ".bag" else "cycle")
     end = "" if whole else "; the recording was cut off: its last second may be missing"
+    if damaged:
+        end += f"; {counted(damaged, 'damaged chunk')} left out"
     output.line(f"{args.to}: {what}, {size / 1e6:.1f} MB{end}")

@@ -1,20 +1,56 @@
 // The parameters of all components, as fields; they can be changed where the scope has the right.
 import { ask, query } from "../server.js";
 
-const AFTER_MS = 150; // a slider that is dragged says where it is so often
+const UNDONE = 100; // changes that can be undone
 
 export class Parameters {
   constructor(box, told) { // told: right, runner(), trouble(text)
     this.box = box;
     this.told = told;
     this.fields = new Map(); // "component.parameter" -> function(value)
+    this.values = new Map(); // "component.parameter" -> the value that rtcfd told
+    this.done = []; // {component, name, before}, of this page, newest last
+    this.undoing = document.createElement("button");
+    this.undoing.onclick = () => this.undo();
+  }
+
+  // Takes the newest change of this page back.
+  async undo() {
+    const change = this.done.pop();
+    if (!change) return;
+    const { component, name, before } = change;
+    try {
+      await this.#set(component, name, before);
+      this.fields.get(`${component}.${name}`)?.(before);
+      this.told.trouble("");
+    } catch (error) {
+      this.done.push(change);
+      this.told.trouble(error.message);
+    }
+    this.#offer();
+  }
+
+  #offer() {
+    const { component, name, before } = this.done.at(-1) ?? {};
+    this.undoing.hidden = !component;
+    this.undoing.textContent = `Undo: ${component}.${name} back to ${before}`;
+  }
+
+  async #set(component, name, value) {
+    await ask(`/api/parameter?${query({ runner: this.told.runner() })}`, {
+      method: "POST", headers: { "Content-Type": "application/json" },
+      body: JSON.stringify({ component, parameter: name, value }),
+    });
+    this.values.set(`${component}.${name}`, value);
   }
 
   show(components) {
     this.fields.clear();
     const open = new Set([...this.box.querySelectorAll("details[open]")].map((each) => each.dataset.name));
     const with_ = components.filter((each) => each.parameters.length);
-    this.box.replaceChildren();
+    this.box.replaceChildren(this.undoing);
+    this.#offer();
+    for (const component of with_) for (const { name, value } of component.parameters) this.values.set(`${component.name}.${name}`, value);
     if (this.told.right === "observe" && with_.length) {
       const hint = document.createElement("p");
       hint.className = "hint";
@@ -36,8 +72,10 @@ export class Parameters {
   // Values that somebody has changed, without making the fields anew.
   tell(components) {
     for (const component of components)
-      for (const { name, value } of component.parameters)
+      for (const { name, value } of component.parameters) {
+        this.values.set(`${component.name}.${name}`, value);
         this.fields.get(`${component.name}.${name}`)?.(value);
+      }
   }
 
   async who() {
@@ -91,7 +129,6 @@ export class Parameters {
   }
 
   #mind(component, parameter, field, slider) {
-    let timer = null;
     const read = (input) => parameter.type === "bool" ? input.checked
       : parameter.type === "int" || parameter.type === "double" ? Number(input.value) : input.value;
     // One at a time, so that the last one said is the last one set.
@@ -108,24 +145,24 @@ export class Parameters {
       saying = false;
     };
     const set = async (value) => {
+      const before = this.values.get(`${component}.${parameter.name}`);
       try {
-        await ask(`/api/parameter?${query({ runner: this.told.runner() })}`, {
-          method: "POST", headers: { "Content-Type": "application/json" },
-          body: JSON.stringify({ component, parameter: parameter.name, value }),
-        });
+        await this.#set(component, parameter.name, value);
         field.classList.remove("wrong");
         this.told.trouble("");
+        if (before !== value) this.done = [...this.done.slice(1 - UNDONE), { component, name: parameter.name, before }];
+        this.#offer();
       } catch (error) {
         field.classList.add("wrong");
         this.told.trouble(error.message);
       }
     };
     field.onchange = () => { if (slider) slider.value = field.value; say(read(field)); };
-    if (slider)
-      slider.oninput = () => {
-        field.value = slider.value;
-        timer ??= setTimeout(() => { timer = null; say(read(slider)); }, AFTER_MS);
-      };
+    if (slider) {
+      // Dragging shows the value; releasing it sets it.
+      slider.oninput = () => { field.value = slider.value; };
+      slider.onchange = () => say(read(slider));
+    }
     this.fields.set(`${component}.${parameter.name}`, (value) => {
       if (document.activeElement === field || document.activeElement === slider) return;
       if (parameter.type === "bool") field.checked = value; else field.value = value;

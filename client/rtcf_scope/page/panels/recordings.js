@@ -38,12 +38,18 @@ export class Recordings {
     } catch (error) { this.trouble(error.message); }
   }
 
-  // Reads what the panes show.
+  // Reads the traces of the panes.
   async load() {
     const wanted = this.scope.traces().map((each) => each.name).filter((name) => !name.startsWith("~"));
     for (const { signals } of this.open) for (const { name, unit } of signals) this.scope.units.set(name, unit);
-    const stores = await Promise.all(this.open.map(async ({ name }) => ({ name, store: Store.of(await recorded(name, wanted), wanted) })));
-    this.scope.showRecordings(stores);
+    this.scope.showRecordings(await Promise.all(this.open.map((each) => Opened.of(each.name, wanted, this.scope.view))));
+  }
+
+  // Reads each cycle in sight where all of a recording is too much; called a few times a second.
+  async look() {
+    try {
+      for (const each of this.scope.recordings) if (await each.look()) this.scope.changed();
+    } catch (error) { this.trouble(error.message); }
   }
 
   // The signals of what is open, by name.
@@ -53,3 +59,32 @@ export class Recordings {
     return [...found.values()];
   }
 }
+
+// One that is shown: all of it, and the part in sight more closely.
+class Opened {
+  static async of(name, wanted, view) {
+    const opened = new Opened();
+    Object.assign(opened, { name, wanted, view, all: await part(name, wanted), close: null, asks: false });
+    return opened;
+  }
+
+  get store() { return this.close && covers(this.close, this.view) ? this.close.store : this.all.store; }
+
+  async look() {
+    const { view, all, close } = this;
+    const fine = all.each === 1 || view.span > all.store.lastTime - all.store.firstTime;
+    if (fine || this.asks || (close && covers(close, view) && (close.each === 1 || view.span > (close.end - close.begin) / 8))) return false;
+    this.asks = true;
+    try {
+      this.close = await part(this.name, this.wanted, view.begin - view.span, view.end + view.span);
+    } finally { this.asks = false; }
+    return true;
+  }
+}
+
+async function part(name, wanted, begin = -Infinity, end = Infinity) {
+  const message = isFinite(begin) ? await recorded(name, wanted, begin, end) : await recorded(name, wanted);
+  return { begin, end, each: message.hit, store: Store.of(message, wanted) };
+}
+
+const covers = ({ begin, end }, view) => begin <= view.begin && end >= view.end;
