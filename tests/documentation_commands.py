@@ -31,6 +31,10 @@ ELSEWHERE: dict[str, dict[str, str]] = {
     },
     "graph.md": {"rtcfctl load my_package Pid": "is of a package of the reader's"},
     "launching.md": {"roslaunch ": _LAUNCH, "rosrun ": _LAUNCH},
+    "operating.md": {
+        "rtcfctl doctor": "tells of the machine by its exit code: tests/unit/python/test_doctor.py",
+        "sudo apt install ": _APT,
+    },
     "performance.md": {"sudo perf ": "takes rights that a test may not have"},
     "python-components.md": {"sudo apt install ": _APT},
     "ros-setup.md": {

@@ -52,11 +52,13 @@ def _loop_with_a_bag(daemon: Daemon, client: rtcf.Client) -> None:
 # What a page takes for granted.
 PREPARE: dict[str, Callable[[Daemon, rtcf.Client], None]] = {
     "boot.md": _nothing,
+    "first-ten-minutes.md": _nothing,
     "from-hal.md": _nothing,
     "from-ros-control.md": _nothing,
     "graph-files.md": _graph_of_a_file("arm.yaml"),
     "graph.md": _nothing,
     "incidents.md": _nothing,
+    "operating.md": _nothing,
     "performance.md": _graph_of_a_file("fig1.yaml"),
     "ros.md": _nothing,
     "scope.md": _nothing,

@@ -129,6 +129,8 @@ def test_a_slider_sets_the_parameter_of_the_running_component(
     page.wait("scope.rate")
     _press(page, "aside [data-tab=parameters]")
     page.wait("document.querySelector('[data-slider=\"/w1.amplitude\"]') !== null")
+    with rtcf.Client(loop.socket) as client:
+        before = _amplitude(client)
     page.ask(
         """(() => {
           const slider = document.querySelector('[data-slider="/w1.amplitude"]');
@@ -136,10 +138,19 @@ def test_a_slider_sets_the_parameter_of_the_running_component(
             slider.value = value;
             slider.dispatchEvent(new Event("input", { bubbles: true }));
           }
+          slider.dispatchEvent(new Event("change", { bubbles: true }));
         })()"""
     )
     with rtcf.Client(loop.socket) as client:
         wait_for(lambda: _amplitude(client) == 1.5, "the slider's value in the loop")
+        # Dragging is a preview: only its end is a change.
+        changes = [each for each in client.get_history("w1", "amplitude") if each.how != "load"]
+        assert [each.value.double_value for each in changes] == [1.5]
+        undo = "[...document.querySelectorAll('#parameters > button')]"
+        page.wait(f"{undo}.some((each) => !each.hidden && each.textContent.includes('back to'))")
+        page.ask(f"{undo}[0].click()")
+        wait_for(lambda: _amplitude(client) == before, "the value before")
+        page.wait(f"{undo}[0].hidden")
     # The page says who it was, and follows what others set.
     page.wait("document.querySelector('[data-who=\"/w1.amplitude\"]').textContent")
     with rtcf.Client(loop.socket) as client:

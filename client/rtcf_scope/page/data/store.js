@@ -1,6 +1,5 @@
 // The cycles that are at hand: times, numbers, and a column for each trace.
 import { BLOCK, Column } from "./column.js";
-import { derived, isDerived, sources } from "./derived.js";
 
 export const LATENCY = "~latency", DURATION = "~duration";
 const KEPT = 128 * BLOCK; // cycles: 4 minutes of 2 kHz, 4 MB a trace
@@ -22,8 +21,6 @@ export class Store {
     this.times = new Float64Array(this.capacity);
     this.cycles = new Float64Array(this.capacity);
     this.columns = new Map([[LATENCY, new Column(this.capacity)], [DURATION, new Column(this.capacity)]]);
-    this.derived = new Map(); // name -> function of a place, whose values are in a column of that name
-    this.shift = 0; // seconds that are added to all times
     this.end = 0; // all that have come
     this.lost = 0;
   }
@@ -32,22 +29,13 @@ export class Store {
   get empty() { return this.end === 0; }
   get firstTime() { return this.time(this.begin); }
   get lastTime() { return this.time(this.end - 1); }
-  time(at) { return this.times[at % this.capacity] + this.shift; }
+  time(at) { return this.times[at % this.capacity]; }
   cycle(at) { return this.cycles[at % this.capacity]; }
-  column(name) { return this.columns.get(name) ?? (isDerived(name) ? this.#derive(name) : undefined); }
-
-  #derive(name) {
-    const step = derived(name).start(), column = new Column(this.capacity);
-    const value = (at) => step((signal) => this.columns.get(signal)?.get(at) ?? NaN, at > this.begin ? this.time(at) - this.time(at - 1) : NaN);
-    for (let at = this.begin; at < this.end; at++) column.set(at, value(at));
-    this.columns.set(name, column);
-    this.derived.set(name, value);
-    return column;
-  }
+  column(name) { return this.columns.get(name); }
 
   push(message, names) {
     if (!message.count) return;
-    if (!this.empty && message.times[0] + this.shift < this.lastTime) this.clear(); // a clock that went back
+    if (!this.empty && message.times[0] < this.lastTime) this.clear(); // a clock that went back
     this.lost += message.lost;
     const columns = new Map([[LATENCY, message.latencies], [DURATION, message.durations]]);
     names.forEach((name, i) => columns.set(name, message.traces[i]));
@@ -55,7 +43,7 @@ export class Store {
       if (!this.columns.has(name)) this.columns.set(name, new Column(this.capacity));
     // Where cycles are missing lines are broken.
     const gap = !this.empty && (message.lost || message.cycles[0] > this.cycle(this.end - 1) + 1);
-    if (gap) this.#append(this.times[(this.end - 1) % this.capacity], NaN, () => NaN, columns);
+    if (gap) this.#append(this.lastTime, NaN, () => NaN, columns);
     for (let i = 0; i < message.count; i++)
       this.#append(message.times[i], message.cycles[i], (values) => values ? values[i] : NaN, columns);
   }
@@ -64,15 +52,13 @@ export class Store {
     const at = this.end++;
     this.times[at % this.capacity] = time;
     this.cycles[at % this.capacity] = cycle;
-    for (const [name, column] of this.columns) if (!this.derived.has(name)) column.set(at, value(columns.get(name)));
-    for (const [name, value] of this.derived) this.columns.get(name).set(at, value(at));
+    for (const [name, column] of this.columns) column.set(at, value(columns.get(name)));
   }
 
   // Columns that nobody looks at any more.
   keep(names) {
-    const kept = new Set([LATENCY, DURATION, ...names, ...sources(names)]);
-    for (const name of this.columns.keys())
-      if (!kept.has(name)) { this.columns.delete(name); this.derived.delete(name); }
+    const kept = new Set([LATENCY, DURATION, ...names]);
+    for (const name of this.columns.keys()) if (!kept.has(name)) this.columns.delete(name);
   }
 
   // The place of the first cycle that is not before `time`.
