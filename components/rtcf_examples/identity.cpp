@@ -1,4 +1,4 @@
-// The smallest component that does something.
+// A minimal component: one input, one output.
 #include <std_msgs/Float64.h>
 
 #include <rtcf/component.hpp>

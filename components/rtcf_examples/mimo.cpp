@@ -1,5 +1,5 @@
-// The component of the paper's evaluation (section 3): a sum, so that what is
-// measured is the framework.
+// The component of the paper's evaluation (section 3). It only adds numbers, so
+// that a benchmark measures the framework and not the component.
 #include <std_msgs/Float64.h>
 
 #include <rtcf/component.hpp>
@@ -17,7 +17,7 @@ class Mimo final : public rtcf::Component {
     rtcf::Output<Number> out2{this, "out2"};
 
     void update() override {
-        // in1 counts 1 without new data, so that a loop of sums does not stay at 0.
+        // Without new data in1 counts as 1, so that a loop of sums leaves 0.
         double sum = in1.read() == rtcf::DataStatus::New ? in1.value().data : 1.0;
         if (in2.read() == rtcf::DataStatus::New) sum += in2.value().data;
         if (in3.read() == rtcf::DataStatus::New) sum += in3.value().data;
@@ -29,7 +29,7 @@ class Mimo final : public rtcf::Component {
         out2.publish();
     }
 
-    // Sums in a loop grow without end; they begin anew before they lose precision.
+    // Sums in a loop grow without bound: restart at 1 above this value.
     static constexpr double kLimit = 1e20;
 };
 

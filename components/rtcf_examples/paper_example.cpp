@@ -1,4 +1,4 @@
-// The paper's Listing 1 in this project's own API.
+// Listing 1 of the paper, written with the API of rtcf.
 #include <std_msgs/Float32.h>
 
 #include <rtcf/component.hpp>
@@ -9,7 +9,7 @@ class PaperExample final : public rtcf::Component {
     rtcf::Input<std_msgs::Float32> in_port{this, "in_port"};
     rtcf::Output<std_msgs::Float32> out_port{this, "out_port"};
     rtcf::Parameter<double> test_param{this, "test_param", 0.0,
-                                       rtcf::Doc("shown in the log at start")};
+                                       rtcf::Doc("logged when the loop starts")};
 
     bool start() override {
         RTCF_INFO(this, "test_param is {}", test_param.value());
@@ -25,4 +25,4 @@ class PaperExample final : public rtcf::Component {
 
 }  // namespace
 
-RTCF_COMPONENT(PaperExample, "Passes its input on and logs; Listing 1 of the paper")
+RTCF_COMPONENT(PaperExample, "Copies its input to its output and logs; Listing 1 of the paper")

@@ -1,5 +1,5 @@
-// A parameter of each kind, and log records of each hook: what the launch files
-// for parameters and for logging show.
+// A wave generator with a parameter of each kind and a log record in each hook,
+// for the launch files parameters.launch and logging.launch.
 #include <std_msgs/Float64.h>
 
 #include <cmath>
@@ -14,7 +14,7 @@ class Wave final : public rtcf::Component {
     rtcf::Output<std_msgs::Float64> wave{this, "wave"};
 
     rtcf::Parameter<double> amplitude{this,           "amplitude",     1.0,
-                                      rtcf::Min(0.0), rtcf::Max(10.0), rtcf::Doc("of the wave")};
+                                      rtcf::Min(0.0), rtcf::Max(10.0), rtcf::Doc("peak value")};
     rtcf::Parameter<double> rate{this,
                                  "rate",
                                  1.0,
@@ -24,10 +24,10 @@ class Wave final : public rtcf::Component {
                                  rtcf::Doc("waves per second")};
     rtcf::Parameter<Shape> shape{this, "shape", Shape::Sine, rtcf::Choice("sine", Shape::Sine),
                                  rtcf::Choice("square", Shape::Square)};
-    rtcf::Parameter<bool> silent{this, "silent", false, rtcf::Doc("writes 0")};
+    rtcf::Parameter<bool> silent{this, "silent", false, rtcf::Doc("write 0 instead of the wave")};
 
-    rtcf::State<double> phase_{this, "phase", 0.0, rtcf::Doc("of the wave, from 0 to 1")};
-    rtcf::State<bool> above_{this, "above", false, rtcf::Doc("the wave was above 0")};
+    rtcf::State<double> phase_{this, "phase", 0.0, rtcf::Doc("phase of the wave, from 0 to 1")};
+    rtcf::State<bool> above_{this, "above", false, rtcf::Doc("the sine was above 0")};
 
     bool configure() override {
         RTCF_INFO(this, "configured: amplitude {}, rate {} Hz", amplitude.value(), rate.value());
@@ -63,4 +63,4 @@ class Wave final : public rtcf::Component {
 
 }  // namespace
 
-RTCF_COMPONENT(Wave, "Writes a wave; shows parameters and logging")
+RTCF_COMPONENT(Wave, "Wave generator; an example of parameters and logging")

@@ -1,7 +1,7 @@
-"""Fig. 1 of the paper: five components, their wires, and how they are loaded.
+"""Fig. 1 of the paper: five components, their connections, and their load requests.
 
-A connection is a name that an output and its inputs share.  What is not wired
-gets a name of the component's own (~port), so that it meets nobody.
+A connection is a name that an output and its inputs share.  An unconnected port
+gets a private name (~port), so that no other port has the same name.
 """
 
 import rtcf
@@ -25,13 +25,16 @@ WIRES: dict[str, dict[str, str]] = {
 
 ORDER = ["/H1", "/F1", "/R1", "/R2", "/R3"]
 
-# The connections that are ROS topics too.
+# Connections that are also ROS topics.
 WHITELIST = ".*R3_G2H1|.*R1_H1R2|.*G2_R2"
 
 
 def component(name: str) -> graph_pb2.ComponentSpec:
-    """Return a component of the figure.  H1 talks to the hardware, so it is the first in
-    each cycle, and reads what the others have written in the cycle before."""
+    """Return a component of the figure.
+
+    H1 stands for the hardware: it runs first in each cycle and reads the values that the
+    other components wrote in the previous cycle.
+    """
     wires = WIRES[name]
     remaps = [f"{port}:={wires.get(port, f'~{port}')}" for port in PORTS]
     return rtcf.component("rtcf_examples", "Mimo", name=name, remaps=remaps, first=name == "H1")

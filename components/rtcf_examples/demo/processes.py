@@ -1,8 +1,8 @@
 """The processes of the demo: a private ROS master, a private rtcfd, ROS nodes.
 
-All their files are in one temporary folder.  Each is in a session of its own,
-so that Ctrl-C reaches the demo alone, which then ends them one by one, by pid,
-the last one first.
+All their files are in one temporary folder.  Each process runs in a session of
+its own: Ctrl-C reaches the demo alone, which then ends the processes by pid, in
+reverse order.
 """
 
 import contextlib
@@ -25,11 +25,11 @@ _LAST_LINES = 15
 
 
 class Failure(Exception):
-    """The demo cannot go on; the text is for people."""
+    """The demo cannot continue; the text is shown to the user."""
 
 
 class Child:
-    """One process; what it says on standard error is in a log."""
+    """One process, with a log of its standard error and a thread that reads its output."""
 
     def __init__(
         self, name: str, command: list[str], environment: dict[str, str], folder: Path
@@ -55,33 +55,33 @@ class Child:
         """Raise Failure if it has ended."""
         status = self._process.poll()
         if status is not None:
-            raise Failure(f"{self.name} ended with status {status}; it said:\n{self.last_words()}")
+            raise Failure(f"{self.name} ended with status {status}:\n{self.log_tail()}")
 
-    def last_words(self) -> str:
+    def log_tail(self) -> str:
         """Return the end of its log."""
         return "\n".join(self._log.read_text(errors="replace").splitlines()[-_LAST_LINES:])
 
     def end(self, number: signal.Signals) -> str:
-        """End it; return what was not right about that, or nothing."""
+        """End the process by a signal; return an error text, empty if it ended in order."""
         if self._process.poll() is None:
             self._process.send_signal(number)
-        problem = ""
+        error = ""
         try:
             status = self._process.wait(_END_TIMEOUT_S)
             if status not in (0, -number):
-                problem = f"{self.name} ended with status {status}:\n{self.last_words()}"
+                error = f"{self.name} ended with status {status}:\n{self.log_tail()}"
         except subprocess.TimeoutExpired:
-            problem = f"{self.name} did not end within {_END_TIMEOUT_S:g} s and was killed"
+            error = f"{self.name} did not end within {_END_TIMEOUT_S:g} s and was killed"
             self._process.kill()
             self._process.wait()
         self._reader.join()
-        return problem
+        return error
 
     def _read(self) -> None:
         assert self._process.stdout is not None
         with self._process.stdout as lines:
             for line in lines:
-                # roscore prints text.
+                # Skip lines that are not JSON: roscore prints text.
                 with contextlib.suppress(ValueError):
                     found = json.loads(line)
                     if isinstance(found, dict):
@@ -97,7 +97,7 @@ class Processes:
         self.master_uri = f"http://localhost:{_free_port()}"
         self._build = build
         self._children: list[tuple[Child, signal.Signals]] = []
-        # Nothing of a ROS or a Python that may be set up in the caller's shell.
+        # Drop the settings of any ROS or Python environment in the caller's shell.
         kept = {k: v for k, v in os.environ.items() if not k.startswith(("ROS", "PYTHON", "RTCF"))}
         self._environment = kept | {
             "ROS_MASTER_URI": self.master_uri,
@@ -130,14 +130,17 @@ class Processes:
         """Start a ROS node."""
         return self._start(name, ["/usr/bin/python3", str(program)], signal.SIGTERM)
 
-    def wait_until(self, condition: Callable[[], bool], what: str, timeout_s: float = 30.0) -> None:
-        """Return when the condition holds; raise Failure when a child ends or time is up."""
+    def wait_until(self, condition: Callable[[], bool], name: str, timeout_s: float = 30.0) -> None:
+        """Return when the condition holds; raise Failure if a child ends or at the timeout.
+
+        `name` describes the condition in the error text.
+        """
         deadline = time.monotonic() + timeout_s
         while not condition():
             self.check()
             if time.monotonic() > deadline:
-                words = "".join(f"\n{c.name}: {c.last_words()}" for c, _ in self._children)
-                raise Failure(f"waited {timeout_s:g} s for {what}{words}")
+                logs = "".join(f"\n{c.name}: {c.log_tail()}" for c, _ in self._children)
+                raise Failure(f"waited {timeout_s:g} s for {name}{logs}")
             time.sleep(_POLL_S)
 
     def check(self) -> None:
@@ -146,16 +149,16 @@ class Processes:
             child.check()
 
     def end(self) -> list[str]:
-        """End all, remove the folder; return what was not right."""
-        problems = []
+        """End all processes and remove the folder; return the error texts."""
+        errors = []
         while self._children:
             child, number = self._children.pop()
-            if problem := child.end(number):
-                problems.append(problem)
+            if error := child.end(number):
+                errors.append(error)
         if self.socket.exists():
-            problems.append("rtcfd left its socket behind")
+            errors.append("rtcfd did not remove its socket")
         shutil.rmtree(self.folder)
-        return problems
+        return errors
 
     def _start(self, name: str, command: list[str], number: signal.Signals) -> Child:
         child = Child(name, command, self._environment, self.folder)

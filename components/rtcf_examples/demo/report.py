@@ -1,5 +1,5 @@
-"""What a ROS node of the demo tells its parent: a line of JSON on standard output,
-several times a second, and a last one when the node is shut down."""
+"""Reports of a ROS node of the demo to its parent process: one line of JSON on standard
+output, several times a second, and a last line when the node shuts down."""
 
 import json
 import math
@@ -15,7 +15,7 @@ _PERIOD_S = 0.1
 
 
 class Report:
-    """What a node has received and sent."""
+    """Counts the messages that a node receives and sends, and prints the counts."""
 
     def __init__(self) -> None:
         self.newest: float | None = None
@@ -24,7 +24,7 @@ class Report:
         self._not_finite = 0
 
     def take(self, message: Any) -> None:
-        """Take a std_msgs/Float64; called by rospy, in its order."""
+        """Count a std_msgs/Float64; called by rospy, in the order of arrival."""
         self._received += 1
         if math.isfinite(message.data):
             self.newest = message.data
@@ -32,22 +32,22 @@ class Report:
             self._not_finite += 1
 
     def run(self, connected: Callable[[], bool]) -> None:
-        """Report until the node is shut down or nobody reads."""
+        """Report until the node shuts down or the parent stops reading."""
         try:
             while not rospy.is_shutdown():
                 self._print(connected())
                 time.sleep(_PERIOD_S)
             self._print(False)
         except BrokenPipeError:
-            # The parent is gone; what is left in the buffer would only raise again at exit.
+            # The parent is gone. Flushing the rest of the buffer at exit would raise again.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
     def _print(self, connected: bool) -> None:
-        figures = {
+        counts = {
             "connected": connected,
             "received": self._received,
             "not_finite": self._not_finite,
             "newest": self.newest,
             "sent": self.sent,
         }
-        print(json.dumps(figures), flush=True)
+        print(json.dumps(counts), flush=True)

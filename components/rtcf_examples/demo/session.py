@@ -1,4 +1,4 @@
-"""One run of the demo, from the first process to the last, told as it goes."""
+"""One run of the demo: starts the processes, prints the progress, collects the results."""
 
 import signal
 import sys
@@ -12,26 +12,26 @@ from rtcf.v1 import runner_pb2
 from summary import Outcome, show
 
 FREQUENCY_HZ = 2000.0
-# Messages kept for a node that is late: 10 s of them, so that none is lost on a busy machine.
+# Messages queued for a slow node: 10 s of them, so that a busy machine drops none.
 QUEUE = 20_000
 _HERE = Path(__file__).resolve().parent
 _CATCH_UP_S = 30.0
 
 
 def run(build: Path, seconds: float) -> int:
-    """Run the figure; return the exit status.  Whatever happens, nothing is left behind."""
+    """Run the figure; return the exit status.  All processes end, even after an exception."""
     processes = Processes(build)
     try:
         outcome = _run(processes, seconds)
     except BaseException:
-        for problem in _end(processes):
-            print(f"\ndemo: {problem}", file=sys.stderr)
+        for error in _end(processes):
+            print(f"\ndemo: {error}", file=sys.stderr)
         raise
     return show(outcome, _end(processes))
 
 
 def _end(processes: Processes) -> list[str]:
-    # A second Ctrl-C would leave behind what the first one is about to end.
+    # A second Ctrl-C must not interrupt the clean-up after the first one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     return processes.end()
@@ -40,8 +40,8 @@ def _end(processes: Processes) -> list[str]:
 def _run(processes: Processes, seconds: float) -> Outcome:
     print(
         "Fig. 1 of Fennel, Geyer, Hanebeck: RTCF, Software Impacts 9 (2021)\n"
-        "Five components in one real-time loop, two ROS nodes around it; all of it private to\n"
-        "this demo.\n",
+        "Five components in one real-time loop, two ROS nodes around it.\n"
+        "The ROS master and the daemon are private to this demo.\n",
         flush=True,
     )
     _say("ROS master", f"at {processes.master_uri}", processes.start_master())
@@ -54,14 +54,14 @@ def _run(processes: Processes, seconds: float) -> Outcome:
         processes.wait_until(
             lambda: all(node.newest.get("connected") for node in nodes), "G1 and G2 to connect"
         )
-        _say("G1", "listens to /R1_H1R2", g1)
-        _say("G2", "listens to /R3_G2H1, answers on /G2_R2", g2)
+        _say("G1", "subscribes to /R1_H1R2", g1)
+        _say("G2", "subscribes to /R3_G2H1, publishes /G2_R2", g2)
         print(f"\nRunning at {FREQUENCY_HZ:g} Hz for {seconds:g} s:")
         client.start()
         try:
             _watch(client, processes, seconds, nodes)
         finally:
-            # Statistics and values are those of the loop that ran.
+            # Statistics and values of the loop stay readable after the stop.
             client.stop()
         status = client.get_status("rt_runner").runners[0]
         _wait_for_messages(processes, status.iteration, nodes)
@@ -77,12 +77,12 @@ def _run(processes: Processes, seconds: float) -> Outcome:
         )
 
 
-def _say(name: str, what: str, child: Child) -> None:
-    print(f"  {name:<11} pid {child.pid:<7} {what}", flush=True)
+def _say(name: str, description: str, child: Child) -> None:
+    print(f"  {name:<11} pid {child.pid:<7} {description}", flush=True)
 
 
 def _set_up(client: rtcf.Client, processes: Processes) -> None:
-    """Load the figure and show it as rtcfd sees it."""
+    """Load the figure and print its connections as rtcfd reports them."""
     ros = runner_pb2.RosSettings(whitelist=figure.WHITELIST, queue=QUEUE)
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=FREQUENCY_HZ, ros=ros))
     for name in figure.WIRES:
@@ -92,7 +92,7 @@ def _set_up(client: rtcf.Client, processes: Processes) -> None:
         if len(connection.readers) + connection.HasField("writer") < 2 and not (
             connection.published or connection.subscribed
         ):
-            continue  # a port that is not used
+            continue  # an unconnected port
         writer = connection.writer
         begin = f"{writer.component[1:]}.{writer.port}" if connection.HasField("writer") else "ROS"
         ends = [
@@ -111,7 +111,7 @@ def _set_up(client: rtcf.Client, processes: Processes) -> None:
 def _watch(
     client: rtcf.Client, processes: Processes, seconds: float, nodes: tuple[Child, Child]
 ) -> None:
-    """Show progress until the time is up."""
+    """Print the progress until the time is up."""
     terminal = sys.stdout.isatty()
     begin = time.monotonic()
     step_s = min(0.1 if terminal else 1.0, seconds)
@@ -132,7 +132,7 @@ def _progress(
 ) -> None:
     status = client.get_status("rt_runner").runners[0]
     if status.state != runner_pb2.RUNNER_STATE_RUNNING:
-        raise Failure(f"the loop does not run any more: {status.status}")
+        raise Failure(f"the loop has ended: {status.status}")
     width = 20
     bar = ("█" * int(width * passed / seconds)).ljust(width, "·")
     received = "   ".join(
@@ -146,7 +146,7 @@ def _progress(
 
 
 def _wait_for_messages(processes: Processes, count: int, nodes: tuple[Child, Child]) -> None:
-    """Let the nodes catch up; those that do not are told of in the summary."""
+    """Wait until the nodes have received all messages; the summary reports missing ones."""
     deadline = time.monotonic() + _CATCH_UP_S
     while time.monotonic() < deadline:
         processes.check()

@@ -1,4 +1,4 @@
-"""A Butterworth low-pass filter of fourth order as two biquads, by the bilinear transform with
+"""A Butterworth low-pass filter of fourth order: two biquads, from the bilinear transform with a
 pre-warped frequency (Oppenheim and Schafer, Discrete-Time Signal Processing, 2010, section 7.2).
 """
 
@@ -13,7 +13,7 @@ SECTIONS = ORDER // 2
 
 
 class Butterworth(Component):
-    """Lets low frequencies pass."""
+    """Low-pass filter of fourth order."""
 
     u: Input[float]
     y: Output[float]

@@ -1,5 +1,5 @@
-"""A disturbance observer for a drive: the force on it beside the commanded one (Ohnishi,
-Shibata and Murakami, Motion control for advanced mechatronics, 1996).
+"""A disturbance observer for a drive: estimates the disturbance torque from the commanded torque
+and the velocity (Ohnishi, Shibata and Murakami, Motion control for advanced mechatronics, 1996).
 """
 
 import numpy as np
@@ -7,19 +7,19 @@ from rtcf.component import Component, Input, Output, Parameter, State
 
 
 class Observer(Component):
-    """Base of observers that are first-order filters of the drive's model."""
+    """Base class of observers that apply a first-order filter to the drive's model."""
 
     inertia: Parameter[float] = Parameter(0.02, min=1e-6, unit="kg m^2")
     bandwidth: Parameter[float] = Parameter(200.0, min=1.0, max=2000.0, unit="rad/s")
 
     def filtered(self, value, target):
-        """Return a value one step further to its target."""
+        """Return the next value of a first-order filter towards the target."""
         share = 1.0 - np.exp(-self.bandwidth * self.dt)
         return value + share * (target - value)
 
 
 class DisturbanceObserver(Observer):
-    """Compensates for what acts on a drive beside its command."""
+    """Estimates the disturbance torque on a drive and compensates for it."""
 
     command: Input[float]
     velocity: Input[float]

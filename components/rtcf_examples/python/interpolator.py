@@ -1,5 +1,5 @@
-"""Moves joints through the points that come: a quintic for each joint, which meets position,
-velocity and acceleration at both ends (Craig, Introduction to Robotics, 2005, section 7.3).
+"""Moves joints through goal points: one quintic polynomial per joint meets position, velocity and
+acceleration at both ends (Craig, Introduction to Robotics, 2005, section 7.3).
 """
 
 import numpy as np
@@ -9,7 +9,7 @@ JOINTS = 6
 
 
 class Interpolator(Component):
-    """Joint positions, velocities and accelerations from points that come now and then."""
+    """Interpolates joint positions and velocities between goal points."""
 
     goal: Input[np.float64, JOINTS]
     position: Output[np.float64, JOINTS]

@@ -53,7 +53,7 @@ class Kalman(Component):
         self.p = f @ self.p @ f.T + q
 
     def correct(self, h, residual, variance):
-        """Take one measured number in: no matrix is inverted."""
+        """Correct the estimate by one scalar measurement, without inverting a matrix."""
         ph = self.p @ h
         gain = ph / (h @ ph + variance)
         self.x += gain * residual

@@ -1,5 +1,6 @@
-"""A motor's torque from a measured table, linear between its points, and a friction table by
-speed and temperature, bilinear (Press and others, Numerical Recipes, 2007, sections 3.1 and 3.6).
+"""Torque of a motor from two measured tables: drive torque by current, interpolated linearly, and
+friction by speed and temperature, interpolated bilinearly (Press and others, Numerical Recipes,
+2007, sections 3.1 and 3.6).
 """
 
 import numpy as np
@@ -20,7 +21,7 @@ FRICTION = np.array(
 
 
 def interval(points, x):
-    """Return the interval of a value, and how far it lies in it."""
+    """Return the index of the interval around x, and the position of x in it, from 0 to 1."""
     i = min(max(np.searchsorted(points, x) - 1, 0), len(points) - 2)
     return i, np.clip((x - points[i]) / (points[i + 1] - points[i]), 0.0, 1.0)
 

@@ -1,5 +1,5 @@
-"""A linear-quadratic regulator for a cart with a pendulum: the gain is computed of the weights,
-when they change, by iterating the Riccati equation (Anderson and Moore, Optimal Control, 1990,
+"""A linear-quadratic regulator for a cart with a pendulum. Whenever the weights change, prepare()
+computes the gain by iterating the Riccati equation (Anderson and Moore, Optimal Control, 1990,
 section 2.4).
 """
 
@@ -19,7 +19,7 @@ B = np.array([[0.0], [1.0 / CART], [0.0], [-1.0 / (CART * LENGTH)]])
 
 
 class Lqr(Component):
-    """Keeps a pendulum upright and its cart in its place."""
+    """Keeps a pendulum upright and its cart at the reference position."""
 
     state: Input[np.float64, 4]
     reference: Input[float]

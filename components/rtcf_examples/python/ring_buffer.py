@@ -1,5 +1,5 @@
-"""Statistics of the last hundred values: mean, deviation, extremes and median, and a finite impulse
-response filter of the last eight.
+"""Statistics of the last hundred values (mean, deviation, extremes, median) and a finite impulse
+response filter over the last eight.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ WINDOW = np.hanning(TAPS + 2)[1:-1] / np.sum(np.hanning(TAPS + 2))
 
 
 class RingBuffer(Component):
-    """What a signal has been lately."""
+    """Computes statistics of the last values of a signal."""
 
     u: Input[float]
     mean: Output[float]

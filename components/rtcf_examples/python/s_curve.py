@@ -1,6 +1,6 @@
-"""An S-curve: moves one axis with limits of velocity, acceleration and jerk, in closed loop with
-its own state, so that a new target may come at any time (after Gerelli and Guarino Lo Bianco,
-2010).
+"""An S-curve: moves one axis within limits of velocity, acceleration and jerk. It is a closed loop
+around its own state, so that the target may change at any time (after Gerelli and Guarino Lo
+Bianco, 2010).
 """
 
 import enum
@@ -39,7 +39,7 @@ class SCurve(Component):
         return abs(self.v) > 1e-6 or abs(self.a) > 1e-4
 
     def wanted_velocity(self, distance):
-        """Return how fast it may be so that it can still stop there."""
+        """Return the highest velocity from which the axis can stop at the target."""
         far = abs(distance)
         ramp = self.max_acceleration**2 / self.max_jerk
         v = math.sqrt(ramp**2 / 4.0 + 2.0 * self.max_acceleration * far) - ramp / 2.0

@@ -1,4 +1,4 @@
-// A component as a stranger would write it, with every kind of port.
+// A component with every kind of port, built outside the source tree.
 #include <geometry_msgs/Vector3.h>
 #include <std_msgs/String.h>
 

@@ -71,9 +71,14 @@ def test_the_words_of_an_option_stand_in_the_manual_page(setting: str) -> None:
     assert set(head[1].split("|")) == set(found.choices or ())
 
 
-def test_each_page_is_linked_from_the_readme() -> None:
-    readme = (TREE / "README.md").read_text()
-    assert [page.name for page in PAGES[1:] if f"(docs/{page.name})" not in readme] == []
+def test_each_page_is_linked_from_the_index() -> None:
+    index = (TREE / "docs" / "index.md").read_text()
+    pages = [page.name for page in PAGES[1:] if page.name != "index.md"]
+    assert [name for name in pages if f"]({name})" not in index] == []
+
+
+def test_the_index_is_linked_from_the_readme() -> None:
+    assert "](docs/index.md)" in (TREE / "README.md").read_text()
 
 
 def test_manual_pages_name_files_of_the_documentation_as_they_are_installed() -> None:
