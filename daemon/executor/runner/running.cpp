@@ -83,7 +83,7 @@ void Runner::requireNoStop() const {
     if (loop_.stops() == job_stops_) return;
     throw Refusal(
         RefusalKind::LoopStopped,
-        fmt::format("the loop of {} is not started: a stop was asked for after the start", name_));
+        fmt::format("the loop of {} is not started: a stop was requested after the start", name_));
 }
 
 RealtimeProblems Runner::lockAndStart() {

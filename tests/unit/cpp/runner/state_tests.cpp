@@ -54,7 +54,7 @@ TEST_F(DeclaredState, GoesOverToARebuiltComponentInARunningLoop) {
     EXPECT_EQ(state("gain"), "2") << "of another type than before";
     for (const char* note : {"state fresh of /A is new: it begins at 0.25",
                              "state gain of /A begins at 2: it was float and is double",
-                             "state old_name of /A is no more", "state dropped of /A is no more"})
+                             "state old_name of /A no longer exists", "state dropped of /A no longer exists"})
         EXPECT_TRUE(has(notes, note)) << note;
     EXPECT_EQ(notes.size(), 5U) << "and that new_name is new";
 }
@@ -76,7 +76,7 @@ TEST_F(DeclaredState, WithoutAnyBeforeTheAnswerSaysSo) {
                                                    [](const std::string&) {});
                        }).notes;
     EXPECT_EQ(notes, std::vector<std::string>{
-                         "/B begins at its initial state: what it replaces declares none"});
+                         "/B begins at its initial state: the replaced component declares no state"});
 }
 
 TEST_F(DeclaredState, IsShownWithItsDeclaration) {
@@ -149,7 +149,7 @@ TEST_F(DeclaredState, GoesOverInAnApplyToo) {
     const auto outcome = onGraphThread([&] {
         return runner().apply({{stateful(), version(2)}}, false, [](const std::string&) {});
     });
-    EXPECT_TRUE(has(outcome.notes, "state dropped of /A is no more"));
+    EXPECT_TRUE(has(outcome.notes, "state dropped of /A no longer exists"));
     step(1);
     EXPECT_EQ(value("/A", "out"), 11.0);
 }
