@@ -143,7 +143,7 @@ def test_a_replacement_says_which_parameters_do_not_fit(
     done = daemon.ctl("replace", "knobs", "rtcf_test", "Counter")
     assert done.stdout == "replaced knobs by /knobs\n"
     # Of the others nobody has chosen the value.
-    note = "rtcfctl: note: parameter rate = 2.5 is not kept: rtcf_test/Counter has none"
+    note = "rtcfctl: note: parameter rate = 2.5 is not kept: rtcf_test/Counter has no such parameter"
     assert done.stderr == f"{note}\n"
 
 

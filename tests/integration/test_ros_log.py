@@ -132,7 +132,7 @@ def test_how_often_one_line_is_handed_on_is_a_setting(
         """Return how many records of the line there were up to each count, and since the last."""
         found = [0]
         for each in listener.records():
-            if "more of this line within a second" in each["msg"]:
+            if "more records of this line within a second" in each["msg"]:
                 found.append(0)
             elif each["msg"] == "each cycle":
                 found[-1] += 1
