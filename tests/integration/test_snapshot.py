@@ -157,7 +157,7 @@ def test_refusals_say_what_does_not_fit(
     client.unload(["chaos"])
     done = daemon.ctl("restore", str(file))
     assert done.returncode == 1
-    assert "there is no component /chaos" in done.stderr
+    assert "the graph has no component /chaos" in done.stderr
     file.write_bytes(file.read_bytes()[:-1] + b"?")
     assert "the snapshot is damaged" in daemon.ctl("restore", str(file)).stderr
     file.write_text("rt_runner:\n")

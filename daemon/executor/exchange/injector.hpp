@@ -27,7 +27,7 @@ namespace rtcf::executor {
 class Injector {
    public:
     /// @param topic mapped name of the connection
-    /// type of all inputs of the connection
+    /// @param type  type of all inputs of the connection
     Injector(std::string topic, const TypeInfo& type);
 
     const std::string& topic() const noexcept { return topic_; }

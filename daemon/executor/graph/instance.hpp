@@ -24,6 +24,7 @@ class Instance {
    public:
     /// Constructs the component and checks and sets its load-time parameters.
     /// @param gate access of hooks to ROS; null = none
+    /// @throws Refusal if that fails; nothing is left behind then
     Instance(ComponentDefinition definition, std::shared_ptr<const Library> library,
              const std::string& runner, const LoopClock& clock, Log& log, FlightRecorder& recorder,
              HookGate* gate = nullptr);

@@ -34,7 +34,7 @@ struct LoopSettings {
     std::int64_t period_ns = 1'000'000;
     std::int64_t spin_ns = 0;  ///< busy wait before each deadline, ns
     OverrunPolicy overrun = OverrunPolicy::Skip;
-    /// size of the leaky bucket of overruns; 0 = never stop for overruns
+    /// Size of the leaky bucket of overruns; 0 = never stop for overruns.
     std::uint32_t max_overruns = 0;
     std::uint64_t warmup_cycles = 10;  ///< first cycles, which statistics do not count
     RealtimeSettings realtime;

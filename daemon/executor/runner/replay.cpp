@@ -74,7 +74,7 @@ void Replay::inject(const RecordedMessage& message) {
                                static_cast<std::uint32_t>(message.bytes.size())))
         return;
     throw Refusal(RefusalKind::RecordingInvalid,
-                  fmt::format("a message of {} at {:.9f} s is none of type {}: is the recording "
+                  fmt::format("a message of {} at {:.9f} s is not of type {}: is the recording "
                               "damaged?",
                               message.topic, static_cast<double>(message.time_ns) / 1e9,
                               found->second->type().ros_type));

@@ -121,6 +121,7 @@ class Parameter final : public ParameterBase {
     /// @param owner the component, `this`
     /// @param name  ROS base name, unique among the component's parameters
     /// @param initial default value
+    /// @param options any of Min, Max, Unit, Doc, Choice
     template <typename... Options>
     Parameter(Component* owner, std::string name, T initial, Options... options)
         : ParameterBase(owner, declare(std::move(name), initial, std::move(options)...)),

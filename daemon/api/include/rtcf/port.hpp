@@ -293,7 +293,7 @@ class Output final : public OutputBase {
    public:
     /// @param owner the component, `this`
     /// @param name  ROS base name, unique among the component's ports
-    /// unit of the value, for people
+    /// @param unit  unit of the value, for people
     Output(Component* owner, std::string name, std::string unit = {})
         : OutputBase(owner, std::move(name), std::move(unit), typeInfo<T>(), nullptr) {}
     /// An output whose values the executor checks for NaN and infinity before readers see them.

@@ -263,10 +263,10 @@ TEST_F(Image, ThatDoesNotFitIsRefusedWhole) {
                             const std::function<void(RunnerImage&)>& change) {
         expectRefused(changed(change), words);
     };
-    expect("component /P is not in it",
+    expect("component /P is not in the snapshot",
            [](RunnerImage& other) { other.components.erase(other.components.begin()); });
-    expect("there is no component /X", [](RunnerImage& other) { other.components[0].name = "/X"; });
-    expect("a component is there twice",
+    expect("the graph has no component /X", [](RunnerImage& other) { other.components[0].name = "/X"; });
+    expect("a component is in the snapshot twice",
            [](RunnerImage& other) { other.components.push_back(other.components[0]); });
     expect("/P was a Wave and is a Chaos",
            [](RunnerImage& other) { other.components[0].type = "Wave"; });
@@ -276,9 +276,9 @@ TEST_F(Image, ThatDoesNotFitIsRefusedWhole) {
         other.components[0].states[0].type = "int";
         ++other.components[0].states[0].identity;
     });
-    expect("state /P.digest is not in it",
+    expect("state /P.digest is not in the snapshot",
            [](RunnerImage& other) { other.components[0].states[1].name = "other"; });
-    expect("there is no state /P.other",
+    expect("the graph has no state /P.other",
            [](RunnerImage& other) { other.components[0].states[1].name = "other"; });
     expect("state /P.past was",
            [](RunnerImage& other) { other.components[0].states[2].bytes.pop_back(); });
@@ -286,15 +286,15 @@ TEST_F(Image, ThatDoesNotFitIsRefusedWhole) {
            [](RunnerImage& other) { other.components[0].outputs[0].type.name = "float"; });
     expect("output /P.checked is",
            [](RunnerImage& other) { other.components[0].outputs[1].staged.reset(); });
-    expect("the value of /P.x is none",
+    expect("the value of /P.x is not of type",
            [](RunnerImage& other) { other.components[0].outputs[0].value.bytes += 'x'; });
-    expect("the value of /P.listed is none",
+    expect("the value of /P.listed is not of type",
            [](RunnerImage& other) { other.components[0].outputs[3].value.bytes = "\xff"; });
     expect("input /P.a read /Q.x and reads /S.x",
            [](RunnerImage& other) { other.components[0].inputs[0].source = "/Q.x"; });
     expect("input /P.a read nothing",
            [](RunnerImage& other) { other.components[0].inputs[0].source.clear(); });
-    expect("there is no parameter /P.gain",
+    expect("the graph has no parameter /P.gain",
            [](RunnerImage& other) { other.components[0].parameters[0].first = "gain"; });
     expect("above its maximum",
            [](RunnerImage& other) { other.components[0].parameters[0].second = 5.0; });
@@ -321,8 +321,8 @@ TEST_F(Image, OfAnotherBuildFitsByNameAndType) {
     loadVersion(2);
     const std::string text = refusal([&] { restore(image); });
     for (const char* words :
-         {"state /A.fresh is not in it", "state /A.gain was float and is double",
-          "there is no state /A.old_name"})
+         {"state /A.fresh is not in the snapshot", "state /A.gain was float and is double",
+          "the graph has no state /A.old_name"})
         EXPECT_NE(text.find(words), std::string::npos) << text;
     unload("/A");
     loadVersion(1);
