@@ -134,7 +134,7 @@ def test_a_jump_begins_anew_with_one_cycle_and_is_said(
     _wait_for_exactly(client, 11)
     log = tmp_path / "log"
     wait_for(lambda: "went from 0.003000000 s to 60.0" in log.read_text(), "the jump's event")
-    assert log.read_text().count("the simulated clock went from") == 2
+    assert log.read_text().count("the simulated clock jumped from") == 2
     assert log.read_text().count("the simulated clock begins at 1.000000000 s") == 1
 
 

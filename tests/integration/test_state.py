@@ -70,4 +70,4 @@ def test_state_is_set_while_the_loop_does_not_run(daemon: Daemon, client: rtcf.C
     client.start()
     done = daemon.ctl("set", "wave.state", "phase:=0.5")
     assert done.returncode == 1
-    assert "state is set while it does not" in done.stderr
+    assert "stop it to set state" in done.stderr

@@ -39,7 +39,7 @@ class FrameBlock {
 class FrameMemory {
    public:
     static constexpr std::size_t kRings = 8;  ///< rings kept, including the one in use
-    /// size of all blocks, bytes
+    /// Most bytes of all blocks.
     static constexpr std::size_t kMost = std::size_t{36} * 1024 * 1024;
 
     /// @throws std::system_error if there is no memory for it

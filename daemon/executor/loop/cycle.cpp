@@ -304,7 +304,7 @@ bool Cycle::copy(const Latch& latch) noexcept {
     } catch (...) {
         if (active_ && !faulted())
             endLoop(LoopFault::Kind::NoMemory, latch.writer,
-                    "an output that another one reads late");
+                    "an output that is read one cycle late");
         return false;
     }
 }

@@ -501,7 +501,7 @@ TEST_F(Image, FileThatIsNotAsItWasWrittenIsRefused) {
     };
     EXPECT_EQ(told(file), "");
     for (const std::string& none : {std::string(), std::string("RTCF"), std::string(100, 'x')})
-        EXPECT_NE(told(none).find("that is no snapshot"), std::string::npos);
+        EXPECT_NE(told(none).find("the file is not a snapshot"), std::string::npos);
     std::string newer = file;
     newer[8] = 2;
     EXPECT_NE(told(newer).find("is of format 2, this rtcf reads format 1"), std::string::npos);
@@ -518,7 +518,7 @@ TEST_F(Image, SaysWhatDeclaresNoState) {
     load(definition("Controller", "C"));
     const auto notes = onGraphThread([&] { return runner().takeImage().notes; });
     ASSERT_EQ(notes.size(), 1U);
-    EXPECT_NE(notes[0].find("declare no state"), std::string::npos);
+    EXPECT_NE(notes[0].find("components that declare no state"), std::string::npos);
     EXPECT_NE(notes[0].find("/C"), std::string::npos);
 }
 

@@ -109,7 +109,7 @@ TEST_F(DeclaredState, IsResetAtABoundaryOfARunningLoop) {
 TEST_F(DeclaredState, ThatIsNotThereCannotBeReset) {
     load(definition("Camera", "B"));
     EXPECT_EQ(refusal([&] { onGraphThread([&] { return runner().reset("/B"); }); }),
-              "/B declares no state (rtcf::State) that could be reset");
+              "/B declares no state (rtcf::State) to reset");
     EXPECT_NE(refusal([&] { onGraphThread([&] { return runner().reset("/C"); }); }), "");
 }
 
@@ -139,7 +139,7 @@ TEST_F(DeclaredState, IsSetExactlyOrNotAtAll) {
     step(1);
     EXPECT_EQ(value("/A", "out"), 42.0);
     start();
-    EXPECT_NE(set("gain", 1.0).find("state is set while it does not"), std::string::npos);
+    EXPECT_NE(set("gain", 1.0).find("stop it to set state"), std::string::npos);
 }
 
 // A graph file that names a rebuilt library replaces too.
