@@ -163,6 +163,6 @@ def test_levels_of_a_rosconsole_config_file_are_honoured(tmp_path: Path, master:
         with rtcf.Client(daemon.socket) as client:
             client.load(rtcf.component("rtcf_test_ros", "Speaker", name="speaker"))
             wait_for(lambda: "by macro, for those who debug" in daemon.log(), "the record")
-            logged(daemon, f"{config}:4: 'LOUD' is no level")
+            logged(daemon, f"{config}:4: 'LOUD' is not a level")
     finally:
         daemon.end()

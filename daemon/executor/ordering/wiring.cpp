@@ -164,8 +164,8 @@ void requireOneWriter(const Graph& graph, const std::string& name, const Connect
     const std::string& port = other.output->name();
     throw Refusal(
         RefusalKind::TwoWriters,
-        fmt::format("{} has two writers and a reader: {} and {} write what {} reads; remap one of "
-                    "them, e.g. --remap {}:=~{}",
+        fmt::format("{} has two writers and a reader: {} and {} write it, {} reads it; remap one "
+                    "writer, e.g. --remap {}:=~{}",
                     name, portName(graph, plan.writer->node, plan.writer->output->name()),
                     portName(graph, other.node, port),
                     portName(graph, plan.readers[0].node, plan.readers[0].input->name()), port,

@@ -134,7 +134,7 @@ void DirectStop::accept() {
     }
     // Checks the right at once, before reading, so that clients without it cost little.
     if (const Right has = access_.of(peer.uid, groupsOf(fd, peer.gid)); has < Right::Operate) {
-        answer(fd, fmt::format("refused: stop requires the right operate, but user {} has {}",
+        answer(fd, fmt::format("refused: stop requires the right `operate`, but user {} has {}",
                                peer.uid, has == Right::None ? "none" : wordOf(has)));
         ::close(fd);
         return;

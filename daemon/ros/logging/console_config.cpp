@@ -30,7 +30,7 @@ void applyConsoleConfig(const std::string& file, executor::Log& log) {
     std::ifstream stream(file);
     if (!stream) {
         log.write(LogLevel::Warn, {},
-                  fmt::format("ROSCONSOLE_CONFIG_FILE {} cannot be read: levels stay", file));
+                  fmt::format("cannot read ROSCONSOLE_CONFIG_FILE {}: log levels are unchanged", file));
         return;
     }
     std::string line;
@@ -51,7 +51,7 @@ void applyConsoleConfig(const std::string& file, executor::Log& log) {
             log.levels().set(logger, level->second);
         } else if (!word.empty()) {
             log.write(LogLevel::Warn, {},
-                      fmt::format("{}:{}: '{}' is no level: DEBUG, INFO, WARN, ERROR or FATAL",
+                      fmt::format("{}:{}: '{}' is not a level: use DEBUG, INFO, WARN, ERROR or FATAL",
                                   file, number, word));
         }
     }
