@@ -81,7 +81,7 @@ class FrameCopy {
     std::size_t words_ = 0;
     // sources of the first words; padded to a multiple of kAtOnce
     std::vector<const void*> gathered_;
-    std::vector<Block> blocks_;          // values after the gathered ones
+    std::vector<Block> blocks_;  // values after the gathered ones
 };
 
 }  // namespace rtcf::executor

@@ -128,7 +128,7 @@ class FrameRing {
     std::size_t stride_;  // size of a frame, words
     std::size_t mask_;    // capacity minus 1
     std::shared_ptr<FrameBlock> block_;
-    std::unique_ptr<Word[]> own_;   // NOLINT(modernize-avoid-c-arrays): if there is no block
+    std::unique_ptr<Word[]> own_;  // NOLINT(modernize-avoid-c-arrays): if there is no block
     // Values of setBase(); of the writer.
     std::unique_ptr<Word[]> base_;  // NOLINT(modernize-avoid-c-arrays)
     std::uint64_t base_end_ = 0;    // end_ at the last setBase()

@@ -22,9 +22,9 @@ struct WantedComponent {
 struct Difference {
     enum class Kind { Load, Unload, Replace, Breaks, Parameters };
     Kind kind;
-    std::string component;                                           ///< full name
-    std::string detail;                                              ///< one line
-    const WantedComponent* wanted = nullptr;                         ///< null for Unload
+    std::string component;                    ///< full name
+    std::string detail;                       ///< one line
+    const WantedComponent* wanted = nullptr;  ///< null for Unload
     /// Parameters only: new values
     std::vector<std::pair<std::string, ParameterValue>> parameters;
 };

@@ -165,8 +165,8 @@ void ImageRestorer::fitOutputs(const ImageComponent& image, const Instance& inst
             const auto latch = plan_.latches.find(slot);
             if (is_staged != from.staged.has_value() ||
                 (latch != plan_.latches.end()) != from.latched.has_value()) {
-                problem(
-                    fmt::format("output {} is checked or read one cycle late, unlike before", name));
+                problem(fmt::format("output {} is checked or read one cycle late, unlike before",
+                                    name));
                 return;
             }
             restoreTo(slot, type, from.value, name);

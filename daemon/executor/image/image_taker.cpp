@@ -20,12 +20,11 @@ ImageValue valueFrom(const Capture::Value& value) {
 // Requires that values can be copied in the cycle.
 void requireCopied(const TypeInfo& type) {
     if (!allocatesMessage(type)) return;
-    throw Refusal(
-        RefusalKind::FailedPrecondition,
-        fmt::format("a snapshot cannot contain values of {}: they own memory, "
-                    "and so do messages of {}, which would be allocated in the cycle; "
-                    "store the values in a std::array",
-                    type.name, type.ros_type));
+    throw Refusal(RefusalKind::FailedPrecondition,
+                  fmt::format("a snapshot cannot contain values of {}: they own memory, "
+                              "and so do messages of {}, which would be allocated in the cycle; "
+                              "store the values in a std::array",
+                              type.name, type.ros_type));
 }
 
 // The slot that an input without a writer still reads; null if it never had a writer.

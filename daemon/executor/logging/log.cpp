@@ -120,7 +120,8 @@ void Log::reportLeftOut(std::int64_t now_ns) {
         entry.component = origin.component;
         entry.file = origin.file;
         entry.line = origin.line;
-        entry.message = fmt::format("{} more records of this line within a second were suppressed", count);
+        entry.message =
+            fmt::format("{} more records of this line within a second were suppressed", count);
         consumer_(std::move(entry));
     });
 }
@@ -158,8 +159,9 @@ void Log::reportDrops() {
     LogEntry entry;
     entry.level = LogLevel::Warn;
     entry.time_ns = wallClockNow();
-    entry.message = fmt::format("{} log records were dropped: components log faster than they can be written",
-                                now - reported_drops_);
+    entry.message =
+        fmt::format("{} log records were dropped: components log faster than they can be written",
+                    now - reported_drops_);
     reported_drops_ = now;
     consumer_(std::move(entry));
 }

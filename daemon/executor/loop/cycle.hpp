@@ -27,7 +27,7 @@ struct LoopFigures {
     Histogram adoption;  ///< ticks; time of adopting a change
     /// ns from the requested end of the sleep (`spin` before the deadline) to the wake-up
     Histogram wake_up;
-    Counting counting;   ///< keeps these and the components' statistics consistent
+    Counting counting;  ///< keeps these and the components' statistics consistent
     std::atomic<std::uint64_t> iteration{0};  ///< cycles completed since the loop started
     Counter faults;                           ///< component faults that did not end the loop
     std::atomic<std::uint64_t> overruns{0};

@@ -96,9 +96,10 @@ RealtimeProblems Loop::start(const LoopSettings& settings, std::uint64_t stops_k
         joinable_.store(true, std::memory_order_release);
         const int error = pthread_create(&thread_, attributes.get(), &Loop::threadMain, this);
         if (error != 0) {
-            throw Refusal(RefusalKind::NoRealtime,
-                          fmt::format("cannot create the real-time thread: {} (CPU {}, priority {})",
-                                      std::strerror(error), realtime.cpu, realtime.priority));
+            throw Refusal(
+                RefusalKind::NoRealtime,
+                fmt::format("cannot create the real-time thread: {} (CPU {}, priority {})",
+                            std::strerror(error), realtime.cpu, realtime.priority));
         }
     } catch (...) {
         cycle_.abandon();
@@ -199,11 +200,11 @@ RealtimeSettings Loop::placed(RealtimeSettings settings, RealtimeProblems& probl
         other_threads_.keepOff(cpu(), threadId());
     }
     if (!cpu_claim_->alone()) {
-        problems.push_back(
-            {fmt::format("CPU {} also runs another loop, each may delay the other: choose another CPU for one "
-                         "of them (rtcfctl runner set NAME --cpu N)",
-                         cpu()),
-             false});
+        problems.push_back({fmt::format("CPU {} also runs another loop, each may delay the other: "
+                                        "choose another CPU for one "
+                                        "of them (rtcfctl runner set NAME --cpu N)",
+                                        cpu()),
+                            false});
     }
     settings.cpu = cpu();
     return settings;

@@ -101,7 +101,7 @@ struct Rewire {
     InputBase* input;
     const SlotHeader* source;
     const Injector* injector;
-    bool continued;                    ///< the same writer's values as before
+    bool continued;  ///< the same writer's values as before
     /// filled at the boundary: slot of the input's present value
     const SlotHeader* kept = nullptr;
 

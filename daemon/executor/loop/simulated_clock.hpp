@@ -15,7 +15,7 @@ namespace rtcf::executor {
 
 /// A cycle that is due.
 struct SimulatedCycle {
-    std::int64_t time_ns = 0;     ///< simulated
+    std::int64_t time_ns = 0;  ///< simulated
     /// CLOCK_MONOTONIC; messages that arrived until then are older than the cycle
     std::int64_t arrived_ns = 0;
     double rate = 0.0;  ///< simulated time per real time since the last cycle; 0 = start or jump

@@ -59,7 +59,8 @@ int privateCopy(const std::string& path, int source) {
     for (off_t left = status.st_size; left > 0;) {
         const ssize_t moved =
             ::sendfile(copy.get(), source, nullptr, static_cast<std::size_t>(left));
-        if (moved <= 0) refuse(path, moved == 0 ? "the file changed while it was read" : systemError());
+        if (moved <= 0)
+            refuse(path, moved == 0 ? "the file changed while it was read" : systemError());
         left -= moved;
     }
     return copy.release();
@@ -109,7 +110,8 @@ class OpenCopy {
              at = why.find(copy_path)) {
             why.replace(at, copy_path.size(), std::filesystem::path(path).filename());
         }
-        refuse(path, "does not load: " + why + "; link the libraries that it needs and build it again");
+        refuse(path,
+               "does not load: " + why + "; link the libraries that it needs and build it again");
     }
 
     FileDescriptor copy_;
@@ -123,7 +125,8 @@ void requireNoLazyThreadLocals(const std::string& path, int file) {
     refuse(
         path,
         "has thread_local variables, which are allocated in the cycle that first uses them: make "
-        "them members of the component, or build with -ftls-model=initial-exec, which reserves their "
+        "them members of the component, or build with -ftls-model=initial-exec, which reserves "
+        "their "
         "memory in advance");
 }
 

@@ -84,7 +84,8 @@ class LinkCheck {
                 folder.replace(at, word.size(), origin);
         }
         if (folder.empty() || folder.front() != '/' || folder.find('$') != std::string::npos)
-            refuse(fmt::format("its run path contains \"{}\", which is not an absolute path", folder));
+            refuse(
+                fmt::format("its run path contains \"{}\", which is not an absolute path", folder));
         return folder;
     }
 

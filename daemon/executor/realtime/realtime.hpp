@@ -26,7 +26,7 @@ struct RealtimeSettings {
     unsigned priority = 80;  ///< SCHED_FIFO, 1 to 98
     bool wanted = true;      ///< false = an ordinary thread, for a simulated clock
     bool lock_memory = true;
-    std::size_t heap_bytes = 8192 * 1024;   ///< heap to prefault
+    std::size_t heap_bytes = 8192 * 1024;  ///< heap to prefault
     std::size_t stack_bytes = 256 * 1024;  ///< stack of the real-time thread to prefault
 };
 

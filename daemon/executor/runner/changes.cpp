@@ -49,10 +49,11 @@ void Runner::requireThreadLocals(const Library& library) {
     const bool own = lacking.rfind("/proc/", 0) == 0;  // our copy of the library
     throw Refusal(
         RefusalKind::LoopRuns,
-        fmt::format("library {0}: {1} has thread_local variables, and the loop of {2} started "
-                    "without memory for them: stop the loop first (rtcfctl -r {2} stop), or load it "
-                    "before the loop starts",
-                    library.path(), own ? "it" : lacking + ", which it links against,", name_));
+        fmt::format(
+            "library {0}: {1} has thread_local variables, and the loop of {2} started "
+            "without memory for them: stop the loop first (rtcfctl -r {2} stop), or load it "
+            "before the loop starts",
+            library.path(), own ? "it" : lacking + ", which it links against,", name_));
 }
 
 void Runner::requireNoReplay() const {
@@ -169,11 +170,12 @@ void Runner::checkTaps(const Wiring& wiring) const {
         taps += connection.published ? 1 + connection.others.size() : 0;
     // If the limit was lowered, existing taps may stay, and their number may shrink.
     if (taps <= most_taps_ || taps <= plan_->taps.size()) return;
-    throw Refusal(RefusalKind::ResourceExhausted,
-                  fmt::format("{} published outputs (taps) are more than the {} allowed: reduce the "
-                              "whitelist, or raise taps under [limits] in rtcfd's "
-                              "settings",
-                              taps, most_taps_));
+    throw Refusal(
+        RefusalKind::ResourceExhausted,
+        fmt::format("{} published outputs (taps) are more than the {} allowed: reduce the "
+                    "whitelist, or raise taps under [limits] in rtcfd's "
+                    "settings",
+                    taps, most_taps_));
 }
 
 ChangeOutcome Runner::load(ComponentDefinition definition, const std::string& library,

@@ -33,9 +33,10 @@ void Runner::requireSmall(std::size_t bytes, const char* what) const {
     if (bytes <= most) return;
     throw Refusal(
         RefusalKind::ResourceExhausted,
-        fmt::format("{} touches {} bytes in one cycle of {}; the limit is {} at {:g} Hz: stop the loop, "
-                    "or lower its frequency",
-                    what, bytes, name_, most, settings_.frequency_hz));
+        fmt::format(
+            "{} touches {} bytes in one cycle of {}; the limit is {} at {:g} Hz: stop the loop, "
+            "or lower its frequency",
+            what, bytes, name_, most, settings_.frequency_hz));
 }
 
 ImageOutcome Runner::takeImage() {
@@ -127,7 +128,8 @@ ChangeOutcome Runner::restore(const RunnerImage& image, const Progress& progress
     ChangeOutcome result = outcome();
     if (begins) {
         result.notes.emplace_back(
-            "the loop is paused, as after a step: rtcfctl step continues from the snapshot, rtcfctl "
+            "the loop is paused, as after a step: rtcfctl step continues from the snapshot, "
+            "rtcfctl "
             "start starts anew");
     }
     return result;

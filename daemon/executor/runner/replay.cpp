@@ -25,10 +25,11 @@ void Replay::check(const BridgeTable& table, const std::vector<RecordedTopic>& t
                 continue;
             throw Refusal(
                 RefusalKind::RecordingInvalid,
-                fmt::format("{} is recorded as {} (MD5 {}), but its reader has type {} (MD5 {}): replay "
-                            "without that topic, or remap the input",
-                            recorded.topic, recorded.type, recorded.md5, injector->type().ros_type,
-                            injector->type().ros_md5));
+                fmt::format(
+                    "{} is recorded as {} (MD5 {}), but its reader has type {} (MD5 {}): replay "
+                    "without that topic, or remap the input",
+                    recorded.topic, recorded.type, recorded.md5, injector->type().ros_type,
+                    injector->type().ros_md5));
         }
     }
 }

@@ -32,9 +32,9 @@ struct RecordedMessage {
 
 /// A piece of a replay.
 struct ReplayChunk {
-    bool begin = false;                     ///< begins a new replay, with new components
-    std::int64_t start_ns = 0;  ///< with `begin`: time of the first cycle, ns since 1970
-    std::vector<RecordedTopic> topics;      ///< with `begin`: topics of the recording
+    bool begin = false;                 ///< begins a new replay, with new components
+    std::int64_t start_ns = 0;          ///< with `begin`: time of the first cycle, ns since 1970
+    std::vector<RecordedTopic> topics;  ///< with `begin`: topics of the recording
     std::vector<RecordedMessage> messages;  ///< in order of time; none after `until_ns`
     std::int64_t until_ns = 0;              ///< runs all cycles up to this time
     bool end = false;                       ///< ends the replay

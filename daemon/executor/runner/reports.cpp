@@ -82,7 +82,8 @@ void Runner::noteFaultsOf(Instance& instance) {
         say(fault, "output {} is not finite: readers keep its last value", more);
     }
     say(faults.taken_out.take(), "update() threw: {}; taken out, the loop goes on", 0);
-    say(faults.unsafe.take(), "cannot copy a value of safe(): {}; readers keep the value before", 0);
+    say(faults.unsafe.take(), "cannot copy a value of safe(): {}; readers keep the value before",
+        0);
 }
 
 void Runner::noteOverruns(bool last) {

@@ -50,10 +50,10 @@ struct NumberedState {
 /// Result of a change.
 struct ChangeOutcome {
     std::uint64_t generation = 0;
-    std::vector<std::string> order;     ///< full names, in order of execution
-    std::string component;              ///< full name of the changed component; may be empty
-    std::vector<std::string> notes;     ///< one line each
-    std::vector<std::string> degraded;  ///< start() only: missing prerequisites of real time
+    std::vector<std::string> order;       ///< full names, in order of execution
+    std::string component;                ///< full name of the changed component; may be empty
+    std::vector<std::string> notes;       ///< one line each
+    std::vector<std::string> degraded;    ///< start() only: missing prerequisites of real time
     std::vector<Difference> differences;  ///< apply() only
     std::uint64_t cycles = 0;             ///< step() only: cycles run
     /// replace() only: parameter values kept from the old component.

@@ -135,8 +135,7 @@ void Runner::tuneSpin() {
 ChangeOutcome Runner::stop(const Progress& progress) {
     if (loop_.joinable()) {
         progress("stopping the loop");
-        if (!loop_.stopRequested())
-            loop_.requestStop();  // once, so that a later start stays valid
+        if (!loop_.stopRequested()) loop_.requestStop();  // once, so that a later start stays valid
         if (!loop_.join(adoptionTimeout())) {
             throw Refusal(RefusalKind::Unavailable,
                           fmt::format("the loop of {} does not reach the end of its cycle: {}",

@@ -29,11 +29,10 @@ ChangeOutcome Runner::setStates(const std::string& name,
     noticeEnd();
     const auto& states = plan_->graph.get(name).instance->component().states();
     if (loop_.joinable()) {
-        throw Refusal(
-            RefusalKind::FailedPrecondition,
-            fmt::format("the loop of {0} runs: stop it to set state: rtcfctl -r "
-                        "{0} stop",
-                        name_));
+        throw Refusal(RefusalKind::FailedPrecondition,
+                      fmt::format("the loop of {0} runs: stop it to set state: rtcfctl -r "
+                                  "{0} stop",
+                                  name_));
     }
     std::vector<std::vector<std::byte>> values;
     Change change;
@@ -42,10 +41,9 @@ ChangeOutcome Runner::setStates(const std::string& name,
             std::find_if(states.begin(), states.end(),
                          [&](const StateDeclaration& state) { return state.name == state_name; });
         if (found == states.end()) {
-            throw Refusal(
-                RefusalKind::NotFound,
-                fmt::format("{} declares no state {}: rtcfctl info {} lists its states", name,
-                            state_name, name));
+            throw Refusal(RefusalKind::NotFound,
+                          fmt::format("{} declares no state {}: rtcfctl info {} lists its states",
+                                      name, state_name, name));
         }
         values.push_back(stateValue(name, *found, value));
         change.copies.push_back({found->value, values.back().data(), found->size});

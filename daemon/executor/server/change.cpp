@@ -32,7 +32,8 @@ ChangeOutcome change(Runner& runner, const v1::Request& request, const Runner::P
             return runner.stop(progress);
         case v1::Request::kStep:
             if (request.step().cycles() == 0)
-                throw Refusal(RefusalKind::InvalidArgument, "0 cycles to step: give a positive number");
+                throw Refusal(RefusalKind::InvalidArgument,
+                              "0 cycles to step: give a positive number");
             return runner.step(request.step().cycles(), progress, &given_up);
         case v1::Request::kLoad: {
             trustOwnerOf(runner, request.load());

@@ -18,9 +18,8 @@ OutsideAnswer OutsideCalls::wait(std::uint64_t call, std::chrono::milliseconds t
         answered_.wait_for(lock, kLook);
     }
     OutsideAnswer answer = waiting.answer.value_or(OutsideAnswer{
-        false, cancel
-                   ? "the executor is ending"
-                   : "rtcfd has not answered in time, but may still act: see rtcfctl status"});
+        false, cancel ? "the executor is ending"
+                      : "rtcfd has not answered in time, but may still act: see rtcfctl status"});
     waiting_.erase(call);
     return answer;
 }

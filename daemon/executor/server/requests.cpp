@@ -363,9 +363,10 @@ void Server::goOnWithResets() {
         const std::string activity = runner_->recorder().realtimeActivity();
         answer = errorResponse(
             0, RefusalKind::Unavailable,
-            fmt::format("the loop of {} reaches no cycle boundary: {} does not return; the statistics "
-                        "are not reset",
-                        runner_->name(), activity.empty() ? "a component" : activity + "()"));
+            fmt::format(
+                "the loop of {} reaches no cycle boundary: {} does not return; the statistics "
+                "are not reset",
+                runner_->name(), activity.empty() ? "a component" : activity + "()"));
     }
     for (const Reset& each : answered) {
         answer.set_id(each.request);

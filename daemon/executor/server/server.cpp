@@ -25,9 +25,8 @@ constexpr std::chrono::seconds kAskTimeout{70};
 constexpr std::size_t kLargestOutbox = 10000;  // most messages kept while no rtcfd is connected
 constexpr std::size_t kLargestConnections = 8;
 constexpr int kBacklog = 8;
-constexpr int kPortsInterval = 20;  // ms between batches of values
-constexpr std::size_t kMostPorts =
-    std::size_t{4} * 1024 * 1024;  // most bytes queued for a reader
+constexpr int kPortsInterval = 20;                                // ms between batches of values
+constexpr std::size_t kMostPorts = std::size_t{4} * 1024 * 1024;  // most bytes queued for a reader
 
 [[noreturn]] void fail(const std::string& what) {
     throw std::system_error(errno, std::generic_category(), what);
@@ -246,7 +245,8 @@ void Server::respond(std::uint64_t connection, const v1::Response& response) {
                                      ->FindFieldByNumber(static_cast<int>(response.kind_case()))
                                      ->name();
         const std::string text = fmt::format(
-            "{} of runner {} take {} bytes; the limit is {}: spread its components over more runners, "
+            "{} of runner {} take {} bytes; the limit is {}: spread its components over more "
+            "runners, "
             "or give them smaller values",
             kind, runner_->name(), size, Connection::kLargestFrame);
         if (response.id() == 0) {

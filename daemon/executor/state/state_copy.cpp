@@ -27,7 +27,8 @@ void planHandOver(const Component& previous, const Component& successor,
                   std::vector<StateCopy>& copies, std::vector<std::string>& notes) {
     const std::string& name = successor.fullName();
     if (previous.states().empty() && !successor.states().empty())
-        notes.push_back(name + " begins at its initial state: the replaced component declares no state");
+        notes.push_back(name +
+                        " begins at its initial state: the replaced component declares no state");
     for (const StateDeclaration& state : successor.states()) {
         const StateDeclaration* before = find(previous, state.name);
         if (before == nullptr) {

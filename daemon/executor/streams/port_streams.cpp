@@ -16,7 +16,7 @@ namespace {
 
 // approximate size of values in a batch, bytes
 constexpr std::size_t kLargestBatch = std::size_t{512} * 1024;
-constexpr int kMostCycles = 4096;                               // most cycles in a batch
+constexpr int kMostCycles = 4096;       // most cycles in a batch
 constexpr std::size_t kMostTables = 8;  // most frame tables that a stream may be behind
 
 std::vector<PortPacker> packersOf(const FrameTable& table,

@@ -62,14 +62,14 @@ class PortStreams {
         PortSelection selection;
         std::uint32_t every;
         bool min_max;
-        std::deque<Table> tables;              // the first one is being read
-        std::vector<std::size_t> columns;      // columns of the first table
+        std::deque<Table> tables;          // the first one is being read
+        std::vector<std::size_t> columns;  // columns of the first table
         // open window of minima and maxima; null = single cycles
         std::unique_ptr<PortWindows> windows;
-        bool begun = false;                    // the first table has arrived
-        bool told = false;                     // the schema was sent
-        std::uint64_t next = 0;                // next frame of the first table
-        std::uint64_t lost = 0;                // lost cycles since the last batch
+        bool begun = false;      // the first table has arrived
+        bool told = false;       // the schema was sent
+        std::uint64_t next = 0;  // next frame of the first table
+        std::uint64_t lost = 0;  // lost cycles since the last batch
 
         // Cycles per sent value; lost cycles are counted in this unit.
         std::uint32_t step() const noexcept { return min_max ? 1 : every; }

@@ -31,8 +31,8 @@ void requireCpu(int cpu) {
     const std::vector<int>& allowed = processCpus();
     if (std::find(allowed.begin(), allowed.end(), cpu) != allowed.end()) return;
     refuse(fmt::format(
-        "cpu {} is not available to this daemon: use one of {}, or -1 for an automatic choice",
-        cpu, fmt::join(allowed, ", ")));
+        "cpu {} is not available to this daemon: use one of {}, or -1 for an automatic choice", cpu,
+        fmt::join(allowed, ", ")));
 }
 
 }  // namespace

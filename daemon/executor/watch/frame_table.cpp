@@ -150,9 +150,10 @@ void requireMatches(const PortSelection& selection, const Plan& plan) {
         }
         const bool all = names.size() <= kNamesInMessage;
         if (!all) names.resize(kNamesInMessage);
-        throw Refusal(RefusalKind::PortNotFound,
-                      fmt::format("{} matches no output of fixed size and no state; available: {}{}",
-                                  pattern.given(), fmt::join(names, ", "), all ? "" : ", …"));
+        throw Refusal(
+            RefusalKind::PortNotFound,
+            fmt::format("{} matches no output of fixed size and no state; available: {}{}",
+                        pattern.given(), fmt::join(names, ", "), all ? "" : ", …"));
     }
 }
 

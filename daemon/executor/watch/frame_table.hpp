@@ -25,7 +25,7 @@ struct FrameTable {
     std::vector<std::string> notes;    ///< omitted values, one line each
     std::string shortness;             ///< message if less than one second is kept; else empty
     std::shared_ptr<FrameRing> ring;
-    Watches watches;    ///< watches that read the ring
+    Watches watches;  ///< watches that read the ring
     /// frames are kept for watches or an incident; else only the last one is used, by the loop
     bool kept = false;
 };
@@ -37,7 +37,7 @@ struct FrameDemand {
     /// Most bytes of states and staged outputs per frame, watched or not; 0 = only watched ones.
     /// Other outputs are always in the frame: the loop restores them after an update() that throws.
     std::size_t most_bytes;
-    FrameMemory* memory;         ///< memory that outlives the process; may be null
+    FrameMemory* memory;  ///< memory that outlives the process; may be null
     /// table whose ring is reused if the sources are the same; may be null
     const FrameTable* previous;
 };

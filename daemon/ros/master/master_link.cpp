@@ -322,7 +322,8 @@ void MasterLink::obeyShutdownRequest(const Sight& sight) {
 std::string MasterLink::whyOff() const {
     if (off_ == Why::Killed) {
         return "ROS node " + name().full() +
-               " received a shutdown request: it is off until there is a new master, or `rtcfctl runner "
+               " received a shutdown request: it is off until there is a new master, or `rtcfctl "
+               "runner "
                "set --ros`";
     }
     return "another node named " + name().full() +

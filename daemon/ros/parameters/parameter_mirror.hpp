@@ -62,7 +62,7 @@ class ParameterMirror {
     struct Known {
         std::map<std::string, ParameterValue> values;       // by parameter
         std::map<std::string, XmlRpc::XmlRpcValue> others;  // last values written by others
-        std::set<std::string> ours;  // parameters written by us
+        std::set<std::string> ours;                         // parameters written by us
     };
     // Components, by full name. Shared with late answers.
     struct Pending {

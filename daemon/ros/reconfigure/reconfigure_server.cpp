@@ -96,9 +96,10 @@ bool ReconfigureServer::change(const dynamic_reconfigure::ReconfigureRequest& as
     const Set before = set();
     executor::ParameterBatch batch = batchOf(asked.config, *before);
     if (!range_.allowed) {  // the answer contains the present values
-        range_.warn(before->full_name,
-                    "parameters are unchanged: ROS peers do not have the right 'tune'; to allow it: "
-                    "rtcfctl runner set --ros-peers tune");
+        range_.warn(
+            before->full_name,
+            "parameters are unchanged: ROS peers do not have the right 'tune'; to allow it: "
+            "rtcfctl runner set --ros-peers tune");
         answer.config = valuesOf(*before);
         return true;
     }

@@ -129,8 +129,8 @@ std::vector<std::string> broken(const std::vector<Dependence>& list) {
                 works = works || constant.find(each.name) != std::string_view::npos;
         }
         if (works) continue;
-        lines.push_back(std::string(each.library) + " has another version than rtcf expects (" + each.name +
-                        "): not available: " + each.use);
+        lines.push_back(std::string(each.library) + " has another version than rtcf expects (" +
+                        each.name + "): not available: " + each.use);
     }
     return lines;
 }

@@ -205,7 +205,8 @@ void Publishing::makeRoom() {
     if (disconnected_ == 0 || now - room_told_ < kSilence) return;
     room_told_ = now;
     warn_(std::to_string(std::exchange(disconnected_, 0)) +
-          " subscribers that read nothing were disconnected, because their messages used too much memory");
+          " subscribers that read nothing were disconnected, because their messages used too much "
+          "memory");
 }
 
 void Publishing::run() {

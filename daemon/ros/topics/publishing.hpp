@@ -91,7 +91,7 @@ class Publishing {
     mutable std::mutex mutex_;  // protects all members below
     std::condition_variable changed_;
     Taps taps_;
-    std::optional<Deliveries> deliveries_;                       // unset before configure()
+    std::optional<Deliveries> deliveries_;  // unset before configure()
     // one for each tap, and for closing topics
     std::map<Key, std::shared_ptr<TopicPublisher>> publishers_;
     std::uint64_t generation_ = 0;

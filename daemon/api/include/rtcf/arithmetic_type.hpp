@@ -47,7 +47,7 @@ struct ArithmeticConversion {
     template <>                                                                        \
     struct PortType<TYPE>                                                              \
         : MappedPortType<TYPE, MESSAGE, detail::ArithmeticConversion<TYPE, MESSAGE>> { \
-        /* a byte of a message may be neither true nor false */                         \
+        /* a byte of a message may be neither true nor false */                        \
         static constexpr bool kPlain = !std::is_same_v<TYPE, bool>;                    \
     }
 

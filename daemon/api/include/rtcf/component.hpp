@@ -54,9 +54,9 @@ struct ComponentContext {
     std::int64_t updated_ns = -1;
     bool disabled = false;            ///< taken out after a fault; written by the cycle thread
     std::uint32_t recorder_slot = 0;  ///< slot number in the flight recorder
-    DeviceFigures* device = nullptr;                          ///< null outside an executor
-    LogSink* log = nullptr;                                   ///< null = no log
-    NodeGate* gate = nullptr;  ///< access to the ROS node; null without one
+    DeviceFigures* device = nullptr;  ///< null outside an executor
+    LogSink* log = nullptr;           ///< null = no log
+    NodeGate* gate = nullptr;         ///< access to the ROS node; null without one
     std::vector<std::pair<std::string, std::string>> remaps;  ///< resolved names (from, to)
     std::atomic<LogLevel> log_level{LogLevel::Info};          ///< least severe level that is logged
     LogMemory said;  ///< state of the _ONCE and _THROTTLE macros
@@ -83,8 +83,8 @@ class Component {
     }
     /// Opens devices and allocates memory. Not real-time.
     virtual bool configure() { return true; }
-    virtual bool start() { return true; }      ///< Called before the loop runs. Not real-time.
-    virtual void update() = 0;                 ///< Runs one cycle. Real-time.
+    virtual bool start() { return true; }  ///< Called before the loop runs. Not real-time.
+    virtual void update() = 0;             ///< Runs one cycle. Real-time.
     /// Writes safe commands. Called once instead of update():
     /// - when the loop ends for any reason but a crash,
     /// - after an update() of this component that threw,

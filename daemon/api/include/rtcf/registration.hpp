@@ -27,8 +27,8 @@ struct ComponentRecord {
 struct PluginDescriptor {
     /// AbiProbe::fingerprint() of the headers that the library was built with
     std::uint32_t abi_version;
-    std::uint32_t size;         ///< size of this struct, bytes
-    const char* version;        ///< release of these headers
+    std::uint32_t size;   ///< size of this struct, bytes
+    const char* version;  ///< release of these headers
     const ComponentRecord* components;
 };
 

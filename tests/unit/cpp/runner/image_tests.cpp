@@ -265,7 +265,8 @@ TEST_F(Image, ThatDoesNotFitIsRefusedWhole) {
     };
     expect("component /P is not in the snapshot",
            [](RunnerImage& other) { other.components.erase(other.components.begin()); });
-    expect("the graph has no component /X", [](RunnerImage& other) { other.components[0].name = "/X"; });
+    expect("the graph has no component /X",
+           [](RunnerImage& other) { other.components[0].name = "/X"; });
     expect("a component is in the snapshot twice",
            [](RunnerImage& other) { other.components.push_back(other.components[0]); });
     expect("/P was a Wave and is a Chaos",

@@ -52,9 +52,10 @@ TEST_F(DeclaredState, GoesOverToARebuiltComponentInARunningLoop) {
     EXPECT_EQ(state("new_name"), "7.5") << "handed over by takeOver()";
     EXPECT_NE(state("fresh"), "0.25") << "the output's last value, by takeOver()";
     EXPECT_EQ(state("gain"), "2") << "of another type than before";
-    for (const char* note : {"state fresh of /A is new: it begins at 0.25",
-                             "state gain of /A begins at 2: it was float and is double",
-                             "state old_name of /A no longer exists", "state dropped of /A no longer exists"})
+    for (const char* note :
+         {"state fresh of /A is new: it begins at 0.25",
+          "state gain of /A begins at 2: it was float and is double",
+          "state old_name of /A no longer exists", "state dropped of /A no longer exists"})
         EXPECT_TRUE(has(notes, note)) << note;
     EXPECT_EQ(notes.size(), 5U) << "and that new_name is new";
 }
@@ -75,8 +76,9 @@ TEST_F(DeclaredState, WithoutAnyBeforeTheAnswerSaysSo) {
                                                    RTCF_UNIT_COMPONENTS "/rtcf_unit_test.so", false,
                                                    [](const std::string&) {});
                        }).notes;
-    EXPECT_EQ(notes, std::vector<std::string>{
-                         "/B begins at its initial state: the replaced component declares no state"});
+    EXPECT_EQ(notes,
+              std::vector<std::string>{
+                  "/B begins at its initial state: the replaced component declares no state"});
 }
 
 TEST_F(DeclaredState, IsShownWithItsDeclaration) {

@@ -90,7 +90,8 @@ class RtcfExtension {
     const rtcf::Component& component() const {
         if (component_ == nullptr) {
             throw std::logic_error(
-                "RtcfExtension does not work in a constructor: use it from configureHook() on, in a "
+                "RtcfExtension does not work in a constructor: use it from configureHook() on, in "
+                "a "
                 "component that ORO_CREATE_COMPONENT registers");
         }
         return *component_;
