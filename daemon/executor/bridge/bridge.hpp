@@ -64,7 +64,7 @@ struct BridgeSettings {
     std::uint32_t decimation = 1;  ///< publish every n-th value of an output
     std::string decimate = ".*";   ///< regular expression of outputs that are decimated
     std::string stamped;  ///< regular expression of scalar outputs published with the cycle's stamp
-    /// largest message of a type of variable size, bytes
+    /// Largest message of a type of variable size, bytes.
     std::uint32_t largest_message = 256 * 1024;
     Right peers = Right::Observe;      ///< right of unauthenticated peers
     bool refuse_out_of_range = false;  ///< reject out-of-range parameters of peers; else clamp them

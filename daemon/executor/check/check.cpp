@@ -70,7 +70,7 @@ ParameterValue parseValue(const std::string& text) {
             return std::int64_t{number};
         if (const double number = std::stod(text, &used); used == text.size()) return number;
     } catch (const std::logic_error&) {
-        // not a number, so a string
+        // Not a number, so a string.
     }
     return text;
 }

@@ -14,7 +14,7 @@ constexpr std::size_t kWord = 8;  // granularity, as a number rarely changes in 
 }  // namespace
 
 UndeclaredMembers::UndeclaredMembers(const Component& component)
-    // address of the complete object
+    // Address of the complete object.
     : object_(static_cast<const std::byte*>(dynamic_cast<const void*>(&component))) {
     const std::size_t size = malloc_usable_size(const_cast<std::byte*>(object_));
     before_.assign(object_, object_ + size);

@@ -79,7 +79,7 @@ class FrameCopy {
     std::vector<Source> sources_;
     std::vector<std::size_t> offsets_;
     std::size_t words_ = 0;
-    // sources of the first words; padded to a multiple of kAtOnce
+    // Sources of the first words; padded to a multiple of kAtOnce.
     std::vector<const void*> gathered_;
     std::vector<Block> blocks_;  // values after the gathered ones
 };

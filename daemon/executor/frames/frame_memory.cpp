@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::uint32_t kMagic = 0x42435452;  // "RTCB"
 constexpr std::uint32_t kVersion = 1;
-// bytes; block sizes are powers of two, so that blocks can be reused
+// Bytes; block sizes are powers of two, so that blocks can be reused.
 constexpr std::size_t kSmallest = 4096;
 
 // Maps a range of the file, with all pages present, and locked if the process's memory is.

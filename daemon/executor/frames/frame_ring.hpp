@@ -50,7 +50,7 @@ class FrameRing {
     FrameRing(const FrameRing&) = delete;
     FrameRing& operator=(const FrameRing&) = delete;
 
-    /// bytes; locked memory
+    /// Bytes; locked memory.
     static constexpr std::size_t kLargestRing = std::size_t{16} * 1024 * 1024;
     static constexpr std::size_t kFewestFrames = 16;
 

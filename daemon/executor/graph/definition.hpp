@@ -32,7 +32,7 @@ struct ComponentDefinition {
     /// value.
     std::vector<InheritedParameter> inherited;
     bool first = false;  ///< all connections into the component are loop breaks
-    /// regular expression; matching connections into the component are loop breaks
+    /// Regular expression; matching connections into the component are loop breaks.
     std::string ignore;
     std::set<std::string> breaks;  ///< inputs whose connection is a loop break
     std::uint32_t every = 1;       ///< runs in every n-th cycle

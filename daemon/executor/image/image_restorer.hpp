@@ -67,7 +67,7 @@ class ImageRestorer {
     const Sources sources_;
     Restoration restoration_;
     std::vector<std::string> problems_;
-    // output and sample
+    // Output and sample.
     std::map<std::string, std::pair<const OutputBase*, const SlotHeader*>> outputs_;
     std::map<const SlotHeader*, std::pair<std::string, const SlotHeader*>> reserved_;
     std::map<Instance*, Batch> parameters_;

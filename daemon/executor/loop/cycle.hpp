@@ -25,7 +25,7 @@ struct LoopFigures {
     Histogram duration;  ///< ticks
     Histogram latency;   ///< ns
     Histogram adoption;  ///< ticks; time of adopting a change
-    /// ns from the requested end of the sleep (`spin` before the deadline) to the wake-up
+    /// Ns from the requested end of the sleep (`spin` before the deadline) to the wake-up.
     Histogram wake_up;
     Counting counting;  ///< keeps these and the components' statistics consistent
     std::atomic<std::uint64_t> iteration{0};  ///< cycles completed since the loop started

@@ -25,7 +25,7 @@ struct LoopFault {
     Kind kind = Kind::None;
     const Component* component =
         nullptr;  ///< the component that caused it, or null; for comparison only
-    /// full name; the component may be gone when this is read
+    /// Full name; the component may be gone when this is read.
     std::array<char, 240> component_name{};
     std::uint64_t iteration = 0;
     std::array<char, 240> text{};  ///< text of the exception, or name of the output

@@ -200,11 +200,11 @@ RealtimeSettings Loop::placed(RealtimeSettings settings, RealtimeProblems& probl
         other_threads_.keepOff(cpu(), threadId());
     }
     if (!cpu_claim_->alone()) {
-        problems.push_back({fmt::format("CPU {} also runs another loop, each may delay the other: "
-                                        "choose another CPU for one "
-                                        "of them (rtcfctl runner set NAME --cpu N)",
-                                        cpu()),
-                            false});
+        problems.push_back(
+            {fmt::format("CPU {} also runs another loop, each may delay the other: "
+                         "choose another CPU for one of them (rtcfctl runner set NAME --cpu N)",
+                         cpu()),
+             false});
     }
     settings.cpu = cpu();
     return settings;

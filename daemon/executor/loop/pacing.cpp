@@ -18,9 +18,9 @@ namespace rtcf::executor {
 
 namespace {
 
-// cycles on time that remove one overrun from the bucket
+// Cycles on time that remove one overrun from the bucket.
 constexpr std::uint64_t kBucketLeak = 1000;
-// most cycles to catch up in a row; after a freeze of the machine there are many
+// Most cycles to catch up in a row; after a freeze of the machine there are many.
 constexpr std::uint32_t kMostCaughtUp = 100;
 
 }  // namespace

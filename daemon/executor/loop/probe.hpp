@@ -21,7 +21,7 @@ class Probe {
         std::uint64_t sequence = 0;  ///< writes so far; 0 = no value
         std::uint64_t seen = 0;  ///< inputs: sequence of the last value that the component has read
         std::int64_t age_ns = 0;  ///< loop time since the write, ns
-        /// unset without a value, or if the value is too large to copy
+        /// Unset without a value, or if the value is too large to copy.
         std::optional<std::string> text;
     };
 

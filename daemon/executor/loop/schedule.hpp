@@ -102,7 +102,7 @@ struct Rewire {
     const SlotHeader* source;
     const Injector* injector;
     bool continued;  ///< the same writer's values as before
-    /// filled at the boundary: slot of the input's present value
+    /// Filled at the boundary: slot of the input's present value.
     const SlotHeader* kept = nullptr;
 
     void apply() noexcept {

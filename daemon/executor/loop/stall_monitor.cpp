@@ -16,7 +16,7 @@ namespace rtcf::executor {
 namespace {
 
 constexpr std::int64_t kMicrosecond = 1000;
-// ns after the monitor's timeout, so that the monitor acts first if it gets a CPU
+// Ns after the monitor's timeout, so that the monitor acts first if it gets a CPU.
 constexpr std::int64_t kMargin = 500'000'000;
 constexpr auto kPoll = std::chrono::milliseconds(20);
 constexpr std::int64_t kPollNs = 20'000'000;

@@ -17,11 +17,11 @@ namespace rtcf::executor {
 
 /// The source of an input, and the owners that keep it alive.
 struct Binding {
-    /// the output's slot, or the injector; null = no writer any more
+    /// The output's slot, or the injector; null = no writer any more.
     const void* writer = nullptr;
     const SlotHeader* source = nullptr;  ///< slot that the input reads; null with an injector
     std::shared_ptr<const void> source_owner;
-    /// value of an earlier writer that the component may still read
+    /// Value of an earlier writer that the component may still read.
     const SlotHeader* kept = nullptr;
     std::shared_ptr<const void> kept_owner;
 };

@@ -126,8 +126,7 @@ void requireNoLazyThreadLocals(const std::string& path, int file) {
         path,
         "has thread_local variables, which are allocated in the cycle that first uses them: make "
         "them members of the component, or build with -ftls-model=initial-exec, which reserves "
-        "their "
-        "memory in advance");
+        "their memory in advance");
 }
 
 }  // namespace

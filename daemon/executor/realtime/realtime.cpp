@@ -167,7 +167,7 @@ __attribute__((noinline)) void prefaultStack(std::size_t bytes) {
     // In steps, because one large frame could skip the guard page.
     constexpr std::size_t kStep = 16 * 1024;
     std::array<unsigned char, kStep> block{};
-    // keeps the compiler from omitting the writes
+    // Keeps the compiler from omitting the writes.
     asm volatile("" : : "r"(block.data()) : "memory");
     if (bytes > kStep) prefaultStack(bytes - kStep);
     asm volatile("" : : "r"(block.data()) : "memory");  // and from making a tail call

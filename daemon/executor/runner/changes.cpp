@@ -173,8 +173,7 @@ void Runner::checkTaps(const Wiring& wiring) const {
     throw Refusal(
         RefusalKind::ResourceExhausted,
         fmt::format("{} published outputs (taps) are more than the {} allowed: reduce the "
-                    "whitelist, or raise taps under [limits] in rtcfd's "
-                    "settings",
+                    "whitelist, or raise taps under [limits] in rtcfd's settings",
                     taps, most_taps_));
 }
 

@@ -74,8 +74,8 @@ ImageOutcome Runner::takeImage() {
                             stateless.begin() + static_cast<std::ptrdiff_t>(told), ", "));
         if (stateless.size() > told) names += fmt::format(" and {} more", stateless.size() - told);
         outcome.notes.push_back(
-            "components that declare no state; if they keep values between cycles, these are not "
-            "in the snapshot: " +
+            "the snapshot omits values that components without declared state keep between "
+            "cycles: " +
             names);
     }
     return outcome;
@@ -129,8 +129,7 @@ ChangeOutcome Runner::restore(const RunnerImage& image, const Progress& progress
     if (begins) {
         result.notes.emplace_back(
             "the loop is paused, as after a step: rtcfctl step continues from the snapshot, "
-            "rtcfctl "
-            "start starts anew");
+            "rtcfctl start starts anew");
     }
     return result;
 }

@@ -43,7 +43,7 @@ struct ReplayChunk {
 struct ReplayOutcome {
     std::uint64_t cycles = 0;  ///< cycles since the replay began
     std::size_t consumed = 0;  ///< number of consumed messages; the caller sends the others again
-    /// too many outputs for one answer: the caller asks again for the cycles up to `until_ns`
+    /// Too many outputs for one answer: the caller asks again for the cycles up to `until_ns`.
     bool more = false;
     std::vector<RecordedMessage> outputs;
     std::vector<RecordedTopic> inputs;   ///< with `begin`: topics that components read

@@ -11,7 +11,7 @@ namespace rtcf::executor {
 namespace {
 
 constexpr std::size_t kHeader = 4;
-// most bytes queued for a peer that does not read
+// Most bytes queued for a peer that does not read.
 constexpr std::size_t kLargestBacklog = 64 * 1024 * 1024;
 
 std::uint32_t lengthOf(const std::string& bytes, std::size_t at) {

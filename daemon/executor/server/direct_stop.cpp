@@ -23,12 +23,12 @@ namespace {
 
 constexpr std::int64_t kLineTimeout = kSecond;        // from the connection to the request line
 constexpr std::int64_t kAnswerTimeout = 2 * kSecond;  // from the request to the end of the loop
-// from the request to the removal of the mark on disk
+// From the request to the removal of the mark on disk.
 constexpr std::int64_t kDiskTimeout = 3 * kSecond / 10;
 constexpr int kLookMs = 2;                // ms between checks of a stopping loop
 constexpr std::size_t kMostClients = 32;  // clients with the right; others are disconnected at once
 constexpr std::size_t kLongestLine = 64;
-// users without the right get an answer; the folder excludes all others
+// Users without the right get an answer; the folder excludes all others.
 constexpr mode_t kSocketMode = 0660;
 
 void answer(int fd, const std::string& text) {

@@ -246,8 +246,7 @@ void Server::respond(std::uint64_t connection, const v1::Response& response) {
                                      ->name();
         const std::string text = fmt::format(
             "{} of runner {} take {} bytes; the limit is {}: spread its components over more "
-            "runners, "
-            "or give them smaller values",
+            "runners, or give them smaller values",
             kind, runner_->name(), size, Connection::kLargestFrame);
         if (response.id() == 0) {
             log_->write(LogLevel::Error, {}, text);

@@ -14,7 +14,7 @@ namespace pb = ::rtcf::v1;
 
 namespace {
 
-// approximate size of values in a batch, bytes
+// Approximate size of values in a batch, bytes.
 constexpr std::size_t kLargestBatch = std::size_t{512} * 1024;
 constexpr int kMostCycles = 4096;       // most cycles in a batch
 constexpr std::size_t kMostTables = 8;  // most frame tables that a stream may be behind

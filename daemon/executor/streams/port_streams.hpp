@@ -64,7 +64,7 @@ class PortStreams {
         bool min_max;
         std::deque<Table> tables;          // the first one is being read
         std::vector<std::size_t> columns;  // columns of the first table
-        // open window of minima and maxima; null = single cycles
+        // Open window of minima and maxima; null = single cycles.
         std::unique_ptr<PortWindows> windows;
         bool begun = false;      // the first table has arrived
         bool told = false;       // the schema was sent

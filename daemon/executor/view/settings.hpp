@@ -22,17 +22,17 @@ struct RunnerSettings {
     bool realtime_required = false;
     bool spin_auto = false;  ///< loop.spin_ns follows the observed wake-up latency
     std::int64_t stall_timeout_ns = 2'000'000'000;  ///< limit of a hook in the cycle; 0 = none
-    /// the loop stops after this time without rtcfd; 0 = at once
+    /// The loop stops after this time without rtcfd; 0 = at once.
     std::int64_t orphan_timeout_ns = 60'000'000'000;
     int on_boot = 0;   ///< stored for rtcfd
     int on_crash = 0;  ///< stored for rtcfd
-    /// records per second from one line of a component; 0 = no limit
+    /// Records per second from one line of a component; 0 = no limit.
     std::uint32_t log_limit = 100;
-    /// most bytes of states and staged outputs per frame
+    /// Most bytes of states and staged outputs per frame.
     std::size_t frame_bytes = std::size_t{64} * 1024;
     BridgeSettings bridge;
     SimTime sim_time = SimTime::Auto;
-    /// a larger step forward restarts the simulated clock
+    /// A larger step forward restarts the simulated clock.
     std::int64_t max_clock_jump_ns = 10'000'000'000;
     std::string whitelist;  ///< regular expressions over mapped names
     std::string blacklist;

@@ -26,7 +26,7 @@ struct FrameTable {
     std::string shortness;             ///< message if less than one second is kept; else empty
     std::shared_ptr<FrameRing> ring;
     Watches watches;  ///< watches that read the ring
-    /// frames are kept for watches or an incident; else only the last one is used, by the loop
+    /// Frames are kept for watches or an incident; else only the last one is used, by the loop.
     bool kept = false;
 };
 
@@ -38,7 +38,7 @@ struct FrameDemand {
     /// Other outputs are always in the frame: the loop restores them after an update() that throws.
     std::size_t most_bytes;
     FrameMemory* memory;  ///< memory that outlives the process; may be null
-    /// table whose ring is reused if the sources are the same; may be null
+    /// Table whose ring is reused if the sources are the same; may be null.
     const FrameTable* previous;
 };
 

@@ -199,7 +199,7 @@ void Registrar::run() {
         changed_.notify_all();
         for (const auto& [topic, publishers] : connections) connect_(topic, publishers);
         lock.lock();
-        // closes the connections, because a master has a thread for each
+        // Closes the connections, because a master has a thread for each.
         if (settled()) master.reset();
     }
 }

@@ -169,8 +169,7 @@ bool MasterLink::mayFollow(const std::string& uri, const MasterAddress& address,
     if (right >= needed) return true;
     away("the ROS master at " + uri + " belongs to user " + std::to_string(*owner) +
          " of this machine, who has the right '" + executor::wordOf(right) +
-         "': the runner does not use it, "
-         "because its ROS peers have the right '" +
+         "': the runner does not use it, because its ROS peers have the right '" +
          executor::wordOf(needed) +
          "'; give that user this right in [access], or reduce that of peers: rtcfctl runner set "
          "--ros-peers");
@@ -323,8 +322,7 @@ std::string MasterLink::whyOff() const {
     if (off_ == Why::Killed) {
         return "ROS node " + name().full() +
                " received a shutdown request: it is off until there is a new master, or `rtcfctl "
-               "runner "
-               "set --ros`";
+               "runner set --ros`";
     }
     return "another node named " + name().full() +
            " runs at this ROS master: rename its host or runner";

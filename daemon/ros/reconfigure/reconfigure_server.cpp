@@ -123,7 +123,7 @@ bool ReconfigureServer::change(const dynamic_reconfigure::ReconfigureRequest& as
     }
     const std::lock_guard lock(mutex_);
     answer.config = valuesOf(*set_);
-    // corrects the display of other clients
+    // Corrects the display of other clients.
     if (refused && updates_) updates_.publish(answer.config);
     return !(refused && refuse);
 }

@@ -49,7 +49,7 @@ Reconciled ClockSubscription::reconcile(ros::NodeHandle& handle, ros::CallbackQu
 void ClockSubscription::close() {
     const bool was_open = open_.exchange(false);
     subscriber_.shutdown();
-    // back to the machine's time; there is no other function for it
+    // Back to the machine's time; there is no other function for it.
     if (was_open) ros::Time::init();
 }
 

@@ -13,7 +13,7 @@ namespace rtcf::ros1 {
 
 namespace {
 
-// most messages per tap and turn, so that a fast tap does not starve others
+// Most messages per tap and turn, so that a fast tap does not starve others.
 constexpr int kMost = 1000;
 
 }  // namespace

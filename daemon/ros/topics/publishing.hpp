@@ -92,7 +92,7 @@ class Publishing {
     std::condition_variable changed_;
     Taps taps_;
     std::optional<Deliveries> deliveries_;  // unset before configure()
-    // one for each tap, and for closing topics
+    // One for each tap, and for closing topics.
     std::map<Key, std::shared_ptr<TopicPublisher>> publishers_;
     std::uint64_t generation_ = 0;
     std::uint64_t served_ = 0;  // generation that the thread serves

@@ -71,7 +71,7 @@ Reconciled Subscribing::reconcileTopics(ros::NodeHandle& handle, bool master) {
             } else if (topic != topics.end() && !goes_on) {
                 closing_first.push_back(subscriber);  // roscpp allows one type per topic
             } else {
-                // closed after others are opened, so that peers stay connected
+                // Closed after others are opened, so that peers stay connected.
                 closing.push_back(subscriber);
             }
         }

@@ -86,7 +86,7 @@ void Connection::read(std::uint32_t size, const ReadFinishedFunc& callback) {
     const auto buffer =
         size <= most ? rtcf::ros1::tryNetworkBytes(size) : boost::shared_array<std::uint8_t>();
     if (!buffer) {
-        // a disconnect is retried, a header error is not
+        // A disconnect is retried, a header error is not.
         drop(size <= most ? TransportDisconnect : HeaderError);
         return;
     }

@@ -519,7 +519,7 @@ TEST_F(Image, SaysWhatDeclaresNoState) {
     load(definition("Controller", "C"));
     const auto notes = onGraphThread([&] { return runner().takeImage().notes; });
     ASSERT_EQ(notes.size(), 1U);
-    EXPECT_NE(notes[0].find("components that declare no state"), std::string::npos);
+    EXPECT_NE(notes[0].find("components without declared state"), std::string::npos);
     EXPECT_NE(notes[0].find("/C"), std::string::npos);
 }
 

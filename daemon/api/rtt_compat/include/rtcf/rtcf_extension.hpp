@@ -91,8 +91,7 @@ class RtcfExtension {
         if (component_ == nullptr) {
             throw std::logic_error(
                 "RtcfExtension does not work in a constructor: use it from configureHook() on, in "
-                "a "
-                "component that ORO_CREATE_COMPONENT registers");
+                "a component that ORO_CREATE_COMPONENT registers");
         }
         return *component_;
     }
