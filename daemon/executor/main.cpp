@@ -1,6 +1,6 @@
 // rtcf-executor: the process that runs one loop. Started by rtcfd; see
-// proto/rtcf/executor/v1/executor.proto for its socket. The only file that
-// knows the executor and ROS, and joins them.
+// proto/rtcf/executor/v1/executor.proto for its socket. Only this file includes both executor and
+// ROS, and connects them.
 #include <fmt/format.h>
 #include <getopt.h>
 
@@ -61,7 +61,7 @@ constexpr const char* kUsage =
 
 constexpr int kUsageStatus = 2;
 
-// @return exit status, or -1 to go on
+// @return exit status, or -1 to continue
 int parse(int argc, char** argv, Options& options) {
     enum Option {
         kRunner = 1,
@@ -166,7 +166,7 @@ int parse(int argc, char** argv, Options& options) {
     return kUsageStatus;
 }
 
-// Makes texts of what components log, until the executor ends.
+// Thread that formats log records until the executor ends.
 class LogDrain {
    public:
     explicit LogDrain(Log& log)
@@ -205,7 +205,7 @@ LogLevel levelOf(RunnerEvent::Kind kind) {
 
 int run(const Options& options) {
     prepareProcess();
-    // Takes the signals first, so that every thread made from here on has them blocked.
+    // Blocks signals first, so that all later threads inherit the mask.
     Server server(options.socket);
     Access access;
     rtcf::ros1::Rosout rosout;
@@ -241,7 +241,7 @@ int run(const Options& options) {
                               return server.ask(call, cancel);
                           }),
                       recorder, options.cpu_claims);
-        // After the runner, which it stops to the last.
+        // Constructed after the runner, so that it can stop the runner until the end.
         DirectStop direct_stop(options.stop_socket, options.resume_mark, access);
         direct_stop.serve({[&](const DirectStopReport& report) {
                                runner.requestStop();
@@ -250,7 +250,8 @@ int run(const Options& options) {
                                    try {
                                        runner.stop([](const std::string&) {});
                                    } catch (const std::exception&) {
-                                       // The loop has not ended yet; its end is noticed.
+                                       // The loop has not ended yet; Runner::tick() notices its
+                                       // end.
                                    }
                                });
                            },

@@ -1,5 +1,5 @@
 /// @file
-/// The executor's ROS 1 node, by which taps and injectors become topics.
+/// The executor's ROS 1 node, which connects taps and injectors to topics.
 #pragma once
 
 #include <memory>
@@ -16,25 +16,25 @@ namespace rtcf::ros1 {
 class MasterWatch;
 class Rosout;
 
-/// One per process, and one in its life: roscpp cannot be started again. All
-/// work is done in threads of its own; none is real-time. With no master it
-/// waits for one; it outlives masters that go and come.
+/// One per process, and only once: roscpp cannot be started again. It works in its own threads,
+/// none of them real-time. Without a master, it waits for one; it survives restarts of the master.
 class RosNode final : public executor::Bridge {
    public:
-    /// @param daemon names the daemon among those of this host; empty: the system's
-    /// @param runner names the node, `/rtcfd/<host>/<runner>` or `/rtcfd/<host>/<daemon>/<runner>`
-    /// @param report hears of what changes; not called after the destructor
-    /// @param log    what is said by ROS_* macros goes there; its levels are the loggers'; outlives
-    /// this
-    /// @param rosout opened and closed with the node; outlives this
-    /// @param ask who decides on changes that ROS peers ask for by services
-    /// @param access whose masters of this machine are followed; outlives this
+    /// @param daemon name of the daemon on this host; empty = the system daemon
+    /// @param runner name of the runner; the node is `/rtcfd/<host>/<runner>` or
+    /// `/rtcfd/<host>/<daemon>/<runner>`
+    /// @param access rights of users, which decide on masters of this machine; outlives this object
+    /// @param report called on changes; not called after the destructor
+    /// @param log    receives messages of ROS_* macros; its levels are those of ROS loggers;
+    /// outlives this object
+    /// @param rosout opened and closed with the node; outlives this object
+    /// @param ask    requests changes from rtcfd for ROS peers
     RosNode(const std::string& daemon, const std::string& runner, const executor::Access& access,
             executor::BridgeReport report, executor::Log& log, Rosout& rosout,
             executor::AskSupervisor ask);
 
-    /// Withdraws from the master and closes all topics, in less than two seconds whatever the
-    /// master does. Taps and injectors are not used any more afterwards.
+    /// Withdraws all registrations and closes all topics, in less than two seconds even if the
+    /// master hangs. Does not use taps and injectors afterwards.
     ~RosNode() override;
     RosNode(const RosNode&) = delete;
     RosNode& operator=(const RosNode&) = delete;

@@ -143,8 +143,8 @@ def test_a_replacement_says_which_parameters_do_not_fit(
     done = daemon.ctl("replace", "knobs", "rtcf_test", "Counter")
     assert done.stdout == "replaced knobs by /knobs\n"
     # Of the others nobody has chosen the value.
-    note = "rtcfctl: note: parameter rate = 2.5 is not kept: rtcf_test/Counter has none"
-    assert done.stderr == f"{note}\n"
+    note = "parameter rate = 2.5 is not kept: rtcf_test/Counter has no such parameter"
+    assert done.stderr == f"rtcfctl: note: {note}\n"
 
 
 def test_a_replacement_begins_with_defaults_if_asked_to(

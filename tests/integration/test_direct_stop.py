@@ -366,7 +366,7 @@ def test_who_may_not_operate_stops_nothing_past_the_daemon(open_folder: Path) ->
                 capture_output=True, text=True, timeout=60, check=False,
             )  # fmt: skip
             assert done.stdout == (
-                f"refused: stop takes the right to operate, and user {STRANGER} has none\n"
+                f"refused: stop requires the right `operate`, but user {STRANGER} has none\n"
             ), done.stderr
             assert runs(client)
             # What is no request, or no end of one, does nothing and holds up nobody.

@@ -34,7 +34,7 @@ def test_people_get_some_cycles_a_second(running: Daemon) -> None:
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        (("nobody",), 1, "nobody matches no output of fixed size and no state; there is "),
+        (("nobody",), 1, "nobody matches no output of fixed size and no state; available: "),
         (("wave", "-n", "0"), 2, "-n 0: at least 1"),
         (("wave", "--rate", "fast"), 2, "fast"),
     ],

@@ -141,5 +141,5 @@ def test_values_that_are_not_finite_are_told_of_again(client: rtcf.Client) -> No
             heard = until(events, lambda each: each.kind == Event.KIND_COMPONENT_FAULT)[-1]
             assert heard.component == "/bad"
             assert "output value is not finite: readers keep its last value" in heard.message
-            assert ("times since this was told before" in heard.message) == (number == 1)
+            assert ("times since the last report" in heard.message) == (number == 1)
     wait_for(lambda: len(client.list_incidents()) == 2, "an incident of each")

@@ -446,7 +446,7 @@ def test_each_orderly_end_makes_all_safe_once(
     # Those that failed, too.
     assert safe_calls(daemon) == (3 if end in ("Throws", "NotFiniteStops") else 2)
     if spared:
-        wait_for(lambda: "; max_overruns ends no loop that runs" in daemon.log(), "the log")
+        wait_for(lambda: "; max_overruns does not stop a degraded loop" in daemon.log(), "the log")
     elif end == "overruns":
         assert re.search(
             r"loop stopped in iteration \d+: more than 10 overruns", state(client).status

@@ -189,7 +189,7 @@ def test_a_peer_of_rtcf_2021_loads_looks_and_unloads(
     assert _call(master, "unload_orocos_component", unload) == {"success": {"data": True}}
     # Its answer has no room for the reason.
     assert _call(master, "unload_orocos_component", unload) == {"success": {"data": False}}
-    wait_for(lambda: "refused by service: " in daemon.log(), "the reason")
+    wait_for(lambda: "service call failed: " in daemon.log(), "the reason")
 
 
 def test_the_rt_launcher_of_rtcf_2021_names_a_component_by_its_full_name(

@@ -139,12 +139,12 @@ def test_the_workspace_has_nothing_in_the_way_of_rtcfs_own_programs(workspace: P
 @pytest.mark.parametrize(
     ("line", "said", "instead"),
     [
-        ("orocos_plugin(clock clock.cpp)", "orocos_plugin(clock): rtcf has no plugins",
+        ("orocos_plugin(clock clock.cpp)", "orocos_plugin(clock): rtcf does not support plugins",
          "orocos_library()"),
-        ("orocos_service(clock clock.cpp)", "orocos_service(clock): rtcf has no plugins",
+        ("orocos_service(clock clock.cpp)", "orocos_service(clock): rtcf does not support plugins",
          "orocos_library()"),
-        ("orocos_executable(deploy main.cpp)", "orocos_executable(deploy): programs on OROCOS",
-         "orocos_component()"),
+        ("orocos_executable(deploy main.cpp)",
+         "orocos_executable(deploy): rtcf does not run programs", "orocos_component()"),
         # What has only nothing to do here is no error.
         ("orocos_typekit(types types.hpp)", "orocos_typekit(types) does nothing", ""),
         ("orocos_typegen_headers(types.hpp)", "orocos_typegen_headers() does nothing", ""),

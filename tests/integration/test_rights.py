@@ -113,7 +113,7 @@ def test_a_full_bucket_does_not_stop_a_loop_that_runs_degraded(tmp_path: Path) -
         wait_for(lambda: client.get_statistics().overruns > 50, "overruns")
         status = client.get_status("rt_runner").runners[0]
         assert status.state == runner_pb2.RUNNER_STATE_RUNNING
-        for said in ("ended late", "max_overruns ends no loop that runs degraded"):
+        for said in ("ended late", "max_overruns does not stop a degraded loop"):
             wait_for(lambda: said in daemon.log(), said)  # noqa: B023
         client.stop()
         wait_for(lambda: "most of them in /Sleeps" in daemon.log(), "the last line")

@@ -132,7 +132,7 @@ def test_how_often_one_line_is_handed_on_is_a_setting(
         """Return how many records of the line there were up to each count, and since the last."""
         found = [0]
         for each in listener.records():
-            if "more of this line within a second" in each["msg"]:
+            if "more records of this line within a second" in each["msg"]:
                 found.append(0)
             elif each["msg"] == "each cycle":
                 found[-1] += 1
@@ -163,6 +163,6 @@ def test_levels_of_a_rosconsole_config_file_are_honoured(tmp_path: Path, master:
         with rtcf.Client(daemon.socket) as client:
             client.load(rtcf.component("rtcf_test_ros", "Speaker", name="speaker"))
             wait_for(lambda: "by macro, for those who debug" in daemon.log(), "the record")
-            logged(daemon, f"{config}:4: 'LOUD' is no level")
+            logged(daemon, f"{config}:4: 'LOUD' is not a level")
     finally:
         daemon.end()

@@ -81,9 +81,9 @@ def test_messages_of_variable_size_flow_both_ways_and_those_too_large_are_report
     daemon.ctl("runner", "set", "--largest-message", "1")
     wait_for(lambda: ros(client).too_large > 20, "messages that are too large")
     wait_for(lambda: "/v/said: " in daemon.log(), "the report")
-    assert "messages of more than 1 KiB not published" in daemon.log()
+    assert "messages larger than 1 KiB not published" in daemon.log()
     sender = master.node("text", "/v/heard", "5001")
-    wait_for(lambda: "/v/heard: 1 messages of more than 1 KiB not taken" in daemon.log(), "it")
+    wait_for(lambda: "/v/heard: 1 messages larger than 1 KiB not received" in daemon.log(), "it")
     assert port_value(client, "/v/text", "length") == 5000
     sender.end()
     assert "larger than 1 KiB" in daemon.ctl("status").stdout

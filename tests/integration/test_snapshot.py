@@ -157,11 +157,11 @@ def test_refusals_say_what_does_not_fit(
     client.unload(["chaos"])
     done = daemon.ctl("restore", str(file))
     assert done.returncode == 1
-    assert "there is no component /chaos" in done.stderr
+    assert "the graph has no component /chaos" in done.stderr
     file.write_bytes(file.read_bytes()[:-1] + b"?")
     assert "the snapshot is damaged" in daemon.ctl("restore", str(file)).stderr
     file.write_text("rt_runner:\n")
-    assert "that is no snapshot" in daemon.ctl("restore", str(file)).stderr
+    assert "the file is not a snapshot" in daemon.ctl("restore", str(file)).stderr
 
 
 def test_a_stopped_loop_is_paused_where_the_snapshot_was(

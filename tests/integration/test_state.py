@@ -39,7 +39,7 @@ def test_a_replacement_says_which_state_it_does_not_keep(
     done = daemon.ctl("replace", "wave", "rtcf_examples", "Identity")
     assert done.returncode == 0, done.stderr
     for name in ("phase", "above"):
-        assert f"state {name} of /wave is no more" in done.stdout + done.stderr
+        assert f"state {name} of /wave no longer exists" in done.stdout + done.stderr
 
 
 def test_what_declares_no_state_cannot_be_reset(daemon: Daemon, client: rtcf.Client) -> None:
@@ -70,4 +70,4 @@ def test_state_is_set_while_the_loop_does_not_run(daemon: Daemon, client: rtcf.C
     client.start()
     done = daemon.ctl("set", "wave.state", "phase:=0.5")
     assert done.returncode == 1
-    assert "state is set while it does not" in done.stderr
+    assert "stop it to set state" in done.stderr

@@ -179,7 +179,10 @@ def test_a_stream_ends_when_its_executor_does(client: rtcf.Client) -> None:
 @pytest.mark.parametrize(
     ("selection", "said"),
     [
-        ("nobody.out", "nobody.out matches no output of fixed size and no state; there is /wave."),
+        (
+            "nobody.out",
+            "nobody.out matches no output of fixed size and no state; available: /wave.",
+        ),
         ("wave.nothing", "wave.nothing matches no output"),
         ("", "a selection of ports is empty"),
     ],

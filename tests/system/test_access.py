@@ -137,7 +137,7 @@ def untrusted(service: Service, make: str) -> str:
         ("{ln} -Wl,-rpath,/usr/../srv/open -L$o -lhelps", "/srv/open can be written by everybody"),
         ("{ln} -Wl,-rpath,/srv/open/none -L$o -lhelps", "/srv/open can be written by everybody"),
         ("{ln} -Wl,-rpath,/tmp -Wl,--disable-new-dtags", "/tmp can be written by everybody"),
-        ("{ln} -Wl,-rpath,lib", 'its run path has "lib", which is no absolute folder'),
+        ("{ln} -Wl,-rpath,lib", 'its run path contains "lib", which is not an absolute path'),
         ("{ln} $o/libhelps.so", "which links against /srv/open/libhelps.so: /srv/open can be"),
         ("{ln} -Wl,-rpath,/srv/root -L/srv/root -lhelps",
          "which links against /srv/root/libhelps.so: /srv/root/libhelps.so belongs to user alice"),
@@ -249,7 +249,7 @@ def test_nobody_else_moves_a_loop_to_another_cpu(service: Service) -> None:
         service.ctl("start")
         after = service.status()
         assert after.get("loop_cpu") == before.get("loop_cpu")
-        assert not any("has another loop" in line for line in after.get("degraded", []))
+        assert not any("also runs another loop" in line for line in after.get("degraded", []))
     finally:
         service.machine.run("kill", pid)
         holder.communicate()

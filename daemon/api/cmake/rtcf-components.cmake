@@ -1,17 +1,17 @@
 # rtcf_add_components(<target> PACKAGE <package> SOURCES <file>... [LINK <library>...])
 #
-# Builds a shared library of components and puts it where daemons look:
+# Builds a shared library of components, in a folder that daemons search:
 #   in a catkin workspace  devel/lib/rtcf-components/<package>, found by CMAKE_PREFIX_PATH
 #   elsewhere              <build>/lib/rtcf/<package>, for `rtcfd --path <build>/lib/rtcf`
-#   installed              <prefix>/lib/rtcf-components/<package>, or where the prefix has a folder
-#                          for each architecture, <libdir>/rtcf/<package>
-# The folder lib/rtcf of a prefix is that of the programs of the ROS package rtcf; another one in a
-# workspace would hide them from rosrun and roslaunch.
-# Where no CMAKE_BUILD_TYPE is set it is built as by RelWithDebInfo: a loop needs optimised code, and
-# `rtcfctl check` and crash reports need its lines.
+#   installed              <prefix>/lib/rtcf-components/<package>; if the prefix has a folder for
+#                          each architecture, <libdir>/rtcf/<package>
+# The folder lib/rtcf of a prefix contains the programs of the ROS package rtcf. A folder of that
+# name in a workspace would hide them from rosrun and roslaunch, hence rtcf-components. Without
+# CMAKE_BUILD_TYPE, the library is built as with RelWithDebInfo: a loop needs optimised code, and
+# `rtcfctl check` and crash reports need line numbers.
 include(GNUInstallDirs)
 
-# Sets where the libraries of a package are built, and where they are installed.
+# Sets the folders in which a package's libraries are built and installed.
 function(rtcf_places package folder destination)
   if(CATKIN_DEVEL_PREFIX)
     set(${folder} ${CATKIN_DEVEL_PREFIX}/lib/rtcf-components/${package} PARENT_SCOPE)
@@ -36,7 +36,7 @@ function(rtcf_add_components target)
   rtcf_places(${arg_PACKAGE} folder destination)
 
   add_library(${target} MODULE ${arg_SOURCES})
-  # Not by target_link_libraries, whose two signatures do not mix: its caller may use either.
+  # Not target_link_libraries(): its two signatures do not mix, and the caller may use either.
   set_property(TARGET ${target} APPEND PROPERTY LINK_LIBRARIES rtcf::rtcf ${arg_LINK})
   set_target_properties(
     ${target}
@@ -45,23 +45,22 @@ function(rtcf_add_components target)
                VISIBILITY_INLINES_HIDDEN ON
                LIBRARY_OUTPUT_DIRECTORY ${folder})
   if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
-    # Of these libraries alone: a catkin workspace builds other packages with them.
+    # Only for these libraries: a catkin workspace builds other packages in the same run.
     separate_arguments(optimised UNIX_COMMAND "${CMAKE_CXX_FLAGS_RELWITHDEBINFO}")
     target_compile_options(${target} PRIVATE ${optimised})
     get_property(said GLOBAL PROPERTY RTCF_BUILD_TYPE_SAID)
     if(NOT said)
-      message(STATUS "rtcf: no CMAKE_BUILD_TYPE is set: components are built as by RelWithDebInfo "
+      message(STATUS "rtcf: CMAKE_BUILD_TYPE is not set: components are built as with RelWithDebInfo "
                      "(${CMAKE_CXX_FLAGS_RELWITHDEBINFO})")
       set_property(GLOBAL PROPERTY RTCF_BUILD_TYPE_SAID TRUE)
     endif()
   endif()
-  # A unique symbol would be shared between an old and a new build of the same
-  # library in one process.
+  # One process can load an old and a new build of the same library, which must not share symbols.
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     target_compile_options(${target} PRIVATE -fno-gnu-unique)
   endif()
-  # A missing symbol is an error here and not when the component is loaded; a
-  # sanitizer's run time is the exception, as the executor brings it.
+  # Makes a missing symbol an error of the build, not of the load. A sanitizer's run time is the
+  # exception, because the executor provides it.
   get_target_property(options ${target} COMPILE_OPTIONS)
   get_directory_property(directory_options COMPILE_OPTIONS)
   if(NOT "${options};${directory_options};${CMAKE_CXX_FLAGS}" MATCHES "-fsanitize")
@@ -72,8 +71,8 @@ endfunction()
 
 # rtcf_add_python_components(<target> PACKAGE <package> SOURCES <file.py>... [DEPENDS <file>...])
 #
-# The same for components written in Python, which rtcf-compile (package rtcf-python) makes machine
-# code of. DEPENDS: other files that the sources import or read.
+# The same for components written in Python, which rtcf-compile (package rtcf-python) compiles to
+# machine code. DEPENDS: other files that the sources import or read.
 function(rtcf_add_python_components target)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "PACKAGE" "SOURCES;DEPENDS")
   if(NOT arg_PACKAGE OR NOT arg_SOURCES)
@@ -82,10 +81,10 @@ function(rtcf_add_python_components target)
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "rtcf_add_python_components(${target}): unknown arguments ${arg_UNPARSED_ARGUMENTS}")
   endif()
-  # That of a build tree first.
+  # Prefers rtcf-compile of the build tree.
   find_program(RTCF_COMPILE rtcf-compile HINTS ${rtcf_DIR}/../../bin)
   if(NOT RTCF_COMPILE)
-    message(FATAL_ERROR "rtcf_add_python_components(${target}): no rtcf-compile: sudo apt install rtcf-python")
+    message(FATAL_ERROR "rtcf_add_python_components(${target}): rtcf-compile not found: sudo apt install rtcf-python")
   endif()
   rtcf_places(${arg_PACKAGE} folder destination)
   set(library ${folder}/${target}.so)
@@ -114,8 +113,8 @@ endfunction()
 
 # rtcf_add_python_test(<name>)
 #
-# Adds a test that runs pytest (python3-pytest) in the current source folder. It imports the Python
-# modules of the same rtcf as find_package(rtcf) has found: those of a build tree, or installed ones.
+# Adds a test that runs pytest (python3-pytest) in the current source folder, with the Python
+# modules of the rtcf that find_package(rtcf) has found: a build tree or the installed package.
 function(rtcf_add_python_test name)
   add_test(
     NAME ${name}

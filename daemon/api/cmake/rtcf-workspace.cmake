@@ -1,11 +1,11 @@
-# A package of a workspace that hides one of ours: RTCF 2021's checkout, left in src/, or any other
-# that has the name. ROS would build and run that one.
+# Rejects a package of a workspace that hides one of ours, e.g. a checkout of RTCF 2021 left in
+# src/: ROS would build and run it instead of the installed package.
 foreach(_rtcf_package rtcf rtcf_msgs)
   set(_rtcf_theirs "")
   if(PROJECT_NAME STREQUAL _rtcf_package AND COMMAND catkin_package)
     set(_rtcf_theirs ${CMAKE_CURRENT_SOURCE_DIR})
   endif()
-  # Of catkin_make, in each of its packages.
+  # catkin_make lists its packages in these variables.
   list(FIND CATKIN_ORDERED_PACKAGES ${_rtcf_package} _rtcf_at)
   if(NOT _rtcf_at EQUAL -1)
     list(GET CATKIN_ORDERED_PACKAGE_PATHS ${_rtcf_at} _rtcf_theirs)

@@ -1,6 +1,6 @@
 /// @file
-/// Who may do what at this executor without rtcfd between: the rules of
-/// rtcfd's [access], by numbers of users and groups.
+/// Access rights at this executor's own interfaces, which rtcfd does not check: the rules of
+/// rtcfd's [access], with numeric user and group ids.
 #pragma once
 
 #include <sys/types.h>
@@ -12,28 +12,30 @@
 
 namespace rtcf::executor {
 
-/// Each with those before it; the words of [access].
+/// Each right includes those before it. The names are those of [access].
 enum class Right { None, Observe, Tune, Operate, Admin };
 
-/// As settings and messages write it.
+/// The right's name in settings and messages.
 const char* wordOf(Right right) noexcept;
 
 struct AccessRules {
     Right others = Right::None;
     std::map<uid_t, Right> users;
     std::map<gid_t, Right> groups;
-    std::optional<gid_t> door_group;  ///< of those who can connect to rtcfd at all
-    bool door_open = false;           ///< everybody can
+    std::optional<gid_t> door_group;  ///< group that may connect to rtcfd's socket
+    bool door_open = false;           ///< everybody may connect
 };
 
-/// The rules in force. Until there are any: root and our own user, everything. Any thread.
+/// The rules in force. Before set(), only root and the executor's own user have a right: admin. Any
+/// thread.
 class Access {
    public:
     void set(AccessRules rules);
-    /// What a process with these ids may do. @param groups all of them, the primary one too
+    /// The right of a process with these ids.
+    /// @param groups all groups of the process, including the primary one
     Right of(uid_t user, const std::vector<gid_t>& groups) const;
-    /// What a user may do, by the groups that the user database has for it: a look-up that may
-    /// block, for threads that nobody waits for.
+    /// The right of a user, with the groups from the user database. The look-up may block, so it is
+    /// only for threads that may wait.
     Right ofUser(uid_t user) const;
 
    private:

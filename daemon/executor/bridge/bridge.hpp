@@ -1,6 +1,6 @@
 /// @file
-/// What the executor asks of a link to the world outside its loop, such as the
-/// ROS node. The executor knows no more of ROS than this.
+/// Interface of the executor to a link with the world outside its loop, such as the ROS node. The
+/// executor knows nothing else of ROS.
 #pragma once
 
 #include <cstdint>
@@ -21,54 +21,56 @@ namespace rtcf::executor {
 
 class SimulatedClock;
 
-/// A parameter as it was declared, and its value.
+/// A parameter's declaration and value.
 struct ParameterSnapshot {
     ParameterDeclaration declaration;
     ParameterValue value;
 };
 
-/// The parameters of a component. Never changed: a new value makes a new one.
+/// The parameters of a component. Immutable: a new value makes a new object.
 struct ParameterSet {
-    std::string full_name;  ///< of the component
+    std::string full_name;  ///< the component's full name
     std::vector<ParameterSnapshot> parameters;
 };
 
-/// All mapped connections of one generation of the graph. The topic's name and
-/// type are the tap's and the injector's. And the components that have parameters.
+/// The mapped connections and the components with parameters of one generation of the graph. The
+/// names and types of topics are in the taps and injectors.
 struct BridgeTable {
-    std::vector<std::shared_ptr<Tap>> outputs;                    ///< to be published
-    std::vector<std::shared_ptr<Injector>> inputs;                ///< to be subscribed
-    std::vector<std::shared_ptr<const ParameterSet>> parameters;  ///< to be offered for change
+    std::vector<std::shared_ptr<Tap>> outputs;                    ///< outputs to publish
+    std::vector<std::shared_ptr<Injector>> inputs;                ///< inputs to subscribe
+    std::vector<std::shared_ptr<const ParameterSet>> parameters;  ///< parameters to offer
 };
 
-/// A batch of parameters on its way in.
+/// A batch of parameter changes (name, value).
 using ParameterBatch = std::vector<std::pair<std::string, ParameterValue>>;
 
-/// By which a bridge asks for a change of a component's parameters. Any thread; returns at once.
-/// @param done called once by the graph thread, with the reason if it is refused, else empty; not
-/// called any more if the runner ends
+/// Function by which a bridge requests a change of a component's parameters. Any thread; returns at
+/// once.
+/// @param done called once by the graph thread, with the error text or an empty string; not called
+/// if the runner ends first
 using ParameterRequest = std::function<void(const std::string& component, ParameterBatch batch,
                                             std::function<void(const std::string&)> done)>;
 
-/// What a bridge needs to know to find its peers.
+/// Settings of a bridge.
 struct BridgeSettings {
     bool enabled = true;
-    std::string master_uri;  ///< empty: of the environment
-    std::string hostname;    ///< by which peers reach us; empty: of the environment
-    /// Of cycles and services, and at the start of the node its name; not of ports. Empty: the
-    /// node's own name.
+    std::string master_uri;  ///< empty = from the environment
+    std::string hostname;    ///< host name for peers; empty = from the environment
+    /// Namespace of the topics of cycles, of services and, when the node starts, of its name; not
+    /// of ports. Empty = the node's own name.
     std::string name_space;
-    std::uint32_t queue = 1000;                  ///< messages kept for a slow subscriber
-    std::string latch;                           ///< outputs that are latched; an expression
-    std::uint32_t decimation = 1;                ///< each n-th value of an output is published,
-    std::string decimate = ".*";                 ///< if its name matches this expression
-    std::string stamped;                         ///< scalar outputs that go with the cycle's time
-    std::uint32_t largest_message = 256 * 1024;  ///< of a type of variable size, bytes
-    Right peers = Right::Observe;                ///< what peers may do, who are strangers
-    bool refuse_out_of_range = false;  ///< what peers ask for; else it is brought into the range
+    std::uint32_t queue = 1000;    ///< messages kept for a slow subscriber
+    std::string latch;             ///< regular expression of latched outputs
+    std::uint32_t decimation = 1;  ///< publish every n-th value of an output
+    std::string decimate = ".*";   ///< regular expression of outputs that are decimated
+    std::string stamped;  ///< regular expression of scalar outputs published with the cycle's stamp
+    /// Largest message of a type of variable size, bytes.
+    std::uint32_t largest_message = 256 * 1024;
+    Right peers = Right::Observe;      ///< right of unauthenticated peers
+    bool refuse_out_of_range = false;  ///< reject out-of-range parameters of peers; else clamp them
 };
 
-/// How a bridge fares.
+/// Status of a bridge.
 struct BridgeStatus {
     bool enabled = false;
     bool connected = false;
@@ -77,48 +79,47 @@ struct BridgeStatus {
     std::uint32_t publications = 0;
     std::uint32_t subscriptions = 0;
     std::string problem;                 ///< one line; empty = none
-    bool killed = false;                 ///< a peer has asked it to shut down
-    std::optional<bool> simulated_time;  ///< of the peers; nothing = they have not been asked yet
+    bool killed = false;                 ///< a peer has requested a shutdown
+    std::optional<bool> simulated_time;  ///< the peers use simulated time; unset = not known yet
     bool follows_clock = false;          ///< ticks go to the clock of setClock()
 };
 
 class RunnerView;
 
-/// A link between taps and injectors and their peers outside. All calls come
-/// from one thread that is not real-time and return at once; the work is done
-/// in threads of the bridge's own.
+/// A link between taps and injectors and their peers outside. All calls come from one thread that
+/// is not real-time, and return at once; the bridge works in threads of its own.
 class Bridge {
    public:
     virtual ~Bridge() = default;
 
-    /// Once, before anything else: the runner that it serves, which outlives it.
-    /// @return true if the bridge takes the runner's cycle records; else they are discarded
+    /// Sets the runner, which outlives the bridge. Called once, before all other functions.
+    /// @return true if the bridge consumes the runner's cycle records; else the runner discards
+    /// them
     virtual bool attach(RunnerView& runner) {
         (void)runner;
         return false;
     }
 
-    /// The settings to use from now on. The first call lets the bridge begin.
+    /// Changes the settings. The first call starts the bridge.
     virtual void configure(const BridgeSettings& settings) = 0;
 
-    /// The connections to serve from now on; what is not in it any more is
-    /// closed, what stays in it (the same object) goes on undisturbed.
+    /// Changes the connections. Removed ones are closed; those that stay (the same object) continue
+    /// undisturbed.
     virtual void setTable(std::shared_ptr<const BridgeTable> table) = 0;
 
-    /// Ticks of the peers' simulated clock go there from now on; null = nobody wants them.
+    /// Sets the receiver of the peers' simulated clock; null = none.
     virtual void setClock(std::shared_ptr<SimulatedClock> clock) = 0;
 
     virtual BridgeStatus status() const = 0;
 
-    /// Whether somebody outside feeds an injector now: a peer that publishes its topic is
-    /// connected.
+    /// True if a peer that publishes the injector's topic is connected.
     virtual bool feeds(const Injector& /*injector*/) const { return false; }
 
-    /// How parameters are to be changed. Called once, before all else.
+    /// Sets the function that changes parameters. Called once, before configure().
     // NOLINTNEXTLINE(performance-unnecessary-value-param): to be kept
     virtual void serveParameters(ParameterRequest /*request*/) {}
 
-    /// What hooks reach the outside by; null if they do not. As long as the bridge.
+    /// Access of hooks to the outside; null if there is none. Lives as long as the bridge.
     virtual HookGate* hooks() noexcept { return nullptr; }
 };
 

@@ -1,8 +1,7 @@
 /// @file
-/// What a peer outside, such as the caller of a ROS service, may ask for. The
-/// executor decides nothing: its supervisor does what it does for its own
-/// clients, so that rights, the search for libraries and the desired state are
-/// in one place.
+/// Requests of peers outside, such as callers of a ROS service. The executor passes them to its
+/// supervisor, rtcfd, which treats them like requests of its own clients: rights, the search for
+/// libraries and the desired state stay in one place.
 #pragma once
 
 #include <atomic>
@@ -16,8 +15,8 @@ namespace rtcf::executor {
 struct OutsideCall {
     enum class Kind { Load, Unload, Start, Stop };
     Kind kind = Kind::Start;
-    ComponentDefinition component;  ///< of Load
-    std::string name;               ///< of Unload, full
+    ComponentDefinition component;  ///< Load only
+    std::string name;               ///< Unload only: full name
 };
 
 struct OutsideAnswer {
@@ -25,8 +24,8 @@ struct OutsideAnswer {
     std::string message;  ///< one line
 };
 
-/// Asks the supervisor and waits for its answer, a bounded time. Any thread but
-/// the real-time one; ends soon after `cancel` becomes true.
+/// Sends the request to the supervisor and waits for its answer, for a bounded time. Returns soon
+/// after `cancel` becomes true. Any thread but the real-time thread.
 using AskSupervisor =
     std::function<OutsideAnswer(const OutsideCall& call, const std::atomic<bool>& cancel)>;
 

@@ -8,7 +8,7 @@ namespace rtcf::executor {
 
 namespace {
 
-constexpr std::int64_t kQuiet = 10'000'000'000;  // ns
+constexpr std::int64_t kQuiet = 10'000'000'000;  // ns between reports of one connection
 constexpr std::size_t kKilo = 1024;
 
 }  // namespace
@@ -24,7 +24,7 @@ void SizeWatch::look(const std::map<std::string, std::shared_ptr<Tap>>& taps,
     }
     for (const auto& [topic, injector] : injectors) {
         if (const std::uint64_t count = injector->tooLarge(); count != 0)
-            note(topic, injector, count, "not taken", largest, now_ns);
+            note(topic, injector, count, "not received", largest, now_ns);
     }
 }
 
@@ -35,7 +35,7 @@ void SizeWatch::note(const std::string& topic, const Connection& connection, std
     known.counted = count;
     if (count == known.reported || now_ns < known.next_report_ns) return;
     report_(
-        fmt::format("{}: {} messages of more than {} KiB {}: allow more: rtcfctl runner set {} "
+        fmt::format("{}: {} messages larger than {} KiB {}: raise the limit: rtcfctl runner set {} "
                     "--largest-message KIB",
                     topic, count - known.reported, largest / kKilo, what, runner_));
     known.reported = count;

@@ -1,6 +1,6 @@
 /// @file
-/// Notices messages that were lost as they are larger than a loop makes room
-/// for, and says so in one line per connection, not one per message.
+/// Reports messages that are lost because they exceed the size limit: one line per connection, not
+/// one per message.
 #pragma once
 
 #include <cstdint>
@@ -19,17 +19,17 @@ class SizeWatch {
    public:
     using Report = std::function<void(const std::string& line)>;
 
-    /// @param runner for the advice
+    /// @param runner name of the runner, for the advice
     SizeWatch(std::string runner, Report report)
         : runner_(std::move(runner)), report_(std::move(report)) {}
 
-    /// Looks at all connections of a plan; reports a connection once in ten seconds at most.
-    /// @param largest what is allowed now, bytes
+    /// Checks all connections of a plan; reports each at most once in ten seconds.
+    /// @param largest present limit, bytes
     void look(const std::map<std::string, std::shared_ptr<Tap>>& taps,
               const std::map<std::string, std::shared_ptr<Injector>>& injectors,
               std::size_t largest, std::int64_t now_ns);
 
-    /// All that were lost so far.
+    /// Number of messages lost so far.
     std::uint64_t total() const noexcept { return total_; }
 
    private:
@@ -45,7 +45,8 @@ class SizeWatch {
 
     std::string runner_;
     Report report_;
-    // Forgotten with their connections. One that leaves a plan and comes back goes on counting.
+    // Removed when the connection is destroyed. A connection that leaves a plan and returns keeps
+    // its count.
     std::map<Connection, Known, std::owner_less<Connection>> known_;
     std::uint64_t total_ = 0;
 };

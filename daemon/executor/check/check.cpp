@@ -27,7 +27,7 @@ namespace {
 constexpr std::uint64_t kCyclesPerValue = 10;
 constexpr std::int64_t kStallTimeout = 120'000'000'000;
 
-// Stands where the ROS node would: a value comes on every input, every output is read.
+// Bridge that replaces the ROS node: it writes a value to every input and reads every output.
 class ValueSource final : public Bridge {
    public:
     void configure(const BridgeSettings& /*settings*/) override {}
@@ -35,7 +35,7 @@ class ValueSource final : public Bridge {
     void setClock(std::shared_ptr<SimulatedClock> /*clock*/) override {}
     BridgeStatus status() const override { return {}; }
 
-    // Graph thread, as all calls.
+    // Graph thread, like all calls.
     void exchange() {
         for (const auto& injector : table_->inputs) {
             const std::string message = injector->type().sample();
@@ -70,7 +70,7 @@ ParameterValue parseValue(const std::string& text) {
             return std::int64_t{number};
         if (const double number = std::stod(text, &used); used == text.size()) return number;
     } catch (const std::logic_error&) {
-        // no number: a string
+        // Not a number, so a string.
     }
     return text;
 }
@@ -84,7 +84,7 @@ ComponentDefinition definitionOf(const CheckRequest& request) {
         const std::size_t at = parameter.find(":=");
         if (at == std::string::npos) {
             throw Refusal(RefusalKind::InvalidArgument,
-                          fmt::format("'{}' is not name:=value", parameter));
+                          fmt::format("'{}' is not of the form name:=value", parameter));
         }
         definition.parameters.emplace_back(parameter.substr(0, at),
                                            parseValue(parameter.substr(at + 2)));
@@ -92,7 +92,7 @@ ComponentDefinition definitionOf(const CheckRequest& request) {
     return definition;
 }
 
-// On standard output: what runs, for whoever waits for it to return.
+// Prints the present activity to standard output, for `rtcfctl check`, which waits for its end.
 void say(const std::string& what) {
     fmt::print("{}\n", what);
     std::fflush(stdout);
@@ -103,11 +103,11 @@ void run(const CheckRequest& request, Runner& runner, ValueSource& values) {
     RunnerSettings settings = runner.settings();
     settings.whitelist = ".*";
     settings.loop.warmup_cycles = 0;
-    // A report is made inside the cycle, and finding its source lines may take seconds.
+    // The sanitizer prints reports inside the cycle, and finding source lines may take seconds.
     settings.stall_timeout_ns = kStallTimeout;
     runner.configure(settings);
     const std::string name = runner.load(definitionOf(request), request.library, say).component;
-    // From the first cycle on, which start() comes before.
+    // Compares members only after the first cycles, as start() runs before them.
     std::optional<UndeclaredMembers> members;
     for (std::uint64_t done = 0; done < request.cycles; done += kCyclesPerValue) {
         values.exchange();

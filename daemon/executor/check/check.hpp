@@ -1,9 +1,8 @@
 /// @file
-/// `rtcf-executor --check`: runs one component for some cycles, with values on
-/// all its inputs and taps on all its outputs, in this process, which does
-/// nothing else and then ends. In the build with RealtimeSanitizer
-/// (rtcf-executor-rtsan) everything that is not real-time safe is reported on
-/// standard error. Standard output tells line by line what runs.
+/// `rtcf-executor --check`: runs one component for some cycles, with values on all inputs and taps
+/// on all outputs, in a process that then ends. In the build with RealtimeSanitizer
+/// (rtcf-executor-rtsan), everything that is not real-time safe is reported on standard error.
+/// Standard output lists the activities, one per line.
 #pragma once
 
 #include <cstdint>
@@ -17,10 +16,11 @@ struct CheckRequest {
     std::string package;
     std::string type;
     std::uint64_t cycles = 1000;
-    std::vector<std::string> parameters;  ///< "name:=value", a value as in YAML
+    std::vector<std::string> parameters;  ///< "name:=value"; the value as in YAML
 };
 
-/// @return the process's exit status: 0 the cycles were run, 1 refused or faulted
+/// Runs the check.
+/// @return exit status of the process: 0 = the cycles were run, 1 = rejected or faulted
 int checkComponent(const CheckRequest& request);
 
 }  // namespace rtcf::executor

@@ -13,7 +13,8 @@ namespace rtcf::executor {
 int checkSettings() {
     ::rtcf::v1::RunnerSettings message;
     if (!message.ParseFromFileDescriptor(STDIN_FILENO)) {
-        throw Refusal(RefusalKind::InvalidArgument, "standard input is no RunnerSettings");
+        throw Refusal(RefusalKind::InvalidArgument,
+                      "standard input is not a RunnerSettings message");
     }
     requireKnownValues(message);
     RunnerSettings settings = settingsFrom(message, {});

@@ -1,13 +1,13 @@
 /// @file
-/// `rtcf-executor --check-settings`: whether an executor would take settings,
-/// by the code that takes them, in a process that does nothing else.
+/// `rtcf-executor --check-settings`: checks settings with the executor's own code, in a process
+/// that does nothing else.
 #pragma once
 
 namespace rtcf::executor {
 
-/// Reads a RunnerSettings from standard input; what it does not set is as by default.
-/// @return the process's exit status
-/// @throws Refusal saying what is wrong with them
+/// Reads a RunnerSettings message from standard input; unset fields have their defaults.
+/// @return exit status of the process
+/// @throws Refusal if a setting is invalid
 int checkSettings();
 
 }  // namespace rtcf::executor

@@ -19,9 +19,9 @@ namespace rtcf::executor {
 
 namespace {
 
-// Foreign code runs from here on, and needs none of what a loop needs.
+// Code of components runs from here on, and needs no privileges here.
 void dropCapabilities() {
-    if (::geteuid() == 0) return;  // a private rtcfd of root's: it would be root all the same
+    if (::geteuid() == 0) return;  // a private rtcfd of root: it would stay root anyway
     ::prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL, 0, 0, 0);
     __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
     std::array<__user_cap_data_struct, _LINUX_CAPABILITY_U32S_3> none{};
@@ -36,7 +36,7 @@ int describeLibrary(const std::string& library, const std::string& package,
     v1::LibraryDescription description;
     try {
         dropCapabilities();
-        // Not destroyed: components may be of a library that has static state of its own.
+        // Never destroyed, because libraries may have static state.
         auto* libraries = new LibraryStore;
         for (const uid_t owner : owners) libraries->trust(owner);
         const auto code = libraries->open(library);

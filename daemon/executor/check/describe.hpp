@@ -1,6 +1,6 @@
 /// @file
-/// `rtcf-executor --describe`: what a library offers, found out by loading it
-/// in this process, which does nothing else and then ends.
+/// `rtcf-executor --describe`: lists the component types of a library by loading it, in a process
+/// that then ends.
 #pragma once
 
 #include <sys/types.h>
@@ -10,8 +10,9 @@
 
 namespace rtcf::executor {
 
-/// Writes a LibraryDescription to standard output. @return the process's exit status
-/// @param owners users whose libraries are trusted besides root's and our own
+/// Writes a LibraryDescription to standard output.
+/// @param owners users whose libraries are trusted, besides root and the executor's own user
+/// @return exit status of the process
 int describeLibrary(const std::string& library, const std::string& package,
                     const std::vector<uid_t>& owners);
 

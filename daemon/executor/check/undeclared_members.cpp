@@ -9,12 +9,12 @@ namespace rtcf::executor {
 
 namespace {
 
-constexpr std::size_t kWord = 8;  // what is told apart: a number rarely changes in all its bytes
+constexpr std::size_t kWord = 8;  // granularity, as a number rarely changes in all its bytes
 
 }  // namespace
 
 UndeclaredMembers::UndeclaredMembers(const Component& component)
-    // NOLINTNEXTLINE(bugprone-casting-through-void): where the whole object begins
+    // Address of the complete object.
     : object_(static_cast<const std::byte*>(dynamic_cast<const void*>(&component))) {
     const std::size_t size = malloc_usable_size(const_cast<std::byte*>(object_));
     before_.assign(object_, object_ + size);
@@ -35,7 +35,7 @@ UndeclaredMembers::UndeclaredMembers(const Component& component)
 void UndeclaredMembers::add(const void* begin, std::size_t size, std::string name,
                             bool may_change) {
     const auto offset = static_cast<const std::byte*>(begin) - object_;
-    // A port may also be where the component has a pointer to.
+    // A port may be outside the object, if the component holds it by pointer.
     if (offset < 0 || static_cast<std::size_t>(offset) >= before_.size()) return;
     const auto at = static_cast<std::size_t>(offset);
     fields_.push_back({at, at + size, std::move(name), may_change});

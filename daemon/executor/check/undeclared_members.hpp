@@ -1,7 +1,7 @@
 /// @file
-/// Finds what a component remembers without declaring it: bytes of the object that change from
-/// cycle to cycle and are neither a port nor a State. What it holds by pointer, as the elements of
-/// a std::vector, is not looked at. Not real-time.
+/// Finds undeclared state of a component: bytes of the object that change from cycle to cycle and
+/// belong neither to a port nor to a State. Memory that the object points to, such as the elements
+/// of a std::vector, is not checked. Not real-time.
 #pragma once
 
 #include <cstddef>
@@ -14,16 +14,16 @@ namespace rtcf::executor {
 
 class UndeclaredMembers {
    public:
-    /// @param component by itself in memory from `new`; outlives this
+    /// @param component allocated by `new`; outlives this object
     explicit UndeclaredMembers(const Component& component);
 
-    /// Notes what has changed since the last call. Between cycles.
+    /// Records the bytes that have changed since the last call. Between cycles.
     void look();
-    /// What has, a line each, e.g. "8 bytes at offset 304, after state integral".
+    /// The changed bytes, one line per range, e.g. "8 bytes at offset 304, after state integral".
     std::vector<std::string> found() const;
 
    private:
-    // What is declared, in the order in which it lies in the object.
+    // A declared member, in the order of their offsets.
     struct Field {
         std::size_t begin;
         std::size_t end;

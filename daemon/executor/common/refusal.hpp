@@ -1,6 +1,6 @@
 /// @file
-/// The one exception by which the executor says no. Its text is one line for a
-/// person: what, where, how to mend it. A refused change has changed nothing.
+/// The executor's exception for errors in requests. Its text is one line for a person: the error,
+/// the names, and how to correct it. A rejected change has changed nothing.
 #pragma once
 
 #include <stdexcept>
@@ -8,7 +8,7 @@
 
 namespace rtcf::executor {
 
-/// What programs switch on: messages/errors.cpp makes a reason and a code of each.
+/// Error kind, for programs. messages/errors.cpp maps each kind to a reason and a status code.
 enum class RefusalKind {
     InvalidArgument,  ///< a value is out of range or of the wrong type
     RequestMalformed,
@@ -20,7 +20,7 @@ enum class RefusalKind {
     RatesConflict,
     RecordingInvalid,
 
-    NotFound,  ///< a component
+    NotFound,  ///< no such component
     PortNotFound,
     ParameterNotFound,
     TypeNotFound,

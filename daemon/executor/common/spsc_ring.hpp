@@ -1,6 +1,6 @@
 /// @file
-/// A bounded ring between one producer and one consumer, with a count of what
-/// did not fit. Wait-free on both sides.
+/// A bounded ring for one producer and one consumer, which counts dropped elements. Wait-free on
+/// both sides.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ namespace rtcf::executor {
 
 template <typename T, std::size_t Capacity>
 class SpscRing {
-    static_assert((Capacity & (Capacity - 1)) == 0, "a power of two");
+    static_assert((Capacity & (Capacity - 1)) == 0, "the capacity must be a power of two");
 
    public:
     /// The element to fill next, or null (counted) if the ring is full. Producer; real-time safe.
@@ -43,7 +43,7 @@ class SpscRing {
         tail_.store(tail_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
     }
 
-    /// Elements that found the ring full. Any thread.
+    /// Elements dropped because the ring was full. Any thread.
     std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
 
    private:

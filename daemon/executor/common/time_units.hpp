@@ -1,5 +1,5 @@
 /// @file
-/// Units of time in ns.
+/// Time units, ns.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 /// @file
-/// What waits to enter a queue (rtcf::Queue): messages from outside the loop, each deserialised
-/// where it arrives, which the real-time thread takes over, in order, at the next cycle boundary.
-/// Neither side waits; what does not fit is counted as the queue's drops.
+/// Messages from outside the loop that wait to enter a queue (rtcf::Queue). The arriving thread
+/// deserialises them; the cycle thread moves them into the queue, in order, at the next cycle
+/// boundary. Neither side waits; lost messages count as the queue's drops.
 #pragma once
 
 #include <atomic>
@@ -16,23 +16,24 @@ namespace rtcf::executor {
 
 class Backlog {
    public:
-    /// For a queue; as long as it.
+    /// @param queue outlives this object
     explicit Backlog(QueueBase& queue)
         : type_(queue.type()), queue_(queue), arrived_(type_.make_slot(nullptr)) {
         for (std::size_t i = 0; i < queue.capacity(); ++i)
             slots_.push_back(type_.make_slot(queue.sample()));
     }
 
-    /// Takes a message; bytes that are none are passed over. One thread at a time; not real-time
-    /// safe. @param age_ns of the message at the next boundary
+    /// Stores a message; ignores bytes that are not a valid message. One thread at a time; not
+    /// real-time safe.
+    /// @param age_ns age of the message at the next boundary, ns
     void store(const std::uint8_t* bytes, std::uint32_t size, std::int64_t age_ns) {
         const std::size_t head = head_.load(std::memory_order_relaxed);
         if (head - tail_.load(std::memory_order_acquire) == slots_.size()) {
             lost_.fetch_add(1, std::memory_order_relaxed);
             return;
         }
-        // Copied, as that keeps the slot's memory: it becomes the queue's, which a component may
-        // feed one day.
+        // Copying keeps the memory reserved in the slot. The slot's value moves to the queue, which
+        // an output may feed later.
         if (!type_.deserialize(*arrived_, bytes, size)) return;
         arrived_->time_ns = age_ns;
         try {
@@ -44,7 +45,7 @@ class Backlog {
         head_.store(head + 1, std::memory_order_release);
     }
 
-    /// Hands over all that waits. Loop side only; real-time safe.
+    /// Moves all messages into the queue. Cycle thread; real-time safe.
     void enter(std::int64_t now_ns) noexcept {
         std::size_t tail = tail_.load(std::memory_order_relaxed);
         for (const std::size_t head = head_.load(std::memory_order_acquire); tail != head; ++tail) {
@@ -63,12 +64,12 @@ class Backlog {
    private:
     const TypeInfo& type_;
     QueueBase& queue_;
-    std::shared_ptr<SlotHeader> arrived_;  // delivering side
+    std::shared_ptr<SlotHeader> arrived_;  // of the delivering thread
     std::vector<std::shared_ptr<SlotHeader>> slots_;
-    std::atomic<std::size_t> head_{0};  // delivering side
-    std::atomic<std::size_t> tail_{0};  // loop side
+    std::atomic<std::size_t> head_{0};  // of the delivering thread
+    std::atomic<std::size_t> tail_{0};  // of the cycle thread
     std::atomic<std::uint64_t> lost_{0};
-    std::uint64_t told_ = 0;  // loop side
+    std::uint64_t told_ = 0;  // of the cycle thread
 };
 
 }  // namespace rtcf::executor

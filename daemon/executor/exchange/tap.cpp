@@ -10,7 +10,7 @@ Tap::Tap(std::string topic, const TypeInfo& type, std::shared_ptr<const SlotHead
     : topic_(std::move(topic)),
       type_(type),
       source_(std::move(source)),
-      passed_over_(UINT32_MAX - 1),  // the first value is taken
+      passed_over_(UINT32_MAX - 1),  // so that the first value is taken
       largest_(type.fixed_size ? SIZE_MAX : largest),
       fixed_length_(type.builds_message || type.fixed_size
                         ? static_cast<std::uint32_t>(valueBytes(type))
@@ -28,7 +28,7 @@ std::size_t Tap::recordBytes(const TypeInfo& type) { return kHead + padded(value
 
 std::size_t Tap::ringBytes(const TypeInfo& type, std::size_t capacity) {
     const std::size_t one = recordBytes(type);
-    // A power of two, so that a place in the ring is found without a division.
+    // A power of two, so that the offset needs no division.
     std::size_t size = kHead;
     while (size < std::max(capacity, 2 * one)) size *= 2;
     return size;

@@ -18,12 +18,12 @@ namespace rtcf::executor {
 
 namespace {
 
-// A signal handler has no owner to be handed things by: these two are the
-// exception to "no globals", set once before any component is loaded.
+// A signal handler has no parameters for its objects, so these two are global. Set once, before any
+// component is loaded.
 std::atomic<FlightRecorder*> the_recorder{nullptr};
 thread_local ThreadRole this_thread = ThreadRole::Other;
 
-// Where a thread was when a signal interrupted it.
+// The instruction at which a signal interrupted the thread.
 const void* placeOf(const void* context) {
     const mcontext_t& machine = static_cast<const ucontext_t*>(context)->uc_mcontext;
 #if defined(__x86_64__)
@@ -38,31 +38,31 @@ const void* placeOf(const void* context) {
 #endif
 }
 
-// Notes the callers, too: reads the stack, which may be corrupt. A fault in here ends the process
-// at once, as its signal is blocked; all that is needed is noted by then.
+// Records the call stack. It may be corrupt: a fault in here ends the process at once, because the
+// signal is blocked. The essential data is recorded before.
 void noteTrace(FlightRecorder& recorder, const void* context) {
-    constexpr int kOurs = 2;  // this and the handler, above the kernel's frame
+    constexpr int kOurs = 2;  // this function and the handler, above the kernel's frame
     std::array<void*, FlightRecorder::kMostFrames + kOurs> frames{};
     const void* place = placeOf(context);
     const int count = ::backtrace(frames.data(), static_cast<int>(frames.size()));
     auto* const end = frames.begin() + count;
     auto* begin = std::find(frames.begin(), end, place);
     if (begin == end) {
-        // It is not on its stack: a call through a bad pointer.
+        // The instruction is not on the stack: a call through a bad pointer.
         begin = frames.begin() + std::min(count, kOurs);
         *begin = const_cast<void*>(place);  // NOLINT(cppcoreguidelines-pro-type-const-cast)
     }
     recorder.noteTrace(&*begin, std::max<std::size_t>(static_cast<std::size_t>(end - begin), 1));
 }
 
-// Async-signal-safe (signal-safety(7)): atomics and system calls; and backtrace(), which takes no
-// lock and no memory after its first call.
+// Handler of crash signals. Async-signal-safe (signal-safety(7)): it uses atomics, system calls,
+// and backtrace(), which takes no lock and no memory after its first call.
 void handle(int signal, siginfo_t* info, void* context) {
     const int error = errno;
     FlightRecorder* recorder = the_recorder.load();
     const bool first = recorder != nullptr &&
                        recorder->noteCrash(signal, this_thread, CrashReason::Signal, info->si_addr);
-    // Writing a core may take seconds, which must not be real-time seconds of the loops' CPU.
+    // Leaves real-time scheduling and the loops' CPU, because writing a core may take seconds.
     const sched_param ordinary{};
     sched_setscheduler(0, SCHED_OTHER, &ordinary);
     cpu_set_t all;
@@ -71,7 +71,8 @@ void handle(int signal, siginfo_t* info, void* context) {
     sched_setaffinity(0, sizeof all, &all);
     if (first) noteTrace(*recorder, context);
     std::signal(signal, SIG_DFL);
-    // Pending until the handler returns, then the default action: the core shows this very frame.
+    // Raises the signal again. It stays pending until the handler returns; then the default action
+    // writes a core that shows the faulting frame.
     syscall(SYS_tgkill, getpid(), syscall(SYS_gettid), signal);
     errno = error;
 }
@@ -80,7 +81,7 @@ void handle(int signal, siginfo_t* info, void* context) {
 
 void installCrashHandler(FlightRecorder& recorder) {
     the_recorder.store(&recorder);
-    // Its first call loads a library.
+    // The first call of backtrace() loads a library.
     std::array<void*, 1> ours{};
     (void)::backtrace(ours.data(), 1);
     for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP}) {

@@ -1,7 +1,6 @@
 /// @file
-/// What happens in the process when a component crashes it: the note in the
-/// flight recorder, then the death it would have died anyway, with a core and
-/// off the real-time CPU. rtcfd does the rest.
+/// Handling of a crash inside the process: a note in the flight recorder, then the default action
+/// of the signal, with a core, outside of real time. rtcfd does the rest.
 #pragma once
 
 #include <cstddef>
@@ -11,16 +10,15 @@
 
 namespace rtcf::executor {
 
-/// Takes SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS and SIGTRAP of the whole
-/// process. @param recorder outlives the process's threads
+/// Handles SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS and SIGTRAP in the whole process.
+/// @param recorder outlives the process's threads
 void installCrashHandler(FlightRecorder& recorder);
 
-/// Ends the process as stalled; any thread.
+/// Ends the process, noted as stalled. Any thread.
 [[noreturn]] void dieStalled();
 
-/// Tells the handler which thread this is, and gives the thread a stack on
-/// which the handler can run when the thread has used up its own. One object
-/// per thread, made and destroyed by that thread.
+/// Sets the calling thread's role for the handler, and gives the thread an alternate signal stack,
+/// for a crash by stack overflow. One object per thread, made and destroyed by that thread.
 class CrashContext {
    public:
     explicit CrashContext(ThreadRole role);
@@ -33,8 +31,8 @@ class CrashContext {
     std::unique_ptr<unsigned char[]> stack_;
 };
 
-/// The calling thread does another's work as long as this lives: a crash is then that one's.
-/// Real-time safe.
+/// Gives the calling thread another role for the life of this object, while it does another
+/// thread's work. Real-time safe.
 class CrashRole {
    public:
     explicit CrashRole(ThreadRole role) noexcept;

@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::uint32_t kMagic = 0x46435452;  // "RTCF"
 constexpr std::uint32_t kVersion = 1;
-constexpr off_t kLargest = 8 * 1024 * 1024;  // of the file, with the mappings of a crash
+constexpr off_t kLargest = 8 * 1024 * 1024;  // largest file, with the memory mappings of a crash
 
 }  // namespace
 
@@ -114,7 +114,8 @@ bool FlightRecorder::noteCrash(int signal, ThreadRole thread, CrashReason reason
     return true;
 }
 
-// Behind the page, where nothing is until then: memory that is locked is not spent on it.
+// Writes to the file after the page. That part of the file is empty before a crash, so it takes no
+// locked memory.
 void FlightRecorder::noteTrace(const void* const* frames, std::size_t count) const noexcept {
     constexpr off_t kFrames = sizeof(Page) + sizeof(std::uint64_t);
     off_t at = kFrames + static_cast<off_t>(kMostFrames * sizeof(std::uint64_t));
@@ -134,7 +135,7 @@ void FlightRecorder::noteTrace(const void* const* frames, std::size_t count) con
         const auto place = kFrames + static_cast<off_t>(i * sizeof frame);
         if (::pwrite(fd_, &frame, sizeof frame, place) != sizeof frame) return;
     }
-    // Last, so that all counted frames are written.
+    // Written last, so that all counted frames are complete.
     const std::uint64_t counted = count;
     [[maybe_unused]] const ssize_t done =
         ::pwrite(fd_, &counted, sizeof counted, static_cast<off_t>(sizeof(Page)));

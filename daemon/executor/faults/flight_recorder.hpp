@@ -1,7 +1,6 @@
 /// @file
-/// The flight recorder: a shared memory that tells, after any death of the
-/// process, what its threads were doing. rtcfd holds it open. Writing is one
-/// store; layout and meaning are fixed in executor.proto.
+/// The flight recorder: shared memory that shows, after any end of the process, what its threads
+/// were doing. rtcfd holds it open. Each note is one store. executor.proto defines the layout.
 #pragma once
 
 #include <atomic>
@@ -14,10 +13,10 @@
 
 namespace rtcf::executor {
 
-/// Which thread, in the recorder's numbers.
+/// Role of a thread, as stored in the recorder.
 enum class ThreadRole : std::uint32_t { None = 0, Realtime = 1, Graph = 2, Other = 3 };
 
-/// Which hook a thread is in, in the recorder's numbers.
+/// Hook that a thread runs, as stored in the recorder.
 enum class Hook : std::uint32_t {
     None = 0,
     Constructor = 1,
@@ -26,7 +25,7 @@ enum class Hook : std::uint32_t {
     Stop = 4,
     Cleanup = 5,
     Prepare = 6,
-    // In the real-time thread, whose hook is update() otherwise.
+    // Real-time thread only; None means update() there.
     Safe = 7,
     TakeOver = 8,
     Wait = 9
@@ -34,13 +33,13 @@ enum class Hook : std::uint32_t {
 
 const char* hookName(Hook hook) noexcept;
 
-/// Why the process dies, in the recorder's numbers.
+/// Reason for the end of the process, as stored in the recorder.
 enum class CrashReason : std::uint32_t { Signal = 0, Stall = 1 };
 
 class FlightRecorder {
    public:
     static constexpr std::uint32_t kSlots = 10241;  ///< one per component; slot 0 means none
-    static constexpr std::size_t kMostFrames = 64;  ///< of a crash
+    static constexpr std::size_t kMostFrames = 64;  ///< most stack frames of a crash
 
     /// @throws std::system_error if there is no memory for it
     FlightRecorder();
@@ -48,19 +47,19 @@ class FlightRecorder {
     FlightRecorder(const FlightRecorder&) = delete;
     FlightRecorder& operator=(const FlightRecorder&) = delete;
 
-    /// The descriptor that rtcfd opens by /proc.
+    /// File descriptor, which rtcfd opens by /proc.
     int fd() const noexcept { return fd_; }
 
-    /// @name Slots: names of components; graph thread
+    /// @name Slots with the names of components; graph thread
     /// @{
-    std::uint32_t addSlot(
-        const std::string& name);  ///< @throws Refusal if there are too many components
+    /// @throws Refusal if there are too many components
+    std::uint32_t addSlot(const std::string& name);
     void removeSlot(std::uint32_t slot) noexcept;
     /// @}
 
     /// @name Notes; real-time safe
     /// @{
-    /// The real-time thread's own, see below.
+    /// Notes of the real-time thread, see below.
     class RealtimeNotes;
     inline RealtimeNotes realtimeNotes() noexcept;
     void setRunning(bool running) noexcept RTCF_NONBLOCKING {
@@ -71,19 +70,22 @@ class FlightRecorder {
         page_->graph_hook.store(static_cast<std::uint32_t>(hook), std::memory_order_relaxed);
     }
     void leaveHook() noexcept { enterHook(0, Hook::None); }
-    /// Async-signal-safe; the first note stays. @return whether this is it
+    /// Records a crash; only the first one counts. Async-signal-safe.
+    /// @return true if this is the first one
     bool noteCrash(int signal, ThreadRole thread, CrashReason reason, const void* address) noexcept;
-    /// Keeps where a crash was, and the process's mappings, by which others find its source lines.
-    /// Async-signal-safe; once. @param frames addresses of code, innermost first
+    /// Records the call stack of a crash, and the process's memory mappings, which are needed to
+    /// find the source lines. Async-signal-safe; once.
+    /// @param frames addresses of code, innermost first
     void noteTrace(const void* const* frames, std::size_t count) const noexcept;
     /// @}
 
-    /// Slot of the component that the real-time thread runs; 0 = none.
+    /// Slot of the component that the real-time thread is running; 0 = none.
     std::uint32_t runningSlot() const noexcept {
         return page_->realtime_slot.load(std::memory_order_relaxed);
     }
 
-    /// What the real-time thread is in, e.g. "/H1.update"; empty = no component. Not real-time.
+    /// Component and hook that the real-time thread is running, e.g. "/H1.update"; empty = none.
+    /// Not real-time.
     std::string realtimeActivity() const;
 
    private:
@@ -113,8 +115,8 @@ class FlightRecorder {
     std::uint32_t next_ = 1;
 };
 
-/// What the real-time thread notes in each cycle. To be copied into a local
-/// variable, so that a note is one store. Real-time safe.
+/// Notes of the real-time thread. Copy the object into a local variable, so that a note is one
+/// store. Real-time safe.
 class FlightRecorder::RealtimeNotes {
    public:
     void setIteration(std::uint64_t iteration) const noexcept RTCF_NONBLOCKING {
@@ -123,7 +125,7 @@ class FlightRecorder::RealtimeNotes {
     void enterComponent(std::uint32_t slot) const noexcept RTCF_NONBLOCKING {
         page_->realtime_slot.store(slot, std::memory_order_relaxed);
     }
-    /// What is neither update() nor in the cycle proper: the slot's hook until leaveHook().
+    /// Notes a hook other than update(), until leaveHook().
     void enterHook(std::uint32_t slot, Hook hook) const noexcept RTCF_NONBLOCKING {
         page_->realtime_hook.store(static_cast<std::uint32_t>(hook), std::memory_order_relaxed);
         enterComponent(slot);

@@ -1,5 +1,5 @@
 /// @file
-/// What is noted of every cycle.
+/// Record of a cycle.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@ namespace rtcf::executor {
 struct CycleRecord {
     std::uint64_t iteration;
     std::int64_t stamp_ns;     ///< CLOCK_REALTIME of the deadline, or the simulated clock's time
-    std::int64_t latency_ns;   ///< wake-up after the deadline; may be negative
-    std::int64_t duration_ns;  ///< calculation
+    std::int64_t latency_ns;   ///< wake-up minus deadline; may be negative
+    std::int64_t duration_ns;  ///< from the wake-up to the end of the cycle
 };
 
 }  // namespace rtcf::executor

@@ -7,8 +7,8 @@ namespace rtcf::executor {
 
 namespace {
 
-constexpr std::size_t kMostGathered = 4;  // words of one value
-constexpr std::uint64_t kNothing = 0;     // fills up what is gathered last
+constexpr std::size_t kMostGathered = 4;  // most words of a gathered value
+constexpr std::uint64_t kNothing = 0;     // pads the last group
 
 bool isGathered(const FrameCopy::Source& source) {
     return source.size % FrameCopy::kWord == 0 && source.size / FrameCopy::kWord <= kMostGathered;
@@ -36,8 +36,8 @@ FrameCopy::FrameCopy(std::vector<Source> sources) : sources_(std::move(sources))
     }
 }
 
-// The bytes after the last whole word, in their place of a word. As they lie in memory, which is
-// little-endian where the sizes that are common take one load.
+// Loads the bytes after the last whole word into a word, in memory order. On little-endian
+// machines, the common sizes take one load.
 std::uint64_t FrameCopy::loadRest(const std::uint8_t* from, std::size_t size) noexcept
     RTCF_NONBLOCKING {
 #if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__

@@ -1,7 +1,7 @@
 /// @file
-/// The values of a frame, and how the real-time thread copies them: most are
-/// numbers of a word or a few, which are gathered several at a time; what is
-/// larger, or no whole words, is copied one by one.
+/// The list of a frame's values, and the code by which the real-time thread copies them. Most
+/// values are numbers of a few words: these are gathered several at a time. Larger values, and
+/// those that are not whole words, are copied one by one.
 #pragma once
 
 #include <atomic>
@@ -19,7 +19,7 @@ class FrameCopy {
     using Word = std::atomic<std::uint64_t>;
     static constexpr std::size_t kWord = sizeof(std::uint64_t);  ///< bytes
 
-    /// A value to copy, of a size that stays.
+    /// A value of fixed size to copy.
     struct Source {
         const void* from;
         std::size_t size;  ///< bytes
@@ -31,18 +31,18 @@ class FrameCopy {
     explicit FrameCopy(std::vector<Source> sources);
 
     const std::vector<Source>& sources() const noexcept { return sources_; }
-    /// Where a source's value goes, bytes from the first; each begins at a word.
+    /// Offset of a source's value among the values, bytes; a multiple of a word.
     std::size_t offset(std::size_t source) const noexcept { return offsets_[source]; }
-    /// Of all values.
+    /// Size of all values, words.
     std::size_t words() const noexcept { return words_; }
-    /// Copies them. A reader that has seen any of the words sees, by acquire, what was stored
-    /// before them, too. Real-time safe.
+    /// Copies all values. Words are stored with release order: a reader that loads one of them with
+    /// acquire order also sees all stores before it. Real-time safe.
     void copy(Word* to) const noexcept RTCF_NONBLOCKING {
         const void* const* from = gathered_.data();
         const void* const* const end = from + gathered_.size();
         Word* next = to;
         for (; from != end; from += kAtOnce, next += kAtOnce) {
-            static_assert(kAtOnce == 4, "as many as stand here");
+            static_assert(kAtOnce == 4, "one line per word below");
             put(next[0], load<std::uint64_t>(from[0]));
             put(next[1], load<std::uint64_t>(from[1]));
             put(next[2], load<std::uint64_t>(from[2]));
@@ -50,11 +50,11 @@ class FrameCopy {
         }
         if (!blocks_.empty()) copyBlocks(to);
     }
-    /// Copies the value of a source out of such words. Its writer; real-time safe.
+    /// Copies the value of a source out of copied words. Only by the writer; real-time safe.
     void copyBack(const Word* from, std::size_t source, void* to) const noexcept RTCF_NONBLOCKING;
 
    private:
-    static constexpr std::size_t kAtOnce = 4;  // words that are gathered
+    static constexpr std::size_t kAtOnce = 4;  // words gathered at a time
 
     template <typename T>
     static std::uint64_t load(const void* from) noexcept RTCF_NONBLOCKING {
@@ -69,18 +69,19 @@ class FrameCopy {
     }
     void copyBlocks(Word* to) const noexcept RTCF_NONBLOCKING;
 
-    /// What is not gathered.
+    /// A value that is not gathered.
     struct Block {
         const std::uint8_t* from;
-        std::size_t words;  ///< whole ones
-        std::size_t rest;   ///< bytes after them
+        std::size_t words;  ///< whole words
+        std::size_t rest;   ///< bytes after the whole words
     };
 
     std::vector<Source> sources_;
     std::vector<std::size_t> offsets_;
     std::size_t words_ = 0;
-    std::vector<const void*> gathered_;  // the first words; as many as are gathered at a time
-    std::vector<Block> blocks_;          // after them
+    // Sources of the first words; padded to a multiple of kAtOnce.
+    std::vector<const void*> gathered_;
+    std::vector<Block> blocks_;  // values after the gathered ones
 };
 
 }  // namespace rtcf::executor

@@ -18,9 +18,10 @@ namespace {
 
 constexpr std::uint32_t kMagic = 0x42435452;  // "RTCB"
 constexpr std::uint32_t kVersion = 1;
-constexpr std::size_t kSmallest = 4096;  // bytes; blocks are powers of two, to be used again
+// Bytes; block sizes are powers of two, so that blocks can be reused.
+constexpr std::size_t kSmallest = 4096;
 
-// Present from the beginning, and locked if the process's memory is.
+// Maps a range of the file, with all pages present, and locked if the process's memory is.
 void* mapped(int fd, std::uint64_t offset, std::size_t bytes) {
     void* memory = MAP_FAILED;
     if (::ftruncate(fd, static_cast<off_t>(offset + bytes)) == 0) {
@@ -36,7 +37,7 @@ void* mapped(int fd, std::uint64_t offset, std::size_t bytes) {
 
 struct FrameMemory::Directory {
     struct Entry {
-        std::atomic<std::uint64_t> sequence;  // 0 = none
+        std::atomic<std::uint64_t> sequence;  // 0 = unused
         std::uint64_t words_offset;
         std::uint64_t frames;
         std::uint64_t words_of_frame;
@@ -105,7 +106,8 @@ std::shared_ptr<FrameBlock> FrameMemory::block(std::size_t bytes) {
             return made;
         }
         if (free_.empty()) continue;
-        // Of another size: back to the system, as late as can be, for that interrupts the loop.
+        // A free block of another size returns to the system. This happens as late as possible,
+        // because unmapping interrupts the loop's CPU.
         const FrameBlock& gone = *free_.front();
         (void)::fallocate(fd_, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE,
                           static_cast<off_t>(gone.offset()), static_cast<off_t>(gone.bytes()));
@@ -124,7 +126,8 @@ void FrameMemory::announce(const std::shared_ptr<FrameBlock>& block, std::size_t
     const std::shared_ptr<FrameBlock> text =
         unused == entries.end() ? nullptr : this->block(layout.size());
     if (text == nullptr) {
-        // Nobody can read it, and yet it takes room until it is filled no more.
+        // Without a directory entry or room for its layout, the ring cannot be read, but it
+        // occupies memory while the loop fills it.
         rings_.push_back({block, nullptr, kRings});
         return;
     }
@@ -138,7 +141,8 @@ void FrameMemory::announce(const std::shared_ptr<FrameBlock>& block, std::size_t
     rings_.push_back({block, text, static_cast<std::size_t>(unused - entries.begin())});
 }
 
-// @return whether there was one that nobody fills or reads
+// Removes the oldest ring that is neither filled nor read.
+// @return false if there is none
 bool FrameMemory::forgetOldest() {
     const auto oldest = std::find_if(rings_.begin(), rings_.end(),
                                      [](const Ring& ring) { return ring.block.use_count() == 1; });

@@ -1,8 +1,8 @@
 /// @file
 /// The memory of the loop's frames: a file that rtcfd opens too, so that it can read the last
-/// cycles after any death of the process. A block holds the ring of one graph, and after a change
-/// stays as long as there is room: what ran just before the change is known, too. Its layout is
-/// fixed in executor.proto. Owned by the runner; graph thread.
+/// cycles after any end of the process. A block contains the ring of one graph. After a change of
+/// the graph, the block stays as long as there is room, so that the cycles before the change can be
+/// read. executor.proto defines the layout. Owned by the runner; graph thread.
 #pragma once
 
 #include <atomic>
@@ -14,7 +14,7 @@
 
 namespace rtcf::executor {
 
-/// Zeroed words of the file, mapped as long as somebody has the block.
+/// Zeroed words of the file, mapped for the life of the object.
 class FrameBlock {
    public:
     using Word = std::atomic<std::uint64_t>;
@@ -38,8 +38,9 @@ class FrameBlock {
 
 class FrameMemory {
    public:
-    static constexpr std::size_t kRings = 8;  ///< that are kept, the one in use among them
-    static constexpr std::size_t kMost = std::size_t{36} * 1024 * 1024;  ///< bytes of all blocks
+    static constexpr std::size_t kRings = 8;  ///< rings kept, including the one in use
+    /// Most bytes of all blocks.
+    static constexpr std::size_t kMost = std::size_t{36} * 1024 * 1024;
 
     /// @throws std::system_error if there is no memory for it
     FrameMemory();
@@ -50,11 +51,11 @@ class FrameMemory {
     /// The descriptor that rtcfd opens by /proc.
     int fd() const noexcept { return fd_; }
 
-    /// A block for a ring; the oldest ones that nobody fills or reads make room for it.
-    /// @return null if others take all the room, or the system has none
+    /// Allocates a block for a ring. Removes the oldest unused rings if necessary.
+    /// @return null if blocks in use take all the room, or the system has no memory
     std::shared_ptr<FrameBlock> take(std::size_t bytes);
-    /// Makes a block known to who reads the file; before its ring is filled.
-    /// @param layout a FrameLayout, serialised
+    /// Adds a block to the file's directory, before its ring is filled.
+    /// @param layout a serialised FrameLayout
     void announce(const std::shared_ptr<FrameBlock>& block, std::size_t frames,
                   std::size_t words_of_frame, const std::string& layout);
 
@@ -71,10 +72,10 @@ class FrameMemory {
 
     int fd_ = -1;
     Directory* directory_ = nullptr;
-    std::uint64_t end_ = 0;       // of the file
-    std::size_t bytes_ = 0;       // of all blocks
-    std::uint64_t sequence_ = 0;  // of the last ring
-    std::vector<Ring> rings_;     // from the oldest on
+    std::uint64_t end_ = 0;       // size of the file, bytes
+    std::size_t bytes_ = 0;       // size of all blocks, bytes
+    std::uint64_t sequence_ = 0;  // sequence number of the last ring
+    std::vector<Ring> rings_;     // oldest first
     std::vector<std::shared_ptr<FrameBlock>> free_;
 };
 

@@ -6,7 +6,7 @@ namespace {
 
 std::int64_t signedOf(std::uint64_t word) { return static_cast<std::int64_t>(word); }
 
-// A power of two, so that a place in the ring is found without a division.
+// A power of two, so that the index needs no division.
 std::size_t capacityOf(std::size_t words_of_frame, std::size_t frames) {
     std::size_t capacity = FrameRing::kFewestFrames;
     while (capacity < frames &&
@@ -24,7 +24,7 @@ FrameRing::FrameRing(std::vector<Source> sources, std::size_t frames, FrameMemor
     const std::size_t words = capacity() * stride_;
     if (memory != nullptr) block_ = memory->take(words * FrameCopy::kWord);
     if (block_ == nullptr) {
-        // Written here for the first time, not in the loop.
+        // Touches the memory here, so that the loop has no page faults.
         own_ = std::make_unique<Word[]>(words);  // NOLINT(modernize-avoid-c-arrays)
         for (std::size_t i = 0; i < words; ++i) own_[i].store(0, std::memory_order_relaxed);
     }

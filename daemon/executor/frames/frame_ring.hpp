@@ -1,9 +1,9 @@
 /// @file
-/// The values of every cycle: at its end the real-time thread copies them, with the cycle's
-/// record, into a ring. One writer, any number of readers, none of whom it waits
-/// for or knows of: a reader that is late finds its frame gone, and one that is being written is
-/// recognised. Words are atomic and ordered by release and acquire alone, which costs nothing on
-/// x86-64.
+/// The ring of frames. At the end of each cycle, the real-time thread copies the cycle's record and
+/// values into the next frame. There is one writer and any number of readers; the writer does not
+/// know the readers and never waits for them. A late reader finds its frame overwritten, and
+/// detects a frame that is being written. Words are atomic, with release and acquire order, which
+/// costs nothing on x86-64.
 #pragma once
 
 #include <atomic>
@@ -19,12 +19,12 @@
 
 namespace rtcf::executor {
 
-/// One frame, as a reader has copied it.
+/// A reader's copy of one frame.
 class Frame {
    public:
     const CycleRecord& cycle() const noexcept { return cycle_; }
     bool lastOfLoop() const noexcept { return last_of_loop_; }
-    /// The values, each at the offset that FrameRing::offset() tells.
+    /// The values, each at its FrameRing::offset().
     const std::uint8_t* values() const noexcept {
         return reinterpret_cast<const std::uint8_t*>(words_.data());
     }
@@ -40,7 +40,9 @@ class FrameRing {
    public:
     using Source = FrameCopy::Source;
 
-    /// @param frames how many the ring is to hold; fewer where they would take more than
+    /// @param frames wanted capacity; reduced if the ring would exceed kLargestRing
+    /// @param memory memory for a ring that outlives the process; null, or memory without room: the
+    /// ring is in the process's own memory
     ///               kLargestRing
     /// @param memory for a ring that is to outlive the process; null = any. Where that has no room,
     ///               it is any, too
@@ -48,25 +50,28 @@ class FrameRing {
     FrameRing(const FrameRing&) = delete;
     FrameRing& operator=(const FrameRing&) = delete;
 
-    static constexpr std::size_t kLargestRing = std::size_t{16} * 1024 * 1024;  ///< bytes, locked
+    /// Bytes; locked memory.
+    static constexpr std::size_t kLargestRing = std::size_t{16} * 1024 * 1024;
     static constexpr std::size_t kFewestFrames = 16;
 
-    /// @name Whoever runs cycles; real-time safe
+    /// @name Cycle thread; real-time safe
     /// @{
-    /// Copies the values into the next frame, which no reader has before commit().
+    /// Copies the values into the next frame. Readers cannot read it before commit().
     void take() noexcept RTCF_NONBLOCKING {
         Word* const frame = writing_;
         frame[kMark].store(2 * end_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
         copy_.copy(frame + kHeadWords);
     }
-    /// Notes the values as they are, where they were changed otherwise than by a cycle.
+    /// Records the present values after they were changed outside of a cycle, for putBack().
     void setBase() noexcept RTCF_NONBLOCKING {
         copy_.copy(base_.get());
         base_end_ = end_.load(std::memory_order_relaxed);
     }
-    /// Gives a source the value that it had after the last frame or setBase(). @param value where
-    /// a source lies; other addresses are left alone
+    /// Restores the value of a source from the last frame or setBase(). Does nothing if `value` is
+    /// not a source.
+    /// @param value address of the source's value
     void putBack(void* value) const noexcept RTCF_NONBLOCKING;
+    /// Adds the cycle's record and makes the frame readable.
     void commit(const CycleRecord& cycle, bool last_of_loop) noexcept RTCF_NONBLOCKING {
         const auto put = [frame = writing_](Head place, std::uint64_t value) {
             frame[place].store(value, std::memory_order_release);
@@ -86,23 +91,25 @@ class FrameRing {
     /// @name Any thread
     /// @{
     const std::vector<Source>& sources() const noexcept { return copy_.sources(); }
-    /// Where a source's value lies in a frame, bytes.
+    /// Offset of a source's value among a frame's values, bytes.
     std::size_t offset(std::size_t source) const noexcept { return copy_.offset(source); }
     std::size_t capacity() const noexcept { return mask_ + 1; }
-    /// Words of a frame, those of its values, which are its last, and the block that frames lie
-    /// in; null = it goes with the process.
+    /// Size of a frame, words; size of its values, which come last, words; and the block of the
+    /// ring; null = in the process's own memory.
     std::size_t wordsOfFrame() const noexcept { return stride_; }
     std::size_t wordsOfValues() const noexcept { return copy_.words(); }
     const std::shared_ptr<FrameBlock>& block() const noexcept { return block_; }
-    /// How many frames a ring of such sources holds.
+    /// Capacity of a ring of these sources, frames.
     static std::size_t capacityFor(const std::vector<Source>& sources, std::size_t frames);
-    /// Number of the next frame: those from 0 up to it have been committed.
+    /// Number of the next frame; all smaller numbers have been committed.
     std::uint64_t end() const noexcept { return end_.load(std::memory_order_acquire); }
-    /// Copies a committed frame. @return false if it is not there any more
+    /// Copies a committed frame.
+    /// @return false if it has been overwritten
     bool read(std::uint64_t number, Frame& frame) const;
-    /// The readers have all frames below this one. @param next UINT64_MAX = there are none
+    /// Notes that the readers have taken all frames below `next`.
+    /// @param next UINT64_MAX = there are no readers
     void setTaken(std::uint64_t next) noexcept { taken_.store(next, std::memory_order_release); }
-    /// How many frames a reader has yet to take.
+    /// Number of frames that the slowest reader has yet to take.
     std::uint64_t waiting() const noexcept {
         const std::uint64_t taken = taken_.load(std::memory_order_acquire);
         return end() > taken ? end() - taken : 0;
@@ -111,21 +118,22 @@ class FrameRing {
 
    private:
     using Word = FrameBlock::Word;
-    // A frame begins with these words. The first one is twice its number plus 1 while it is
-    // written, plus 2 once it is whole.
+    // Header of a frame, in words. kMark is 2 * number + 1 while the frame is being written, and 2
+    // * number + 2 when it is complete.
     enum Head : std::size_t { kMark, kIteration, kStamp, kLatency, kDuration, kLast, kHeadWords };
 
     Word* at(std::uint64_t number) const noexcept { return words_ + (number & mask_) * stride_; }
 
     FrameCopy copy_;
-    std::size_t stride_;  // words of a frame
-    std::size_t mask_;    // frames minus 1
+    std::size_t stride_;  // size of a frame, words
+    std::size_t mask_;    // capacity minus 1
     std::shared_ptr<FrameBlock> block_;
-    std::unique_ptr<Word[]> own_;   // NOLINT(modernize-avoid-c-arrays): without a block
-    std::unique_ptr<Word[]> base_;  // NOLINT(modernize-avoid-c-arrays): values; of the writer
+    std::unique_ptr<Word[]> own_;  // NOLINT(modernize-avoid-c-arrays): if there is no block
+    // Values of setBase(); of the writer.
+    std::unique_ptr<Word[]> base_;  // NOLINT(modernize-avoid-c-arrays)
     std::uint64_t base_end_ = 0;    // end_ at the last setBase()
     Word* words_ = nullptr;
-    Word* writing_;  // the writer's: its next frame
+    Word* writing_;  // of the writer: the next frame
     std::atomic<std::uint64_t> end_{0};
     std::atomic<std::uint64_t> taken_{UINT64_MAX};
 };

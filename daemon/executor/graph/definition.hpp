@@ -1,5 +1,5 @@
 /// @file
-/// All that defines one component of a graph: what a person wrote, checked.
+/// Definition of one component of a graph: validated user input.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,11 @@
 
 namespace rtcf::executor {
 
-/// A value of a component that another one replaces.
+/// A parameter value of a component that is being replaced.
 struct InheritedParameter {
     std::string name;
     ParameterValue value;
-    bool chosen = true;  ///< it is not the default: worth saying if it gets lost
+    bool chosen = true;  ///< not the default, so its loss is reported
 };
 
 struct ComponentDefinition {
@@ -28,15 +28,17 @@ struct ComponentDefinition {
     std::string type;
     Remaps remaps;
     std::vector<std::pair<std::string, ParameterValue>> parameters;  ///< load-time values
-    /// Values of the component it replaces, taken where they fit and `parameters` has no other.
+    /// Values of the replaced component; used if they are valid and `parameters` has no other
+    /// value.
     std::vector<InheritedParameter> inherited;
-    bool first = false;  ///< all connections into it are loop breaks
-    std::string ignore;  ///< regular expression of connections that are loop breaks for it
+    bool first = false;  ///< all connections into the component are loop breaks
+    /// Regular expression; matching connections into the component are loop breaks.
+    std::string ignore;
     std::set<std::string> breaks;  ///< inputs whose connection is a loop break
-    std::uint32_t every = 1;       ///< runs each n-th cycle
-    std::optional<std::uint32_t>
-        phase;              ///< the cycle of those n it runs in; unset = chosen to spread load
-    bool optional = false;  ///< a fault takes it out, and the loop goes on
+    std::uint32_t every = 1;       ///< runs in every n-th cycle
+    /// Cycle modulo `every` in which it runs; unset = chosen to spread the load.
+    std::optional<std::uint32_t> phase;
+    bool optional = false;  ///< a fault takes the component out, and the loop goes on
 
     std::string fullName() const { return joinName(ns, name); }
 };

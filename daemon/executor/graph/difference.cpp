@@ -15,7 +15,7 @@ std::string text(const ParameterValue& value) {
     return std::visit([](const auto& held) { return fmt::format("{}", held); }, value);
 }
 
-// Why a component has to be replaced; empty = it can stay.
+// The reason for replacing a component; empty = it can stay.
 std::string replacementReason(const Instance& present, const WantedComponent& wanted) {
     const ComponentDefinition& is = present.definition();
     const ComponentDefinition& shall = wanted.definition;
@@ -37,7 +37,7 @@ std::string replacementReason(const Instance& present, const WantedComponent& wa
     return {};
 }
 
-// Parameters whose value is not what it shall be, with the value they shall have.
+// The parameters whose present value differs from the wanted one, with the wanted value.
 std::vector<std::pair<std::string, ParameterValue>> otherParameters(
     const Instance& present, const ComponentDefinition& shall, std::string& detail) {
     std::vector<std::pair<std::string, ParameterValue>> others;
@@ -48,7 +48,7 @@ std::vector<std::pair<std::string, ParameterValue>> otherParameters(
                                            return parameter->declaration().name == name;
                                        });
         if (!known)
-            others.emplace_back(name, value);  // to be refused with the list of those there are
+            others.emplace_back(name, value);  // rejected later, with the list of known names
     }
     for (std::size_t i = 0; i < declared.size(); ++i) {
         const std::string& name = declared[i]->declaration().name;
@@ -73,7 +73,7 @@ std::vector<Difference> compare(const Graph& graph, const std::vector<WantedComp
     for (const WantedComponent& component : wanted) {
         if (names.insert(component.definition.fullName()).second) continue;
         throw Refusal(RefusalKind::ComponentTwice,
-                      fmt::format("{} stands twice in the graph", component.definition.fullName()));
+                      fmt::format("{} is in the graph twice", component.definition.fullName()));
     }
     std::vector<Difference> differences;
     for (const GraphNode& node : graph.nodes()) {

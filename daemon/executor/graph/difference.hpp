@@ -1,6 +1,5 @@
 /// @file
-/// What has to change for a graph to become another. Pure functions; graph
-/// thread only.
+/// The changes that turn one graph into another. Pure functions; graph thread only.
 #pragma once
 
 #include <string>
@@ -12,25 +11,26 @@
 
 namespace rtcf::executor {
 
-/// A component as it shall be, and the library that has its type.
+/// A wanted component, and the library with its type.
 struct WantedComponent {
     ComponentDefinition definition;
     std::string library;
-    bool anew = false;  ///< from the library as it is now, also if it is loaded from there already
+    bool anew = false;  ///< load from the present file, even if the component already comes from it
 };
 
-/// One component that is not as it shall be.
+/// One difference between a component and the wanted one.
 struct Difference {
     enum class Kind { Load, Unload, Replace, Breaks, Parameters };
     Kind kind;
-    std::string component;                                           ///< full name
-    std::string detail;                                              ///< one line
-    const WantedComponent* wanted = nullptr;                         ///< null for Unload
-    std::vector<std::pair<std::string, ParameterValue>> parameters;  ///< of Parameters: new values
+    std::string component;                    ///< full name
+    std::string detail;                       ///< one line
+    const WantedComponent* wanted = nullptr;  ///< null for Unload
+    /// Parameters only: new values
+    std::vector<std::pair<std::string, ParameterValue>> parameters;
 };
 
-/// Compares a graph with what it shall be: first what leaves, then the rest in the order given.
-/// A parameter that is not given shall have its default.
+/// Compares a graph with the wanted one. Components to unload come first, the others in the order
+/// of `wanted`. A parameter without a wanted value shall have its default.
 /// @throws Refusal if a name is given twice
 std::vector<Difference> compare(const Graph& graph, const std::vector<WantedComponent>& wanted);
 

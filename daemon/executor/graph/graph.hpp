@@ -1,7 +1,6 @@
 /// @file
-/// The graph of a runner as a value: which components there are and where
-/// their loops are broken. A change makes a new graph; the old one stays as it
-/// is until the loop has adopted the new one. Graph thread only.
+/// The graph of a runner as a value: its components and its loop breaks. A change makes a new
+/// graph; the old one stays unchanged until the loop has adopted the new one. Graph thread only.
 #pragma once
 
 #include <memory>
@@ -15,8 +14,7 @@ namespace rtcf::executor {
 
 struct GraphNode {
     std::shared_ptr<Instance> instance;
-    std::set<std::string>
-        breaks;  ///< inputs whose connection is a loop break, set at load or since
+    std::set<std::string> breaks;  ///< inputs whose connection is a loop break
 };
 
 class Graph {
@@ -25,20 +23,21 @@ class Graph {
 
     /// @param full_name with namespace. @return null if there is none
     const GraphNode* find(const std::string& full_name) const noexcept;
-    /// @throws Refusal that lists what there is
+    /// @throws Refusal that lists the components
     const GraphNode& get(const std::string& full_name) const;
 
-    /// @name Changes; each throws Refusal and changes nothing
+    /// @name Changes; if one throws Refusal, it has changed nothing
     /// @{
     void add(GraphNode node);  ///< the name must be free
     void remove(const std::string& full_name);
     void replace(const std::string& full_name, GraphNode node);
     void setBreak(const std::string& full_name, const std::string& port, bool broken);
-    void setBreaks(const std::string& full_name,
-                   const std::set<std::string>& ports);  ///< and no others
+    /// Makes the connections into `ports`, and no others, loop breaks.
+    void setBreaks(const std::string& full_name, const std::set<std::string>& ports);
     /// @}
 
-    /// Refuses a name that is taken. For before a component is constructed.
+    /// Checks that a name is free, before a component is constructed.
+    /// @throws Refusal if it is taken
     void requireFree(const std::string& full_name) const;
 
    private:

@@ -1,5 +1,5 @@
 /// @file
-/// What components' hooks may have to do with the link to the outside.
+/// Access of components' hooks to the bridge.
 #pragma once
 
 #include <string>
@@ -8,14 +8,15 @@
 
 namespace rtcf::executor {
 
-/// Knows which hook runs, so that it can let it through, name it in logs, and
-/// tell what went wrong under it. Implemented by the bridge; graph thread only.
+/// Knows the hook that runs: it grants access to that hook only, names it in logs, and reports
+/// calls that failed under it. Implemented by the bridge; graph thread only.
 class HookGate : public NodeGate {
    public:
-    /// A hook of this component begins. @param component full name; lives until leave()
+    /// Begins a hook of a component.
+    /// @param component full name; lives until leave()
     virtual void enter(const std::string& component) noexcept = 0;
-    /// It has ended. @return what it asked of the outside and got no answer to, one line; empty =
-    /// nothing
+    /// Ends the hook.
+    /// @return a call of the hook that got no answer from outside, in one line; empty = none
     virtual std::string leave() noexcept = 0;
 
    protected:

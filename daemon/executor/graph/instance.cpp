@@ -12,8 +12,8 @@ namespace rtcf::executor {
 
 namespace {
 
-// Of others a value that update() has half written is put back from the last frame; a larger one
-// costs a cycle less as a copy whenever it is written.
+// Outputs up to this size are restored from the last frame if update() throws. For larger ones, a
+// copy after each write costs less per cycle.
 constexpr std::size_t kLargestPutBack = 4096;  // bytes
 
 const ComponentRecord& findRecord(const Library& library, const ComponentDefinition& definition) {
@@ -38,7 +38,7 @@ std::string parameterText(const ParameterValue& value) {
     return std::visit([](const auto& held) { return fmt::format("{}", held); }, value);
 }
 
-// What the flight recorder and the gate to ROS know of a hook, as long as it runs.
+// Notes a hook in the flight recorder and in the gate to ROS while it runs.
 class HookNote {
    public:
     HookNote(FlightRecorder& recorder, std::uint32_t slot, Hook hook, HookGate* gate,
@@ -54,7 +54,8 @@ class HookNote {
     HookNote(const HookNote&) = delete;
     HookNote& operator=(const HookNote&) = delete;
 
-    // What the hook asked of the ROS master and got no answer to; the hook has returned.
+    // A call of the hook that the ROS master did not answer; empty = none. After the hook has
+    // returned.
     std::string unanswered() {
         HookGate* const gate = std::exchange(gate_, nullptr);
         return gate != nullptr ? gate->leave() : std::string();
@@ -124,7 +125,7 @@ void Instance::setFirstParameters() {
         ParameterValue value = given;
         const std::string why =
             found == declared.end()
-                ? fmt::format("{}/{} has none", definition_.package, definition_.type)
+                ? fmt::format("{}/{} has no such parameter", definition_.package, definition_.type)
                 : (*found)->check(value);
         if (why.empty()) {
             if (!sameValue(value, (*found)->declaration().default_value))
@@ -141,7 +142,8 @@ void Instance::setFirstParameters() {
     definition_.inherited.clear();
 }
 
-// A failing hook's own words, or its exception's, in one line.
+// Calls a hook. If it fails, throws a Refusal with the hook's error text, or the text of its
+// exception.
 void Instance::callHook(Hook hook, const std::function<bool()>& call) {
     HookNote note(recorder_, slot(), hook, gate_, context_.full_name);
     RefusalKind kind = RefusalKind::HookFailed;
@@ -154,7 +156,7 @@ void Instance::callHook(Hook hook, const std::function<bool()>& call) {
         } else if (passed) {
             return;
         } else {
-            why = component_->failure().empty() ? "it returned false and did not say why"
+            why = component_->failure().empty() ? "it returned false without an error text"
                                                 : component_->failure();
         }
     } catch (const Refusal&) {
@@ -182,14 +184,14 @@ void Instance::callLastHook(Hook hook, const std::function<void()>& call) noexce
     } catch (...) {
         why = "it threw an exception of unknown type";
     }
-    // There is nobody left to refuse to: the component is on its way out.
+    // The component is leaving, so the failure cannot reject anything.
     if (why.empty()) return;
     log_.write(LogLevel::Error, context_.full_name, fmt::format("{}: {}", hookName(hook), why));
 }
 
 void Instance::configure() {
     if (configured_) return;
-    // cleanup() undoes what a configure() that fails has begun.
+    // cleanup() also undoes a configure() that fails halfway.
     configured_ = true;
     try {
         callHook(Hook::Configure, [this] { return component_->configure(); });
@@ -228,8 +230,8 @@ void Instance::start() {
     if (started_) return;
     callHook(Hook::Start, [this] {
         if (!component_->start()) return false;
-        // Its first values are there for those that run before it. Checked ones wait for the cycle,
-        // which reports values that are not finite.
+        // Publishes first values for components that run earlier in the schedule. Checked outputs
+        // wait for the cycle, which reports values that are not finite.
         for (OutputBase* output : component_->stagedOutputs())
             if (!output->checked()) output->commit();
         return true;
@@ -241,7 +243,7 @@ void Instance::start() {
 void Instance::stop() noexcept {
     if (!started_) return;
     started_ = false;
-    // Who waits in a callback is answered first: stop() may wait for the callback.
+    // First ends calls that wait in a callback: stop() may wait for the callback.
     for (MailboxBase* mailbox : component_->mailboxes()) mailbox->close();
     callLastHook(Hook::Stop, [this] { component_->stop(); });
 }

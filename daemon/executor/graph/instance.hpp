@@ -1,7 +1,7 @@
 /// @file
-/// One loaded component: the object, its names, its lifecycle. Owned by the
-/// graphs it is in; all calls come from the graph thread. Hooks may throw and
-/// fail: what comes out is a Refusal that names component and hook.
+/// One loaded component: the object, its names, its lifecycle. Owned by the graphs that contain it;
+/// all calls come from the graph thread. A hook that throws or fails makes the call throw a Refusal
+/// that names component and hook.
 #pragma once
 
 #include <functional>
@@ -23,21 +23,20 @@ namespace rtcf::executor {
 class Instance {
    public:
     /// Constructs the component and checks and sets its load-time parameters.
-    /// @param gate by which hooks reach ROS; null = they do not
-    /// @throws Refusal and leaves nothing behind
+    /// @param gate access of hooks to ROS; null = none
+    /// @throws Refusal if that fails; nothing is left behind then
     Instance(ComponentDefinition definition, std::shared_ptr<const Library> library,
              const std::string& runner, const LoopClock& clock, Log& log, FlightRecorder& recorder,
              HookGate* gate = nullptr);
-    /// Stops and cleans up what still is started and configured, and drains the log of what it
-    /// said.
+    /// Stops and cleans up the component if necessary, and drains its log records.
     ~Instance();
     Instance(const Instance&) = delete;
     Instance& operator=(const Instance&) = delete;
 
     /// @name Lifecycle; idempotent
     /// @{
-    void configure();  ///< then freezes the ports. @throws Refusal, after cleanup()
-    /// Freezes and resolves the ports without configure(), for a look at how it would be wired.
+    void configure();  ///< Configures and freezes the ports. @throws Refusal, after cleanup()
+    /// Freezes and resolves the ports without configure(), to show how they would be wired.
     void freezePorts();
     void start();  ///< @throws Refusal
     void stop() noexcept;
@@ -47,7 +46,7 @@ class Instance {
     const ComponentDefinition& definition() const noexcept { return definition_; }
     const std::string& fullName() const noexcept { return context_.full_name; }
     const Library& library() const noexcept { return *library_; }
-    /// Keeps its code loaded.
+    /// The library as a shared pointer, which keeps the code loaded.
     const std::shared_ptr<const Library>& code() const noexcept { return library_; }
     const ComponentRecord& record() const noexcept { return *record_; }
     const NamePattern& ignore() const noexcept { return ignore_; }
@@ -55,53 +54,54 @@ class Instance {
     ComponentContext& context() noexcept { return context_; }
     const std::shared_ptr<ComponentFigures>& figures() const noexcept { return figures_; }
 
-    /// Mapped names, in the order of the component's inputs() and outputs(); after configure().
+    /// Mapped names in the order of the component's inputs() and outputs(); after configure().
     const std::vector<std::string>& inputNames() const noexcept { return input_names_; }
     const std::vector<std::string>& outputNames() const noexcept { return output_names_; }
-    /// A slot with the capacity that configure() gave the output, for copies of it.
+    /// A slot with the output's capacity after configure(), to make copies from.
     const SlotHeader* sample(std::size_t output) const noexcept { return samples_[output].get(); }
-    /// Remaps that name no port of it; after configure().
+    /// Remaps that match no port of the component; after configure().
     std::vector<std::string> uselessRemaps() const;
-    /// Its place in the flight recorder.
+    /// The component's slot in the flight recorder.
     std::uint32_t slot() const noexcept { return slot_.number; }
-    /// The cycle of its every() in which it runs; chosen once, so that a change of others does not
-    /// move it.
+    /// Cycle modulo `every` in which the component runs. Chosen once, so that changes of other
+    /// components do not move it.
     std::uint32_t phase() const noexcept { return phase_.value_or(0); }
     bool hasPhase() const noexcept { return phase_.has_value(); }
     void setPhase(std::uint32_t phase) noexcept { phase_ = phase; }
-    /// Not null if it paces the loop.
+    /// The component as a Source; null if it is none.
     Source* source() const noexcept { return dynamic_cast<Source*>(component_.get()); }
-    /// Frees what an adopted batch has replaced.
+    /// Frees staged values and values that an adopted batch has replaced.
     void releaseStaged() noexcept;
     InputBase* findInput(const std::string& port) const noexcept;
-    /// @throws Refusal that lists what there is
+    /// @throws Refusal that lists the inputs
     const InputBase& requireInput(const std::string& port) const;
 
     /// The parameters' values as last staged, in the order of declaration.
     const std::vector<ParameterValue>& parameterValues() const noexcept {
         return parameter_values_;
     }
-    /// What it has taken of its definition's `inherited`, but for what is its default anyway.
+    /// Inherited parameters that the component has taken, except those equal to its default.
     const std::vector<std::pair<std::string, ParameterValue>>& keptParameters() const noexcept {
         return kept_parameters_;
     }
-    /// What of `inherited` does not fit, a line each.
+    /// Inherited parameters that were not taken, one line each.
     const std::vector<std::string>& lostParameters() const noexcept { return lost_parameters_; }
-    /// Takes back a batch that the loop did not adopt.
+    /// Undoes a batch that the loop did not adopt.
     void restoreParameterValues(std::vector<ParameterValue> values);
-    /// Checks a batch, stages it and lets the component prepare for it. @return what to commit at
-    /// the boundary @throws Refusal naming the first bad one; nothing is staged then
+    /// Checks and stages a batch, and calls prepare().
+    /// @return the values to commit at the boundary
+    /// @throws Refusal naming the first invalid parameter; nothing is staged then
     std::vector<StagedValue*> stageParameters(
         const std::vector<std::pair<std::string, ParameterValue>>& batch);
 
-    /// What it threw out of update(); empty = nothing.
+    /// Text of the exception from update(); empty = none.
     const std::string& faultText() const noexcept { return fault_; }
     void setFault(std::string text) { fault_ = std::move(text); }
 
    private:
     void setFirstParameters();
     void callHook(Hook hook, const std::function<bool()>& call);
-    /// Of a hook that cannot refuse any more: what goes wrong is logged.
+    /// Calls a hook whose failure rejects nothing: errors are logged.
     void callLastHook(Hook hook, const std::function<void()>& call) noexcept;
 
     ComponentDefinition definition_;
@@ -112,9 +112,9 @@ class Instance {
     FlightRecorder& recorder_;
     HookGate* gate_;
 
-    // What stands around the component as long as there is one. It goes in the order against this
-    // one, also when the constructor refuses: first the component, then its level, then what it
-    // has said, whose records refer to its name.
+    // Members that surround the component's life. They are destroyed in reverse order, also if the
+    // constructor throws: first the component, then its log level, then its log records, which
+    // refer to its name.
     struct Slot {
         Slot(FlightRecorder& in, const std::string& name)
             : recorder(in), number(in.addSlot(name)) {}
@@ -130,7 +130,7 @@ class Instance {
             try {
                 log.drain();
             } catch (...) {  // NOLINT(bugprone-empty-catch)
-                // There is no memory for their texts: they are lost.
+                // No memory for the texts: the records are lost.
             }
         }
         Drained(const Drained&) = delete;

@@ -1,8 +1,8 @@
 /// @file
-/// An image of a runner: all that its next cycle depends on, as a value, by the names and types
-/// of what holds it. Restored into a runner with the same graph, whoever built its libraries and
-/// whenever, the loop goes on with the same values, bit by bit, as far as components declare what
-/// they remember. How it stands in a file: messages/image_file.hpp.
+/// A snapshot of a runner: all values that its next cycle depends on, by the names and types of
+/// their components and ports. If a snapshot is restored into a runner with the same graph, even
+/// with rebuilt libraries, the loop continues with the same values, bit by bit, provided that
+/// components declare all their state. File format: messages/image_file.hpp.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace rtcf::executor {
 
-/// A port's type, as connections compare it.
+/// A port's type, with the properties that connections compare.
 struct ImageType {
     std::string name;
     std::string md5;
@@ -25,18 +25,18 @@ struct ImageType {
     bool flat = false;
 };
 ImageType imageTypeOf(const TypeInfo& type);
-/// @return whether values of the one are values of the other
+/// @return true if values of the two types are compatible
 bool same(const ImageType& image, const TypeInfo& type);
 
 struct ImageValue {
     std::uint64_t sequence = 0;
     std::int64_t time_ns = 0;
-    std::string bytes;  ///< of a flat type: as they lie in memory; else serialised
+    std::string bytes;  ///< flat types: as in memory; others: serialised
 };
 
 struct ImageState {
     std::string name;
-    std::string type;  ///< for people
+    std::string type;  ///< type for people
     std::uint64_t identity = 0;
     std::string bytes;
 };
@@ -45,24 +45,24 @@ struct ImageOutput {
     std::string name;
     ImageType type;
     ImageValue value;
-    std::optional<ImageValue> staged;   ///< written and not let pass, if it is staged
-    std::optional<ImageValue> latched;  ///< what loop breaks have of it
+    std::optional<ImageValue> staged;   ///< staged outputs only: the value before commit()
+    std::optional<ImageValue> latched;  ///< the copy that loop breaks read
 };
 
 struct ImageInput {
     std::string name;
     ImageType type;
-    std::string source;  ///< what feeds it, e.g. "/C.out"; empty = nothing
+    std::string source;  ///< its writer, e.g. "/C.out"; empty = none
     std::uint64_t seen = 0;
-    bool reads_source = true;        ///< its component has the source's value,
-    std::string kept_of;             ///< or that of an output that fed it earlier,
-    std::optional<ImageValue> kept;  ///< or one of what has gone; none of these: none
-    bool kept_is_new = false;        ///< it has not read that yet
-    std::optional<ImageValue> left;  ///< with nothing that feeds it: the source's last value
+    bool reads_source = true;        ///< the component has the source's value,
+    std::string kept_of;             ///< or that of an earlier writer in the graph,
+    std::optional<ImageValue> kept;  ///< or that of a removed writer; if none of these: no value
+    bool kept_is_new = false;        ///< the component has not read that value yet
+    std::optional<ImageValue> left;  ///< without a writer: the last value of the removed writer
 };
 
 struct ImageComponent {
-    std::string name;  ///< full
+    std::string name;  ///< full name
     std::string package;
     std::string type;
     std::uint32_t every = 1;
@@ -75,7 +75,7 @@ struct ImageComponent {
     std::vector<ImageInput> inputs;
 };
 
-/// The last value that came from outside on a topic.
+/// The last value from outside on a topic.
 struct ImageTopic {
     std::string name;
     ImageType type;

@@ -43,22 +43,22 @@ void ImageRestorer::fitEach(const std::string& of, const char* kind, const From&
                             Name name, Fit fit) {
     std::map<std::string, const typename From::value_type*> there;
     for (const auto& each : from) there[each.name] = &each;
-    if (there.size() != from.size()) problem(fmt::format("a {} is there twice", kind));
+    if (there.size() != from.size()) problem(fmt::format("a {} is in the snapshot twice", kind));
     for (const auto& each : to) {
         const std::string wanted = name(each);
         const auto found = there.find(wanted);
         if (found == there.end()) {
-            problem(fmt::format("{} {}{} is not in it", kind, of, wanted));
+            problem(fmt::format("{} {}{} is not in the snapshot", kind, of, wanted));
             continue;
         }
         fit(*found->second, each);
         there.erase(found);
     }
     for (const auto& [left, each] : there)
-        problem(fmt::format("there is no {} {}{}", kind, of, left));
+        problem(fmt::format("the graph has no {} {}{}", kind, of, left));
 }
 
-// What components compute with must be times that a loop can have.
+// Requires times that a loop can have, because components compute with them.
 void ImageRestorer::requireTimes() const {
     constexpr std::int64_t kLongest = INT64_MAX / 2;
     constexpr std::int64_t kLastStamp = 4'294'967'295'999'999'999;  // of a ros::Time
@@ -75,8 +75,8 @@ void ImageRestorer::requireTimes() const {
         std::all_of(image_.components.begin(), image_.components.end(), isTurn))
         return;
     throw Refusal(RefusalKind::InvalidArgument,
-                  fmt::format("the snapshot of {} has a clock that no loop has (time {} ns, stamp "
-                              "{} ns, elapsed {} ns): it has been changed; take another one",
+                  fmt::format("the snapshot of {} has an invalid clock (time {} ns, stamp "
+                              "{} ns, elapsed {} ns): the file was modified; take another snapshot",
                               image_.runner, clock.time_ns, clock.stamp_ns, clock.elapsed_ns));
 }
 
@@ -89,7 +89,7 @@ void ImageRestorer::requireFit() const {
         text += fmt::format("; and {} more", problems_.size() - kToldProblems);
     throw Refusal(RefusalKind::FailedPrecondition,
                   fmt::format("the snapshot of {} does not fit this graph: {}; load the graph that "
-                              "it was taken of",
+                              "it was taken from",
                               image_.runner, text));
 }
 
@@ -165,8 +165,8 @@ void ImageRestorer::fitOutputs(const ImageComponent& image, const Instance& inst
             const auto latch = plan_.latches.find(slot);
             if (is_staged != from.staged.has_value() ||
                 (latch != plan_.latches.end()) != from.latched.has_value()) {
-                problem(
-                    fmt::format("output {} is checked or read late by others than before", name));
+                problem(fmt::format("output {} is checked or read one cycle late, unlike before",
+                                    name));
                 return;
             }
             restoreTo(slot, type, from.value, name);
@@ -203,7 +203,7 @@ void ImageRestorer::fitInput(const ImageInput& image, InputBase& input, const st
     const auto binding = plan_.bindings.find(&input);
     const bool was_bound = binding != plan_.bindings.end();
     if (source.empty() && image.seen != 0 && !image.left) {
-        problem(fmt::format("input {} has seen values of what has gone, and none is in it", name));
+        problem(fmt::format("input {} has read a removed writer, whose value is missing", name));
         return;
     }
     if (source.empty() && (image.left || was_bound)) {
@@ -217,7 +217,7 @@ void ImageRestorer::fitInput(const ImageInput& image, InputBase& input, const st
         if (!image.kept_of.empty()) {
             const auto output = outputs_.find(image.kept_of);
             if (output == outputs_.end() || !sameType(output->second.first->type(), type)) {
-                problem(fmt::format("input {} has a value of {}, which is not there", name,
+                problem(fmt::format("input {} has a value of {}, which does not exist", name,
                                     image.kept_of));
                 return;
             }
@@ -262,7 +262,7 @@ std::shared_ptr<SlotHeader> ImageRestorer::slotFrom(const TypeInfo& type, const 
     } else {
         valid = type.deserialize(*slot, bytes, static_cast<std::uint32_t>(value.bytes.size()));
     }
-    if (!valid) problem(fmt::format("the value of {} is none of type {}", name, type.name));
+    if (!valid) problem(fmt::format("the value of {} is not of type {}", name, type.name));
     slot->sequence = value.sequence;
     slot->time_ns = value.time_ns;
     return slot;

@@ -1,6 +1,6 @@
 /// @file
-/// Restores an image of a runner: finds the place of each of its values in a graph, or says what
-/// does not fit. Lives for one restoration; graph thread only.
+/// Restores a snapshot of a runner: assigns each of its values to a place in the graph, or reports
+/// the differences. Lives for one restoration; graph thread only.
 #pragma once
 
 #include <map>
@@ -19,20 +19,23 @@ class ImageRestorer {
    public:
     using Batch = std::vector<std::pair<std::string, ParameterValue>>;
 
-    /// Finds the place of everything. @param plan that the loop has; it and `image` outlive this
-    /// @throws Refusal that says what does not fit
+    /// Assigns all values.
+    /// @param image outlives this object
+    /// @param plan the loop's plan; outlives this object
+    /// @throws Refusal that lists the differences
     ImageRestorer(const RunnerImage& image, const Plan& plan);
     ImageRestorer(const ImageRestorer&) = delete;
     ImageRestorer& operator=(const ImageRestorer&) = delete;
 
-    /// To be applied at a boundary.
+    /// The restoration to apply at a boundary.
     Restoration& restoration() noexcept { return restoration_; }
-    /// Requires that nothing is larger than what its component has reserved. @throws Refusal
+    /// Requires that no value is larger than the capacity that its component has reserved.
+    /// @throws Refusal
     void requireReserved() const;
-    /// Parameters that are to change, and the cycles of their every() in which components run.
+    /// Parameters to change, and new phases (cycle modulo `every`) of components.
     const std::map<Instance*, Batch>& parameters() const noexcept { return parameters_; }
     const std::map<Instance*, std::uint32_t>& phases() const noexcept { return phases_; }
-    /// After that, of the plan that the loop has now: who keeps alive what inputs refer to.
+    /// After the restoration: adds the owners of slots that inputs refer to to the loop's plan.
     void noteIn(Plan& plan) const;
 
    private:
@@ -43,11 +46,13 @@ class ImageRestorer {
     void fitInputs(const ImageComponent& image, const Instance& instance);
     void fitInput(const ImageInput& image, InputBase& input, const std::string& name);
     void fitTopics();
-    /// @param from what an image has, and `to` the graph, of one kind of thing that has a name
+    /// Matches the elements of one kind by name, and calls `fit` for each pair.
+    /// @param from elements of the snapshot
+    /// @param to elements of the graph
     template <typename From, typename To, typename Name, typename Fit>
     void fitEach(const std::string& of, const char* kind, const From& from, const To& to, Name name,
                  Fit fit);
-    /// @param sample what has the room that the slot is to have, if any
+    /// @param sample slot whose capacity the new slot gets, or null
     std::shared_ptr<SlotHeader> slotFrom(const TypeInfo& type, const ImageValue& value,
                                          const std::string& name,
                                          const SlotHeader* sample = nullptr);
@@ -62,12 +67,13 @@ class ImageRestorer {
     const Sources sources_;
     Restoration restoration_;
     std::vector<std::string> problems_;
-    std::map<std::string, std::pair<const OutputBase*, const SlotHeader*>> outputs_;  // and samples
+    // Output and sample.
+    std::map<std::string, std::pair<const OutputBase*, const SlotHeader*>> outputs_;
     std::map<const SlotHeader*, std::pair<std::string, const SlotHeader*>> reserved_;
     std::map<Instance*, Batch> parameters_;
     std::map<Instance*, std::uint32_t> phases_;
     struct Kept {
-        std::shared_ptr<const SlotHeader> left;  // in the place of a source that is no more
+        std::shared_ptr<const SlotHeader> left;  // in place of a removed writer
         std::shared_ptr<const SlotHeader> kept;
     };
     std::map<InputBase*, Kept> kept_;

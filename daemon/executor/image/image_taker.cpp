@@ -17,18 +17,17 @@ ImageValue valueFrom(const Capture::Value& value) {
             std::string(value.bytes.begin(), value.bytes.begin() + value.length)};
 }
 
-// Values are copied in the cycle.
+// Requires that values can be copied in the cycle.
 void requireCopied(const TypeInfo& type) {
     if (!allocatesMessage(type)) return;
-    throw Refusal(
-        RefusalKind::FailedPrecondition,
-        fmt::format("there is no snapshot of values of {}: they have memory of their own, "
-                    "and so have messages of {}, which would be allocated in the cycle; "
-                    "keep the values in a std::array",
-                    type.name, type.ros_type));
+    throw Refusal(RefusalKind::FailedPrecondition,
+                  fmt::format("a snapshot cannot contain values of {}: they own memory, "
+                              "and so do messages of {}, which would be allocated in the cycle; "
+                              "store the values in a std::array",
+                              type.name, type.ros_type));
 }
 
-// What an input goes on to read whose source is no more; null if it had none.
+// The slot that an input without a writer still reads; null if it never had a writer.
 const SlotHeader* leftBy(const Binding& binding) {
     if (binding.writer != nullptr) return nullptr;
     if (binding.source != nullptr || binding.source_owner == nullptr) return binding.source;
@@ -177,8 +176,8 @@ RunnerImage ImageTaker::image() const {
         const Instance& instance = instanceOf(plan_, step);
         if (capture_.turns[step].disabled) {
             throw Refusal(RefusalKind::FailedPrecondition,
-                          fmt::format("{0} was taken out after a fault, and nobody knows what it "
-                                      "remembers: replace or unload it first",
+                          fmt::format("{0} was taken out after a fault, so its state is unknown: "
+                                      "replace or unload it first",
                                       instance.fullName()));
         }
         image.components.push_back(componentOf(step));

@@ -1,6 +1,6 @@
 /// @file
-/// Takes an image of a runner: works out what is to be copied, and makes an image of the copies.
-/// Lives for one snapshot; graph thread only.
+/// Takes a snapshot of a runner: plans the copies, and makes a snapshot from them. Lives for one
+/// snapshot; graph thread only.
 #pragma once
 
 #include <cstddef>
@@ -13,14 +13,14 @@
 
 namespace rtcf::executor {
 
-/// The names of what feeds inputs.
+/// Names of the sources of inputs.
 class Sources {
    public:
-    /// @param plan outlives this
+    /// @param plan outlives this object
     explicit Sources(const Plan& plan);
-    /// "/C.out", "/C.out one cycle late", "topic /x"; empty = nothing feeds it.
+    /// The source of an input: "/C.out", "/C.out one cycle late", "topic /x"; empty = none.
     std::string of(const InputBase& input) const;
-    /// The output whose slot this is, as "/C.out". Empty: none of the graph's.
+    /// The output of a slot, e.g. "/C.out"; empty = no output of the graph.
     std::string output(const SlotHeader* slot) const;
 
    private:
@@ -30,16 +30,17 @@ class Sources {
 
 class ImageTaker {
    public:
-    /// @param plan that the loop has; outlives this
+    /// @param plan the loop's plan; outlives this object
     explicit ImageTaker(const Plan& plan);
     ImageTaker(const ImageTaker&) = delete;
     ImageTaker& operator=(const ImageTaker&) = delete;
 
-    /// To be filled at a boundary.
+    /// The capture to fill at a boundary.
     Capture& capture() noexcept { return capture_; }
-    /// Makes the room that filling it lacked.
+    /// Enlarges buffers that were too small.
     void makeRoom();
-    /// After that. @throws Refusal if a component was taken out
+    /// The snapshot, after the capture.
+    /// @throws Refusal if a component was taken out after a fault
     RunnerImage image() const;
 
    private:

@@ -9,7 +9,7 @@ namespace {
 constexpr const char* kRoot = "ros";
 constexpr const char* kComponents = "ros.rtcf";
 
-// RTCF 2021 called the logger of /arm/H1 `ros.rtcf./arm/H1`.
+// Converts logger names of RTCF 2021, e.g. `ros.rtcf./arm/H1` for /arm/H1, to ours.
 std::string plain(const std::string& logger) {
     if (logger.find('/') == std::string::npos) return logger;
     std::string name;

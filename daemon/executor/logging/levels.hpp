@@ -1,8 +1,7 @@
 /// @file
-/// Which records are wanted: a level for each logger that was given one, the
-/// nearest ancestor's for the others. A component's logger is
-/// `ros.rtcf.<name>`, with dots where its full name has slashes; what it logs
-/// follows a change at once, in the cycle too.
+/// Log levels of loggers. A logger without its own level has that of its nearest ancestor. A
+/// component's logger is `ros.rtcf.<name>`, with dots for the slashes of its full name. A change
+/// takes effect at once, also in the cycle.
 #pragma once
 
 #include <atomic>
@@ -20,28 +19,28 @@ class LogLevels {
    public:
     LogLevels();
 
-    /// The logger of a component, by its full name; of the executor, if that is empty.
+    /// The logger of a component, by its full name; the executor's logger if it is empty.
     static std::string loggerOf(const std::string& component);
 
     LogLevel of(const std::string& logger) const;
     void set(const std::string& logger, LogLevel level);
-    /// The lowest level that any component logs at.
+    /// The least severe level of all components.
     LogLevel lowest() const;
-    /// All loggers that have been named so far, components' included, and their levels.
+    /// All known loggers, including those of components, and their levels.
     std::map<std::string, LogLevel> all() const;
-    /// Names a logger, so that all() tells of it.
+    /// Adds a logger to those that all() returns.
     void know(const std::string& logger);
 
-    /// @name A component's level, kept up to date from attach() to detach()
+    /// @name A component's level, updated from attach() to detach()
     /// @{
     void attach(const std::string& component, std::atomic<LogLevel>& level);
     void detach(const std::atomic<LogLevel>& level);
     /// @}
 
    private:
-    LogLevel find(const std::string& logger) const;  // with the lock
+    LogLevel find(const std::string& logger) const;  // mutex_ is held
 
-    mutable std::mutex mutex_;  // all below
+    mutable std::mutex mutex_;  // protects all members below
     std::map<std::string, LogLevel> set_;
     std::set<std::string> known_;
     struct Attached {

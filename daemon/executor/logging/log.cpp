@@ -77,7 +77,7 @@ void Log::drain() {
         const std::lock_guard<std::mutex> posted_lock(posted_mutex_);
         posted.swap(posted_);
     }
-    // In order of time with what comes out of the rings.
+    // Merges posted entries with those of the rings, by time.
     const auto handOnUntil = [&](std::int64_t time_ns) {
         while (!posted.empty() && posted.front().time_ns <= time_ns) {
             handOn(std::move(posted.front()));
@@ -104,7 +104,7 @@ void Log::end() {
     reportLeftOut(INT64_MAX);
 }
 
-// What is not of a component is what the executor itself says, each once.
+// Passes an entry on. Entries of the executor itself are not limited.
 void Log::handOn(LogEntry&& entry) {
     const LogOrigin origin{entry.component, entry.file, entry.line, entry.level};
     if (origin.component.empty() || limit_.admit(origin, entry.time_ns))
@@ -120,7 +120,8 @@ void Log::reportLeftOut(std::int64_t now_ns) {
         entry.component = origin.component;
         entry.file = origin.file;
         entry.line = origin.line;
-        entry.message = fmt::format("{} more of this line within a second were left out", count);
+        entry.message =
+            fmt::format("{} more records of this line within a second were suppressed", count);
         consumer_(std::move(entry));
     });
 }
@@ -158,8 +159,9 @@ void Log::reportDrops() {
     LogEntry entry;
     entry.level = LogLevel::Warn;
     entry.time_ns = wallClockNow();
-    entry.message = fmt::format("{} log records were lost: components log more than can be written",
-                                now - reported_drops_);
+    entry.message =
+        fmt::format("{} log records were dropped: components log faster than they can be written",
+                    now - reported_drops_);
     reported_drops_ = now;
     consumer_(std::move(entry));
 }

@@ -1,8 +1,7 @@
 /// @file
-/// The executor's log: the sink that components' macros write to, and the
-/// executor's own records. The real-time thread has a ring of its own; all
-/// other threads share another behind a lock. drain() makes texts of what has
-/// come and hands them on.
+/// The executor's log: the sink of the components' macros, and the executor's own records. The
+/// real-time thread has its own ring; all other threads share another one behind a lock. drain()
+/// formats the records and passes them on.
 #pragma once
 
 #include <atomic>
@@ -19,7 +18,7 @@
 
 namespace rtcf::executor {
 
-/// A record as text.
+/// A formatted record.
 struct LogEntry {
     LogLevel level = LogLevel::Info;
     std::int64_t time_ns = 0;  ///< CLOCK_REALTIME, ns since 1970
@@ -30,52 +29,52 @@ struct LogEntry {
     std::uint32_t line = 0;
     std::string function;
     bool realtime = false;
-    std::string logger;  ///< of what came by ROS_* macros; empty = that of the component
+    std::string logger;  ///< logger of a ROS_* macro; empty = that of the component
 };
 
 class Log final : public LogSink {
    public:
     using Consumer = std::function<void(LogEntry&&)>;
 
-    /// @param consumer gets every record, in drain()
+    /// @param consumer called by drain() for every record
     explicit Log(Consumer consumer) : consumer_(std::move(consumer)) {}
 
     LogRecord* claim() noexcept override;
     void commit(LogRecord* record) noexcept override;
 
-    /// A record of the executor's own. Not real-time safe.
+    /// Writes a record of the executor. Not real-time safe.
     void write(LogLevel level, const std::string& component, std::string message);
 
-    /// As write(), of what has been said already; handed on by the next drain(), so that the caller
-    /// may hold locks. Time and iteration are noted here.
+    /// Like write(), but the next drain() passes the entry on, so that the caller may hold locks.
+    /// Sets time and iteration. Not real-time safe.
     void post(LogEntry entry);
 
-    /// Which records are wanted.
+    /// The log levels.
     LogLevels& levels() noexcept { return levels_; }
 
-    /// Hands all pending records to the consumer, the oldest first. Any
-    /// thread that is not real-time. Called before a component goes away, as
-    /// records refer to its name and library.
+    /// Passes all pending records to the consumer, oldest first. Any thread that is not real-time.
+    /// Must be called before a component is destroyed, because records refer to its name and
+    /// library.
     void drain();
 
-    /// Records of components, from one line of one of them, that are handed on in a second; 0 = any
-    /// number. What is left out is counted, and the count is handed on. Any thread.
+    /// Sets the most records per second from one source line of one component; 0 = no limit. The
+    /// log counts suppressed records and reports the count. Any thread.
     void setLimit(std::uint32_t records) {
         const std::lock_guard<std::mutex> lock(drain_mutex_);
         limit_.set(records);
     }
-    /// Hands on all pending records, and what was left out so far: the last call of all.
+    /// Passes on all pending records and counts of suppressed ones. The last call.
     void end();
 
-    /// Records lost in full rings.
+    /// Number of records dropped because a ring was full. Any thread.
     std::uint64_t dropped() const noexcept {
         return realtime_.dropped() + others_.dropped() +
                posted_dropped_.load(std::memory_order_relaxed);
     }
 
-    /// Marks the calling thread as the one real-time thread (or not any more).
-    /// @param iteration the loop's counter, read at each claim of any thread
+    /// Marks the calling thread as the real-time thread, or not any more. Real-time safe.
     static void setRealtimeThread(bool realtime) noexcept;
+    /// Sets the loop's counter of cycles, which claim() reads in any thread; null = none.
     void setIteration(const std::atomic<std::uint64_t>* iteration) noexcept {
         iteration_.store(iteration, std::memory_order_release);
     }
@@ -94,11 +93,11 @@ class Log final : public LogSink {
     Ring realtime_;
     Ring others_;
     std::mutex others_mutex_;  // held from claim() to commit() by threads that are not real-time
-    std::mutex drain_mutex_;   // down to limit_
+    std::mutex drain_mutex_;   // protects consumer_ to limit_
     std::uint64_t reported_drops_ = 0;
     LogLimit limit_;
     LogLevels levels_;
-    std::mutex posted_mutex_;  // posted_
+    std::mutex posted_mutex_;  // protects posted_
     std::deque<LogEntry> posted_;
     std::atomic<std::uint64_t> posted_dropped_{0};
     std::atomic<const std::atomic<std::uint64_t>*> iteration_{nullptr};

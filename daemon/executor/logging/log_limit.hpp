@@ -1,6 +1,6 @@
 /// @file
-/// How much one call site may log: a component that logs in each cycle neither floods those who
-/// read nor costs much. What is left out is counted, and the count is said.
+/// Limit of the records per source line, so that a component that logs in each cycle neither floods
+/// readers nor costs much. Suppressed records are counted and reported.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace rtcf::executor {
 
-/// Where a record comes from: a line of a component.
+/// Source of a record: a line of a component.
 struct LogOrigin {
     std::string component;  ///< full name
     std::string file;
@@ -26,20 +26,20 @@ struct LogOrigin {
     }
 };
 
-/// Owned by the log, which locks it.
+/// Owned by the log, which locks a mutex around each call.
 class LogLimit {
    public:
-    /// @param count the origin's records that were left out
+    /// @param count number of suppressed records of the origin
     using Report = std::function<void(const LogOrigin& origin, std::uint64_t count)>;
 
-    /// Records of one origin in a second; 0 = any number.
+    /// Sets the most records of one origin per second; 0 = no limit.
     void set(std::uint32_t records) { limit_ = records; }
 
-    /// @param time_ns of the record, on any clock, never much before the last one
-    /// @return false if it is to be left out
+    /// @param time_ns time of the record, on any clock; never much before the last one
+    /// @return false if the record is to be suppressed
     bool admit(const LogOrigin& origin, std::int64_t time_ns);
 
-    /// Reports what was left out in seconds that are over.
+    /// Reports the suppressed records of past seconds.
     void report(std::int64_t now_ns, const Report& report);
 
    private:
@@ -50,7 +50,7 @@ class LogLimit {
     };
 
     std::uint32_t limit_ = 0;
-    std::map<LogOrigin, Second> origins_;  // that have logged lately
+    std::map<LogOrigin, Second> origins_;  // origins with records in the last second
 };
 
 }  // namespace rtcf::executor

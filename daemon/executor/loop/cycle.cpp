@@ -8,9 +8,9 @@ namespace rtcf::executor {
 
 namespace {
 
-constexpr std::int64_t kAbandoned = -1;  // no time: the cycle has ended before its end
+constexpr std::int64_t kAbandoned = -1;  // no time: the cycle was abandoned
 
-// What the flight recorder knows of a hook in the cycle, as long as it runs.
+// Notes a hook of the cycle in the flight recorder while it runs.
 class HookNote {
    public:
     HookNote(const FlightRecorder::RealtimeNotes& notes, const Component& component, Hook hook)
@@ -25,7 +25,7 @@ class HookNote {
     const FlightRecorder::RealtimeNotes& notes_;
 };
 
-// Lends a component other figures of its device, or none (null), for one update.
+// Replaces a component's device statistics for one update, unless `figures` is null.
 class DeviceLoan {
    public:
     DeviceLoan(ComponentContext& context, DeviceFigures* figures) noexcept
@@ -61,7 +61,7 @@ void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles) {
         step.figures->faults.clear();
     }
     noteSchedule();
-    // Hooks may have written since the last cycle.
+    // Hooks may have written outputs since the last cycle.
     if (frames_ != nullptr) frames_->setBase();
     figures_.iteration.store(0, std::memory_order_relaxed);
     exchanged_at_ = UINT64_MAX;
@@ -74,7 +74,7 @@ bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     std::int64_t before = begin;
     if (exchanges_ || boundary_.waiting()) {
         before = exchange(begin, time_ns);
-        if (before == kAbandoned) return false;  // the values of inputs are undefined
+        if (before == kAbandoned) return false;  // the inputs' values are undefined
     }
     const Schedule& schedule = *schedule_;
     setTimes(time_ns);
@@ -116,12 +116,13 @@ bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     return true;
 }
 
-// What comes before the components' turns: a change, values from outside, those of the previous
-// cycle. @return ticks when it has ended, or kAbandoned
+// Runs the work before the components: a change at the boundary, values from outside, and values of
+// the previous cycle.
+// @return ticks at the end, or kAbandoned
 [[gnu::noinline]] std::int64_t Cycle::exchange(std::int64_t begin_ticks,
                                                std::int64_t time_ns) noexcept {
     if (boundary_.waiting()) {
-        // Elapsed time is measured in the period before a change of it.
+        // The elapsed time of this cycle is measured in the period before the change.
         const std::int64_t elapsed = clock_.elapsed_ns;
         atBoundary(time_ns);
         clock_.elapsed_ns = elapsed;
@@ -130,15 +131,16 @@ bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     setTimes(time_ns);
     feed();
     if (!schedule_->latches.empty() && !copyLatches()) return kAbandoned;
-    const std::int64_t end = readCycleCounter();  // that was the work of no component
+    const std::int64_t end = readCycleCounter();  // not part of any component's duration
     exchanged_ticks_ = end - begin_ticks;
     exchanged_at_ = clock_.iteration;
     return end;
 }
 
-// The one frame that catches: a component may throw, the loop may not. `Plain` leaves out what
-// most components do not have, so that it costs them nothing.
-// @param before ticks when they begin @return ticks when the last has ended, or kAbandoned
+// The only place that catches exceptions of components. `Plain` leaves out features that most
+// components do not use, so that they cost those nothing.
+// @param before ticks at the begin
+// @return ticks at the end of the last component, or kAbandoned
 template <bool Plain>
 [[gnu::always_inline]] inline std::int64_t Cycle::update(const Step* next, const Step* end,
                                                          std::int64_t before) noexcept {
@@ -174,13 +176,14 @@ template <bool Plain>
     }
 }
 
-// Steps that are not plain; a function of its own, as it needs registers that the others do not.
+// Runs steps that are not plain. A separate function, as it needs registers that plain steps do
+// not.
 [[gnu::noinline]] std::int64_t Cycle::updateSelected(const Step* next, const Step* end,
                                                      std::int64_t before) noexcept {
     return update<false>(next, end, before);
 }
 
-// Whether a component runs in this cycle; then its clock is set.
+// True if a component runs in this cycle; also sets its elapsed time.
 bool Cycle::due(const Step& step) const noexcept RTCF_NONBLOCKING {
     ComponentContext& context = *step.context;
     if (context.disabled) return false;
@@ -208,7 +211,7 @@ void Cycle::commit(Component& component, ComponentFigures& figures, OnBadOutput 
     }
 }
 
-// @return whether the cycle goes on with the next component
+// @return true if the cycle goes on with the next component
 bool Cycle::threw(const Step& step, const char* text) noexcept {
     step.context->disabled = true;
     putBack(*step.component);
@@ -253,7 +256,8 @@ void Cycle::makeSafe(Component& component, ComponentFigures& figures, OnBadOutpu
     }
 }
 
-// Half-written values are visible neither to readers, nor to the component itself in safe().
+// Restores the outputs of a component that threw, so that neither readers nor its own safe() see
+// half-written values.
 void Cycle::putBack(Component& component) noexcept {
     for (OutputBase* output : component.outputs()) {
         if (!output->staged()) {
@@ -263,16 +267,16 @@ void Cycle::putBack(Component& component) noexcept {
         try {
             output->takeBack();
         } catch (...) {
-            output->discard();  // no memory for its own copy; readers have theirs
+            output->discard();  // no memory for the component's copy; readers have theirs
         }
     }
 }
 
-// The value is that of the last frame; sequence and time are recovered from the readers' notes.
+// Restores the value from the last frame, and sequence and time from the readers' read positions.
 void Cycle::putBack(OutputBase& output) noexcept {
     SlotHeader& slot = *output.slot();
     if (frames_ != nullptr) frames_->putBack(valueOf(output.type(), slot));
-    if (slot.time_ns != clock_.time_ns) return;  // it was not written in this cycle
+    if (slot.time_ns != clock_.time_ns) return;  // not written in this cycle
     const bool had_value = slot.sequence > 1;
     slot.sequence = 0;
     slot.time_ns = clock_.time_ns - clock_.elapsed_ns;
@@ -289,7 +293,7 @@ void Cycle::putBack(OutputBase& output) noexcept {
         if (tap->source() == &slot) known(tap->lastSequence());
     for (const Latch& latch : schedule_->latches)
         if (latch.from == &slot) slot = *latch.to;
-    // Read by nobody so far, it may be read by safe().
+    // No reader has read it so far, but another component's safe() may.
     if (slot.sequence == 0 && had_value) slot.sequence = 1;
 }
 
@@ -300,7 +304,7 @@ bool Cycle::copy(const Latch& latch) noexcept {
     } catch (...) {
         if (active_ && !faulted())
             endLoop(LoopFault::Kind::NoMemory, latch.writer,
-                    "an output that another one reads late");
+                    "an output that is read one cycle late");
         return false;
     }
 }
@@ -311,16 +315,16 @@ bool Cycle::copyLatches() noexcept {
     return copied;
 }
 
-// In schedule order, so that a driver's safe() reads what the controller's has written.
+// In schedule order, so that a driver's safe() reads the output of its controller's safe().
 void Cycle::makeSafe(std::int64_t time_ns) noexcept {
     if (!active_) return;
-    active_ = false;  // from here on a fault ends nothing
+    active_ = false;  // from here on, a fault does not end the loop again
     setTimes(time_ns);
     notes_.setIteration(clock_.iteration);
     feed();
     copyLatches();
     for (const Step& step : schedule_->steps) {
-        // What was taken out has made safe then.
+        // safe() of a component that was taken out has already run.
         if (step.optional && step.context->disabled) continue;
         makeSafe(*step.component, *step.figures, OnBadOutput::GoOn);
     }
@@ -356,8 +360,8 @@ void Cycle::apply(Adoption& adoption) noexcept {
     figures_.adoption.add(readCycleCounter() - begin);
 }
 
-// Rewires connections and calls the hooks of new and leaving components, at the time of the cycle
-// that begins here.
+// Rewires connections and calls the hooks of new and leaving components. They see the time of the
+// cycle that begins here.
 void Cycle::changeComponents(Adoption& adoption) noexcept {
     const std::int64_t time = clock_.time_ns;
     const std::int64_t stamp = clock_.stamp_ns;
@@ -366,7 +370,7 @@ void Cycle::changeComponents(Adoption& adoption) noexcept {
         adoption.rewires.begin() + static_cast<std::ptrdiff_t>(adoption.rewires_of_new);
     std::for_each(adoption.rewires.begin(), new_inputs, [](Rewire& each) { each.apply(); });
     for (HandOver& hand_over : adoption.hand_overs) {
-        // Nobody knows what state an exception has left.
+        // The exception may have left any state.
         hand_over.skipped = hand_over.previous->context().disabled;
         if (hand_over.skipped) continue;
         for (const StateCopy& state : hand_over.states) state.copy();
@@ -375,7 +379,8 @@ void Cycle::changeComponents(Adoption& adoption) noexcept {
     }
     if (active_) {
         for (const Leaving& leaving : adoption.leaving) {
-            // What threw has made safe then. The loop belongs to those that stay.
+            // If the component threw, its safe() has already run. A fault of a leaving component
+            // does not end the loop.
             if (!leaving.component->context().disabled)
                 makeSafe(*leaving.component, *leaving.figures, OnBadOutput::GoOn);
             for (const Latch& latch : leaving.latches) copy(latch);
@@ -472,11 +477,11 @@ void Cycle::blame(std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept R
     if (!exchanged || begin_ticks + exchanged_ticks_ <= limit_ticks) {
         for (const Step& step : schedule_->steps) {
             if (step.ended_ticks < begin_ticks || step.ended_ticks <= limit_ticks)
-                continue;  // not now, or in time
+                continue;  // did not run in this cycle, or ended in time
             bump(step.figures->overruns);
             return;
         }
-        // All components were in time: the overrun is of the frames or the exchange.
+        // All components ended in time: frames or exchange caused the overrun.
         if (frames_ != nullptr && (!exchanges_ || given_ticks_ <= limit_ticks)) {
             figures_.frame_overruns.add(1);
             return;

@@ -1,7 +1,8 @@
 /// @file
-/// How the loop tells of what failed in a cycle: what ended the loop, and the
-/// first fault of each component that did not, and now and then another. No record can be lost to
-/// others: each component has room for its own.
+/// Records of faults in a cycle, from the cycle thread to the graph thread: the fault that ended
+/// the loop, and the first fault of each kind of each component that did not end it. After rearm(),
+/// the next fault is recorded too. Each component has its own record, so that no component's record
+/// displaces another's.
 #pragma once
 
 #include <array>
@@ -23,22 +24,23 @@ struct LoopFault {
     enum class Kind { None, Exception, NotFinite, NoMemory, Overruns };
     Kind kind = Kind::None;
     const Component* component =
-        nullptr;  ///< the culprit, if it is one component; for comparison only
-    std::array<char, 240> component_name{};  ///< its full name, as it may be gone when this is read
+        nullptr;  ///< the component that caused it, or null; for comparison only
+    /// Full name; the component may be gone when this is read.
+    std::array<char, 240> component_name{};
     std::uint64_t iteration = 0;
     std::array<char, 240> text{};  ///< text of the exception, or name of the output
 };
 
-/// What failed in a component while the loop goes on.
+/// A fault of a component that does not end the loop.
 struct ComponentFault {
     std::uint64_t iteration = 0;
     std::array<char, 160> text{};
 };
 
-/// Room for the first fault of one kind since the loop began, or since rearm().
+/// The first fault of one kind since the loop began, or since rearm().
 class FirstFault {
    public:
-    /// Keeps it if it is the first. Whoever runs cycles; real-time safe.
+    /// Records the fault if it is the first. Cycle thread; real-time safe.
     void note(std::uint64_t iteration, const char* text) noexcept RTCF_NONBLOCKING {
         // Acquire: pairs with rearm(), after which the previous fault has been read.
         if (state_.load(std::memory_order_acquire) != State::Empty) return;
@@ -46,19 +48,20 @@ class FirstFault {
         std::strncpy(fault_.text.data(), text, fault_.text.size() - 1);
         state_.store(State::Noted, std::memory_order_release);
     }
-    /// Graph thread. @return null if there is none, or it has been taken
+    /// Takes the recorded fault. Graph thread.
+    /// @return null if there is none, or it was taken before
     const ComponentFault* take() noexcept {
         if (state_.load(std::memory_order_acquire) != State::Noted) return nullptr;
         state_.store(State::Told, std::memory_order_relaxed);
         return &fault_;
     }
-    /// Has the next fault noted, if this one has been taken. Graph thread.
+    /// Records the next fault, if this one was taken. Graph thread.
     void rearm() noexcept {
         State told = State::Told;
         state_.compare_exchange_strong(told, State::Empty, std::memory_order_release,
                                        std::memory_order_relaxed);
     }
-    /// While no cycle runs.
+    /// Removes the record. While no cycle runs.
     void clear() noexcept { state_.store(State::Empty, std::memory_order_relaxed); }
 
    private:
@@ -67,12 +70,12 @@ class FirstFault {
     ComponentFault fault_;
 };
 
-/// What failed in one component since the loop began.
+/// Faults of one component since the loop began.
 struct ComponentFaults {
-    FirstFault not_finite;  ///< an output that was held; its name is the text
+    FirstFault not_finite;  ///< an output kept its last finite value; the text is the output's name
     FirstFault taken_out;   ///< an optional component that threw
-    FirstFault unsafe;      ///< a value of safe() that could not be copied for its readers
-    Counter count;          ///< of all, those that are not kept included
+    FirstFault unsafe;      ///< an output of safe() could not be copied for its readers
+    Counter count;          ///< number of all faults, also those not recorded
 
     /// While no cycle runs.
     void clear() noexcept {

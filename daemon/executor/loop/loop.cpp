@@ -40,7 +40,7 @@ class CaptureWork final : public BoundaryWork {
     Capture& capture_;
 };
 
-// A bit at each boundary, so that no cycle pays for a large value and another.
+// Takes a few values at each boundary, so that no single cycle copies several large ones.
 class ProbeWork final : public BoundaryWork {
    public:
     explicit ProbeWork(Probe& probe) : probe_(probe) {}
@@ -67,7 +67,7 @@ void Loop::reset(const LoopSettings& settings, std::uint64_t stops_known) {
     stops_known_ = stops_known;
     if (stopRequested()) {
         throw Refusal(RefusalKind::LoopStopped,
-                      "the loop is not started: a stop was asked for after the start");
+                      "the loop is not started: a stop was requested after the start");
     }
     cycle_.begin(settings.period_ns, settings.warmup_cycles);
     bucket_ = 0;
@@ -96,9 +96,10 @@ RealtimeProblems Loop::start(const LoopSettings& settings, std::uint64_t stops_k
         joinable_.store(true, std::memory_order_release);
         const int error = pthread_create(&thread_, attributes.get(), &Loop::threadMain, this);
         if (error != 0) {
-            throw Refusal(RefusalKind::NoRealtime,
-                          fmt::format("no real-time thread: {} (CPU {}, priority {})",
-                                      std::strerror(error), realtime.cpu, realtime.priority));
+            throw Refusal(
+                RefusalKind::NoRealtime,
+                fmt::format("cannot create the real-time thread: {} (CPU {}, priority {})",
+                            std::strerror(error), realtime.cpu, realtime.priority));
         }
     } catch (...) {
         cycle_.abandon();
@@ -122,7 +123,7 @@ bool Loop::join(std::int64_t timeout_ns) {
             nanosleep(&pause, nullptr);
         }
     }
-    // Not running any more is the last thing it does, so that this takes no time.
+    // The thread ends right after it clears running_, so this join does not wait.
     if (pthread_join(thread_, nullptr) != 0) return false;
     joinable_.store(false, std::memory_order_release);
     thread_locals_.reset();
@@ -132,7 +133,7 @@ bool Loop::join(std::int64_t timeout_ns) {
     return true;
 }
 
-// At a boundary of the running loop, or here if there is none.
+// Performs the work at a boundary of the running loop, or here if the loop does not run.
 bool Loop::perform(BoundaryWork& work, std::int64_t timeout_ns) {
     Boundary& boundary = cycle_.boundary();
     boundary.offer(work);
@@ -140,7 +141,7 @@ bool Loop::perform(BoundaryWork& work, std::int64_t timeout_ns) {
     while (boundary.pending()) {
         if (!running()) {
             if (!join(timeout_ns)) break;
-            // It may have come too late for the last cycle.
+            // The work may have come too late for the last cycle.
             const CrashRole crash_role(ThreadRole::Realtime);
             while (boundary.pending()) cycle_.atBoundary(nextStep());
             return true;
@@ -188,7 +189,7 @@ RealtimeProblems Loop::retune(const LoopSettings& settings) {
     return problems;
 }
 
-// The settings with the CPU that the loop gets; other threads leave it.
+// Claims a CPU for the loop and moves other threads off it. Returns the settings with that CPU.
 RealtimeSettings Loop::placed(RealtimeSettings settings, RealtimeProblems& problems) {
     if (!settings.wanted) return settings;
     const bool stays = cpu_claim_ != nullptr && (settings.cpu < 0 || settings.cpu == cpu());
@@ -200,8 +201,8 @@ RealtimeSettings Loop::placed(RealtimeSettings settings, RealtimeProblems& probl
     }
     if (!cpu_claim_->alone()) {
         problems.push_back(
-            {fmt::format("CPU {} has another loop, each may delay the other: choose a CPU for one "
-                         "of them (rtcfctl runner set NAME --cpu N)",
+            {fmt::format("CPU {} also runs another loop, each may delay the other: "
+                         "choose another CPU for one of them (rtcfctl runner set NAME --cpu N)",
                          cpu()),
              false});
     }
@@ -216,7 +217,7 @@ void Loop::leaveCpu() {
 }
 
 void Loop::refreshWallClock() noexcept {
-    if (joinable() && simulation_ != nullptr) return;  // stamps are the simulation's
+    if (joinable() && simulation_ != nullptr) return;  // the simulated clock sets the stamps
     cycle_.setStampOffset(realtimeOffset());
 }
 

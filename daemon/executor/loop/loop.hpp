@@ -1,9 +1,8 @@
 /// @file
-/// The loop: one real-time thread that executes a schedule at a fixed
-/// frequency. The graph thread starts it, hands it changes and joins it; any
-/// thread may ask it to end and read its counters. What a cycle is stands in
-/// cycle.hpp; when one begins, by real time, a device, a simulated clock or as
-/// a step, in pacing.cpp.
+/// The loop: one real-time thread that executes a schedule at a fixed frequency. The graph thread
+/// starts it, hands it changes and joins it; any thread may stop it and read its counters.
+/// cycle.hpp contains the cycle; pacing.cpp begins cycles, by real time, a device, a simulated
+/// clock or as steps.
 #pragma once
 
 #include <pthread.h>
@@ -28,121 +27,130 @@ namespace rtcf::executor {
 class Log;
 class SimulatedClock;
 
-/// What to do after a cycle that ended when the next should have begun.
+/// Action after an overrun: a cycle that ended after the next one should have begun.
 enum class OverrunPolicy { Skip, CatchUp, Relative };
 
 struct LoopSettings {
     std::int64_t period_ns = 1'000'000;
-    std::int64_t spin_ns = 0;  ///< busy wait before each deadline
+    std::int64_t spin_ns = 0;  ///< busy wait before each deadline, ns
     OverrunPolicy overrun = OverrunPolicy::Skip;
-    std::uint32_t max_overruns = 0;    ///< leaky bucket; 0 = never stop for overruns
-    std::uint64_t warmup_cycles = 10;  ///< first cycles, kept out of the figures
+    /// Size of the leaky bucket of overruns; 0 = never stop for overruns.
+    std::uint32_t max_overruns = 0;
+    std::uint64_t warmup_cycles = 10;  ///< first cycles, which statistics do not count
     RealtimeSettings realtime;
-    /// Followed instead of real time, in a thread that is not real-time; null = real time.
+    /// Simulated clock, for a loop in a thread that is not real-time; null = real time.
     std::shared_ptr<SimulatedClock> clock;
 };
 
 class Loop {
    public:
-    /// @param log the thread marks itself there; outlives the loop
-    /// @param recorder what runs is noted there; outlives the loop
-    /// @param cpu_claims folder where loops that are to know of each other claim CPUs, see CpuClaim
+    /// @param log told which thread is the real-time thread; outlives the loop
+    /// @param recorder notes the running component; outlives the loop
+    /// @param cpu_claims folder of CPU claims, shared by loops that must not use the same CPU, see
+    /// CpuClaim
     Loop(Log& log, FlightRecorder& recorder, std::string cpu_claims);
     /// Ends the loop in order.
     ~Loop();
     Loop(const Loop&) = delete;
     Loop& operator=(const Loop&) = delete;
 
-    /// @name By the graph thread
+    /// @name Graph thread
     /// @{
-    /// Begins to execute the adopted schedule. @param stops_known what stops() was when this was
-    /// asked for @return what is missing for real time
-    /// @throws Refusal if no thread can be made, or if a stop was requested since; nothing runs
-    /// then
+    /// Starts the thread, which executes the adopted schedule.
+    /// @param stops_known value of stops() when this start was requested
+    /// @return missing prerequisites of real time
+    /// @throws Refusal if the thread cannot be created, or if a stop was requested since; the loop
+    /// does not run then
     RealtimeProblems start(const LoopSettings& settings, std::uint64_t stops_known);
-    /// Waits for the end of a loop that was asked to end or ended by itself, at most `timeout_ns`.
-    /// @return false if it goes on
+    /// Waits for the end of a loop that was stopped or ended by itself.
+    /// @return false if it still runs after `timeout_ns`
     bool join(std::int64_t timeout_ns);
-    /// Executes cycles back to back on a simulated clock that begins at 0 with beginStepping();
-    /// while the loop does not run. The same graph and inputs give the same values, bit by bit.
-    /// @param given_up looked at before each cycle; null = nobody gives up
-    /// @return cycles done; fewer if a component failed, was given up, or after requestStop()
+    /// Executes cycles back to back on a simulated clock that begins at 0 with beginStepping().
+    /// While the loop does not run. The same graph and inputs give the same values, bit by bit.
+    /// @param given_up checked before each cycle; null = never given up
+    /// @return cycles done; fewer than `cycles` if a component failed, if it was given up, or after
+    /// requestStop()
     std::uint64_t step(std::uint64_t cycles, const std::atomic<bool>* given_up = nullptr) noexcept;
-    /// Sets counters and clock as start() does, for step(). @param stamp_ns of the first cycle
-    /// @throws Refusal as start() does if a stop was requested since
+    /// Resets counters and clock as start() does, for step().
+    /// @param stamp_ns ROS time of the first cycle
+    /// @throws Refusal if a stop was requested since, as start() does
     void beginStepping(const LoopSettings& settings, std::uint64_t stops_known,
                        std::int64_t stamp_ns = 0);
-    /// The last cycle, in which components make safe, as at the end of a running loop.
+    /// Runs the last cycle with safe() of all components, as at the end of a running loop.
     void endStepping() noexcept;
-    /// Makes a change at the next boundary, or at once if the loop does not run.
+    /// Applies a change at the next boundary, or at once if the loop does not run.
     /// @return false if the loop reaches no boundary within `timeout_ns`; nothing has changed then
     bool adopt(Adoption& adoption, std::int64_t timeout_ns);
-    /// Copies what the next cycle depends on, at the next boundary, or at once if the loop does not
-    /// run. @return false if the loop reaches none within `timeout_ns`
+    /// Copies all values that the next cycle depends on, at the next boundary, or at once if the
+    /// loop does not run.
+    /// @return false if the loop reaches no boundary within `timeout_ns`
     bool capture(Capture& capture, std::int64_t timeout_ns);
-    /// Takes over values from outside while the loop does not run.
+    /// Adopts values from outside while the loop does not run.
     void adoptInjections();
-    /// Copies port values at the next boundaries, see Probe. @return false if the loop reaches none
-    /// in time
+    /// Copies port values at the next boundaries, see Probe.
+    /// @return false if the loop reaches no boundary in time
     bool probe(Probe& probe, std::int64_t timeout_ns);
-    /// Follows the wall clock for stamp(); to be called now and then.
+    /// Adjusts stamp() to the wall clock. Called periodically.
     void refreshWallClock() noexcept;
     void setSpin(std::int64_t spin_ns) noexcept {
         spin_ns_.store(spin_ns, std::memory_order_relaxed);
     }
-    /// Ends the loop after so many overruns, see LoopSettings, from here on.
+    /// Sets LoopSettings::max_overruns.
     void setMostOverruns(std::uint32_t most) noexcept {
         max_overruns_.store(most, std::memory_order_relaxed);
     }
-    /// New settings for a running loop (CPU, priority, spin, overrun policy); the period goes by
-    /// adopt(). @return what its thread lacks for real time then, as start() returns it
+    /// Changes the settings of a running loop (CPU, priority, spin, overrun policy); adopt()
+    /// changes the period.
+    /// @return missing prerequisites of real time, as from start()
     RealtimeProblems retune(const LoopSettings& settings);
-    /// The file of a library that `library`, of dlopen(), is or links against, and of whose
-    /// thread_local variables the thread that runs in real time has no memory; empty = none.
+    /// A library file whose thread_local variables have no memory in the running real-time thread:
+    /// `library` itself, or one that it links against. Empty = none.
+    /// @param library handle of dlopen()
     std::string lackingThreadLocals(void* library) const {
         return inRealTime() && thread_locals_ ? thread_locals_->lacking(library) : std::string();
     }
-    /// After join().
+    /// The fault that ended the loop; after join().
     const LoopFault& fault() const noexcept { return cycle_.fault(); }
     /// @}
 
-    /// Takes the oldest cycle record. By one thread, whichever. @return false if there is none
+    /// Takes the oldest cycle record. One thread only.
+    /// @return false if there is none
     bool popRecord(CycleRecord& record);
 
-    /// @name By any thread
+    /// @name Any thread
     /// @{
-    /// Ends the loop at the next boundary. It is final: what was asked for before, see start(),
-    /// cannot begin cycles any more.
+    /// Stops the loop at the next boundary. The stop is final: a start() that was requested before
+    /// it fails.
     void requestStop() noexcept { stops_.fetch_add(1); }
-    /// How many stops have been requested.
+    /// Number of stops requested so far.
     std::uint64_t stops() const noexcept { return stops_.load(); }
-    /// Cycles that have begun are to end. Graph thread, and the loop's own.
+    /// True if a stop was requested since the start. Graph thread and cycle thread.
     bool stopRequested() const noexcept {
         return stops_.load(std::memory_order_acquire) != stops_known_;
     }
-    /// By real time or a device; not by a simulated clock. Graph thread.
+    /// True if real time or a device paces the loop, and not a simulated clock. Graph thread.
     bool inRealTime() const noexcept { return joinable() && simulation_ == nullptr; }
-    /// A thread executes cycles.
+    /// True while the thread executes cycles.
     bool running() const noexcept { return running_.load(std::memory_order_acquire); }
-    /// The thread has been started and not been joined yet.
+    /// True from start() to join().
     bool joinable() const noexcept { return joinable_.load(std::memory_order_acquire); }
-    /// A component's hook is running just now in the loop's thread.
+    /// True while a component's hook runs in the loop's thread.
     bool inComponent() const noexcept { return recorder_.runningSlot() != 0; }
-    /// Grows whenever the loop gets on: by cycles, and by each return of a Source's wait().
+    /// Grows with each cycle and with each return of a Source's wait().
     std::uint64_t progress() const noexcept {
         return figures().iteration.load(std::memory_order_relaxed) + waits_.value();
     }
-    /// That it is pinned to; -1 = none.
+    /// CPU that the thread is pinned to; -1 = none.
     int cpu() const noexcept { return cpu_.load(std::memory_order_relaxed); }
     int threadId() const noexcept { return thread_id_.load(std::memory_order_relaxed); }
     const LoopFigures& figures() const noexcept { return cycle_.figures(); }
-    /// Keeps cycles that begin from here on out of the figures, so that they can be read as of one
-    /// instant, or goes on. One thread.
+    /// Excludes cycles that begin from here on from the statistics, so that these can be read as of
+    /// one instant; or includes them again. One thread only.
     void holdFigures(bool held) noexcept {
         held ? cycle_.figures().counting.hold() : cycle_.figures().counting.release();
     }
     const CycleCounter& counter() const noexcept { return cycle_.counter(); }
-    /// Cycle records lost as nobody took them.
+    /// Cycle records lost because the ring was full.
     std::uint64_t recordsDropped() const noexcept { return cycle_.records().dropped(); }
     /// @}
 
@@ -150,12 +158,12 @@ class Loop {
     const LoopClock& clock() const noexcept { return cycle_.clock(); }
 
    private:
-    /// What became of a wait.
+    /// Result of a wait.
     struct WakeUp {
-        bool cycle = false;  // one is to begin,
+        bool cycle = false;  // a cycle begins
         std::int64_t deadline_ns = 0;
         std::int64_t wake_ns = 0;
-        std::int64_t missed = 0;  ///< beats of a device before it
+        std::int64_t missed = 0;  ///< beats of a device missed before this one
     };
 
     void reset(const LoopSettings& settings, std::uint64_t stops_known);
@@ -187,20 +195,20 @@ class Loop {
     const std::string cpu_claims_;
     pthread_t thread_{};
     std::unique_ptr<IdleStateGuard> idle_guard_;
-    std::unique_ptr<CpuClaim> cpu_claim_;  // while it runs in real time
-    OtherThreads other_threads_;           // while it runs in real time
+    std::unique_ptr<CpuClaim> cpu_claim_;  // while the loop runs in real time
+    OtherThreads other_threads_;           // while the loop runs in real time
     std::atomic<int> cpu_{-1};
-    std::shared_ptr<SimulatedClock> simulation_;  // that the thread follows; null = real time
+    std::shared_ptr<SimulatedClock> simulation_;  // clock that paces the thread; null = real time
     std::size_t stack_bytes_ = 0;
-    std::optional<ThreadLocals> thread_locals_;  // that the thread has, as long as there is one
-    unsigned long long stepped_loads_ = 0;       // whose thread_locals a step has
+    std::optional<ThreadLocals> thread_locals_;  // of the thread, while there is one
+    unsigned long long stepped_loads_ = 0;       // ThreadLocals::loads() at the last step
 
-    // Of whoever runs cycles.
-    std::uint64_t stops_known_ = 0;  // when the present cycles were asked for
-    std::uint32_t bucket_ = 0;       // of overruns
+    // Owned by the cycle thread.
+    std::uint64_t stops_known_ = 0;  // stops() when the present cycles were requested
+    std::uint32_t bucket_ = 0;       // leaky bucket of overruns
     std::uint64_t cycles_on_time_ = 0;
     std::uint32_t caught_up_ = 0;  // cycles since the last one on time
-    std::int64_t beat_ns_ = 0;     // when a Source was last ready; 0 = not yet
+    std::int64_t beat_ns_ = 0;     // time of the last beat of a Source; 0 = none yet
 
     // Shared.
     std::atomic<std::uint64_t> stops_{0};

@@ -1,4 +1,4 @@
-// When the loop's cycles begin: by real time, by a device, by a simulated clock, or one after
+// Pacing of the loop: begins cycles by real time, by a device, by a simulated clock, or one after
 // another as steps.
 #include <time.h>
 
@@ -18,8 +18,10 @@ namespace rtcf::executor {
 
 namespace {
 
-constexpr std::uint64_t kBucketLeak = 1000;   // cycles on time that make good one overrun
-constexpr std::uint32_t kMostCaughtUp = 100;  // cycles in a row; after a freeze there are many
+// Cycles on time that remove one overrun from the bucket.
+constexpr std::uint64_t kBucketLeak = 1000;
+// Most cycles to catch up in a row; after a freeze of the machine there are many.
+constexpr std::uint32_t kMostCaughtUp = 100;
 
 }  // namespace
 
@@ -39,13 +41,13 @@ std::uint64_t Loop::step(std::uint64_t cycles, const std::atomic<bool>* given_up
         stepped_loads_ = loads;
     }
     const FloatingPointDefaults floating_point;
-    // Components log and crash as in any cycle; there is no other thread that runs one.
+    // Logs and crashes of components are attributed to the real-time thread, as in any cycle.
     const CrashRole crash_role(ThreadRole::Realtime);
     Log::setRealtimeThread(true);
     for (; done < cycles && goesOn() && wanted(); ++done) {
         const Counting::Turn turn(cycle_.figures().counting);
         if (!cycle_.run(nextStep(), 0)) break;
-        // Also if a snapshot said otherwise, or the period has changed in it.
+        // Also after a snapshot with another elapsed time, and after a change of the period.
         cycle_.setElapsed(cycle_.clock().period_ns);
     }
     Log::setRealtimeThread(false);
@@ -58,14 +60,14 @@ void Loop::endStepping() noexcept {
     cycle_.makeSafe(nextStep());
 }
 
-// Simulated time begins at 0 and goes on by a period each cycle.
+// Loop time of the next simulated cycle: begins at 0 and advances by a period each cycle.
 std::int64_t Loop::nextStep() const noexcept {
     const LoopClock& clock = cycle_.clock();
     const std::int64_t period = clock.period_ns;
     return clock.iteration == 0 ? 0 : clock.time_ns + period;
 }
 
-// The component that paces the loop; null = the clock does.
+// The component whose device paces the loop; null = none, the clock does.
 Source* Loop::source() const noexcept {
     Source* const source = cycle_.schedule().source;
     return source != nullptr && !source->context().disabled ? source : nullptr;
@@ -89,7 +91,7 @@ void Loop::followRealTime() noexcept {
         const std::int64_t begin = readCycleCounter();
         const std::int64_t time = device != nullptr ? wake_up.wake_ns : wake_up.deadline_ns;
         if (!cycle_.run(time, wake_up.wake_ns - wake_up.deadline_ns)) break;
-        // A device begins the next cycle itself; waitForSource() counts the beats that were missed.
+        // A device begins the next cycle itself; waitForSource() counts missed beats.
         const std::int64_t limit = time + cycle_.clock().period_ns;
         end = endOfCycle(wake_up, begin, limit);
         if (end >= limit) noteOverrun(wake_up, begin, end, behind);
@@ -97,9 +99,9 @@ void Loop::followRealTime() noexcept {
     }
 }
 
-// The processor's counter tells it for one instruction. But over a suspend of the machine it may go
-// on, where CLOCK_MONOTONIC stands still, or begin anew: a cycle that seems late, or to have ended
-// before it began, is looked at by that clock.
+// End time of the cycle, ns. Reading the cycle counter takes one instruction, but during a suspend
+// of the machine it may go on while CLOCK_MONOTONIC stops, or restart from 0. So if the counter
+// says that the cycle is late, or ended before it began, CLOCK_MONOTONIC decides.
 std::int64_t Loop::endOfCycle(const WakeUp& wake_up, std::int64_t begin_ticks,
                               std::int64_t limit_ns) const noexcept RTCF_NONBLOCKING {
     const std::int64_t ticks = readCycleCounter() - begin_ticks;
@@ -107,8 +109,8 @@ std::int64_t Loop::endOfCycle(const WakeUp& wake_up, std::int64_t begin_ticks,
     return ticks >= 0 && end < limit_ns ? end : monotonicNow();
 }
 
-// Components' time() goes on by a period each cycle, whatever the simulated clock does; stamps are
-// the clock's.
+// Follows a simulated clock. time() of the components advances by a period each cycle, even if the
+// simulated clock jumps; stamp() is the clock's time.
 void Loop::followClock() noexcept {
     constexpr auto kPatience = std::chrono::milliseconds(10);
     while (goesOn()) {
@@ -129,9 +131,9 @@ void Loop::followClock() noexcept {
     }
 }
 
-// The device says when a cycle begins. Changes are taken over and a request to stop is seen
-// between its deadlines, which are never far away. A beat is expected a period after the last one:
-// what comes whole periods later has missed some.
+// Waits for the device that begins the cycles. The deadlines of its wait() are short, so that the
+// loop adopts changes and sees a stop between them. A beat is expected a period after the last one;
+// a beat that comes n periods later has missed n - 1.
 Loop::WakeUp Loop::waitForSource(Source& device) noexcept {
     constexpr std::int64_t kPatience = 10'000'000;
     const FlightRecorder::RealtimeNotes notes = recorder_.realtimeNotes();
@@ -155,14 +157,14 @@ Loop::WakeUp Loop::waitForSource(Source& device) noexcept {
 Loop::WakeUp Loop::waitForClock(std::int64_t deadline_ns) noexcept {
     const std::int64_t spin = spin_ns_.load(std::memory_order_relaxed);
     const timespec until{(deadline_ns - spin) / kSecond, (deadline_ns - spin) % kSecond};
-    // Absolute, so that a preemption before the call does not add up (clock_nanosleep(2)).
+    // An absolute time, so that preemptions before the call do not add up (clock_nanosleep(2)).
     while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
     }
     for (const void* line : cycle_.schedule().footprint) __builtin_prefetch(line);
     std::int64_t now = monotonicNow();
     cycle_.figures().wake_up.add(now - deadline_ns + spin);
     while (now < deadline_ns) now = monotonicNow();
-    beat_ns_ = 0;  // no device says when
+    beat_ns_ = 0;  // no device paces this cycle
     return {true, deadline_ns, now};
 }
 
@@ -179,8 +181,8 @@ void Loop::noteOverrun(const WakeUp& wake_up, std::int64_t begin_ticks, std::int
         cycle_.endLoop(LoopFault::Kind::Overruns, nullptr, "too many overruns");
 }
 
-// Counts an overrun where it belongs. A cycle that took less than a period would have been in time,
-// had it begun so.
+// Attributes an overrun to its cause. A cycle that took less than a period would have been in time
+// if it had begun in time.
 void Loop::countOverrun(const WakeUp& wake_up, std::int64_t begin_ticks, std::int64_t end_ns,
                         bool behind) noexcept RTCF_NONBLOCKING {
     LoopFigures& figures = cycle_.figures();

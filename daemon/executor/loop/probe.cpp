@@ -26,7 +26,7 @@ std::size_t Probe::add(const OutputBase& output) {
 }
 
 bool Probe::takeSome(const LoopClock& clock) noexcept {
-    // A byte takes about a nanosecond: a thousandth of the period.
+    // Copying a byte takes about 1 ns, so this is a thousandth of the period.
     constexpr std::int64_t kLeast = 512;
     std::int64_t left = std::max(kLeast, clock.period_ns / 1000);
     for (; taken_ < items_.size() && left > 0; ++taken_) {

@@ -1,7 +1,7 @@
 /// @file
-/// A look at the values of some ports. Built by the graph thread, filled by
-/// whoever runs the cycle, read by the graph thread. Each value is whole; so that
-/// looking costs no cycle much, they may be of several boundaries.
+/// A request for the present values of ports. The graph thread makes and reads it; the cycle thread
+/// fills it. Each value is consistent, but to bound the cost per cycle, the values may come from
+/// several boundaries.
 #pragma once
 
 #include <cstddef>
@@ -16,32 +16,34 @@ namespace rtcf::executor {
 
 class Probe {
    public:
-    /// What was found at one port.
+    /// Result for one port.
     struct Value {
-        std::uint64_t sequence = 0;       ///< writes so far; 0 = there is no value
-        std::uint64_t seen = 0;           ///< input: writes its component has read
-        std::int64_t age_ns = 0;          ///< loop time since the write, ns
-        std::optional<std::string> text;  ///< unset without a value, or if it is too large to copy
+        std::uint64_t sequence = 0;  ///< writes so far; 0 = no value
+        std::uint64_t seen = 0;  ///< inputs: sequence of the last value that the component has read
+        std::int64_t age_ns = 0;  ///< loop time since the write, ns
+        /// Unset without a value, or if the value is too large to copy.
+        std::optional<std::string> text;
     };
 
     /// Adds a port. @return its index for value()
     std::size_t add(const InputBase& input);
     std::size_t add(const OutputBase& output);
 
-    /// Copies some more values: one at least, and as many bytes as a cycle of this period can
-    /// spare. Real-time safe. @return whether that was all
+    /// Copies some more values: at least one, and as many bytes as a cycle of this period can
+    /// spare. Real-time safe.
+    /// @return true if all values are copied
     bool takeSome(const LoopClock& clock) noexcept;
-    /// While no loop runs.
+    /// Copies all values; while no loop runs.
     void takeAll(const LoopClock& clock) noexcept {
         while (!takeSome(clock)) {
         }
     }
 
-    /// Once all are taken. Not real-time safe.
+    /// A value, after all are copied. Not real-time safe.
     Value value(std::size_t index) const;
 
    private:
-    static constexpr std::size_t kLargest = 4096;  // bytes of a value that is copied
+    static constexpr std::size_t kLargest = 4096;  // largest copied value, bytes
 
     struct Item {
         const InputBase* input;  // one of the two is set

@@ -1,7 +1,6 @@
 /// @file
-/// What the real-time thread executes, and what it takes over at a cycle
-/// boundary. Both are built by the graph thread; a schedule is never changed
-/// once the loop has it.
+/// The schedule, which the real-time thread executes, and the adoption, which it applies at a cycle
+/// boundary. The graph thread builds both. A schedule does not change once the loop has it.
 #pragma once
 
 #include <cstdint>
@@ -19,11 +18,11 @@
 
 namespace rtcf::executor {
 
-/// What the loop measures of one component. Outlives the schedules it is in.
+/// Statistics of one component. Outlives the schedules that contain the component.
 struct ComponentFigures {
     Histogram duration;  ///< of update(), in ticks of the cycle counter
-    std::atomic<std::uint64_t> overruns{
-        0};  ///< cycles that passed the next deadline during its update
+    /// Cycles whose next deadline passed during this component's update().
+    std::atomic<std::uint64_t> overruns{0};
     DeviceFigures device;
     ComponentFaults faults;
 };
@@ -34,56 +33,56 @@ struct Step {
     ComponentContext* context;
     ComponentFigures* figures;
     std::uint32_t slot;       ///< in the flight recorder
-    std::uint32_t every = 1;  ///< runs in each n-th cycle,
-    std::uint32_t phase = 0;  ///< in which the iteration modulo n is this
-    bool optional = false;    ///< a fault takes it out, and the loop goes on
-    /// When its last update() ended. Noted here by whoever runs the cycle, as this memory is at
-    /// hand then.
+    std::uint32_t every = 1;  ///< runs in every n-th cycle,
+    std::uint32_t phase = 0;  ///< when the iteration modulo n equals this
+    bool optional = false;    ///< a fault takes the component out, and the loop goes on
+    /// End of the last update(), ticks. The cycle thread writes it here because this cache line is
+    /// already loaded.
     mutable std::int64_t ended_ticks = 0;
 };
 
-/// Steps that follow each other and are of one kind.
+/// Consecutive steps of one kind.
 struct Stretch {
     const Step* begin;
     const Step* end;
-    bool plain;  ///< they run every cycle, and their outputs are seen as they are written
+    bool plain;  ///< the steps run every cycle and have no staged outputs
 };
 
-/// A copy of an output's value, made before any component runs, for inputs that
-/// are to see the previous cycle although their writer runs earlier.
+/// A copy of an output's value, made before any component runs, for inputs that read the previous
+/// cycle's value although their writer runs earlier.
 struct Latch {
     const TypeInfo* type;
     SlotHeader* to;
     const SlotHeader* from;
     const Component* writer;
 
-    /// Real-time safe as TypeInfo::copy is. @throws any exception of a copy
+    /// Real-time safe if TypeInfo::copy is. @throws any exception of a copy
     void copy() const {
         if (to->sequence != from->sequence) type->copy(*to, *from);
     }
 };
 
-/// Values from outside the loop, and who reads them.
+/// Values from outside the loop, and their readers.
 struct Feed {
     Injector* injector;
     std::vector<InputBase*> readers;
-    std::vector<std::shared_ptr<Backlog>> backlogs;  ///< of the queues among them
+    std::vector<std::shared_ptr<Backlog>> backlogs;  ///< backlogs of the queues among the readers
 };
 
-/// The immutable list of a cycle's work. What it points to lives in the Plan that it is part of.
+/// The immutable list of a cycle's work. The Plan that contains it owns the objects it points to.
 struct Schedule {
-    std::uint64_t generation = 0;  ///< transactions adopted; the graph thread's
+    std::uint64_t generation = 0;  ///< transactions adopted so far; for the graph thread
     std::vector<Feed> feeds;
     std::vector<Latch> latches;
-    std::vector<QueueBase*> queues;  ///< that components of this loop feed
+    std::vector<QueueBase*> queues;  ///< queues fed by components of this loop
     std::vector<Step> steps;
     std::vector<Tap*> taps;
-    Source* source = nullptr;  ///< paces the loop instead of the clock
+    Source* source = nullptr;  ///< component that paces the loop; null = the clock does
     std::vector<Stretch> stretches;
-    bool selective = false;              ///< some steps are not plain
+    bool selective = false;              ///< true = some steps are not plain
     std::vector<const void*> footprint;  ///< cache lines to fetch before a cycle
 
-    /// Once all steps are there.
+    /// Groups the steps. After all steps are added.
     void findStretches() {
         for (const Step& step : steps) {
             const bool plain =
@@ -96,14 +95,15 @@ struct Schedule {
     }
 };
 
-/// An input that reads from another place. Either `source` or `injector` is
-/// set; neither: the input keeps its value and has no writer any more.
+/// A change of an input's source. Either `source` or `injector` is set; if neither is, the input
+/// keeps its value and has no writer any more.
 struct Rewire {
     InputBase* input;
     const SlotHeader* source;
     const Injector* injector;
-    bool continued;                    ///< the same writer's values as before
-    const SlotHeader* kept = nullptr;  ///< filled at the boundary: where its present value stays
+    bool continued;  ///< the same writer's values as before
+    /// Filled at the boundary: slot of the input's present value.
+    const SlotHeader* kept = nullptr;
 
     void apply() noexcept {
         QueueBase* const queue = input->queue();
@@ -114,48 +114,48 @@ struct Rewire {
             input->rewire(injector != nullptr ? injector->front() : source, continued);
             if (queue != nullptr && !continued) queue->skip();
         }
-        kept = queue != nullptr ? source : input->current();  // a queue's are copies
+        kept = queue != nullptr ? source : input->current();  // a queue has copies
     }
 };
 
-/// An output that learns whether anybody gets its values.
+/// A change of OutputBase::connected().
 struct Audience {
     OutputBase* output;
     bool present;
 };
 
-/// One component handing its state to its successor.
+/// Hand-over of state from a component to its successor.
 struct HandOver {
     Component* successor;
     const Component* previous;
     std::vector<StateCopy> states;
-    /// Filled at the boundary: what was taken out after a fault hands over nothing.
+    /// Filled at the boundary: a component that was taken out after a fault hands over nothing.
     bool skipped = false;
 };
 
-/// A component whose last cycle has come while the loop runs.
+/// A component that leaves the running loop: its last cycle is at the boundary.
 struct Leaving {
     Component* component;
     ComponentFigures* figures;
-    std::vector<Latch> latches;  ///< of its outputs, by which others see the previous cycle
-    std::vector<Tap*> taps;      ///< of its outputs
+    std::vector<Latch> latches;  ///< latches of its outputs
+    std::vector<Tap*> taps;      ///< taps of its outputs
 };
 
-/// Everything that changes at one cycle boundary. Owned by the graph thread,
-/// which waits until Cycle::apply() has made the change.
+/// All changes of one cycle boundary. Owned by the graph thread, which waits until Cycle::apply()
+/// has made them.
 struct Adoption {
-    const Schedule* schedule = nullptr;  ///< the next one; null = stays
-    std::vector<Latch> new_latches;      ///< to be filled before inputs read them
+    const Schedule* schedule = nullptr;  ///< the next schedule; null = no change
+    std::vector<Latch> new_latches;      ///< latches to fill before inputs read them
     std::vector<Rewire> rewires;
-    std::size_t rewires_of_new = 0;  ///< the first so many are of inputs that never had a writer
+    std::size_t rewires_of_new = 0;  ///< the first rewires, for inputs that never had a writer
     std::vector<Audience> audiences;
     std::vector<HandOver> hand_overs;
-    std::vector<StateCopy> copies;  ///< of state, e.g. to be looked at
+    std::vector<StateCopy> copies;  ///< copies of state, e.g. to show it
     std::vector<Leaving> leaving;
-    std::vector<StagedValue*> values;  ///< parameters, and what derives from them
-    std::int64_t period_ns = 0;        ///< the loop's new period; 0 = stays
-    FrameRing* frames = nullptr;       ///< that cycles fill from now on; null = stays
-    /// Of an earlier state, before anything else; if that refuses, nothing else is done either.
+    std::vector<StagedValue*> values;  ///< parameters and derived values
+    std::int64_t period_ns = 0;        ///< the loop's new period, ns; 0 = no change
+    FrameRing* frames = nullptr;       ///< ring that cycles fill from now on; null = no change
+    /// Restores an earlier state before all other changes; if that fails, nothing else changes.
     Restoration* restoration = nullptr;
 };
 

@@ -49,8 +49,7 @@ std::optional<SimulatedCycle> SimulatedClock::next(std::int64_t period_ns,
     }
 }
 
-// Between two ticks time is taken to have gone on evenly: what came halfway between them, came
-// halfway between their times.
+// Arrival time of the present cycle, by linear interpolation between the last two ticks.
 std::int64_t SimulatedClock::arrival() const {
     const std::int64_t span = tick_->time_ns - before_.time_ns;
     if (span <= 0) return tick_->arrived_ns;

@@ -1,8 +1,7 @@
 /// @file
-/// The clock of a simulation: one thread brings its ticks, the loop's thread
-/// asks for the cycles that are due by them. For each tick there are as many
-/// cycles as whole periods have passed, each with its own exact time. The
-/// runner owns it; nothing here is real-time, as a simulated loop is not.
+/// The clock of a simulation: one thread delivers ticks, and the loop's thread waits for the cycles
+/// that are due. Each tick makes as many cycles due as whole periods have passed, each with its own
+/// exact time. Owned by the runner. Not real-time, as a simulated loop is not.
 #pragma once
 
 #include <chrono>
@@ -16,48 +15,53 @@ namespace rtcf::executor {
 
 /// A cycle that is due.
 struct SimulatedCycle {
-    std::int64_t time_ns = 0;     ///< simulated
-    std::int64_t arrived_ns = 0;  ///< CLOCK_MONOTONIC; what came until then is older than the cycle
-    double rate = 0.0;  ///< at which it went on since the last cycle; 0 = it began or leapt
+    std::int64_t time_ns = 0;  ///< simulated
+    /// CLOCK_MONOTONIC; messages that arrived until then are older than the cycle
+    std::int64_t arrived_ns = 0;
+    double rate = 0.0;  ///< simulated time per real time since the last cycle; 0 = start or jump
 };
 
-/// A tick from which the cycles are counted anew: the clock began, went back, or leapt.
+/// A tick that restarts the count of cycles: the first one, one backwards, or one too far ahead.
 struct ClockJump {
-    std::optional<std::int64_t> from_ns;  ///< the tick before; none = this is the first
+    std::optional<std::int64_t> from_ns;  ///< previous tick; unset = this is the first one
     std::int64_t to_ns = 0;
 };
 
 class SimulatedClock {
    public:
-    /// @name The thread that brings the ticks
+    /// @name The thread that delivers ticks
     /// @{
-    /// The clock shows `now_ns` (since 1970 or any other zero). Returns at once.
-    /// @param arrived_ns when the tick came, CLOCK_MONOTONIC, on the clock by which inputs come
+    /// Sets the clock to `now_ns` (since 1970 or any other epoch). Returns at once.
+    /// @param arrived_ns arrival of the tick, CLOCK_MONOTONIC; comparable with the arrival of
+    /// inputs
     void tick(std::int64_t now_ns, std::int64_t arrived_ns);
     /// @}
 
     /// @name The thread that starts the loop, while it does not run
     /// @{
-    /// Forgets all ticks. @param max_jump_ns a longer way forward is a jump
+    /// Removes all ticks.
+    /// @param max_jump_ns a longer step forward is a jump
     void reset(std::int64_t max_jump_ns);
     /// @}
 
     /// @name The loop's thread
     /// @{
-    /// Waits for the next cycle to be due. @return nothing if none was within `patience`
+    /// Waits for the next cycle to be due.
+    /// @return nothing if none was due within `patience`
     std::optional<SimulatedCycle> next(std::int64_t period_ns, std::chrono::milliseconds patience);
     /// @}
 
     /// @name Any thread
     /// @{
-    /// Takes the oldest jump that has not been taken yet.
+    /// Takes the oldest jump.
     std::optional<ClockJump> takeJump();
-    /// The last tick that the loop has got to.
+    /// The last tick that the loop has reached.
     std::optional<std::int64_t> now() const;
     /// @}
 
    private:
-    // More is a loop that cannot keep up; ticks are then merged, which changes no count of cycles.
+    // If there are more, the loop cannot keep up. Ticks are then merged, which does not change the
+    // number of cycles.
     static constexpr std::size_t kMaxTicks = 65536;
     static constexpr std::size_t kMaxJumps = 64;
 
@@ -71,11 +75,11 @@ class SimulatedClock {
 
     mutable std::mutex mutex_;
     std::condition_variable ticked_;
-    std::deque<Tick> ticks_;       // to be worked off
-    std::optional<Tick> tick_;     // that is being worked off
-    Tick before_{};                // the one before it, or itself
+    std::deque<Tick> ticks_;       // not reached yet
+    std::optional<Tick> tick_;     // last tick reached
+    Tick before_{};                // the tick before tick_; after a jump, tick_ itself
     std::int64_t cycle_ns_ = 0;    // time of the last cycle
-    std::int64_t arrived_ns_ = 0;  // and when that was
+    std::int64_t arrived_ns_ = 0;  // its arrival time
     std::int64_t max_jump_ns_ = INT64_MAX;
     std::deque<ClockJump> jumps_;
 };

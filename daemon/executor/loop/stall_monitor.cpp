@@ -16,19 +16,20 @@ namespace rtcf::executor {
 namespace {
 
 constexpr std::int64_t kMicrosecond = 1000;
-constexpr std::int64_t kMargin = 500'000'000;  // the monitor comes first where it gets a CPU
+// Ns after the monitor's timeout, so that the monitor acts first if it gets a CPU.
+constexpr std::int64_t kMargin = 500'000'000;
 constexpr auto kPoll = std::chrono::milliseconds(20);
 constexpr std::int64_t kPollNs = 20'000'000;
 
-// For SIGXCPU, which comes once a second from the limit on.
+// State of the SIGXCPU handler. The signal comes once a second from the limit on.
 std::atomic<const Loop*> watched_loop{nullptr};
 std::atomic<std::uint64_t> progress_at_last_signal{0};
 
 void handleCpuLimit(int /*signal*/) {
     const Loop* loop = watched_loop.load();
     if (loop == nullptr) return;
-    // A loop that overruns all the time, or polls a silent device, never sleeps either, but gets
-    // on.
+    // A loop that always overruns, or polls a silent device, never sleeps either, but it makes
+    // progress.
     const std::uint64_t now = loop->progress();
     if (progress_at_last_signal.exchange(now) == now && loop->inComponent()) dieStalled();
 }
@@ -69,10 +70,10 @@ void StallMonitor::threadMain() {
         std::this_thread::sleep_for(kPoll);
         const std::uint64_t progress = loop_.progress();
         const std::int64_t now = monotonicNow();
-        // Counted in own polls: when a debugger or SIGSTOP holds the process, it holds this thread
-        // as well, and that time is not the component's.
+        // Counted in polls of this thread: a debugger or SIGSTOP stops the whole process, and that
+        // time must not count as a stall.
         stalled += std::min(now - std::exchange(polled, now), 2 * kPollNs);
-        // Between cycles a loop may wait for long: only a hook that does not return is a stall.
+        // Between cycles, a loop may wait for long; only a hook that does not return is a stall.
         if (!loop_.inComponent() || progress != last) {
             last = progress;
             stalled = 0;

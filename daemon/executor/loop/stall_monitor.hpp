@@ -1,7 +1,6 @@
 /// @file
-/// Watches a running loop for progress. A component that never returns from
-/// update() cannot be helped from inside: the process ends, and rtcfd begins
-/// anew without it.
+/// Monitors the progress of a running loop. If a component never returns from update(), the process
+/// ends, and rtcfd starts a new one without the component.
 #pragma once
 
 #include <atomic>
@@ -12,9 +11,8 @@ namespace rtcf::executor {
 
 class Loop;
 
-/// A thread of its own, SCHED_OTHER. For a real-time thread that takes all of
-/// the only CPU there is RLIMIT_RTTIME besides, whose SIGXCPU asks the same
-/// question.
+/// Runs a thread, SCHED_OTHER. If the real-time thread takes all of the only CPU, this thread
+/// cannot run; then the handler of SIGXCPU, caused by RLIMIT_RTTIME, makes the same check.
 class StallMonitor {
    public:
     /// @param loop outlives the monitor
@@ -23,7 +21,7 @@ class StallMonitor {
     StallMonitor(const StallMonitor&) = delete;
     StallMonitor& operator=(const StallMonitor&) = delete;
 
-    /// Ends the process after so long without progress; 0 = never. Any thread.
+    /// Ends the process after `timeout_ns` without progress; 0 = never. Any thread.
     void setTimeout(std::int64_t timeout_ns);
 
    private:

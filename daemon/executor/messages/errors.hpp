@@ -1,5 +1,6 @@
 /// @file
-/// Refusals as the wire's errors, with a code and a reason for programs. Pure functions.
+/// Conversion of Refusal to the wire's errors, with a code and a reason for programs. Pure
+/// functions.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +12,7 @@
 namespace rtcf::executor {
 
 v1::Error errorTo(RefusalKind kind, const std::string& message);
-/// That which ends request `id`.
+/// The response that ends request `id` with an error.
 v1::Response errorResponse(std::uint64_t id, RefusalKind kind, const std::string& message);
 
 }  // namespace rtcf::executor

@@ -108,8 +108,8 @@ ReplayChunk replayFrom(const pb::ReplayRequest& request) {
     for (const pb::RecordedMessage& message : request.messages()) {
         if (!chunk.messages.empty() && message.time_ns() < chunk.messages.back().time_ns) {
             throw Refusal(RefusalKind::RecordingInvalid,
-                          fmt::format("a message of {} is before the one that precedes it: "
-                                      "messages of a replay come in order of time",
+                          fmt::format("a message of {} is earlier than the one before it: "
+                                      "messages of a replay must be in order of time",
                                       message.topic()));
         }
         chunk.messages.push_back({message.topic(), message.time_ns(), message.data()});

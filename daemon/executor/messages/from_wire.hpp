@@ -1,6 +1,6 @@
 /// @file
-/// The wire's messages as the executor's own types. Generated types go no further than this folder
-/// and the server's. Pure functions; they throw Refusal on what is not legal.
+/// Conversion of the wire's messages to the executor's types. Only this folder and the server use
+/// generated types. Pure functions, which throw Refusal on invalid values.
 #pragma once
 
 #include "graph/definition.hpp"
@@ -10,7 +10,7 @@
 namespace rtcf::executor {
 
 ComponentDefinition definitionFrom(const ::rtcf::v1::ComponentSpec& spec);
-/// What is empty in a replacement is that of the component it replaces.
+/// Empty fields of `spec` get the values of the replaced component.
 ComponentDefinition replacementFrom(const ::rtcf::v1::ComponentSpec& spec,
                                     const ComponentDefinition& old);
 std::vector<std::pair<std::string, ParameterValue>> parametersFrom(

@@ -35,7 +35,7 @@ std::uint32_t checksum(std::string_view bytes) {
     return ~sum;
 }
 
-// Both architectures that rtcf is built for have it in this order.
+// Little-endian, like both architectures that rtcf supports.
 template <typename T>
 T numberAt(std::string_view bytes, std::size_t offset) {
     T number = 0;
@@ -193,9 +193,9 @@ std::string imageToFile(const RunnerImage& image) {
 
 RunnerImage imageFromFile(std::string_view file) {
     if (file.size() < kHeader || file.substr(0, kMagic.size()) != kMagic)
-        refuse("that is no snapshot: rtcfctl snapshot FILE makes one");
+        refuse("the file is not a snapshot: rtcfctl snapshot FILE makes one");
     if (const auto version = numberAt<std::uint32_t>(file, 8); version != kVersion) {
-        refuse(fmt::format("the snapshot is of format {}, this rtcf reads format {}: take it anew",
+        refuse(fmt::format("the snapshot has format {}, this rtcf reads format {}: take a new one",
                            version, kVersion));
     }
     const std::string_view body = file.substr(kHeader);
@@ -203,7 +203,7 @@ RunnerImage imageFromFile(std::string_view file) {
     if (body.size() != numberAt<std::uint64_t>(file, 16) ||
         checksum(body) != numberAt<std::uint32_t>(file, 12) ||
         !message.ParseFromArray(body.data(), static_cast<int>(body.size())))
-        refuse("the snapshot is damaged: its checksum is wrong; take it anew");
+        refuse("the snapshot is damaged: its checksum is wrong; take a new one");
     RunnerImage image{message.runner(),
                       message.taken_ns(),
                       message.period_ns(),

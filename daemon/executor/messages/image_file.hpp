@@ -1,6 +1,5 @@
 /// @file
-/// An image of a runner as a file has it; proto/rtcf/executor/v1/snapshot.proto says how. Pure
-/// functions.
+/// File format of snapshots; defined in proto/rtcf/executor/v1/snapshot.proto. Pure functions.
 #pragma once
 
 #include <string>
@@ -10,9 +9,9 @@
 
 namespace rtcf::executor {
 
-/// @return a whole file
+/// @return the content of the file
 std::string imageToFile(const RunnerImage& image);
-/// @throws Refusal if it is no snapshot, of another format, or not as it was written
+/// @throws Refusal if the file is not a snapshot, has another format, or is damaged
 RunnerImage imageFromFile(std::string_view file);
 
 }  // namespace rtcf::executor

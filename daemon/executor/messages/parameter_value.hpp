@@ -1,5 +1,6 @@
 /// @file
-/// A parameter's value between the wire's message and the executor's own type. Pure functions.
+/// Conversion of a parameter's value between the wire's message and the executor's type. Pure
+/// functions.
 #pragma once
 
 #include <string>
@@ -9,7 +10,8 @@
 
 namespace rtcf::executor {
 
-/// @param name of the parameter, for messages @throws Refusal if it is none
+/// @param name name of the parameter, for errors
+/// @throws Refusal if the message has no value
 ParameterValue parameterValueFrom(const ::rtcf::v1::ParameterValue& value, const std::string& name);
 ::rtcf::v1::ParameterValue parameterValueTo(const ParameterValue& value);
 

@@ -129,7 +129,7 @@ RunnerSettings settingsFrom(const pb::RunnerSettings& message, RunnerSettings ba
     if (ros.has_decimate()) base.bridge.decimate = ros.decimate();
     if (ros.has_stamped()) base.bridge.stamped = ros.stamped();
     if (ros.has_largest_message_kb()) {
-        // What does not fit is out of range anyway.
+        // Clamped to avoid an overflow; the result is out of range anyway.
         base.bridge.largest_message =
             std::min(ros.largest_message_kb(), UINT32_MAX / 1024) * std::uint32_t{1024};
     }

@@ -1,5 +1,6 @@
 /// @file
-/// Settings and rules between the wire's messages and the executor's own types. Pure functions.
+/// Conversion of settings and access rules between the wire's messages and the executor's types.
+/// Pure functions.
 #pragma once
 
 #include "access/rights.hpp"
@@ -8,7 +9,8 @@
 
 namespace rtcf::executor {
 
-/// `base` with what the message sets. @throws Refusal on what is not legal
+/// Returns `base` with the fields that the message sets.
+/// @throws Refusal on invalid values
 RunnerSettings settingsFrom(const ::rtcf::v1::RunnerSettings& message, RunnerSettings base);
 ::rtcf::v1::RunnerSettings settingsTo(const RunnerSettings& settings);
 AccessRules rulesFrom(const v1::AccessRules& message);

@@ -1,5 +1,5 @@
 /// @file
-/// The executor's own types as the wire's messages. Pure functions.
+/// Conversion of the executor's types to the wire's messages. Pure functions.
 #pragma once
 
 #include "bridge/outside_call.hpp"
@@ -13,7 +13,7 @@ namespace rtcf::executor {
 
 ::rtcf::v1::ComponentSpec specTo(const ComponentDefinition& definition);
 ::rtcf::v1::RunnerState stateTo(RunnerState state);
-/// The state that a response was made in.
+/// Sets the runner's state in a response.
 void setState(v1::Response& response, const NumberedState& state);
 ::rtcf::v1::ChangeResult outcomeTo(const ChangeOutcome& outcome);
 /// @throws Refusal if it is too large for the wire
@@ -24,12 +24,12 @@ v1::ServiceCall callTo(std::uint64_t number, const OutsideCall& call);
 v1::Event eventTo(const RunnerEvent& event);
 ::rtcf::v1::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t position,
                                       RunnerState state);
-/// Adds what probe() found, inputs first.
+/// Adds values of Runner::probe(), inputs first.
 void addValues(::rtcf::v1::ComponentInfo& info, const std::vector<Probe::Value>& values);
-/// Adds what Runner::states() found.
+/// Adds values of Runner::states().
 void addStates(::rtcf::v1::ComponentInfo& info, const std::vector<std::string>& values);
 v1::ListConnectionsResult connectionsTo(const GraphSnapshot& snapshot);
-/// Of a component that is not loaded: its ports have no mapped names.
+/// Describes a component that is not loaded; its ports have no mapped names.
 ::rtcf::v1::ComponentType typeTo(const std::string& package, const std::string& library,
                                  const ComponentRecord& record, const Component& component);
 ::rtcf::v1::ReplayResponse replayTo(ReplayOutcome outcome);

@@ -12,7 +12,8 @@ namespace rtcf::executor {
 
 namespace {
 
-// The shell's way to write 'any text'; libstdc++ takes it for a missing parenthesis.
+// True if a repeat follows nothing, as in the shell's "*". libstdc++ reports it as a missing
+// parenthesis.
 bool repeatsNothing(const std::string& expression) {
     constexpr const char* kBegin = "(|";
     char before = '|';
@@ -25,8 +26,9 @@ bool repeatsNothing(const std::string& expression) {
     return false;
 }
 
-// Time and stack that a match takes grow with the name's length times the expression's, and no
-// more: libstdc++'s other way recurses once for each character, and takes for ever on some.
+// Bounds the time and stack of a match by the length of the name times the length of the
+// expression. libstdc++'s other algorithm recurses once per character and takes exponential time
+// for some expressions.
 constexpr auto kSyntax =
     std::regex::ECMAScript | std::regex::optimize | std::regex_constants::__polynomial;
 
@@ -38,8 +40,8 @@ const char* reason(std::regex_constants::error_type code, const std::string& exp
     if (code == error_brack) return "a [ is not closed";
     if (code == error_paren) return "a ( is not closed, or a ) not opened";
     if (code == error_brace || code == error_badbrace) return "a { } is not complete";
-    if (code == error_escape) return "a \\ stands before what cannot be escaped";
-    if (code == error_range) return "a range in [ ] is the wrong way round";
+    if (code == error_escape) return "a \\ is followed by a character that cannot be escaped";
+    if (code == error_range) return "a range in [ ] is reversed";
     if (code == error_complexity || code == error_stack || code == error_space)
         return "it is too complex";
     return "it is not an ECMAScript expression";

@@ -1,6 +1,5 @@
 /// @file
-/// A regular expression over names as users write it: ECMAScript, and it must
-/// match a whole name. Not real-time.
+/// A regular expression for names: ECMAScript, and it must match the whole name. Not real-time.
 #pragma once
 
 #include <memory>
@@ -12,9 +11,9 @@ class NamePattern {
    public:
     /// Matches nothing.
     NamePattern() = default;
-    /// @param what what the expression is for, e.g. "ignore of /H1"
+    /// @param what purpose of the expression, for errors, e.g. "ignore of /H1"
     /// @param expression empty = matches nothing
-    /// @throws Refusal naming both, and where the expression goes wrong
+    /// @throws Refusal that names the purpose, the expression and its error
     NamePattern(const std::string& what, const std::string& expression);
 
     bool matches(const std::string& name) const;

@@ -73,7 +73,7 @@ std::string resolveName(const std::string& name, const std::string& ns,
 std::string mappedName(const std::string& port, const std::string& ns, const std::string& full_name,
                        const Remaps& remaps) {
     const std::string resolved = resolveName(port, ns, full_name);
-    // Of two remaps of one name the later counts, as on a ROS command line.
+    // The last remap of a name wins, as on a ROS command line.
     for (auto remap = remaps.rbegin(); remap != remaps.rend(); ++remap) {
         if (resolveName(remap->first, ns, full_name) == resolved)
             return resolveName(remap->second, ns, full_name);

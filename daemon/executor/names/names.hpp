@@ -1,6 +1,6 @@
 /// @file
-/// ROS graph names: legality and resolution (http://wiki.ros.org/Names), as
-/// components and their ports use them. Pure functions, not real-time.
+/// Validation and resolution of ROS graph names (http://wiki.ros.org/Names) for components and
+/// their ports. Pure functions, not real-time.
 #pragma once
 
 #include <cstddef>
@@ -10,13 +10,15 @@
 
 namespace rtcf::executor {
 
-/// Remaps in order of declaration, from and to as written.
+/// Remaps (from, to) in the order and spelling of the user.
 using Remaps = std::vector<std::pair<std::string, std::string>>;
 
 constexpr std::size_t kLongestName = 255;      ///< characters; with namespace, as in ROS
 constexpr std::size_t kLongestPattern = 1000;  ///< characters of a regular expression
 
-/// Refuses what is too long. @param what it is, for a person
+/// Checks a length.
+/// @param what name of the text, for the error
+/// @throws Refusal if the text is too long
 void requireLength(const char* what, const std::string& text, std::size_t longest = kLongestName);
 
 /// True for a letter followed by letters, digits and underscores.
@@ -25,7 +27,8 @@ bool isBaseName(const std::string& name);
 /// True for a legal relative, absolute or ~private graph name.
 bool isGraphName(const std::string& name);
 
-/// "/" and "arm//" become "/", "/arm". @throws Refusal if it is no legal namespace
+/// Canonical form of a namespace, e.g. "/arm" for "arm//".
+/// @throws Refusal if it is not a legal namespace
 std::string canonicalNamespace(const std::string& ns);
 
 /// Full name of a component: "/" + "H1" = "/H1".
@@ -39,8 +42,8 @@ std::string resolveName(const std::string& name, const std::string& ns,
 std::string mappedName(const std::string& port, const std::string& ns, const std::string& full_name,
                        const Remaps& remaps);
 
-/// A component's name as a person gives it ("H1", "/arm/H1") as full name; relative ones are taken
-/// in "/".
+/// Full name of a component from user input ("H1", "/arm/H1"); relative names are in "/".
+/// @throws Refusal if it is not a legal name
 std::string fullNameOf(const std::string& given);
 
 }  // namespace rtcf::executor

@@ -20,7 +20,7 @@ class Lines {
             if (known_.insert(byte).second) lines_.push_back(byte);
     }
 
-    /// A value's sequence and its beginning.
+    /// Adds a slot's header and the first 8 bytes of its value.
     void addSlot(const SlotHeader* slot) { add(slot, sizeof(SlotHeader) + sizeof(double)); }
 
     std::vector<const void*> take() { return std::move(lines_); }

@@ -1,8 +1,8 @@
 /// @file
-/// The memory that a cycle uses. While the loop sleeps others fill the caches, and then each value
-/// that a component touches is waited for; asked for all at once, they come side by side. (As in
-/// software prefetching for irregular accesses: T. Mowry, Tolerating Latency Through
-/// Software-Controlled Data Prefetching, 1994.)
+/// The cache lines that a cycle uses, for prefetching. While the loop sleeps, other processes fill
+/// the caches, so the cycle would wait for one cache miss after another. Prefetches issued together
+/// overlap. (As in software prefetching for irregular accesses: T. Mowry, Tolerating Latency
+/// Through Software-Controlled Data Prefetching, 1994.)
 #pragma once
 
 #include <cstddef>
@@ -13,13 +13,14 @@
 
 namespace rtcf::executor {
 
-constexpr std::size_t kCacheLine = 64;  ///< bytes; of x86-64 and of most arm64
-/// The most lines of a footprint: half of a first-level cache of 32 kB, the work of a microsecond.
+constexpr std::size_t kCacheLine = 64;  ///< bytes; on x86-64 and most arm64
+/// Most lines of a footprint: half of a first-level cache of 32 kB. Prefetching them takes 1 µs.
 constexpr std::size_t kLargestFootprint = 256;
 
-/// Cache lines that the steps of a schedule use, in the order of their use, none twice: steps,
-/// components, ports, and the values read and written. What does not fit is left out. Graph thread.
-/// @param source what an input reads from; null = nothing
+/// The cache lines that the steps of a schedule use, in order of use, without duplicates: steps,
+/// components, ports, and the values read and written. Lines beyond the limit are omitted. Graph
+/// thread.
+/// @param source slot that an input reads; null = none
 std::vector<const void*> footprint(
     const Schedule& schedule, const std::function<const SlotHeader*(const InputBase*)>& source);
 

@@ -8,7 +8,7 @@ namespace rtcf::executor {
 
 namespace {
 
-// Kahn's algorithm; shorter than problem.names if there are loops.
+// Kahn's algorithm. The result is shorter than problem.names if there are loops.
 std::vector<std::size_t> kahn(const OrderProblem& problem, const std::vector<Edge>& edges) {
     const std::size_t count = problem.names.size();
     std::vector<std::size_t> waiting_for(count, 0);
@@ -38,8 +38,8 @@ std::vector<std::size_t> kahn(const OrderProblem& problem, const std::vector<Edg
     return order;
 }
 
-// A loop among the components that Kahn's algorithm left over. Each of those
-// has a predecessor among them, so walking backwards must meet itself.
+// Finds a loop among the components that Kahn's algorithm left over. Each of them has a predecessor
+// among them, so walking backwards reaches a component twice.
 std::vector<Edge> findLoop(const OrderProblem& problem, const std::vector<Edge>& edges,
                            const std::vector<std::size_t>& ordered) {
     const std::size_t count = problem.names.size();
@@ -74,7 +74,7 @@ void removeInput(std::vector<Edge>& edges, const Edge& input) {
                 edges.end());
 }
 
-// Breaks to add to `start` until there is an order, one from each loop that is left.
+// Extends `start` with one break for each remaining loop, until there is an order.
 std::vector<Edge> cutFrom(const OrderProblem& problem, const Edge& start) {
     std::vector<Edge> cut{start};
     std::vector<Edge> edges = problem.edges;

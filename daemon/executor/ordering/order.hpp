@@ -1,7 +1,7 @@
 /// @file
-/// The order of execution: Kahn's algorithm (A. B. Kahn, "Topological sorting
-/// of large networks", CACM 5(11), 1962) over the connections that are not loop
-/// breaks, and what to say when there is none. Pure functions, not real-time.
+/// The order of execution: Kahn's algorithm (A. B. Kahn, "Topological sorting of large networks",
+/// CACM 5(11), 1962) over the connections that are not loop breaks, and advice if there is no
+/// order. Pure functions, not real-time.
 #pragma once
 
 #include <cstddef>
@@ -18,25 +18,25 @@ struct Edge {
     std::string to_port;
 };
 
-/// What is to be ordered.
+/// Input of findOrder().
 struct OrderProblem {
     std::vector<std::string> names;  ///< full names of the components
-    std::vector<bool> first;         ///< goes before the others as soon as it is ready
+    std::vector<bool> first;         ///< runs before the others as soon as it is ready
     std::vector<Edge> edges;         ///< without loop breaks
 };
 
-/// An order, or why there is none.
+/// An order, or a loop that prevents one.
 struct OrderResult {
     std::vector<std::size_t> order;  ///< all components, if orderable
     std::vector<Edge> loop;          ///< else a loop: each edge ends where the next begins
-    std::vector<std::vector<Edge>>
-        cuts;  ///< for each edge of the loop, breaks with which there is an order
+    /// For each edge of the loop, a set of breaks that includes it and makes an order possible.
+    std::vector<std::vector<Edge>> cuts;
     bool orderable() const { return loop.empty(); }
 };
 
-/// Orders components. Among those that are ready, `first` ones go before the
-/// others, then by name: a function of the graph alone. O((V + E) log V), and
-/// for a cyclic graph times the number of breaks it takes and the loop's length.
+/// Orders components. Among those that are ready, `first` ones run before the others, then the
+/// order is by name, so it is a function of the graph alone. O((V + E) log V); for a graph with
+/// loops, times the number of breaks needed and the length of the loop.
 OrderResult findOrder(const OrderProblem& problem);
 
 }  // namespace rtcf::executor

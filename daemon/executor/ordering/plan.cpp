@@ -12,11 +12,11 @@ namespace rtcf::executor {
 
 namespace {
 
-// A tap holds what is written in half a second: its reader is a thread that
-// has to share the machine with everything else.
+// A tap holds the values of half a second, because its reader is a thread that shares the machine
+// with everything else.
 constexpr double kTapSeconds = 0.5;
-constexpr std::size_t kVariableTapValues = 2;  // of the largest
-// Of larger types it holds fewer, at least two: rings are locked memory.
+constexpr std::size_t kVariableTapValues = 2;  // number of largest values in a tap of variable size
+// Taps of larger types hold fewer values, but at least two, because rings are locked memory.
 constexpr std::size_t kMiB = 1024 * 1024;
 constexpr std::size_t kLargestTap = 8 * kMiB;
 constexpr std::size_t kAllTaps = 256 * kMiB;
@@ -49,8 +49,9 @@ class Builder {
             addConnection(name, connection);
         addSteps();
         addLeaving();
-        // What arrives knows its inputs when it takes over; what leaves has said its last before
-        // others turn to new writers.
+        // Puts the rewires of new inputs first. So a new component has its inputs in takeOver(),
+        // and a leaving component writes its last values before its readers are connected to new
+        // writers.
         adoption_.rewires_of_new = static_cast<std::size_t>(
             std::stable_partition(adoption_.rewires.begin(), adoption_.rewires.end(),
                                   [this](const Rewire& rewire) {
@@ -68,7 +69,7 @@ class Builder {
     void addConnection(const std::string& name, const ConnectionPlan& connection) {
         if (connection.published) {
             addTap(name, name, *connection.writer);
-            // No mapped name has a blank in it.
+            // A mapped name contains no blank, so this key is unique.
             for (const Writer& writer : connection.others) {
                 const Instance& instance = *plan_.graph.nodes()[writer.node].instance;
                 addTap(name + " of " + instance.fullName() + "." + writer.output->name(), name,
@@ -104,7 +105,8 @@ class Builder {
             tap = std::make_shared<Tap>(name, output.type(), output.slot(), capacity,
                                         bridge_.largest_message);
         }
-        // One that stays may be of another frequency: what runs is to be taken anew, too.
+        // Also counts the size that the tap would have at the present frequency, so that the same
+        // graph can be built again later.
         requireRoom(std::max(tap->ringBytes(), Tap::ringBytes(output.type(), capacity)));
         tap->setDecimation(decimated_.matches(name) ? bridge_.decimation : 1);
         plan_.schedule.taps.push_back(tap.get());
@@ -117,8 +119,8 @@ class Builder {
         throw Refusal(
             RefusalKind::ResourceExhausted,
             fmt::format("the rings of all published outputs (taps) would take more than the {} MiB "
-                        "of locked memory allowed: let the whitelist match fewer, or set a lower "
-                        "frequency or a smaller largest message",
+                        "of locked memory allowed: reduce the whitelist, the frequency or the "
+                        "largest message",
                         kAllTaps / kMiB));
     }
 
@@ -162,7 +164,8 @@ class Builder {
     void bindToWriter(const ConnectionPlan& connection, const Reader& reader) {
         if (QueueBase* const queue = reader.input->queue()) plan_.schedule.queues.push_back(queue);
         const std::shared_ptr<SlotHeader>& slot = connection.writer->output->slot();
-        // A loop break means the previous cycle, also where the writer runs earlier in this one.
+        // A loop break always reads the previous cycle, even if the writer runs earlier in this
+        // one.
         const bool latched =
             reader.broken && positions_[connection.writer->node] <= positions_[reader.node];
         const std::shared_ptr<SlotHeader> source =
@@ -199,7 +202,7 @@ class Builder {
 
     void unbind(InputBase* input) {
         Binding binding = present(input);
-        // Never had a writer, nor a value that a snapshot has brought.
+        // The input never had a writer, nor a value from a snapshot.
         if (binding.source_owner == nullptr && binding.kept_owner == nullptr) return;
         if (binding.writer != nullptr)
             adoption_.rewires.push_back({input, nullptr, nullptr, false});
@@ -251,8 +254,8 @@ class Builder {
     Adoption& adoption_;
     const BridgeSettings& bridge_;
     NamePattern decimated_;
-    std::vector<std::size_t> positions_;  // in the order, by node
-    std::size_t tap_bytes_ = 0;           // of the rings so far
+    std::vector<std::size_t> positions_;  // position in the order, by node
+    std::size_t tap_bytes_ = 0;           // size of the rings so far, bytes
 };
 
 }  // namespace

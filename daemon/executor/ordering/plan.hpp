@@ -1,8 +1,7 @@
 /// @file
-/// A graph made ready for the loop: its schedule, and everything that the
-/// schedule's pointers point to. A new plan is built from the one that the loop
-/// has; what stays is taken over, so that running connections are undisturbed.
-/// Graph thread only.
+/// A graph prepared for the loop: its schedule, and all objects that the schedule's pointers refer
+/// to. A new plan is built from the loop's present one and reuses its objects where possible, so
+/// that running connections are undisturbed. Graph thread only.
 #pragma once
 
 #include <map>
@@ -16,12 +15,14 @@
 
 namespace rtcf::executor {
 
-/// Where an input reads, and who keeps that place alive.
+/// The source of an input, and the owners that keep it alive.
 struct Binding {
-    const void* writer = nullptr;  ///< the output's slot or the injector; null = none any more
-    const SlotHeader* source = nullptr;  ///< null with an injector
+    /// The output's slot, or the injector; null = no writer any more.
+    const void* writer = nullptr;
+    const SlotHeader* source = nullptr;  ///< slot that the input reads; null with an injector
     std::shared_ptr<const void> source_owner;
-    const SlotHeader* kept = nullptr;  ///< of an earlier writer, as long as it may be read
+    /// Value of an earlier writer that the component may still read.
+    const SlotHeader* kept = nullptr;
     std::shared_ptr<const void> kept_owner;
 };
 
@@ -31,11 +32,11 @@ struct Plan {
     Schedule schedule;
     std::map<const InputBase*, Binding> bindings;
     std::map<const SlotHeader*, std::shared_ptr<SlotHeader>> latches;  ///< by the writer's slot
-    std::map<std::string, std::shared_ptr<Tap>>
-        taps;  ///< by topic, and by port where a topic has several writers
+    /// By topic; by topic and port if the topic has several writers.
+    std::map<std::string, std::shared_ptr<Tap>> taps;
     std::map<std::string, std::shared_ptr<Injector>> injectors;  ///< by topic
 
-    /// Notes which earlier values inputs still refer to, once the loop has adopted the plan.
+    /// Records the earlier values that inputs still refer to. After the loop has adopted the plan.
     void noteKept(const Adoption& adoption, const Plan& previous) noexcept;
 
     BridgeTable bridgeTable() const;
@@ -43,9 +44,9 @@ struct Plan {
 
 /// Builds a plan.
 /// @param previous the plan that the loop executes
-/// @param frequency_hz of the loop; sizes the taps' rings
-/// @param adoption gets the schedule and the inputs to rewire
-/// @param bridge decimation and sizes of what leaves and enters the loop
+/// @param frequency_hz the loop's frequency, for the sizes of taps
+/// @param adoption receives the schedule and the inputs to rewire
+/// @param bridge decimation and sizes of values that leave and enter the loop
 /// @throws Refusal if the taps' rings would take too much memory
 std::unique_ptr<Plan> buildPlan(Graph graph, Wiring wiring, const Plan& previous,
                                 double frequency_hz, Adoption& adoption,

@@ -15,7 +15,7 @@ namespace {
 
 bool harmonic(std::uint32_t a, std::uint32_t b) { return a % b == 0 || b % a == 0; }
 
-// The values next to `every`, below and above, that go with all of `rates`.
+// The nearest values below and above `every` that are harmonic with all of `rates`.
 std::string nearestRates(std::uint32_t every, const std::vector<std::uint32_t>& rates) {
     const auto works = [&](std::uint32_t candidate) {
         return std::all_of(rates.begin(), rates.end(),
@@ -33,7 +33,7 @@ std::string suffix(std::uint32_t every) {
     return every == 1 ? "every cycle" : fmt::format("every {} cycles", every);
 }
 
-// @param loading the component to be blamed if it is one of two that do not go together
+// @param loading the component to name first if it is one of two that conflict
 void requireHarmonic(const Graph& graph, const std::string& loading) {
     std::map<std::uint32_t, const Instance*> of_rate;
     for (const GraphNode& node : graph.nodes()) {
@@ -49,7 +49,7 @@ void requireHarmonic(const Graph& graph, const std::string& loading) {
             const std::uint32_t every = blamed->definition().every;
             throw Refusal(
                 RefusalKind::RatesConflict,
-                fmt::format("{} runs {}, which does not go with {} {}: one must divide the other; "
+                fmt::format("{} runs {}, but {} runs {}: one rate must divide the other; "
                             "try --every {}",
                             blamed->fullName(), suffix(every), other->fullName(),
                             suffix(other->definition().every), nearestRates(every, others)));
@@ -66,7 +66,7 @@ void assignPhases(const Graph& graph, const std::string& loading) {
     for (const GraphNode& node : graph.nodes())
         slowest = std::max(slowest, node.instance->definition().every);
     if (slowest == 1) return;
-    // How many slower components run in each cycle of the slowest rate.
+    // Number of slower components in each cycle of the slowest rate's period.
     std::vector<std::uint32_t> load(slowest, 0);
     const auto occupy = [&](const Instance& instance) {
         for (std::uint32_t cycle = instance.phase(); cycle < slowest;

@@ -14,12 +14,12 @@ std::string portName(const Graph& graph, std::size_t node, const std::string& po
     return graph.nodes()[node].instance->fullName() + "." + port;
 }
 
-// A component as rtcfctl takes it: without the root namespace's slash.
+// A component's name for rtcfctl, without the slash of the root namespace.
 std::string shortName(const std::string& full_name) {
     return full_name.rfind('/') == 0 ? full_name.substr(1) : full_name;
 }
 
-// Types, for a message: the md5 is told only where the name does not tell them apart.
+// A type for an error text; with the md5 only if both types have the same name.
 std::string describe(const TypeInfo& type, const TypeInfo& other) {
     if (std::string_view(type.name) != other.name) return type.name;
     return fmt::format("{} (md5 {}, {} bytes)", type.name, type.md5, type.size);
@@ -112,7 +112,7 @@ std::string breakCommand(const Graph& graph, const std::vector<Edge>& cut,
 
 [[noreturn]] void refuseLoop(const Graph& graph, const OrderResult& result,
                              const std::string& loading) {
-    // Of a loop that nobody could read, both ends.
+    // Of a long loop, only both ends are shown.
     constexpr std::size_t kListedAtEachEnd = 10;
     constexpr std::size_t kListedCuts = 5;
     const std::size_t length = result.loop.size();
@@ -156,39 +156,40 @@ OrderProblem orderProblem(const Graph& graph, const Wiring& wiring) {
     return problem;
 }
 
-// Of whom would an input read? Where there is none, several may write, as several nodes may
-// publish.
+// Requires one writer if there is a reader. Without a reader, several outputs may write a topic, as
+// several nodes may publish it.
 void requireOneWriter(const Graph& graph, const std::string& name, const ConnectionPlan& plan) {
     if (!plan.writer || plan.others.empty() || plan.readers.empty()) return;
     const Writer& other = plan.others.front();
     const std::string& port = other.output->name();
     throw Refusal(
         RefusalKind::TwoWriters,
-        fmt::format("{} has two writers and a reader: {} and {} write what {} reads; remap one of "
-                    "them, e.g. --remap {}:=~{}",
+        fmt::format("{} has two writers and a reader: {} and {} write it, {} reads it; remap one "
+                    "writer, e.g. --remap {}:=~{}",
                     name, portName(graph, plan.writer->node, plan.writer->output->name()),
                     portName(graph, other.node, port),
                     portName(graph, plan.readers[0].node, plan.readers[0].input->name()), port,
                     port));
 }
 
-// A type of a component's own that is given no message stays inside the runner.
+// True if the type has a ROS message; others stay inside the runner.
 bool onRos(const TypeInfo& type) { return *type.ros_type != '\0'; }
 
-// The consumer builds an output's messages from copies of its values, as that allocates.
+// Rejects types whose messages would be allocated in the cycle: the values own memory, so they
+// cannot be copied bytewise for the consumer, which builds other messages.
 void requirePublishable(const Graph& graph, const std::string& name, const Writer& writer) {
     const TypeInfo& type = writer.output->type();
     if (!allocatesMessage(type)) return;
     throw Refusal(
         RefusalKind::FailedPrecondition,
-        fmt::format("{} cannot be published as {}: values of {} have memory of their own, and so "
-                    "have messages of {}, which would be allocated in the cycle; keep {} off the "
-                    "whitelist, or keep the values in a std::array",
+        fmt::format("{} cannot be published as {}: values of {} own memory, and so do "
+                    "messages of {}, which would be allocated in the cycle; exclude {} from the "
+                    "whitelist, or store the values in a std::array",
                     portName(graph, writer.node, writer.output->name()), name, type.name,
                     type.ros_type, name));
 }
 
-// Two devices cannot both say when a cycle begins.
+// Only one device can pace the loop.
 void requireOneSource(const Graph& graph) {
     const Instance* present = nullptr;
     for (const GraphNode& node : graph.nodes()) {
@@ -214,7 +215,8 @@ Wiring wire(const Graph& graph, const MappingFilter& filter, const std::string& 
     for (auto& [name, plan] : wiring.connections) {
         const bool mapped = onRos(*plan.type) && filter.matches(name);
         plan.published = mapped && plan.writer.has_value();
-        // An input that a component feeds takes nothing from ROS: no side channel past the loop.
+        // An input with a writer in the runner is not subscribed: ROS must not bypass the real-time
+        // path.
         plan.subscribed = mapped && !plan.writer.has_value();
     }
     for (const auto& [name, plan] : wiring.connections) {

@@ -1,6 +1,6 @@
 /// @file
-/// From names to connections and an order: who writes what, who reads it, what
-/// leaves the loop for ROS. Pure function of a graph; graph thread only.
+/// Wiring of a graph: connections by mapped name, topics, and the order of execution. Pure function
+/// of a graph; graph thread only.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace rtcf::executor {
 
-/// Which connections become topics.
+/// Selects the connections that become topics.
 struct MappingFilter {
     NamePattern whitelist;
     NamePattern blacklist;
@@ -28,7 +28,7 @@ struct MappingFilter {
 struct Reader {
     std::size_t node;  ///< index into Graph::nodes()
     InputBase* input;
-    bool broken;  ///< its connection is a loop break
+    bool broken;  ///< true = its connection is a loop break
 };
 
 /// An output within a graph.
@@ -42,11 +42,11 @@ struct Writer {
 struct ConnectionPlan {
     const TypeInfo* type = nullptr;
     std::optional<Writer> writer;
-    std::vector<Writer> others;  ///< write the name too, which then no input reads
+    std::vector<Writer> others;  ///< further writers of the name; then there are no readers
     std::vector<Reader> readers;
-    bool published = false;   ///< to ROS
-    bool subscribed = false;  ///< from ROS
-    bool written = false;     ///< by Runner::writeInput(), as nobody else feeds it
+    bool published = false;   ///< outputs are published to ROS
+    bool subscribed = false;  ///< inputs are subscribed from ROS
+    bool written = false;     ///< Runner::writeInput() writes it, as there is no other writer
 };
 
 struct Wiring {
@@ -54,14 +54,15 @@ struct Wiring {
     std::vector<std::size_t> order;                     ///< node indices in order of execution
 };
 
-/// Connects and orders a graph. @param loading full name of a component that is not part of the
-/// running graph yet, for the advice how to break a loop; may be empty
-/// @throws Refusal for two types of one name, for two writers of one that is read, for a type that
+/// Connects and orders a graph.
+/// @param loading full name of a component that is not part of the running graph yet, for the
+/// advice on loops; may be empty
+/// @throws Refusal if a name has two types, if a name with a reader has two writers, if a type
 /// cannot be published, and for a loop
 Wiring wire(const Graph& graph, const MappingFilter& filter, const std::string& loading);
 
-/// What the ports of some components, by their full names, make of the topics that is not refused
-/// and may surprise: one line each.
+/// Legal but possibly surprising effects of components on topics, one line each.
+/// @param components full names
 std::vector<std::string> remarks(const Graph& graph, const Wiring& wiring,
                                  const MappingFilter& filter,
                                  const std::set<std::string>& components);

@@ -1,5 +1,5 @@
 /// @file
-/// What an ELF file has for the dynamic loader. Read from the file, nothing is loaded. Not
+/// The entries of an ELF file for the dynamic loader. Read from the file, without loading it. Not
 /// real-time.
 #pragma once
 
@@ -12,7 +12,7 @@
 
 namespace rtcf::executor {
 
-/// What is no valid ELF file has none of it: the loader refuses it.
+/// All members are empty if the file is not a valid ELF file; the loader rejects such a file later.
 class ElfFile {
    public:
     /// @param file open for reading; not kept
@@ -21,7 +21,7 @@ class ElfFile {
     std::vector<std::string> needed;
     std::string runpath;
     std::string rpath;
-    /// It has thread_local variables whose memory the loader gets at a thread's first use of one.
+    /// The library has thread_local variables whose memory is allocated at a thread's first use.
     bool lazy_thread_locals = false;
 
    private:
@@ -34,7 +34,7 @@ class ElfFile {
 
     int file_;
     std::vector<ElfW(Phdr)> segments_;
-    std::uint64_t strings_ = 0;  // where in the file
+    std::uint64_t strings_ = 0;  // offset of the string table in the file
     bool static_thread_locals_ = false;
 };
 

@@ -49,7 +49,8 @@ struct stat statusOf(const std::string& path, int file) {
     return status;
 }
 
-// A copy of the file that nobody else can change; in memory, as /run is often mounted noexec.
+// Copies the file so that other processes cannot change it. The copy is in memory, because /run is
+// often mounted noexec.
 int privateCopy(const std::string& path, int source) {
     const struct stat status = statusOf(path, source);
     const std::string name = std::filesystem::path(path).filename();
@@ -58,13 +59,14 @@ int privateCopy(const std::string& path, int source) {
     for (off_t left = status.st_size; left > 0;) {
         const ssize_t moved =
             ::sendfile(copy.get(), source, nullptr, static_cast<std::size_t>(left));
-        if (moved <= 0) refuse(path, moved == 0 ? "it changed while it was read" : systemError());
+        if (moved <= 0)
+            refuse(path, moved == 0 ? "the file changed while it was read" : systemError());
         left -= moved;
     }
     return copy.release();
 }
 
-// A copy that the loader has, until it is said to be kept.
+// A loaded copy, which is unloaded unless keep() is called.
 class OpenCopy {
    public:
     OpenCopy(const std::string& path, int file)
@@ -76,7 +78,8 @@ class OpenCopy {
     ~OpenCopy() {
         if (handle_ == nullptr) return;
         ::dlclose(handle_);
-        // What the loader keeps all the same must go on having the name to itself.
+        // If the loader keeps the library loaded, keep the descriptor open, so that the name stays
+        // unique.
         if (void* still = ::dlopen(name_.c_str(), RTLD_NOW | RTLD_NOLOAD); still != nullptr) {
             ::dlclose(still);
             (void)copy_.release();
@@ -95,7 +98,8 @@ class OpenCopy {
 
    private:
     static void* open(const std::string& name) {
-        // Linked with -ffast-math it would change how all others compute from here on.
+        // A library linked with -ffast-math changes the floating-point environment when it is
+        // loaded.
         const FloatingPointKeeper floating_point;
         return ::dlopen(name.c_str(), RTLD_NOW | RTLD_LOCAL);
     }
@@ -106,7 +110,8 @@ class OpenCopy {
              at = why.find(copy_path)) {
             why.replace(at, copy_path.size(), std::filesystem::path(path).filename());
         }
-        refuse(path, "does not load: " + why + "; build it again, with what it needs linked in");
+        refuse(path,
+               "does not load: " + why + "; link the libraries that it needs and build it again");
     }
 
     FileDescriptor copy_;
@@ -114,14 +119,14 @@ class OpenCopy {
     void* handle_;
 };
 
-// The real-time thread would allocate them, in the middle of a cycle.
+// Rejects thread_local variables that the real-time thread would allocate in a cycle.
 void requireNoLazyThreadLocals(const std::string& path, int file) {
     if (!ElfFile(file).lazy_thread_locals) return;
     refuse(
         path,
         "has thread_local variables, which are allocated in the cycle that first uses them: make "
-        "them members of the component, or build with -ftls-model=initial-exec, which has their "
-        "memory at hand from the start");
+        "them members of the component, or build with -ftls-model=initial-exec, which reserves "
+        "their memory in advance");
 }
 
 }  // namespace
@@ -180,8 +185,8 @@ std::shared_ptr<const Library> LibraryStore::open(const std::string& path) {
     return entries_.back().library;
 }
 
-// What the loader found in other places than were judged. It stays loaded: its library is asked
-// about it whenever it is wanted again, and not loaded another time.
+// Checks libraries that the loader found in folders that were not checked before. They stay loaded;
+// every later request for the library checks them again.
 void LibraryStore::requireTrustedFinds(const std::string& path) {
     for (const std::string& linked : loadedFiles()) {
         if (linked_.count(linked) != 0) continue;

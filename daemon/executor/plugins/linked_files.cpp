@@ -21,8 +21,8 @@ class LinkCheck {
     LinkCheck(const std::string& library, const std::set<uid_t>& owners)
         : library_(library), owners_(owners) {}
 
-    /// @param origin what $ORIGIN is to the loader
-    /// @param inherited the RPATH of those that link against this one
+    /// @param origin value of $ORIGIN in the loader
+    /// @param inherited RPATH of the libraries that link against this one
     void check(int file, const std::string& origin, const std::vector<std::string>& inherited) {
         const ElfFile section(file);
         const bool own = !section.runpath.empty();
@@ -64,7 +64,8 @@ class LinkCheck {
         for (std::size_t begin = 0; begin <= run_path.size();) {
             const std::size_t end = std::min(run_path.find(':', begin), run_path.size());
             const std::string entry = run_path.substr(begin, end - begin);
-            // Those of build trees end in an empty one. To the loader it is the current folder.
+            // Run paths of build trees end in an empty entry, which the loader takes for the
+            // current folder.
             folders.push_back(entry.empty() ? std::filesystem::current_path().string()
                                             : expanded(entry, origin));
             requireTrustedFolder(
@@ -83,13 +84,14 @@ class LinkCheck {
                 folder.replace(at, word.size(), origin);
         }
         if (folder.empty() || folder.front() != '/' || folder.find('$') != std::string::npos)
-            refuse(fmt::format("its run path has \"{}\", which is no absolute folder", folder));
+            refuse(
+                fmt::format("its run path contains \"{}\", which is not an absolute path", folder));
         return folder;
     }
 
     [[noreturn]] void refuse(const std::string& why) const {
         throw Refusal(RefusalKind::LibraryRefused,
-                      fmt::format("library {}: {}: build it without", library_, why));
+                      fmt::format("library {}: {}: build the library without it", library_, why));
     }
 
     const std::string& library_;
@@ -100,7 +102,7 @@ class LinkCheck {
 }  // namespace
 
 void requireTrustedLinks(const std::string& path, int file, const std::set<uid_t>& owners) {
-    // What is loaded is a copy: see Library.
+    // The loader loads a copy, see Library.
     LinkCheck(path, owners).check(file, fmt::format("/proc/{}/fd", ::getpid()), {});
 }
 
@@ -108,7 +110,7 @@ std::set<std::string> loadedFiles() {
     std::set<std::string> files;
     ::dl_iterate_phdr(
         [](dl_phdr_info* info, std::size_t, void* data) {
-            // Neither the program itself, nor the kernel's, nor our copies.
+            // Skips the program itself, the kernel's vdso, and our copies.
             const std::string name = info->dlpi_name;
             if (name.rfind('/', 0) == 0 && name.rfind("/proc/", 0) != 0)
                 static_cast<std::set<std::string>*>(data)->insert(name);

@@ -1,6 +1,6 @@
 /// @file
-/// What a library has the dynamic loader look for, judged before it is loaded:
-/// its code is trusted only as far as that of what it links against. Not real-time.
+/// Check of the files that a library makes the dynamic loader load. A library is trusted only if
+/// all libraries that it links against are. Not real-time.
 #pragma once
 
 #include <sys/types.h>
@@ -10,15 +10,15 @@
 
 namespace rtcf::executor {
 
-/// Requires that the folders of the library's RUNPATH or RPATH, what is found
-/// there, what it names by path, and all that these link against likewise, can be
-/// written by nobody but root and `owners`. What is found in the system's own
-/// folders (ld.so.conf) is the system's affair.
-/// @param path for messages; @param file the library, open for reading
-/// @throws Refusal naming the library, and the folder or file at fault
+/// Requires that only root and `owners` can write the folders of the library's RUNPATH or RPATH,
+/// the libraries found there, the libraries it names by path, and recursively those that these link
+/// against. Libraries in the system's folders (ld.so.conf) are not checked.
+/// @param path name of the library, for errors
+/// @param file the library, open for reading
+/// @throws Refusal naming the library and the untrusted folder or file
 void requireTrustedLinks(const std::string& path, int file, const std::set<uid_t>& owners);
 
-/// The files that are loaded into this process as libraries.
+/// The library files loaded into this process.
 std::set<std::string> loadedFiles();
 
 }  // namespace rtcf::executor

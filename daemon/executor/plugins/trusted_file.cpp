@@ -19,7 +19,7 @@ namespace rtcf::executor {
 
 namespace {
 
-constexpr uid_t kFirstPerson = 1000;  // Debian policy 9.2.2: below are the system's own
+constexpr uid_t kFirstPerson = 1000;  // Debian policy 9.2.2: smaller ids are system users
 
 std::string nameOf(uid_t uid) {
     std::array<char, 4096> buffer{};
@@ -50,20 +50,22 @@ class Walk {
                 refuse(fmt::format("{}: {}", (seen_ / *part).string(), std::strerror(errno)));
             const struct stat status = statusHere();
             if (last && !S_ISREG(status.st_mode)) refuse("not a regular file");
-            // In a sticky folder only its owner moves what is there: that is checked next.
+            // In a sticky folder, only a file's owner can replace it, and the owner is checked
+            // next.
             check(status, !last && (status.st_mode & S_ISVTX) != 0);
         }
         return std::exchange(at_, -1);
     }
 
-    /// Where what is not there (yet) can be put by those who are trusted only.
+    /// Requires that only trusted users can create or change files in the folder; the folder may
+    /// not exist yet.
     void requireFolder(const std::string& wanted) {
         std::error_code error;
         const std::filesystem::path real = std::filesystem::weakly_canonical(wanted, error);
         if (error) refuse(fmt::format("{}: {}", wanted, error.message()));
         struct stat status{};
         for (const std::filesystem::path& part : real) {
-            if (part.empty()) continue;  // of a slash at the end
+            if (part.empty()) continue;  // part after a trailing slash
             if (!step(part, O_PATH | O_DIRECTORY)) {
                 if (errno == ENOENT || errno == ENOTDIR) break;
                 refuse(fmt::format("{}: {}", (seen_ / part).string(), std::strerror(errno)));
@@ -79,7 +81,8 @@ class Walk {
         throw Refusal(RefusalKind::LibraryRefused, fmt::format("{}: {}", subject_, why));
     }
 
-    // Links have been resolved: one that is met now was put there since.
+    // Opens the next part of the path. All symbolic links were resolved before, so a link now is an
+    // attack.
     bool step(const std::filesystem::path& part, int flags) {
         const int next =
             ::openat(at_ < 0 ? AT_FDCWD : at_, part.c_str(), flags | O_NOFOLLOW | O_CLOEXEC);
@@ -101,13 +104,13 @@ class Walk {
         if (!trusted) distrust("belongs to user " + nameOf(status.st_uid));
         if (anybody_may_write) return;
         if ((status.st_mode & S_IWOTH) != 0) distrust("can be written by everybody");
-        // A group of one person (adduser(8), USERGROUPS) is that person.
+        // A user's private group (adduser(8), USERGROUPS) is trusted like the user.
         const bool own_group =
             status.st_gid == 0 || (status.st_gid == status.st_uid && status.st_uid >= kFirstPerson);
         if ((status.st_mode & S_IWGRP) != 0 && !own_group) distrust("can be written by its group");
     }
 
-    // No advice to change the rights of what is there: it may be a home, or /tmp.
+    // The text does not advise to change permissions: the folder may be a home or /tmp.
     [[noreturn]] void distrust(const std::string& why) const {
         refuse(fmt::format(
             "{} {}, so its code is not trusted: install it as root (components into "

@@ -45,7 +45,7 @@ std::vector<int> byPreference(const std::vector<int>& cpus, const std::string& i
 }
 
 CpuClaim::CpuClaim(int wanted, std::string folder) : folder_(std::move(folder)) {
-    constexpr int kMost = 100;  // loops of one CPU that are counted
+    constexpr int kMost = 100;  // most loops counted per CPU
     std::vector<int> cpus{wanted};
     if (wanted < 0) {
         std::string isolated;
@@ -61,17 +61,17 @@ CpuClaim::CpuClaim(int wanted, std::string folder) : folder_(std::move(folder)) 
 
 CpuClaim::~CpuClaim() {
     if (fd_ < 0) return;
-    // While it is locked: nobody else has it for theirs.
+    // Removed while it is locked, so that no other process holds it.
     ::unlink(file_.c_str());
     ::close(fd_);
 }
 
 bool CpuClaim::take(int cpu, int place) {
-    constexpr int kMostTries = 100;  // for a file that goes as soon as it is there
+    constexpr int kMostTries = 100;  // for a file that is removed again and again
     std::string file = folder_ + "/cpu-" + std::to_string(cpu);
     if (place > 0) file += "-" + std::to_string(place);
     for (int i = 0; i < kMostTries; ++i) {
-        // Not readable by others, as any reader of a file can lock it.
+        // Not readable by others, because any reader of a file can lock it.
         const int fd = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
         if (fd < 0) return false;
         struct stat locked{};
@@ -80,7 +80,7 @@ bool CpuClaim::take(int cpu, int place) {
             ::close(fd);
             return false;
         }
-        // Its last holder may have removed it between the two.
+        // Its last owner may have removed it between open() and flock().
         if (::stat(file.c_str(), &named) == 0 && named.st_ino == locked.st_ino &&
             named.st_dev == locked.st_dev) {
             fd_ = fd;

@@ -9,7 +9,7 @@ struct Pair {
     std::int64_t ticks;
 };
 
-// Both clocks at one time: the reading that took least, of several.
+// Reads both clocks at one time: the fastest of several readings.
 Pair readBoth() {
     Pair best{};
     std::int64_t best_gap = INT64_MAX;

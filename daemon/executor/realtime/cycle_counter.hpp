@@ -1,7 +1,7 @@
 /// @file
-/// The processor's own clock: one instruction to read, no system call. Used
-/// for all durations inside a cycle; its ticks are scaled to ns by a factor
-/// measured against CLOCK_MONOTONIC.
+/// The processor's cycle counter, which takes one instruction to read and no system call. It
+/// measures all durations in a cycle. The factor from ticks to ns is measured against
+/// CLOCK_MONOTONIC.
 #pragma once
 
 #include <cstdint>
@@ -27,8 +27,8 @@ inline std::int64_t realtimeNow() noexcept RTCF_NONBLOCKING {
 
 using ClockReading = std::int64_t (*)();
 
-/// CLOCK_REALTIME minus CLOCK_MONOTONIC, ns: of several readings the one that took least, as the
-/// reader may be preempted between the two clocks.
+/// CLOCK_REALTIME minus CLOCK_MONOTONIC, ns. Uses the fastest of several readings, because the
+/// thread may be preempted between the two clocks.
 std::int64_t realtimeOffset(ClockReading monotonic = monotonicNow,
                             ClockReading realtime = realtimeNow) noexcept;
 
@@ -45,19 +45,19 @@ inline std::int64_t readCycleCounter() noexcept RTCF_NONBLOCKING {
 #endif
 }
 
-/// The counter's scale.
+/// Factors between ticks and ns.
 class CycleCounter {
    public:
-    /// Measures for about 20 ms. Not real-time safe.
+    /// Measures the factors, for about 20 ms. Not real-time safe.
     static CycleCounter calibrate();
 
     double nsPerTick() const noexcept { return ns_per_tick_; }
-    /// Real-time safe.
+    /// Converts ticks to ns. Real-time safe.
     std::int64_t toNs(std::int64_t ticks) const noexcept RTCF_NONBLOCKING {
         return static_cast<std::int64_t>((static_cast<__int128>(ticks) * multiplier_) >> kShift);
     }
 
-    /// Real-time safe.
+    /// Converts ns to ticks. Real-time safe.
     std::int64_t toTicks(std::int64_t ns) const noexcept RTCF_NONBLOCKING {
         return static_cast<std::int64_t>((static_cast<__int128>(ns) * inverse_) >> kShift);
     }

@@ -1,9 +1,8 @@
 /// @file
-/// The floating-point environment of cycles: IEEE 754 as a plain program has it,
-/// rounding to nearest, no traps, and no flush-to-zero, so that a component
-/// computes in real time, in steps and in a replay what it computes in a test
-/// of its own. It belongs to a thread, is inherited, and is changed by
-/// libraries built with -ffast-math when they are loaded.
+/// The floating-point environment of cycles: the IEEE 754 defaults of a plain program, with
+/// rounding to nearest, no traps, and no flush-to-zero. So a component computes the same bits in
+/// real time, in steps, in a replay and in its own tests. The environment belongs to a thread and
+/// is inherited by threads; loading a library built with -ffast-math changes it.
 #pragma once
 
 #include <cfenv>
@@ -13,15 +12,15 @@
 
 namespace rtcf::executor {
 
-/// Sets it for the calling thread. Real-time safe.
+/// Sets the environment of the calling thread. Real-time safe.
 inline void setFloatingPointDefaults() noexcept {
     std::fesetenv(FE_DFL_ENV);
 #if defined(__x86_64__)
-    _mm_setcsr(0x1f80);  // also where a C library leaves flush-to-zero alone
+    _mm_setcsr(0x1f80);  // for C libraries whose fesetenv() does not reset flush-to-zero
 #endif
 }
 
-/// Keeps the calling thread's environment, and brings it back.
+/// Saves the calling thread's environment, and restores it in the destructor.
 class FloatingPointKeeper {
    public:
     FloatingPointKeeper() noexcept { std::fegetenv(&kept_); }
@@ -33,7 +32,8 @@ class FloatingPointKeeper {
     std::fenv_t kept_{};
 };
 
-/// Has cycles in a thread that does other things besides.
+/// Sets the environment for cycles in a thread that also does other work, and restores it in the
+/// destructor.
 class FloatingPointDefaults : private FloatingPointKeeper {
    public:
     FloatingPointDefaults() noexcept { setFloatingPointDefaults(); }

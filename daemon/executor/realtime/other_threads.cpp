@@ -13,7 +13,7 @@ namespace rtcf::executor {
 
 namespace {
 
-// A thread that is made by one that has not been moved yet is found by the next pass.
+// A thread may be created by another one that has not been moved yet; the next pass finds it.
 constexpr int kMostPasses = 10;
 
 cpu_set_t cpusWithout(int cpu) {
@@ -25,7 +25,7 @@ cpu_set_t cpusWithout(int cpu) {
     return cpus;
 }
 
-// Empty if there is no such thread.
+// The CPUs of a thread; empty if the thread does not exist.
 cpu_set_t cpusOf(pid_t thread) {
     cpu_set_t cpus;
     CPU_ZERO(&cpus);
@@ -37,7 +37,7 @@ cpu_set_t cpusOf(pid_t thread) {
 
 std::set<pid_t> processThreads() {
     std::set<pid_t> found;
-    std::error_code gone;  // one that ends meanwhile
+    std::error_code gone;  // for a thread that ends meanwhile
     for (const auto& task : std::filesystem::directory_iterator("/proc/self/task", gone))
         found.insert(static_cast<pid_t>(std::stol(task.path().filename())));
     return found;
@@ -57,14 +57,15 @@ void OtherThreads::release() {
     pinned_.clear();
 }
 
-// Whether a thread was pinned or has inherited its CPUs is not to be seen where they are the same.
-// So those that have others when threads are moved are known as pinned from then on. The main
-// thread runs no component, so its CPUs are those of every thread that is not pinned: the kernel
-// takes away those that go offline, or leave the process's cgroup (cpuset(7)).
+// Moves all threads but the loop's to other CPUs, except pinned ones. A thread counts as pinned if
+// its CPUs differ from the main thread's when threads are moved. (If they are equal, it may be
+// pinned or have inherited them.) The main thread runs no component, so it has the CPUs of every
+// thread that is not pinned; the kernel removes CPUs that go offline or leave the process's cgroup
+// (cpuset(7)).
 void OtherThreads::move(const cpu_set_t& to, pid_t loop) {
     const pid_t main = getpid();
     const cpu_set_t from = cpusOf(main);
-    if (sched_setaffinity(main, sizeof to, &to) != 0) return;  // none of them is online
+    if (sched_setaffinity(main, sizeof to, &to) != 0) return;  // none of the CPUs is online
     const cpu_set_t moved_to = cpusOf(main);
     std::set<pid_t> pinned;
     bool moved = true;

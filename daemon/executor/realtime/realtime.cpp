@@ -25,15 +25,15 @@ namespace {
 
 constexpr std::size_t kThreadStack = 512 * 1024;  // for threads that are not real-time
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-constexpr std::size_t kStackReserve =
-    2048 * 1024;  // a sanitizer keeps much of its own in each stack
+// A sanitizer needs much space in each stack.
+constexpr std::size_t kStackReserve = 2048 * 1024;
 #else
 constexpr std::size_t kStackReserve = 64 * 1024;  // for libc and the loop itself
 #endif
 
 std::string systemError(int error) { return std::strerror(error); }
 
-// Touching a block and giving it back keeps its pages, as the heap never shrinks.
+// Touches a block and frees it. The heap never shrinks, so it keeps the pages.
 void prefaultHeap(std::size_t bytes) {
     const std::unique_ptr<unsigned char[]> block(new unsigned char[bytes]);
     const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
@@ -42,8 +42,9 @@ void prefaultHeap(std::size_t bytes) {
     }
 }
 
-// ICU's tables, 30 MB of text conversion and locales that ROS's logging brings along, are half of
-// the process, and no real-time thread reads them. They are read from disk again where needed.
+// Unlocks and drops the pages of ICU's tables: 30 MB for text conversion and locales, a dependency
+// of ROS logging, and half of the process. Real-time threads do not read them; others read them
+// from disk again when needed.
 int releaseTextTables(dl_phdr_info* library, std::size_t /*size*/, void* /*unused*/) {
     if (std::strstr(library->dlpi_name, "/libicudata.so") == nullptr) return 0;
     const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
@@ -64,8 +65,8 @@ std::string fifoProblem(const RealtimeSettings& settings, int error) {
                        settings.priority, systemError(error));
 }
 
-// Asks the kernel with the calling thread, which then goes back to what it was. @return errno, 0 =
-// allowed
+// Tries the priority with the calling thread, and restores its scheduling.
+// @return errno; 0 = allowed
 int tryFifo(unsigned priority) {
     sched_param present{};
     int policy = 0;
@@ -80,17 +81,18 @@ int tryFifo(unsigned priority) {
 }  // namespace
 
 void prepareProcess() {
-    // Memory that has been touched once stays with the process (mallopt(3)).
+    // Keeps touched memory in the process (mallopt(3)).
     mallopt(M_TRIM_THRESHOLD, -1);
     mallopt(M_MMAP_MAX, 0);
     mallopt(M_ARENA_MAX, 1);
-    // 8 MB of locked stack for each of roscpp's threads would be most of the executor.
+    // The default of 8 MB of locked stack for each of roscpp's threads would be most of the
+    // executor's memory.
     pthread_attr_t attributes;
     pthread_attr_init(&attributes);
     pthread_attr_setstacksize(&attributes, kThreadStack);
     pthread_setattr_default_np(&attributes);
     pthread_attr_destroy(&attributes);
-    (void)processCpus();  // as long as all threads may use them
+    (void)processCpus();  // before any thread is restricted
 }
 
 RealtimeProblems lockMemory(const RealtimeSettings& settings) {
@@ -156,18 +158,19 @@ RealtimeProblems applyToThread(pthread_t thread, const RealtimeSettings& setting
     CPU_SET(settings.cpu, &cpus);
     if (const int error = pthread_setaffinity_np(thread, sizeof cpus, &cpus); error != 0) {
         problems.push_back(
-            {fmt::format("not on CPU {}: {}", settings.cpu, systemError(error)), true});
+            {fmt::format("cannot run on CPU {}: {}", settings.cpu, systemError(error)), true});
     }
     return problems;
 }
 
 __attribute__((noinline)) void prefaultStack(std::size_t bytes) {
-    // In steps, as one large frame could jump over the guard page.
+    // In steps, because one large frame could skip the guard page.
     constexpr std::size_t kStep = 16 * 1024;
     std::array<unsigned char, kStep> block{};
-    asm volatile("" : : "r"(block.data()) : "memory");  // the compiler may not leave the writes out
+    // Keeps the compiler from omitting the writes.
+    asm volatile("" : : "r"(block.data()) : "memory");
     if (bytes > kStep) prefaultStack(bytes - kStep);
-    asm volatile("" : : "r"(block.data()) : "memory");  // nor make a tail call
+    asm volatile("" : : "r"(block.data()) : "memory");  // and from making a tail call
 }
 
 IdleStateGuard::IdleStateGuard() : fd_(::open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC)) {

@@ -1,7 +1,7 @@
 /// @file
-/// What makes a process and a thread real-time on Linux: locked memory, a
-/// prefaulted heap and stack, SCHED_FIFO, a CPU of its own, no deep sleep of
-/// the processor. Every part that the machine refuses is said in one line.
+/// Real-time set-up of a process and its threads on Linux: locked memory, a prefaulted heap and
+/// stack, SCHED_FIFO, a CPU of its own, and no deep idle states of the processor. Each failure is
+/// reported in one line.
 #pragma once
 
 #include <pthread.h>
@@ -13,37 +13,38 @@
 
 namespace rtcf::executor {
 
-/// Something that is missing for real time.
+/// A missing prerequisite of real time.
 struct RealtimeProblem {
     std::string text;        ///< one line
-    bool essential = false;  ///< without it there is no real time; else it only becomes worse
+    bool essential = false;  ///< true = no real time without it; false = worse latency
 };
 using RealtimeProblems = std::vector<RealtimeProblem>;
 
-/// What a loop wants of the machine.
+/// Real-time settings of a loop.
 struct RealtimeSettings {
-    int cpu = -1;            ///< -1 = the last one that has no other loop; see CpuClaim
+    int cpu = -1;            ///< -1 = chosen, see CpuClaim
     unsigned priority = 80;  ///< SCHED_FIFO, 1 to 98
-    bool wanted = true;      ///< false: an ordinary thread, for a simulated clock
+    bool wanted = true;      ///< false = an ordinary thread, for a simulated clock
     bool lock_memory = true;
-    std::size_t heap_bytes = 8192 * 1024;
-    std::size_t stack_bytes = 256 * 1024;
+    std::size_t heap_bytes = 8192 * 1024;  ///< heap to prefault
+    std::size_t stack_bytes = 256 * 1024;  ///< stack of the real-time thread to prefault
 };
 
-/// Limits the heap to one arena that never shrinks and gives threads small
-/// stacks. At the beginning of the process, before any thread.
+/// Limits the heap to one arena that never shrinks, and sets small stacks for threads. At the
+/// beginning of the process, before any thread.
 void prepareProcess();
 
-/// Locks all memory, present and future, but tables that only text conversion reads, and touches
-/// the heap.
+/// Locks all present and future memory, except tables for text conversion, and prefaults the heap.
+/// @return missing prerequisites
 RealtimeProblems lockMemory(const RealtimeSettings& settings);
 
-/// Whether threads may have the settings' SCHED_FIFO priority, and whether the kernel is one for
-/// real time.
+/// Checks that threads may have the SCHED_FIFO priority of the settings, and that the kernel is
+/// PREEMPT_RT.
+/// @return missing prerequisites
 RealtimeProblems checkScheduling(const RealtimeSettings& settings);
 
-/// Attributes of a real-time thread's pthread; without SCHED_FIFO where that is not allowed. The
-/// settings name a CPU.
+/// Attributes for pthread_create() of a real-time thread; without SCHED_FIFO if that is not
+/// allowed. The settings must name a CPU.
 class RealtimeAttributes {
    public:
     explicit RealtimeAttributes(const RealtimeSettings& settings);
@@ -56,14 +57,15 @@ class RealtimeAttributes {
     pthread_attr_t attributes_{};
 };
 
-/// Changes policy and CPU of a running thread. The settings name a CPU.
+/// Changes policy and CPU of a running thread. The settings must name a CPU.
+/// @return missing prerequisites
 RealtimeProblems applyToThread(pthread_t thread, const RealtimeSettings& settings);
 
-/// Touches `bytes` of the calling thread's stack, so that the cycle takes no page fault there.
+/// Prefaults `bytes` of the calling thread's stack, so that the cycle has no page faults there.
 void prefaultStack(std::size_t bytes);
 
-/// Keeps the processor out of deep idle states while it lives (Linux
-/// Documentation/power/pm_qos_interface: /dev/cpu_dma_latency held at 0).
+/// Keeps the processor out of deep idle states for the life of this object, by writing 0 to
+/// /dev/cpu_dma_latency (Linux Documentation/power/pm_qos_interface).
 class IdleStateGuard {
    public:
     IdleStateGuard();

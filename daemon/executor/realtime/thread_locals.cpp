@@ -8,8 +8,8 @@
 #include <thread>
 #include <utility>
 
-// What compilers call for a thread_local variable: part of the ABI, in no header. (ELF Handling For
-// Thread-Local Storage, 3.4.)
+// The function that compilers call for a thread_local variable. It is part of the ABI, but in no
+// header (ELF Handling For Thread-Local Storage, 3.4).
 struct TlsIndex {
     unsigned long module;
     unsigned long offset;
@@ -25,14 +25,14 @@ const link_map* mapOf(void* library) {
     return dlinfo(library, RTLD_DI_LINKMAP, static_cast<void*>(&map)) == 0 ? map : nullptr;
 }
 
-// Names that a library has the loader look for.
+// Names of the libraries that a library needs.
 std::vector<const char*> neededBy(const link_map& library) {
     const ElfW(Dyn)* const entries = library.l_ld;
     ElfW(Addr) strings = 0;
     for (const ElfW(Dyn)* entry = entries; entry->d_tag != DT_NULL; ++entry) {
         if (entry->d_tag == DT_STRTAB) strings = entry->d_un.d_ptr;
     }
-    // The loader has made an address of it, unless it must not write there.
+    // The loader has converted the offset to an address, unless the section is read-only.
     if (strings < library.l_addr) strings += library.l_addr;
     std::vector<const char*> names;
     for (const ElfW(Dyn)* entry = entries; entry->d_tag != DT_NULL; ++entry) {
@@ -44,8 +44,8 @@ std::vector<const char*> neededBy(const link_map& library) {
     return names;
 }
 
-// A library and all that it links against, directly or not. Who asks the loader for a name that is
-// needed gets what it has found for it.
+// Collects a library and all libraries that it links against, directly or not. The loader resolves
+// a needed name to the library that it has already loaded for it.
 void collect(HeldLibrary library, std::set<const link_map*>& seen,
              std::vector<HeldLibrary>& libraries) {
     const link_map* const map = library.handle() == nullptr ? nullptr : mapOf(library.handle());
@@ -54,8 +54,8 @@ void collect(HeldLibrary library, std::set<const link_map*>& seen,
     for (const char* name : neededBy(*map)) collect(HeldLibrary(name), seen, libraries);
 }
 
-// What a thread has from its start, beside its stack: the loader has put it there in threads that
-// live already, when it loaded the library (static TLS).
+// Modules whose memory a thread has from its start, in its static TLS. The loader also puts them
+// there in existing threads when it loads a library.
 std::set<std::size_t> modulesOfNewThread() {
     std::set<std::size_t> modules;
     std::thread([&modules] {
@@ -87,13 +87,14 @@ ThreadLocals::ThreadLocals() {
     std::vector<std::string> names;
     dl_iterate_phdr(
         [](dl_phdr_info* info, std::size_t, void* found) {
-            // Not the program itself, which has no name: all threads have its memory.
+            // Skips the program itself, which has no name: all threads have its memory.
             if (info->dlpi_tls_modid != 0 && *info->dlpi_name != '\0')
                 static_cast<std::vector<std::string>*>(found)->emplace_back(info->dlpi_name);
             return 0;
         },
         &names);
-    // Not in there, under the loader's lock. What another thread has closed since is not found.
+    // Not in the callback, which runs under the loader's lock. A library that another thread has
+    // closed since is skipped.
     for (const std::string& name : names) {
         HeldLibrary library(name.c_str());
         if (library.module() != 0) held_.push_back(std::move(library));

@@ -1,7 +1,7 @@
 /// @file
-/// Memory of shared libraries' thread_local variables. The loader gets a library's when a thread
-/// first uses one of them, by malloc() and under locks of its own: threads that run cycles have it
-/// before. Not real-time.
+/// Memory of thread_local variables in shared libraries. The loader allocates a library's variables
+/// when a thread first uses one, with malloc() and under its locks. So threads that run cycles
+/// allocate them in advance. Not real-time.
 #pragma once
 
 #include <cstddef>
@@ -10,10 +10,10 @@
 
 namespace rtcf::executor {
 
-/// A library that stays loaded as long as this lives.
+/// Keeps a library loaded for the life of this object.
 class HeldLibrary {
    public:
-    /// @param name as the loader has it; nothing is held if it has none of that name
+    /// @param name the loader's name of the library; if there is none of that name, nothing is held
     explicit HeldLibrary(const char* name);
     ~HeldLibrary();
     HeldLibrary(HeldLibrary&& other) noexcept;
@@ -21,9 +21,9 @@ class HeldLibrary {
     HeldLibrary(const HeldLibrary&) = delete;
     HeldLibrary& operator=(const HeldLibrary&) = delete;
 
-    /// Of dlopen(); null = nothing is held.
+    /// Handle of dlopen(); null = nothing is held.
     void* handle() const noexcept { return handle_; }
-    /// The loader's number for its thread_local variables; 0 = it has none.
+    /// The loader's TLS module id of the library; 0 = it has no thread_local variables.
     std::size_t module() const noexcept { return module_; }
 
    private:
@@ -31,21 +31,21 @@ class HeldLibrary {
     std::size_t module_ = 0;
 };
 
-/// The libraries that are loaded when this is made and have thread_local variables. None goes
-/// before this does: the loader gives the number of one that is gone to the next that comes, and
-/// has its memory freed by each thread that notices.
+/// The libraries with thread_local variables that are loaded when this object is made. It keeps
+/// them loaded: the loader reuses the module id of an unloaded library, and each thread that
+/// notices frees the memory.
 class ThreadLocals {
    public:
     ThreadLocals();
 
-    /// How many libraries have been loaded so far: another number, other libraries.
+    /// Number of libraries loaded so far; it changes with every load.
     static unsigned long long loads() noexcept;
 
-    /// Gets the calling thread its memory of all of them. Any thread.
+    /// Allocates the calling thread's variables of all these libraries. Any thread.
     void touch() const noexcept;
-    /// @param library of dlopen(); stays open meanwhile
-    /// @return the file of the first library, of this one and all that it links against, whose
-    /// variables a thread that lives, and has called touch(), has no memory of; empty = none
+    /// @param library handle of dlopen(), open during the call
+    /// @return the file of the first library, among this one and those that it links against, whose
+    /// variables a running thread has no memory of although it has called touch(); empty = none
     std::string lacking(void* library) const;
 
    private:

@@ -7,7 +7,7 @@
 namespace rtcf::executor {
 
 UnlockedMemory& UnlockedMemory::ofProcess() {
-    // Never destroyed: threads of libraries hold blocks until the very end.
+    // Never destroyed, because threads of libraries hold blocks until the end of the process.
     static auto& memory = *new UnlockedMemory;  // NOLINT(cppcoreguidelines-owning-memory)
     return memory;
 }
@@ -54,7 +54,8 @@ void UnlockedMemory::giveBack(std::uint8_t* block, std::size_t index) {
 }
 
 std::uint8_t* UnlockedMemory::map(std::size_t bytes) {
-    // What nobody may touch is not made present when it is mapped, as locked memory is.
+    // PROT_NONE: otherwise mmap() would populate the pages, because the process locks future
+    // memory.
     void* block =
         mmap(nullptr, bytes, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     if (block == MAP_FAILED) return nullptr;
@@ -68,7 +69,7 @@ std::uint8_t* UnlockedMemory::map(std::size_t bytes) {
     return mapped_.back().first;
 }
 
-// Of other sizes, the largest first.
+// Unmaps free blocks of other sizes, largest first.
 void UnlockedMemory::makeRoom(std::size_t bytes) {
     for (std::size_t index = kSizes; index-- > 0;) {
         while (!free_[index].empty() && mapped_bytes_ + bytes > kMost) {

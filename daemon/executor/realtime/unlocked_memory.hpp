@@ -1,6 +1,6 @@
 /// @file
-/// Memory outside of what is locked for the loop: for bytes whose number others decide, such as
-/// messages from and for the network. One bounded pool for the process, as locking is.
+/// Memory that is not locked, for data whose size others decide, such as messages from and for the
+/// network. One bounded pool per process, because locking is per process.
 #pragma once
 
 #include <array>
@@ -12,23 +12,24 @@
 
 namespace rtcf::executor {
 
-/// Blocks that are used again and not given back, as the kernel interrupts the loop's CPU when a
-/// process unmaps memory. Any thread that is not real-time.
+/// Blocks are reused and not unmapped, because the kernel interrupts the loop's CPU when a process
+/// unmaps memory. Any thread that is not real-time.
 class UnlockedMemory {
    public:
-    /// Bytes of all blocks together.
+    /// Limit of all blocks together, bytes.
     static constexpr std::size_t kMost = 192U * 1024 * 1024;
 
-    /// The process's, which locks its memory as a whole.
+    /// The pool of the process.
     static UnlockedMemory& ofProcess();
 
-    /// @return null if there is no room for so many bytes now
+    /// Allocates a block, which the shared pointer gives back.
+    /// @return null if the pool has no room
     std::shared_ptr<std::uint8_t[]> allocate(std::size_t bytes);
 
-    /// To be called after each mlockall(), which locks these too.
+    /// Unlocks all blocks. Must be called after each mlockall(), which locks them.
     void unlock();
 
-    /// Bytes of the blocks that are in use.
+    /// Size of the blocks in use, bytes.
     std::size_t used() const;
 
    private:
@@ -42,7 +43,7 @@ class UnlockedMemory {
     std::uint8_t* map(std::size_t bytes);
     void makeRoom(std::size_t bytes);
 
-    mutable std::mutex mutex_;  // all below
+    mutable std::mutex mutex_;  // protects all members below
     std::array<std::vector<std::uint8_t*>, kSizes> free_;
     std::vector<std::pair<std::uint8_t*, std::size_t>> mapped_;
     std::size_t mapped_bytes_ = 0;

@@ -1,4 +1,4 @@
-// What a runner does to change its graph: transactions.
+// Runner: changes of the graph as transactions.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -41,18 +41,19 @@ std::shared_ptr<Instance> Runner::makeInstance(ComponentDefinition definition,
     return instance;
 }
 
-// What is refused stays loaded, as all libraries do: it is judged anew whenever it is wanted.
+// A rejected library stays loaded, like all libraries; each later request checks it again.
 void Runner::requireThreadLocals(const Library& library) {
     noticeEnd();
     const std::string lacking = loop_.lackingThreadLocals(library.handle());
     if (lacking.empty()) return;
-    const bool own = lacking.rfind("/proc/", 0) == 0;  // our copy of it
+    const bool own = lacking.rfind("/proc/", 0) == 0;  // our copy of the library
     throw Refusal(
         RefusalKind::LoopRuns,
-        fmt::format("library {0}: {1} has thread_local variables, and the loop of {2} began "
-                    "without their memory: stop the loop first (rtcfctl -r {2} stop), or load it "
-                    "before the loop starts",
-                    library.path(), own ? "it" : lacking + ", which it links against,", name_));
+        fmt::format(
+            "library {0}: {1} has thread_local variables, and the loop of {2} started "
+            "without memory for them: stop the loop first (rtcfctl -r {2} stop), or load it "
+            "before the loop starts",
+            library.path(), own ? "it" : lacking + ", which it links against,", name_));
 }
 
 void Runner::requireNoReplay() const {
@@ -93,7 +94,7 @@ std::vector<std::string> Runner::adopt(Change change, const Progress& progress) 
     adoption.period_ns = change.period_ns;
     adoption.restoration = change.restoration;
     std::shared_ptr<const FrameTable> frames = framesOf(*plan);
-    // What leaves is not to be copied any more, whoever watches.
+    // Frames must not copy values of leaving components, even if a client watches them.
     adoption.frames = frames->ring.get();
     if (loop_.running() || state_ == RunnerState::Stepping) {
         for (const auto& instance : change.arriving) {
@@ -112,9 +113,9 @@ std::vector<std::string> Runner::adopt(Change change, const Progress& progress) 
     plan->noteKept(adoption, *plan_);
     std::swap(plan_, plan);
     publishFrames(std::move(frames));
-    // It stands, whatever goes wrong from here on.
-    guarded("making a change known", [&] { adopted(change); });
-    // Out of the loop since its last boundary: what left may take its time.
+    // From here on, an error does not undo the change.
+    guarded("publishing a change", [&] { adopted(change); });
+    // The leaving components are out of the loop, so their hooks may take long.
     for (const auto& instance : change.leaving) {
         noteFaultsOf(*instance);
         note(instance->fullName() + ".stop");
@@ -122,11 +123,11 @@ std::vector<std::string> Runner::adopt(Change change, const Progress& progress) 
         note(instance->fullName() + ".cleanup");
         instance->cleanup();
     }
-    guarded("looking after the loop", [this] { noticeEnd(); });
+    guarded("supervising the loop", [this] { noticeEnd(); });
     for (const HandOver& hand_over : adoption.hand_overs) {
         if (!hand_over.skipped) continue;
         change.notes.push_back(fmt::format(
-            "{} begins at its initial state: what it replaces was taken out after a fault",
+            "{} begins at its initial state: the replaced component was taken out after a fault",
             hand_over.successor->fullName()));
     }
     return std::move(change.notes);
@@ -140,7 +141,7 @@ void Runner::handOver(Change& change, const Instance& previous, const Instance& 
     requireSmall(bytes, "the state to hand over");
     if (bytes > kLargestState) {
         throw Refusal(RefusalKind::StateTooLarge,
-                      fmt::format("{} bytes of state are to be handed over at once, {} at most: "
+                      fmt::format("a hand-over of {} bytes of state exceeds the limit of {} bytes: "
                                   "replace fewer components at a time",
                                   bytes, kLargestState));
     }
@@ -167,13 +168,13 @@ void Runner::checkTaps(const Wiring& wiring) const {
     std::size_t taps = 0;
     for (const auto& [name, connection] : wiring.connections)
         taps += connection.published ? 1 + connection.others.size() : 0;
-    // What is above a limit that was lowered may stay, and shrink.
+    // If the limit was lowered, existing taps may stay, and their number may shrink.
     if (taps <= most_taps_ || taps <= plan_->taps.size()) return;
-    throw Refusal(RefusalKind::ResourceExhausted,
-                  fmt::format("{} published outputs (taps) are more than the {} allowed: let the "
-                              "whitelist match fewer, or raise taps under [limits] in rtcfd's "
-                              "settings",
-                              taps, most_taps_));
+    throw Refusal(
+        RefusalKind::ResourceExhausted,
+        fmt::format("{} published outputs (taps) are more than the {} allowed: reduce the "
+                    "whitelist, or raise taps under [limits] in rtcfd's settings",
+                    taps, most_taps_));
 }
 
 ChangeOutcome Runner::load(ComponentDefinition definition, const std::string& library,
@@ -195,7 +196,7 @@ ChangeOutcome Runner::outcomeOf(const Instance& arrived) const {
     ChangeOutcome result = outcome(arrived.fullName());
     for (const std::string& remap : arrived.uselessRemaps()) {
         result.notes.push_back(
-            fmt::format("remap {} names no port of {}", remap, arrived.fullName()));
+            fmt::format("remap {} matches no port of {}", remap, arrived.fullName()));
     }
     result.kept = arrived.keptParameters();
     for (const std::string& line : arrived.lostParameters()) result.notes.push_back(line);

@@ -1,4 +1,4 @@
-// What a runner does for snapshots: takes an image of itself, and becomes what an image says.
+// Runner: taking and restoring snapshots.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <time.h>
@@ -15,8 +15,8 @@ namespace rtcf::executor {
 
 namespace {
 
-// What a cycle at 2 kHz may copy of an image; at other frequencies as much more or less as its
-// period is longer or shorter.
+// Limit of the memory that a snapshot touches in one cycle at 2 kHz; scaled with the period at
+// other frequencies.
 constexpr std::int64_t kLargestImage = 64 * 1024;  // bytes of memory touched
 constexpr std::int64_t kItsPeriod = 500'000;       // ns
 constexpr std::size_t kToldComponents = 5;
@@ -33,15 +33,16 @@ void Runner::requireSmall(std::size_t bytes, const char* what) const {
     if (bytes <= most) return;
     throw Refusal(
         RefusalKind::ResourceExhausted,
-        fmt::format("{} touches {} bytes in one cycle of {}, at most {} at {:g} Hz: stop the loop, "
-                    "or let it run slower",
-                    what, bytes, name_, most, settings_.frequency_hz));
+        fmt::format(
+            "{} touches {} bytes in one cycle of {}; the limit is {} at {:g} Hz: stop the loop, "
+            "or lower its frequency",
+            what, bytes, name_, most, settings_.frequency_hz));
 }
 
 ImageOutcome Runner::takeImage() {
     noticeEnd();
     ImageTaker taker(*plan_);
-    // The second time lengths are known; they may grow meanwhile.
+    // The first capture finds the lengths of values; they may grow until the next one.
     for (int tries = 4; tries > 0; --tries) {
         requireSmall(taker.capture().bytes(), "a snapshot");
         if (!loop_.capture(taker.capture(), adoptionTimeout())) {
@@ -73,8 +74,8 @@ ImageOutcome Runner::takeImage() {
                             stateless.begin() + static_cast<std::ptrdiff_t>(told), ", "));
         if (stateless.size() > told) names += fmt::format(" and {} more", stateless.size() - told);
         outcome.notes.push_back(
-            "declare no state, so that what they remember, if anything, is not "
-            "in it: " +
+            "the snapshot omits values that components without declared state keep between "
+            "cycles: " +
             names);
     }
     return outcome;
@@ -86,7 +87,7 @@ ChangeOutcome Runner::restore(const RunnerImage& image, const Progress& progress
     if (image.period_ns != settings_.loop.period_ns) {
         const double frequency = 1e9 / static_cast<double>(image.period_ns);
         throw Refusal(RefusalKind::FailedPrecondition,
-                      fmt::format("the snapshot was taken at {0:g} Hz, {1} runs at {2:g} Hz: "
+                      fmt::format("the snapshot was taken at {0:g} Hz, but {1} runs at {2:g} Hz: "
                                   "rtcfctl runner set {1} --frequency {0:g}",
                                   frequency, name_, settings_.frequency_hz));
     }
@@ -113,7 +114,7 @@ ChangeOutcome Runner::restore(const RunnerImage& image, const Progress& progress
             phases.emplace_back(instance, instance->phase());
             instance->setPhase(phase);
         }
-        // The last that can be refused, as it starts what is stopped.
+        // Last, because it calls start hooks.
         if (begins) pause(progress);
         begun = begins;
         adopt(std::move(change), progress);
@@ -127,8 +128,8 @@ ChangeOutcome Runner::restore(const RunnerImage& image, const Progress& progress
     ChangeOutcome result = outcome();
     if (begins) {
         result.notes.emplace_back(
-            "the loop is paused as after a step: rtcfctl step goes on from the snapshot, rtcfctl "
-            "start begins anew");
+            "the loop is paused, as after a step: rtcfctl step continues from the snapshot, "
+            "rtcfctl start starts anew");
     }
     return result;
 }

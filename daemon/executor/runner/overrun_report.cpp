@@ -34,8 +34,8 @@ std::string OverrunReport::take(const Loop& loop, const Graph& graph, bool last)
     return line;
 }
 
-// What made most of them since the last line: a component that was running when a cycle should have
-// ended, or what no component is to blame for.
+// The most frequent cause of overruns since the last line: a component, or a cause outside of
+// components.
 std::string OverrunReport::mostFrequentCause(const LoopFigures& figures, const Graph& graph) {
     std::map<std::shared_ptr<const ComponentFigures>, std::uint64_t> present;
     std::string text;
@@ -58,9 +58,9 @@ std::string OverrunReport::mostFrequentCause(const LoopFigures& figures, const G
     const std::uint64_t exchanges = figures.exchange_overruns.value();
     const std::uint64_t frames = figures.frame_overruns.value();
     consider(late - std::exchange(told_late_, late),
-             ", most of them as the machine woke the loop late");
+             ", most of them because the machine woke the loop late");
     consider(exchanges - std::exchange(told_exchanges_, exchanges),
-             ", most of them while changes or values were taken over");
+             ", most of them while changes or values were exchanged");
     consider(frames - std::exchange(told_frames_, frames),
              ", most of them while values were copied into frames: lower frame_kb of the runner");
     return text;

@@ -1,6 +1,6 @@
 /// @file
-/// Sums up late cycles, so that a loop that is late all the time is one line in
-/// the log now and then. Owned by the Runner; used by its graph thread.
+/// Summarises late cycles, so that a loop that is always late logs one line every ten seconds.
+/// Owned by the Runner; graph thread.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +15,8 @@ namespace rtcf::executor {
 
 class OverrunReport {
    public:
-    /// What there is to say, in one line. Empty if no cycle was late since the last one, or if
-    /// that was a moment ago, unless this is the `last` one. Not real-time.
+    /// The summary since the last one, in one line. Empty if no cycle was late, or if the last
+    /// summary is less than ten seconds old and `last` is false. Not real-time.
     std::string take(const Loop& loop, const Graph& graph, bool last);
 
    private:

@@ -8,7 +8,7 @@ namespace rtcf::executor {
 
 namespace {
 
-// Of one answer, so that it fits into a frame with room to spare.
+// Limits of one answer, which must fit into one message on the socket.
 constexpr std::size_t kMaxOutputBytes = 4 * 1024 * 1024;
 constexpr std::size_t kMaxOutputs = 20'000;
 
@@ -25,10 +25,11 @@ void Replay::check(const BridgeTable& table, const std::vector<RecordedTopic>& t
                 continue;
             throw Refusal(
                 RefusalKind::RecordingInvalid,
-                fmt::format("{} is recorded as {} (MD5 {}), its reader takes {} (MD5 {}): replay "
-                            "without that topic, or remap the input",
-                            recorded.topic, recorded.type, recorded.md5, injector->type().ros_type,
-                            injector->type().ros_md5));
+                fmt::format(
+                    "{} is recorded as {} (MD5 {}), but its reader has type {} (MD5 {}): replay "
+                    "without that topic, or remap the input",
+                    recorded.topic, recorded.type, recorded.md5, injector->type().ros_type,
+                    injector->type().ros_md5));
         }
     }
 }
@@ -69,12 +70,12 @@ ReplayOutcome Replay::run(const ReplayChunk& chunk) {
 
 void Replay::inject(const RecordedMessage& message) {
     const auto found = injectors_.find(message.topic);
-    if (found == injectors_.end()) return;  // read by no component
+    if (found == injectors_.end()) return;  // no component reads the topic
     if (found->second->deliver(reinterpret_cast<const std::uint8_t*>(message.bytes.data()),
                                static_cast<std::uint32_t>(message.bytes.size())))
         return;
     throw Refusal(RefusalKind::RecordingInvalid,
-                  fmt::format("a message of {} at {:.9f} s is none of type {}: is the recording "
+                  fmt::format("a message of {} at {:.9f} s is not of type {}: is the recording "
                               "damaged?",
                               message.topic, static_cast<double>(message.time_ns) / 1e9,
                               found->second->type().ros_type));

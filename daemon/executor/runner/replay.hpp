@@ -1,9 +1,8 @@
 /// @file
-/// A replay: the loop runs on the time of recorded messages, each injected
-/// before the first cycle whose time is not before it, and what the loop would
-/// publish is taken out after each cycle. Nothing else comes in and no clock of
-/// the machine is looked at, so that the same graph, anew, gives the same
-/// outputs bit by bit. Owned by the runner; graph thread only.
+/// A replay: the loop runs on the time of recorded messages. Each message is injected before the
+/// first cycle whose time is not earlier. Outputs that would be published are collected after each
+/// cycle. There is no other input and no clock of the machine, so the same graph, newly created,
+/// gives the same outputs, bit by bit. Owned by the runner; graph thread only.
 #pragma once
 
 #include <cstdint>
@@ -17,12 +16,12 @@
 
 namespace rtcf::executor {
 
-/// A topic and its ROS type, as a recording names them.
+/// A topic of a recording and its ROS type.
 struct RecordedTopic {
     std::string topic;
     std::string type;
     std::string md5;
-    std::string definition;  ///< text of the type; of outputs only
+    std::string definition;  ///< definition of the type; outputs only
 };
 
 struct RecordedMessage {
@@ -33,18 +32,19 @@ struct RecordedMessage {
 
 /// A piece of a replay.
 struct ReplayChunk {
-    bool begin = false;                     ///< of a new replay, with components made anew
-    std::int64_t start_ns = 0;              ///< with `begin`: time of the first cycle
-    std::vector<RecordedTopic> topics;      ///< with `begin`: of the recording
-    std::vector<RecordedMessage> messages;  ///< in order of their times, none after `until_ns`
-    std::int64_t until_ns = 0;              ///< all cycles up to this time are to be run
-    bool end = false;                       ///< of the replay
+    bool begin = false;                 ///< begins a new replay, with new components
+    std::int64_t start_ns = 0;          ///< with `begin`: time of the first cycle, ns since 1970
+    std::vector<RecordedTopic> topics;  ///< with `begin`: topics of the recording
+    std::vector<RecordedMessage> messages;  ///< in order of time; none after `until_ns`
+    std::int64_t until_ns = 0;              ///< runs all cycles up to this time
+    bool end = false;                       ///< ends the replay
 };
 
 struct ReplayOutcome {
-    std::uint64_t cycles = 0;  ///< since the replay began
-    std::size_t consumed = 0;  ///< of the chunk's messages; the others come again with the next
-    bool more = false;         ///< outputs are many: ask again for the cycles up to `until_ns`
+    std::uint64_t cycles = 0;  ///< cycles since the replay began
+    std::size_t consumed = 0;  ///< number of consumed messages; the caller sends the others again
+    /// Too many outputs for one answer: the caller asks again for the cycles up to `until_ns`.
+    bool more = false;
     std::vector<RecordedMessage> outputs;
     std::vector<RecordedTopic> inputs;   ///< with `begin`: topics that components read
     std::vector<RecordedTopic> written;  ///< with `begin`: topics of the outputs
@@ -55,17 +55,17 @@ class Replay {
     /// @throws Refusal if a topic of the recording has another type than the input that reads it
     static void check(const BridgeTable& table, const std::vector<RecordedTopic>& topics);
 
-    /// @param table of the components made anew, served by nobody else
-    /// @param loop  that has begun stepping, at time `start_ns`; outlives this
+    /// @param table table of the new components; no bridge serves it
+    /// @param loop  has begun stepping at time `start_ns`; outlives this object
     Replay(BridgeTable table, Loop& loop, std::int64_t start_ns);
 
-    /// Topics that the replay can inject and those it takes out.
+    /// Lists the topics of inputs and outputs.
     void describe(ReplayOutcome& outcome) const;
 
     /// Runs cycles; fewer if the loop ends.
     ReplayOutcome run(const ReplayChunk& chunk);
 
-    /// Forgets what was written since.
+    /// Discards outputs written since the last call.
     void discardOutputs();
 
    private:

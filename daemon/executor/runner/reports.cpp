@@ -1,4 +1,4 @@
-// What a runner tells of that nobody asked for: faults, overruns, messages that are lost.
+// Runner: unsolicited reports on faults, overruns and lost messages.
 #include <fmt/format.h>
 
 #include "common/refusal.hpp"
@@ -15,7 +15,7 @@ std::string whatFailed(const LoopFault& fault) {
         case LoopFault::Kind::NotFinite:
             return fmt::format("output {} is not finite", text);
         case LoopFault::Kind::NoMemory:
-            return fmt::format("no memory to copy the value of {}; reserve() its largest one",
+            return fmt::format("no memory to copy the value of {}; reserve() the largest one",
                                text);
         default:
             return fmt::format("update() threw: {}", text);
@@ -45,7 +45,7 @@ void Runner::noteLoopFault() {
             const std::string what = whatFailed(fault);
             event.message = fmt::format("loop stopped in iteration {}: {}: {}", fault.iteration,
                                         event.component, what);
-            // It may have been unloaded at the boundary at which the loop ended.
+            // The component may have been unloaded at the boundary at which the loop ended.
             if (const GraphNode* node = nodeOf(fault.component); node != nullptr) {
                 node->instance->setFault(fmt::format("iteration {}: {}", fault.iteration, what));
             }
@@ -55,8 +55,8 @@ void Runner::noteLoopFault() {
     }
 }
 
-// Components that failed while the loop went on: a component is taken out once; values that are not
-// finite are reported again after a while.
+// Reports component faults that did not end the loop. A component is taken out once; values that
+// are not finite are reported again after a while.
 void Runner::noteComponentFaults() {
     told_not_finite_.rearm(monotonicNow());
     const std::uint64_t count = loop_.figures().faults.value();
@@ -70,7 +70,7 @@ void Runner::noteFaultsOf(Instance& instance) {
         if (fault == nullptr) return;
         const char* of = fault->text.data();
         std::string what = fmt::vformat(text, fmt::make_format_args(of));
-        if (more > 1) what += fmt::format("; {} times since this was told before", more);
+        if (more > 1) what += fmt::format("; {} times since the last report", more);
         instance.setFault(fmt::format("iteration {}: {}", fault->iteration, what));
         tell({RunnerEvent::Kind::ComponentFailed,
               fmt::format("{}: iteration {}: {}", instance.fullName(), fault->iteration, what),
@@ -82,14 +82,15 @@ void Runner::noteFaultsOf(Instance& instance) {
         say(fault, "output {} is not finite: readers keep its last value", more);
     }
     say(faults.taken_out.take(), "update() threw: {}; taken out, the loop goes on", 0);
-    say(faults.unsafe.take(), "no copy of a value of safe(): {}; readers keep the value before", 0);
+    say(faults.unsafe.take(), "cannot copy a value of safe(): {}; readers keep the value before",
+        0);
 }
 
 void Runner::noteOverruns(bool last) {
     std::string line = overrun_report_.take(loop_, plan_->graph, last);
     if (line.empty()) return;
     if (!degraded_.empty() && settings_.loop.max_overruns != 0)
-        line += "; max_overruns ends no loop that runs degraded";
+        line += "; max_overruns does not stop a degraded loop";
     tell({RunnerEvent::Kind::Overruns, std::move(line), {}, loop_.figures().iteration.load()});
 }
 

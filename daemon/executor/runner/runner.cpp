@@ -65,7 +65,7 @@ void Runner::threadMain() {
     const CrashContext crash_context(ThreadRole::Graph);
     pthread_setname_np(pthread_self(), "rtcf-graph");
     std::unique_lock<std::mutex> lock(jobs_mutex_);
-    while (!ending_) {  // what still waits then is not begun any more
+    while (!ending_) {  // jobs that still wait at the end are discarded
         jobs_changed_.wait_for(lock, kTick, [this] { return ending_ || !jobs_.empty(); });
         Job job{};
         if (!jobs_.empty()) {
@@ -76,7 +76,7 @@ void Runner::threadMain() {
         job_stops_ = job.stops;
         if (job.work) guarded("a change", job.work);
         note({});
-        guarded("looking after the loop", [this] { tick(); });
+        guarded("supervising the loop", [this] { tick(); });
         lock.lock();
     }
     lock.unlock();
@@ -84,18 +84,18 @@ void Runner::threadMain() {
     loop_.join(INT64_MAX);
     if (state_ == RunnerState::Stepping) loop_.endStepping();
     stopAll();
-    guarded("telling the end", [this] {  // to those that hear of it by the bridge
+    guarded("reporting the end", [this] {  // to clients of the bridge
         if (state_ != RunnerState::Faulted) setState(RunnerState::Stopped);
         publishPicture();
     });
     if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>());
-    // Components may reach for ROS until they are gone.
+    // Components may use ROS until they are destroyed.
     plan_ = std::make_unique<Plan>();
     bridge_.reset();
     log_.drain();
 }
 
-// Nothing that goes wrong here ends a process whose loop runs.
+// Logs exceptions, so that no error ends a process whose loop runs.
 void Runner::guarded(const char* what, const std::function<void()>& work) noexcept {
     try {
         try {
@@ -104,15 +104,15 @@ void Runner::guarded(const char* what, const std::function<void()>& work) noexce
             log_.write(LogLevel::Error, {}, fmt::format("{} failed: {}", what, error.what()));
         }
     } catch (...) {
-        // Nor can it be said.
+        // Logging failed, too.
     }
 }
 
 void Runner::tell(const RunnerEvent& event) noexcept {
-    guarded("an event's report", [&] { events_(event); });
+    guarded("reporting an event", [&] { events_(event); });
 }
 
-// What has to be done now and then: a loop that ended by itself, clocks, counters.
+// Periodic work: a loop that ended by itself, clocks, counters.
 void Runner::tick() {
     noticeEnd();
     if (loop_.joinable()) {
@@ -129,7 +129,8 @@ void Runner::tick() {
     publishPicture();
 }
 
-// A loop may end by itself at any time, also while a change waits for its next boundary.
+// Handles a loop that has ended by itself, which is possible at any time, even while a change waits
+// for the next boundary.
 void Runner::noticeEnd() {
     if (state_ == RunnerState::Running && !loop_.running()) loopEnded();
 }
@@ -144,7 +145,7 @@ void Runner::changeByBridge(const std::string& component, const ParameterBatch& 
         tell(event);
     } catch (const std::exception& error) {
         refusal = error.what();
-        log_.write(LogLevel::Warn, component, "a change asked for by ROS is refused: " + refusal);
+        log_.write(LogLevel::Warn, component, "a change requested by ROS was rejected: " + refusal);
     }
     done(refusal);
 }
@@ -166,7 +167,7 @@ std::vector<std::string> Runner::states(const std::string& name) {
     StatePicture picture(plan_->graph.get(name).instance->component());
     Adoption look;
     look.copies = picture.copies();
-    // A look makes no loop wait.
+    // A query must not delay the loop.
     if (look.copies.empty() || bytesOf(look.copies) > mostAtOnce()) return {};
     if (!loop_.adopt(look, kProbeTimeout + 2 * settings_.loop.period_ns)) return {};
     return picture.texts();

@@ -1,9 +1,9 @@
 /// @file
-/// A runner: the graph, its loop, and the one thread that changes them. Every
-/// change is a transaction: what is new is constructed and configured beside
-/// the running loop, wired and ordered, started, adopted at one cycle boundary;
-/// then what left is stopped and cleaned up. A failure at any point leaves all
-/// as it was.
+/// A runner: the graph, its loop, and the graph thread, which alone changes them. Every change is a
+/// transaction: new components are constructed and configured beside the running loop; the new
+/// graph is wired and ordered; new components are started; the loop adopts the change at one cycle
+/// boundary; then leaving components are stopped and cleaned up. A failure before the adoption
+/// leaves everything as it was.
 #pragma once
 
 #include <atomic>
@@ -41,38 +41,38 @@ namespace rtcf::executor {
 
 enum class RunnerState { Stopped, Running, Faulted, Stuck, Stepping };
 
-/// A state, and how many there have been: of two, the one with the higher number is newer.
+/// A state with its number; of two states, the one with the higher number is newer.
 struct NumberedState {
     RunnerState state = RunnerState::Stopped;
     std::uint32_t number = 0;
 };
 
-/// What came of a change.
+/// Result of a change.
 struct ChangeOutcome {
     std::uint64_t generation = 0;
-    std::vector<std::string> order;     ///< full names
-    std::string component;              ///< full name of the one the change was about; may be empty
-    std::vector<std::string> notes;     ///< one line each
-    std::vector<std::string> degraded;  ///< of start(): what is missing for real time
-    std::vector<Difference> differences;  ///< of apply()
-    std::uint64_t cycles = 0;             ///< of step(): how many were run
-    /// Of replace(): what the new component has of the old one's values.
+    std::vector<std::string> order;       ///< full names, in order of execution
+    std::string component;                ///< full name of the changed component; may be empty
+    std::vector<std::string> notes;       ///< one line each
+    std::vector<std::string> degraded;    ///< start() only: missing prerequisites of real time
+    std::vector<Difference> differences;  ///< apply() only
+    std::uint64_t cycles = 0;             ///< step() only: cycles run
+    /// replace() only: parameter values kept from the old component.
     std::vector<std::pair<std::string, ParameterValue>> kept;
 };
 
-/// An image, and what it leaves out: one line each.
+/// A snapshot, and notes on omitted values, one line each.
 struct ImageOutcome {
     RunnerImage image;
     std::vector<std::string> notes;
 };
 
-/// An input that nobody feeds.
+/// An input without a writer.
 struct WritableInput {
-    std::string topic;  ///< its mapped name
+    std::string topic;  ///< mapped name
     const TypeInfo* type;
 };
 
-/// Something that happened without a request.
+/// An event without a request.
 struct RunnerEvent {
     enum class Kind {
         LoopEnded,
@@ -87,12 +87,12 @@ struct RunnerEvent {
     std::string message;
     std::string component;
     std::uint64_t iteration = 0;
-    /// Those that were changed, other than by a request.
+    /// ParametersChanged only: names of the parameters.
     std::vector<std::string> parameters = {};  // NOLINT(readability-redundant-member-init): gcc's
-    NumberedState state = {};                  ///< when it happened
+    NumberedState state = {};                  ///< state at the time of the event
 };
 
-/// Counters and state for a status query; any thread.
+/// Status of a runner, for queries. Any thread.
 struct RunnerPicture {
     RunnerState state = RunnerState::Stopped;
     std::uint32_t state_number = 0;  ///< see NumberedState
@@ -101,7 +101,7 @@ struct RunnerPicture {
     std::string status;
     BridgeStatus bridge;
     bool simulated = false;       ///< the loop follows a simulated clock
-    std::uint64_t too_large = 0;  ///< messages lost for their size
+    std::uint64_t too_large = 0;  ///< messages lost because of their size
 };
 
 class Runner final : private RunnerView {
@@ -109,86 +109,90 @@ class Runner final : private RunnerView {
     using Progress = std::function<void(const std::string&)>;
     using EventConsumer = std::function<void(RunnerEvent)>;
 
-    /// @param name   of the runner
+    /// @param name   name of the runner
     /// @param log    outlives the runner
     /// @param events called from the graph thread
-    /// @param bridge the link to the outside; null = none
+    /// @param bridge link to the outside; null = none
     /// @param recorder outlives the runner
-    /// @param cpu_claims folder of the claims of CPUs, see CpuClaim; empty = none
+    /// @param cpu_claims folder of the CPU claims, see CpuClaim; empty = none
     Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr<Bridge> bridge,
            FlightRecorder& recorder, std::string cpu_claims = {});
-    /// Stops the loop and lets all components go, in order.
+    /// Stops the loop and destroys all components, in order.
     ~Runner();
     Runner(const Runner&) = delete;
     Runner& operator=(const Runner&) = delete;
 
     /// Queues work for the graph thread, which calls the functions below. Any thread.
     void post(std::function<void()> job);
-    /// Ends the loop at the next boundary without waiting for the graph thread; the stop hooks
-    /// follow when it is free. Work that was posted before cannot start the loop any more. Any
-    /// thread.
+    /// Stops the loop at the next boundary without waiting for the graph thread, which calls the
+    /// stop hooks later. Jobs posted before cannot start the loop any more. Any thread.
     void requestStop() noexcept { loop_.requestStop(); }
 
-    /// @name By jobs, on the graph thread. All throw Refusal and have then changed nothing.
+    /// @name Graph thread, from jobs
+    /// If a function throws Refusal, it has changed nothing.
     /// @{
     void configure(RunnerSettings settings);
-    /// Refuses changes that would have more outputs published than so many, from here on.
+    /// Limits the number of published outputs; later changes beyond the limit are rejected.
     void limitTaps(std::size_t most) noexcept { most_taps_ = most; }
-    /// Also loads libraries that belong to this user, from here on.
+    /// Trusts libraries of this user from here on.
     void trust(uid_t owner) { libraries_.trust(owner); }
     ChangeOutcome start(const Progress& progress);
     ChangeOutcome stop(const Progress& progress);
-    /// Runs cycles without real time on a simulated clock, as fast as they go; then pauses.
-    /// @param given_up set by any thread to pause at the next boundary; null = nobody does
+    /// Runs cycles on a simulated clock, as fast as possible; then pauses.
+    /// @param given_up set by any thread to pause at the next boundary; null = never
     ChangeOutcome step(std::uint64_t cycles, const Progress& progress,
                        const std::atomic<bool>* given_up = nullptr);
-    /// Runs a piece of a replay. With its beginning all components are made anew, and ROS sees
-    /// nothing of the loop until its end.
+    /// Runs a part of a replay. The first part recreates all components, and disconnects ROS until
+    /// the end of the replay.
     ReplayOutcome replay(const ReplayChunk& chunk, const Progress& progress);
     ChangeOutcome load(ComponentDefinition definition, const std::string& library,
                        const Progress& progress);
     ChangeOutcome unload(const std::vector<std::string>& names, const Progress& progress);
-    /// @param reset parameters that `definition` does not name get their defaults, else those of
+    /// @param reset true = parameters that `definition` does not set get their defaults; false =
+    /// they keep valid values of the old component
     ///              the old component that fit
     ChangeOutcome replace(const std::string& name, ComponentDefinition definition,
                           const std::string& library, bool reset, const Progress& progress);
-    /// Makes the graph what is wanted, in one transaction; or only tells what it would take.
+    /// Changes the graph to the wanted one, in one transaction.
+    /// @param dry_run only computes the differences
     ChangeOutcome apply(const std::vector<WantedComponent>& wanted, bool dry_run,
                         const Progress& progress);
     ChangeOutcome setBreaks(const std::vector<std::pair<std::string, std::string>>& ports,
                             bool broken);
     ChangeOutcome setParameters(const std::string& name,
                                 const std::vector<std::pair<std::string, ParameterValue>>& batch);
-    /// Takes a component's declared state back to its initial values, at one boundary.
+    /// Resets a component's declared state to its initial values, at one boundary.
     ChangeOutcome reset(const std::string& name);
-    /// The object itself; it is not to be touched while the loop runs.
+    /// The component's object. The caller must not use it while the loop runs.
     const Component& component(const std::string& name) const {
         return plan_->graph.get(name).instance->component();
     }
-    /// Changes values of a component's declared state, numbers and bools, of a loop that does not
-    /// run.
+    /// Sets declared state of a component (numbers and bools). Only while the loop does not run.
     ChangeOutcome setStates(const std::string& name,
                             const std::vector<std::pair<std::string, ParameterValue>>& batch);
-    /// An input that can be written. @throws Refusal also if a component or ROS feeds it
+    /// The input, if it can be written.
+    /// @throws Refusal also if a component or ROS writes it
     WritableInput writableInput(const std::string& name, const std::string& port) const;
-    /// Gives such an input a value at the next boundary. @param message serialised, of its ROS type
+    /// Writes a value to such an input at the next boundary.
+    /// @param message serialised message of the input's ROS type
     ChangeOutcome writeInput(const std::string& name, const std::string& port,
                              const std::string& message);
-    /// All that the next cycle depends on, of one boundary.
+    /// Takes a snapshot at one boundary.
     ImageOutcome takeImage();
-    /// Makes all of it what an image says, at one boundary: parameters, declared state, the values
-    /// of connections. A loop that does not run is paused, as after step().
+    /// Restores a snapshot at one boundary: parameters, declared state, and the values of
+    /// connections. If the loop does not run, it is then paused, as after step().
     ChangeOutcome restore(const RunnerImage& image, const Progress& progress);
     /// Values of a component's declared state, as text. Empty if the loop reaches no boundary in
     /// time.
     std::vector<std::string> states(const std::string& name);
     /// Values of a component's ports, inputs first. Empty if the loop reaches no boundary in time.
     std::vector<Probe::Value> probe(const std::string& name);
-    /// Has cycles keep the values of a selection for a watch. @param watch a number of its own
+    /// Keeps the values of a selection in frames, for a watch.
+    /// @param watch unique number of the watch
     void watch(std::uint64_t watch, PortSelection selection);
-    /// Ends that; one that is not known has ended.
+    /// Ends a watch; does nothing if the number is unknown.
     void endWatch(std::uint64_t watch);
-    /// Settings to start from.
+    /// The present settings.
     const RunnerSettings& settings() const noexcept { return settings_; }
     /// @}
 
@@ -201,15 +205,14 @@ class Runner final : private RunnerView {
     const Loop& loop() const noexcept override { return loop_; }
     const FlightRecorder& recorder() const noexcept { return recorder_; }
     const FrameMemory& frameMemory() const noexcept { return frame_memory_; }
-    /// What has come since the last call of how frames look: each table holds for the frames in its
-    /// ring, up to those of the next one. Its last owner is to let go of it on the graph thread.
+    /// New frame tables since the last call. Each table describes the frames in its ring, until the
+    /// next table's first frame. The last owner must release a table on the graph thread.
     std::vector<std::shared_ptr<const FrameTable>> takeFrameTables();
-    /// Is called, on the graph thread, when there are so many frames that cycles which run as fast
-    /// as they go wait for somebody to take them.
+    /// Sets a function that the graph thread calls when steps wait for readers of frames.
     void onFramesWaiting(std::function<void()> tell);
-    /// See Loop. One thread, whichever.
+    /// See Loop. One thread only.
     void holdFigures(bool held) noexcept { loop_.holdFigures(held); }
-    /// Name of the hook that the graph thread is in, and since when; empty = none.
+    /// Hook that the graph thread is running, and since when (CLOCK_MONOTONIC, ns); empty = none.
     std::pair<std::string, std::int64_t> activity() const;
     /// @}
 
@@ -217,14 +220,14 @@ class Runner final : private RunnerView {
     struct Change {
         Graph graph;
         std::string loading;            // new component, for advice on loops
-        std::set<std::string> changed;  // components to picture anew
+        std::set<std::string> changed;  // components to copy into the graph view again
         std::vector<std::shared_ptr<Instance>> arriving;
         std::vector<std::shared_ptr<Instance>> leaving;
         std::vector<StagedValue*> values;
         std::vector<HandOver> hand_overs;
         std::vector<StateCopy> copies;
         Restoration* restoration = nullptr;
-        std::vector<std::string> notes;  // of what is handed over
+        std::vector<std::string> notes;  // notes on the hand-over of state
         std::int64_t period_ns = 0;
     };
 
@@ -233,7 +236,7 @@ class Runner final : private RunnerView {
 
     struct Job {
         std::function<void()> work;
-        std::uint64_t stops;  // that had been requested when it was posted
+        std::uint64_t stops;  // Loop::stops() when the job was posted
     };
 
     void threadMain();
@@ -247,7 +250,8 @@ class Runner final : private RunnerView {
     void requireNoReplay() const;
     void requireThreadLocals(const Library& library);
     std::string whatDoesNotReturn() const;
-    /// Hands it to the loop. @throws Refusal if that does not take it
+    /// Applies the adoption.
+    /// @throws Refusal if the loop does not apply it in time
     void adoptAtBoundary(Adoption& adoption);
     void loopEnded();
     void noteLoopFault();
@@ -255,7 +259,7 @@ class Runner final : private RunnerView {
     void noteFaultsOf(Instance& instance);
     void noteOverruns(bool last);
     void noteSizes();
-    /// A change of parameters that the bridge asks for.
+    /// Changes parameters at the request of the bridge.
     void changeByBridge(const std::string& component, const ParameterBatch& batch,
                         const std::function<void(const std::string&)>& done);
     std::shared_ptr<const BridgeTable> bridgeTable() const;
@@ -264,7 +268,7 @@ class Runner final : private RunnerView {
     const GraphNode* nodeOf(const Component* component) const noexcept;
     void beginStepping(std::int64_t stamp_ns = 0);
     void pause(const Progress& progress);
-    /// Bytes that may be copied at one boundary.
+    /// Most bytes to copy at one boundary.
     std::size_t mostAtOnce() const;
     void requireSmall(std::size_t bytes, const char* what) const;
     void endStepping();
@@ -273,17 +277,19 @@ class Runner final : private RunnerView {
     std::shared_ptr<Instance> makeInstance(ComponentDefinition definition,
                                            const std::string& library, const Progress& progress,
                                            bool configure = true);
-    /// Works a difference into a change. @param look without configuring what is new
+    /// Adds a difference to a change.
+    /// @param look true = does not configure new components
     void addDifference(Change& change, const Difference& difference, const Progress& progress,
                        bool look);
-    /// Wires, starts, adopts; then stops and cleans up what left.
-    /// @return notes on what was handed over @throws Refusal and others; nothing has changed then
+    /// Wires, starts and adopts a change; then stops and cleans up leaving components.
+    /// @return notes on the hand-over of state
+    /// @throws Refusal and others; nothing has changed then
     std::vector<std::string> adopt(Change change, const Progress& progress);
-    /// Has a component take another's place, with its state.
+    /// Plans the hand-over of state to a replacement.
     void handOver(Change& change, const Instance& previous, const Instance& successor) const;
-    /// Of a change that the loop has: makes it known.
+    /// Publishes a change that the loop has adopted.
     void adopted(const Change& change);
-    /// Has the loop fill the frames that the watches want, of the present plan.
+    /// Replaces the frames after a change of the watches.
     void renewFrames();
     std::shared_ptr<const FrameTable> framesOf(const Plan& plan);
     void publishFrames(std::shared_ptr<const FrameTable> frames) noexcept;
@@ -315,25 +321,25 @@ class Runner final : private RunnerView {
     Loop loop_;
     StallMonitor stall_monitor_;
     std::unique_ptr<Bridge> bridge_;
-    bool discards_cycles_ = true;  // nobody else takes the cycle records
+    bool discards_cycles_ = true;  // no bridge consumes the cycle records
     SizeWatch size_watch_;
 
     // Graph thread only.
     RunnerSettings settings_;
     std::unique_ptr<Plan> plan_ = std::make_unique<Plan>();
-    std::set<std::string> written_;  // mapped names with inputs that writeInput() feeds
+    std::set<std::string> written_;  // mapped names of inputs written by writeInput()
     std::size_t most_taps_ = SIZE_MAX;
     RunnerState state_ = RunnerState::Stopped;
-    std::uint64_t job_stops_ = 0;       // Job::stops of the present one
-    RealtimeProblems memory_problems_;  // as found at the start of the present loop
+    std::uint64_t job_stops_ = 0;       // Job::stops of the present job
+    RealtimeProblems memory_problems_;  // result of lockMemory() at the last start
     std::vector<std::string> degraded_;
     std::string status_;
     OverrunReport overrun_report_;
-    std::uint64_t told_faults_ = 0;  // LoopFigures::faults at the last look
+    std::uint64_t told_faults_ = 0;  // LoopFigures::faults at the last check
     ToldFaults told_not_finite_;
-    std::int64_t tuned_spin_ns_ = -1;  // by tuneSpin(); -1 = not yet
-    std::unique_ptr<Replay> replay_;   // while one is under way
-    bool bridge_served_ = true;        // not while a replay has the ports to itself
+    std::int64_t tuned_spin_ns_ = -1;  // result of tuneSpin(); -1 = none yet
+    std::unique_ptr<Replay> replay_;   // null = no replay
+    bool bridge_served_ = true;        // false during a replay, which uses the ports alone
     std::shared_ptr<SimulatedClock> clock_ = std::make_shared<SimulatedClock>();
     bool simulated_ = false;        // the loop follows clock_
     HistogramSnapshot tuned_from_;  // wake-up latency at the last tuneSpin()
@@ -341,7 +347,7 @@ class Runner final : private RunnerView {
     std::int64_t sizes_due_ns_ = 0;
     FrameMemory frame_memory_;
     Watches watches_;
-    std::shared_ptr<const FrameTable> frames_;  // that the loop fills; null before the first
+    std::shared_ptr<const FrameTable> frames_;  // frames of the loop; null before the first
 
     // Published for queries.
     std::atomic<NumberedState> numbered_state_;

@@ -1,4 +1,4 @@
-// How a runner begins and ends its loop, and with which settings it runs.
+// Runner: settings, start and stop of the loop.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace rtcf::executor {
 
 namespace {
 
-// Each once: the priority is looked at for the process and for its thread.
+// Adds texts without duplicates: the priority is checked for the process and for the thread.
 void addTexts(RealtimeProblems problems, std::vector<std::string>& texts) {
     for (RealtimeProblem& problem : problems) {
         if (std::find(texts.begin(), texts.end(), problem.text) == texts.end())
@@ -78,17 +78,17 @@ ChangeOutcome Runner::start(const Progress& progress) {
     return result;
 }
 
-// A stop is final: no work that was posted before it begins cycles.
+// A stop is final: a job posted before it must not start cycles.
 void Runner::requireNoStop() const {
     if (loop_.stops() == job_stops_) return;
     throw Refusal(
         RefusalKind::LoopStopped,
-        fmt::format("the loop of {} is not started: a stop was asked for after the start", name_));
+        fmt::format("the loop of {} is not started: a stop was requested after the start", name_));
 }
 
 RealtimeProblems Runner::lockAndStart() {
     LoopSettings settings = settings_.loop;
-    settings.max_overruns = 0;  // until all is known that is missing
+    settings.max_overruns = 0;  // until the missing prerequisites are known
     if (simulated_) return loop_.start(settings, job_stops_);
     memory_problems_ = lockMemory(settings_.loop.realtime);
     RealtimeProblems problems = memory_problems_;
@@ -97,7 +97,7 @@ RealtimeProblems Runner::lockAndStart() {
     for (const RealtimeProblem& problem : problems) {
         if (!problem.essential || !settings_.realtime_required) continue;
         throw Refusal(RefusalKind::NoRealtime,
-                      fmt::format("no real time: {}; or let it run degraded: rtcfctl runner set {} "
+                      fmt::format("no real time: {}; to run degraded: rtcfctl runner set {} "
                                   "--realtime preferred",
                                   problem.text, name_));
     }
@@ -107,8 +107,8 @@ RealtimeProblems Runner::lockAndStart() {
     return problems;
 }
 
-// As chosen; but where anything is missing for real time, cycles are late that the graph is not to
-// blame for.
+// The setting max_overruns, or 0 (never stop) without real time, as the graph does not cause all
+// late cycles then.
 std::uint32_t Runner::mostOverruns() const noexcept {
     return degraded_.empty() ? settings_.loop.max_overruns : 0;
 }
@@ -119,8 +119,8 @@ LoopSettings Runner::loopSettings() const {
     return settings;
 }
 
-// spin = auto: as long as 99 of 100 wake-ups of the last second were late, at most a tenth of the
-// period.
+// For spin = auto: sets the spin time to the 99 % quantile of the wake-up latency of the last
+// second, at most a tenth of the period.
 void Runner::tuneSpin() {
     if (!settings_.spin_auto || monotonicNow() - tuned_at_ns_ < kSecond) return;
     const HistogramSnapshot now = loop_.figures().wake_up.snapshot();
@@ -135,8 +135,7 @@ void Runner::tuneSpin() {
 ChangeOutcome Runner::stop(const Progress& progress) {
     if (loop_.joinable()) {
         progress("stopping the loop");
-        if (!loop_.stopRequested())
-            loop_.requestStop();  // it must not void a start that came since
+        if (!loop_.stopRequested()) loop_.requestStop();  // once, so that a later start stays valid
         if (!loop_.join(adoptionTimeout())) {
             throw Refusal(RefusalKind::Unavailable,
                           fmt::format("the loop of {} does not reach the end of its cycle: {}",
@@ -180,7 +179,7 @@ void Runner::startAll(const Progress& progress) {
 }
 
 void Runner::stopAll() noexcept {
-    // Against the order of execution: a component may rely on what it reads as long as it runs.
+    // In reverse order of execution, so that a component's writers run as long as it does.
     for (auto index = plan_->wiring.order.rbegin(); index != plan_->wiring.order.rend(); ++index) {
         Instance& instance = *plan_->graph.nodes()[*index].instance;
         note(instance.fullName() + ".stop");

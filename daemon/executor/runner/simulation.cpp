@@ -1,4 +1,4 @@
-// A runner under a simulated clock.
+// Runner: simulated clock.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -13,7 +13,8 @@ constexpr auto kBridgePatience = std::chrono::seconds(2);
 
 }  // namespace
 
-// A bridge that has just been told where its peers are is given a moment to ask them.
+// Waits for a moment if the bridge has just been configured and does not know its peers' choice
+// yet.
 bool Runner::wantsSimulation(const Progress& progress) {
     if (!bridge_ || !settings_.bridge.enabled || settings_.sim_time == SimTime::Never) return false;
     if (settings_.sim_time == SimTime::Always) return true;
@@ -23,7 +24,7 @@ bool Runner::wantsSimulation(const Progress& progress) {
         requireNoStop();
         const BridgeStatus status = bridge_->status();
         if (status.simulated_time) return *status.simulated_time;
-        if (!status.connected && !status.problem.empty()) return false;  // there is none
+        if (!status.connected && !status.problem.empty()) return false;  // there is no master
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
     return false;
@@ -38,7 +39,8 @@ void Runner::simulate(bool simulated) {
     for (const auto& injector : plan_->bridgeTable().inputs) injector->setQueueing(simulated);
     bridge_->setClock(settings_.loop.clock);
     if (!simulated) return;
-    // Whoever starts the loop and then the simulation is to lose no tick.
+    // Waits until the bridge follows the clock, so that a simulation started after the loop loses
+    // no tick.
     const auto until = std::chrono::steady_clock::now() + kBridgePatience;
     while (!bridge_->status().follows_clock && std::chrono::steady_clock::now() < until && !ending_)
         std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -50,8 +52,8 @@ void Runner::noteClockJumps() {
         std::string message = fmt::format("the simulated clock begins at {:.9f} s", to);
         if (jump->from_ns) {
             message = fmt::format(
-                "the simulated clock went from {:.9f} s to {:.9f} s: time goes on "
-                "from there with one cycle",
+                "the simulated clock jumped from {:.9f} s to {:.9f} s: the loop "
+                "continues from there with one cycle",
                 static_cast<double>(*jump->from_ns) / 1e9, to);
         }
         tell({RunnerEvent::Kind::Clock,

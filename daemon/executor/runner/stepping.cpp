@@ -1,4 +1,4 @@
-// A runner's cycles without real time: steps and replays.
+// Runner: cycles without real time, in steps and replays.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 namespace rtcf::executor {
 
-// Other cycles than the loop's are run only while it does not run.
+// Steps and replays require that the loop does not run.
 void Runner::requireNoLoop() {
     noticeEnd();
     if (!loop_.joinable()) return;
@@ -18,7 +18,7 @@ void Runner::requireNoLoop() {
                     name_));
 }
 
-// Of components that have started.
+// After startAll().
 void Runner::beginStepping(std::int64_t stamp_ns) {
     try {
         loop_.beginStepping(settings_.loop, job_stops_, stamp_ns);
@@ -28,7 +28,7 @@ void Runner::beginStepping(std::int64_t stamp_ns) {
     }
 }
 
-// Has all that a step begins with.
+// Prepares the first step.
 void Runner::pause(const Progress& progress) {
     startAll(progress);
     beginStepping();
@@ -48,7 +48,7 @@ ChangeOutcome Runner::step(std::uint64_t cycles, const Progress& progress,
         const std::uint64_t done = stepWatched(wanted, given_up);
         left -= done;
         log_.drain();
-        note({});  // a long run is not a hook that hangs
+        note({});  // resets the time of the activity, as a long run is not a hook that hangs
         if (done < wanted || ending_) break;
         if (left > 0) progress(fmt::format("{} of {} cycles", cycles - left, cycles));
     }
@@ -85,7 +85,7 @@ ReplayOutcome Runner::beginReplay(const ReplayChunk& chunk, const Progress& prog
     requireNoLoop();
     if (state_ == RunnerState::Stepping) endStepping();
     Replay::check(plan_->bridgeTable(), chunk.topics);
-    // Before the components are made anew: ROS never holds an end of what the replay will use.
+    // Before the components are recreated, so that ROS never uses a port of the replay.
     serveBridge(false);
     try {
         renewComponents(progress);
@@ -109,7 +109,7 @@ void Runner::serveBridge(bool served) {
     if (bridge_) bridge_->setTable(bridgeTable());
 }
 
-// The same components with the same parameters, but nothing that they or their inputs remember.
+// Recreates the components with the same parameters, but without state and old values of inputs.
 void Runner::renewComponents(const Progress& progress) {
     Change renewed;
     Change previous;
@@ -128,7 +128,7 @@ void Runner::renewComponents(const Progress& progress) {
         renewed.graph.add({instance, node.breaks});
         renewed.leaving.push_back(node.instance);
     }
-    adopt({}, progress);  // so that no connection's value stays
+    adopt({}, progress);  // removes all values of connections
     try {
         adopt(std::move(renewed), progress);
     } catch (...) {
@@ -140,7 +140,7 @@ void Runner::renewComponents(const Progress& progress) {
 void Runner::endStepping() {
     loop_.endStepping();
     if (replay_) {
-        replay_->discardOutputs();  // ROS sees nothing of them
+        replay_->discardOutputs();  // ROS must not get them
         replay_.reset();
         serveBridge(true);
     }

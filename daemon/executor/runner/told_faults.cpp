@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::int64_t kShortest = 10 * kSecond;
 constexpr std::int64_t kLongest = 600 * kSecond;
-// One that follows so soon belongs to those before it.
+// A fault this soon after a silence continues the series.
 constexpr std::int64_t kSoon = kSecond;
 
 }  // namespace

@@ -1,7 +1,7 @@
 /// @file
-/// When a component's values that are not finite are told again: the first one of a loop is told
-/// at once, others after a while in which nothing is told, which grows as long as they go on.
-/// Owned by the Runner; graph thread.
+/// Rate limit of reports on non-finite values: the first fault of a component is reported at once,
+/// later ones after a silence, which doubles while the faults continue. Owned by the Runner; graph
+/// thread.
 #pragma once
 
 #include <cstdint>
@@ -14,18 +14,18 @@ namespace rtcf::executor {
 
 class ToldFaults {
    public:
-    /// One of a component's was told, and no other is until rearm() says so.
-    /// @param now_ns CLOCK_MONOTONIC
-    /// @return faults of this component since the one that was told before; 0 = that was the first
+    /// Notes that a fault of a component was reported, and begins a silence.
+    /// @param now_ns CLOCK_MONOTONIC, ns
+    /// @return faults of this component since its last report; 0 = this is the first report
     std::uint64_t told(const std::shared_ptr<ComponentFigures>& of, std::int64_t now_ns);
-    /// Has the next fault told of those components that were silent for long enough.
+    /// Enables the next report of components whose silence is over.
     void rearm(std::int64_t now_ns);
 
    private:
     struct Silence {
         std::int64_t until_ns = 0;
         std::int64_t length_ns = 0;
-        std::uint64_t count = 0;  // of the component's faults when the last one was told
+        std::uint64_t count = 0;  // number of the component's faults at the last report
         bool over = false;
     };
     std::map<std::shared_ptr<ComponentFigures>, Silence> silences_;

@@ -1,4 +1,4 @@
-// What a runner does to change values: parameters, state, inputs that nobody else feeds.
+// Runner: changes of parameters, state, and inputs without a writer.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,7 +13,7 @@ ChangeOutcome Runner::reset(const std::string& name) {
     const Component& component = plan_->graph.get(name).instance->component();
     if (component.states().empty()) {
         throw Refusal(RefusalKind::NoState,
-                      fmt::format("{} declares no state (rtcf::State) that could be reset", name));
+                      fmt::format("{} declares no state (rtcf::State) to reset", name));
     }
     Change change;
     change.graph = plan_->graph;
@@ -23,17 +23,16 @@ ChangeOutcome Runner::reset(const std::string& name) {
     return outcome(name);
 }
 
-// A running loop is not disturbed from outside: what it remembers is its own.
+// Only while the loop does not run: outside changes of state must not disturb a running loop.
 ChangeOutcome Runner::setStates(const std::string& name,
                                 const std::vector<std::pair<std::string, ParameterValue>>& batch) {
     noticeEnd();
     const auto& states = plan_->graph.get(name).instance->component().states();
     if (loop_.joinable()) {
-        throw Refusal(
-            RefusalKind::FailedPrecondition,
-            fmt::format("the loop of {0} runs: state is set while it does not: rtcfctl -r "
-                        "{0} stop",
-                        name_));
+        throw Refusal(RefusalKind::FailedPrecondition,
+                      fmt::format("the loop of {0} runs: stop it to set state: rtcfctl -r "
+                                  "{0} stop",
+                                  name_));
     }
     std::vector<std::vector<std::byte>> values;
     Change change;
@@ -42,10 +41,9 @@ ChangeOutcome Runner::setStates(const std::string& name,
             std::find_if(states.begin(), states.end(),
                          [&](const StateDeclaration& state) { return state.name == state_name; });
         if (found == states.end()) {
-            throw Refusal(
-                RefusalKind::NotFound,
-                fmt::format("{} declares no state {}: rtcfctl info {} lists what there is", name,
-                            state_name, name));
+            throw Refusal(RefusalKind::NotFound,
+                          fmt::format("{} declares no state {}: rtcfctl info {} lists its states",
+                                      name, state_name, name));
         }
         values.push_back(stateValue(name, *found, value));
         change.copies.push_back({found->value, values.back().data(), found->size});
@@ -61,7 +59,7 @@ ChangeOutcome Runner::setParameters(
     const std::vector<ParameterValue> previous = instance.parameterValues();
     noticeEnd();
     requireNoReplay();
-    // Values alone: the schedule stays as it is.
+    // Only values change; the schedule stays.
     Adoption adoption;
     adoption.values = instance.stageParameters(batch);
     try {
@@ -70,10 +68,10 @@ ChangeOutcome Runner::setParameters(
         instance.restoreParameterValues(previous);
         throw;
     }
-    // It stands, whatever goes wrong from here on.
+    // From here on, an error does not undo the change.
     instance.releaseStaged();
-    ++plan_->schedule.generation;  // which the cycle does not look at
-    guarded("making a change known", [&] {
+    ++plan_->schedule.generation;  // not used by the cycle
+    guarded("publishing a change", [&] {
         publish({name});
         if (bridge_) bridge_->setTable(bridgeTable());
         noticeEnd();
@@ -105,7 +103,7 @@ WritableInput Runner::writableInput(const std::string& name, const std::string& 
         }
         if (*input.type().ros_type == '\0') {
             throw Refusal(RefusalKind::InvalidArgument,
-                          fmt::format("{} is of type {}, of which there is no text: write to one "
+                          fmt::format("{} is of type {}, which has no text form: write to an input "
                                       "of a number, bool, string, Eigen type or ROS message",
                                       full, input.type().name));
         }
@@ -121,7 +119,7 @@ ChangeOutcome Runner::writeInput(const std::string& name, const std::string& por
     const auto [topic, type] = writableInput(name, port);
     const auto* const bytes = reinterpret_cast<const std::uint8_t*>(message.data());
     const auto size = static_cast<std::uint32_t>(message.size());
-    // Before anything changes.
+    // Validates before any change.
     if (!type->deserialize(*type->make_slot(nullptr), bytes, size)) {
         throw Refusal(
             RefusalKind::InvalidArgument,

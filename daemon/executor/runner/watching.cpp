@@ -1,4 +1,4 @@
-// What a runner does for those who watch values of every cycle.
+// Runner: frames for watches.
 #include <algorithm>
 #include <chrono>
 #include <thread>
@@ -10,7 +10,7 @@ namespace rtcf::executor {
 
 namespace {
 
-// For readers who take nothing.
+// Longest wait for readers that take no frames.
 constexpr std::chrono::milliseconds kPatience{250};
 constexpr std::chrono::milliseconds kLook{1};
 
@@ -36,7 +36,7 @@ void Runner::onFramesWaiting(std::function<void()> tell) {
     frames_waiting_ = std::move(tell);
 }
 
-// Cycles that go as fast as they can wait for those who watch them.
+// Runs steps, which wait for readers of frames.
 std::uint64_t Runner::stepWatched(std::uint64_t cycles, const std::atomic<bool>* given_up) {
     if (watches_.empty()) return loop_.step(cycles, given_up);
     const std::uint64_t most = frames_->ring->capacity() / 2;
@@ -83,10 +83,10 @@ void Runner::renewFrames() {
     publishFrames(std::move(frames));
 }
 
-// Once the loop fills them.
+// After the loop has begun to fill them.
 void Runner::publishFrames(std::shared_ptr<const FrameTable> frames) noexcept {
     const std::shared_ptr<const FrameTable> previous = std::exchange(frames_, std::move(frames));
-    guarded("making frames known", [&] {
+    guarded("publishing frames", [&] {
         if (!watches_.empty()) {
             const std::lock_guard<std::mutex> lock(published_mutex_);
             new_frames_.push_back(frames_);

@@ -15,7 +15,7 @@ namespace pb = ::rtcf::v1;
 
 namespace {
 
-// What rtcfd says about the folder that it found a library in.
+// Trusts the owner of the library's folder, if rtcfd names one.
 template <typename Message>
 void trustOwnerOf(Runner& runner, const Message& message) {
     if (message.has_owner()) runner.trust(message.owner());
@@ -32,7 +32,8 @@ ChangeOutcome change(Runner& runner, const v1::Request& request, const Runner::P
             return runner.stop(progress);
         case v1::Request::kStep:
             if (request.step().cycles() == 0)
-                throw Refusal(RefusalKind::InvalidArgument, "0 cycles to step: name a number");
+                throw Refusal(RefusalKind::InvalidArgument,
+                              "0 cycles to step: give a positive number");
             return runner.step(request.step().cycles(), progress, &given_up);
         case v1::Request::kLoad: {
             trustOwnerOf(runner, request.load());

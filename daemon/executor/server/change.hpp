@@ -1,5 +1,5 @@
 /// @file
-/// What a request changes.
+/// Requests that change the graph or the loop.
 #pragma once
 
 #include <atomic>
@@ -10,8 +10,8 @@
 namespace rtcf::executor {
 
 /// Carries out a request that changes the graph or the loop. Graph thread.
-/// @param given_up of a step, which then pauses at the next boundary
-/// @throws Refusal, also on a request that is none of these
+/// @param given_up set by any thread to pause a step at the next boundary
+/// @throws Refusal, also if the request is of another kind
 ChangeOutcome change(Runner& runner, const v1::Request& request, const Runner::Progress& progress,
                      const std::atomic<bool>& given_up);
 

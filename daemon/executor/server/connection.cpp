@@ -11,7 +11,8 @@ namespace rtcf::executor {
 namespace {
 
 constexpr std::size_t kHeader = 4;
-constexpr std::size_t kLargestBacklog = 64 * 1024 * 1024;  // bytes for a peer that does not read
+// Most bytes queued for a peer that does not read.
+constexpr std::size_t kLargestBacklog = 64 * 1024 * 1024;
 
 std::uint32_t lengthOf(const std::string& bytes, std::size_t at) {
     std::uint32_t length = 0;
@@ -49,7 +50,7 @@ bool Connection::receive(std::vector<v1::Request>& requests) {
 bool Connection::send(const v1::Response& response) {
     const std::string body = response.SerializeAsString();
     if (out_.size() - written_ > kLargestBacklog) return false;
-    // What a slow peer has taken goes, as it may never take all.
+    // Removes sent bytes, as a slow peer may never empty the queue.
     if (written_ > out_.size() / 2) {
         out_.erase(0, written_);
         written_ = 0;

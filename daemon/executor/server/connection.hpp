@@ -1,6 +1,6 @@
 /// @file
-/// One connected rtcfd: frames in, frames out. A frame is a 4-byte
-/// little-endian length and a message. Main thread only.
+/// One connection from rtcfd: sends and receives messages. On the socket, a message follows its
+/// length, 4 bytes little-endian. Main thread only.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ class Connection {
    public:
     static constexpr std::uint32_t kLargestFrame = 16 * 1024 * 1024;
 
-    /// @param fd a connected stream socket, not blocking; owned from here on
+    /// @param fd a connected, non-blocking stream socket; owned by this object
     Connection(int fd, std::uint64_t id) : fd_(fd), id_(id) {}
     ~Connection();
     Connection(const Connection&) = delete;
@@ -27,15 +27,17 @@ class Connection {
     bool greeted() const noexcept { return greeted_; }
     void setGreeted() noexcept { greeted_ = true; }
     bool wantsWrite() const noexcept { return waiting() != 0; }
-    /// Bytes that the peer has not taken.
+    /// Number of bytes that the peer has not read.
     std::size_t waiting() const noexcept { return out_.size() - written_; }
 
-    /// Reads what has come. @return false if the peer has gone or sent no frames
+    /// Reads received requests.
+    /// @return false if the peer has disconnected or sent invalid data
     bool receive(std::vector<v1::Request>& requests);
-    /// Queues a message and sends what the socket takes. @return false if the peer has gone, or
-    /// does not read and has too much waiting
+    /// Queues a message and sends as much as the socket accepts.
+    /// @return false if the peer has disconnected, or if too many bytes wait for it
     bool send(const v1::Response& response);
-    /// Sends on. @return false if the peer has gone
+    /// Continues sending.
+    /// @return false if the peer has disconnected
     bool flush();
 
    private:

@@ -21,17 +21,19 @@ namespace rtcf::executor {
 
 namespace {
 
-constexpr std::int64_t kLineTimeout = kSecond;           // from the connection to the line
-constexpr std::int64_t kAnswerTimeout = 2 * kSecond;     // from the line to the end of the loop
-constexpr std::int64_t kDiskTimeout = 3 * kSecond / 10;  // from the line, for the disk
-constexpr int kLookMs = 2;                               // between looks at a loop that is to end
-constexpr std::size_t kMostClients = 32;                 // with the right; others are never kept
+constexpr std::int64_t kLineTimeout = kSecond;        // from the connection to the request line
+constexpr std::int64_t kAnswerTimeout = 2 * kSecond;  // from the request to the end of the loop
+// From the request to the removal of the mark on disk.
+constexpr std::int64_t kDiskTimeout = 3 * kSecond / 10;
+constexpr int kLookMs = 2;                // ms between checks of a stopping loop
+constexpr std::size_t kMostClients = 32;  // clients with the right; others are disconnected at once
 constexpr std::size_t kLongestLine = 64;
-constexpr mode_t kSocketMode = 0660;  // who has no right is told so; the folder keeps others out
+// Users without the right get an answer; the folder excludes all others.
+constexpr mode_t kSocketMode = 0660;
 
 void answer(int fd, const std::string& text) {
     const std::string line = text + "\n";
-    // A client that reads nothing is not waited for.
+    // Does not wait for a client that does not read.
     [[maybe_unused]] const ssize_t sent =
         ::send(fd, line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
 }
@@ -100,10 +102,10 @@ void DirectStop::threadMain() {
                                        [](const Client& client) { return client.asked; });
         std::vector<pollfd> polled{{wake_, POLLIN, 0}, {listener_->fd(), listener_->events(), 0}};
         const bool full = polled[1].events == 0;
-        // Nobody is kept waiting by those who only connect.
+        // Clients that only connect must not block others.
         if (clients_.size() >= kMostClients) polled[1].events = 0;
         for (const Client& client : clients_)
-            polled.push_back({client.asked ? -1 : client.fd, POLLIN, 0});  // nothing more is heard
+            polled.push_back({client.asked ? -1 : client.fd, POLLIN, 0});  // no further requests
         const int at_most_ms = clients_.empty() && !full ? 1000 : 100;
         ::poll(polled.data(), polled.size(), waits ? kLookMs : at_most_ms);
         for (std::size_t i = clients_.size(); i-- > 0;) {
@@ -130,9 +132,9 @@ void DirectStop::accept() {
         ::close(fd);
         return;
     }
-    // At once, and without a look at what it sends: that costs the others next to nothing.
+    // Checks the right at once, before reading, so that clients without it cost little.
     if (const Right has = access_.of(peer.uid, groupsOf(fd, peer.gid)); has < Right::Operate) {
-        answer(fd, fmt::format("refused: stop takes the right to operate, and user {} has {}",
+        answer(fd, fmt::format("refused: stop requires the right `operate`, but user {} has {}",
                                peer.uid, has == Right::None ? "none" : wordOf(has)));
         ::close(fd);
         return;
@@ -145,8 +147,8 @@ bool DirectStop::attend(Client& client, bool readable) {
         if (!what_.running()) return !answerStopped(client);
         if (monotonicNow() < client.until_ns) return true;
         answer(client.fd,
-               "late: a component does not return from its update(): its loop ends when that does, "
-               "or its executor after stall_timeout");
+               "late: a component does not return from update(): the loop ends when it does, "
+               "or the executor after stall_timeout");
         return false;
     }
     if (!readable) return monotonicNow() < client.until_ns;
@@ -157,7 +159,7 @@ bool DirectStop::attend(Client& client, bool readable) {
     if (client.text.find('\n') == std::string::npos)
         return count > 0 && client.text.size() <= kLongestLine;
     if (client.text != "stop\n") {
-        answer(client.fd, "refused: what can be asked for here is `stop`");
+        answer(client.fd, "refused: the only request here is `stop`");
         return false;
     }
     stop(client);

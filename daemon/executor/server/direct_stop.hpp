@@ -1,8 +1,7 @@
 /// @file
-/// The executor's own stop: a socket beside the server's, for people and not
-/// for rtcfd, which may be dead, stopped, or busy with others. A thread of its
-/// own serves it; what the main or the graph thread does holds it up as little.
-/// The protocol stands in executor.proto, at DirectStop.
+/// The executor's own stop socket, for users when rtcfd is dead, stopped or busy. A separate thread
+/// serves it, nearly independent of the main thread and the graph thread. executor.proto defines
+/// the protocol, at DirectStop.
 #pragma once
 
 #include <sys/types.h>
@@ -23,7 +22,7 @@
 
 namespace rtcf::executor {
 
-/// Who has stopped the loop, and when.
+/// The client that stopped the loop, and the time.
 struct DirectStopReport {
     std::uint64_t count = 0;  ///< stops so far; 0 = none
     uid_t user = 0;
@@ -31,31 +30,33 @@ struct DirectStopReport {
     std::int64_t at_ns = 0;  ///< CLOCK_MONOTONIC
 };
 
-/// As rtcfd is told.
+/// Conversion to the message for rtcfd.
 v1::DirectStop directStopTo(const DirectStopReport& report);
 
-/// What is stopped. Both are called by the socket's thread.
+/// The loop to stop. The socket's thread calls both functions.
 struct Stoppable {
-    /// Ends the loop at the next boundary, and lets no start that was asked for before happen.
+    /// Stops the loop at the next boundary, and voids earlier start requests.
     std::function<void(const DirectStopReport&)> stop;
     std::function<bool()> running;
 };
 
 class DirectStop {
    public:
-    /// Listens. @param path of the socket; empty = none @param mark file to be removed with each
-    /// stop, by which a loop would be resumed; empty = none
+    /// Listens on the socket.
+    /// @param path path of the socket; empty = none
+    /// @param mark file that each stop removes, so that the loop is not resumed; empty = none
     /// @throws std::system_error
     DirectStop(std::string path, std::string mark, const Access& access);
     ~DirectStop();
     DirectStop(const DirectStop&) = delete;
     DirectStop& operator=(const DirectStop&) = delete;
 
-    /// Begins to serve. @param what outlives close()
+    /// Starts the thread.
+    /// @param what outlives close()
     void serve(Stoppable what);
-    /// Ends serving.
+    /// Ends the thread.
     void close() noexcept;
-    /// Any thread.
+    /// The last stop. Any thread.
     DirectStopReport last() const;
 
    private:
@@ -65,22 +66,24 @@ class DirectStop {
         pid_t pid;
         bool asked;
         std::int64_t until_ns;
-        std::int64_t saved_until_ns;  // for the disk
+        std::int64_t saved_until_ns;  // end of the wait for the disk
         std::string text;
     };
 
     void threadMain();
     void accept();
-    /// @return false if the client is to be let go
+    /// Handles one client.
+    /// @return false if the client is to be disconnected
     bool attend(Client& client, bool readable);
-    /// Answers a client after the end of the loop, if there is an answer yet.
+    /// Answers a client after the end of the loop.
+    /// @return false if the answer still waits for the disk
     bool answerStopped(const Client& client) const;
     void stop(const Client& client);
 
     ResumeMark mark_;
     const Access& access_;
     Stoppable what_;
-    std::optional<Listener> listener_;  // none without a path
+    std::optional<Listener> listener_;  // unset without a path
     int wake_ = -1;
     std::atomic<bool> ending_{false};
     std::vector<Client> clients_;

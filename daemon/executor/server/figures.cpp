@@ -40,7 +40,7 @@ void Figures::addTo(pb::RunnerStatus& status, const GraphSnapshot& graph) const 
     status.set_tap_dropped(tapDropped(graph, *baseline));
 }
 
-// Of the same cycles, unless the loop leaves no time between them.
+// All statistics are of the same cycles, unless the loop leaves no time between cycles.
 pb::RunnerStatistics Figures::statistics(bool buckets) const {
     const std::shared_ptr<const GraphSnapshot> graph = runner_.snapshot();
     const Loop& loop = runner_.loop();
@@ -88,7 +88,7 @@ pb::RunnerStatistics Figures::statistics(bool buckets) const {
                                           static_cast<double>(present.device_calls));
         }
     }
-    // The kernel counts of each thread from its beginning.
+    // The kernel's counters begin with each thread.
     const ThreadUsage before = now.thread == baseline->thread ? baseline->usage : ThreadUsage{};
     message.set_minor_faults(now.usage.minor_faults - before.minor_faults);
     message.set_major_faults(now.usage.major_faults - before.major_faults);
@@ -133,7 +133,7 @@ Figures::Counted Figures::counted(const GraphSnapshot& graph) const {
     return figures;
 }
 
-// @return whether it could be taken: not while a cycle is being counted
+// @return false if a cycle is being counted
 bool Figures::restart() {
     runner_.holdFigures(true);
     const std::shared_ptr<const GraphSnapshot> graph = runner_.snapshot();

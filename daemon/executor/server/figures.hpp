@@ -1,5 +1,5 @@
 /// @file
-/// What a runner has counted since the last reset, as messages.
+/// Statistics of a runner since the last reset, as messages.
 #pragma once
 
 #include <cstdint>
@@ -15,32 +15,34 @@
 
 namespace rtcf::executor {
 
-/// Owned by the server; its thread and the graph thread.
+/// Owned by the server. Main thread and graph thread.
 class Figures {
    public:
-    /// @param runner, log outlive this
+    /// @param runner, log outlive this object
     Figures(Runner& runner, Log& log) : runner_(runner), log_(log) {}
 
-    /// Those of a status.
+    /// Adds the statistics of a status.
     void addTo(::rtcf::v1::RunnerStatus& status, const GraphSnapshot& graph) const;
-    /// @param buckets with how often the loop took how long
+    /// All statistics.
+    /// @param buckets true = with the histograms of the loop
     ::rtcf::v1::RunnerStatistics statistics(bool buckets) const;
 
-    /// Counts from now on. @return whether it could: not while a cycle is being counted; cycles
-    /// after it are not, until it can
+    /// Resets the statistics.
+    /// @return false if a cycle is being counted; later cycles are then not counted until a call
+    /// succeeds
     bool restart();
-    /// Counts from now on, also while a cycle is being counted.
+    /// Resets the statistics, even while a cycle is being counted.
     void restartInStep();
 
    private:
-    struct Counted {  // all that is counted, since the beginning
+    struct Counted {  // all counters since the start
         struct Component {
             HistogramSnapshot duration;
             std::uint64_t overruns = 0;
             std::uint64_t device_calls = 0;
             std::int64_t device_time_ns = 0;
         };
-        // Held, as another component's figures could come to the same address.
+        // Shared ownership, as other statistics could get the same address.
         std::map<std::shared_ptr<const ComponentFigures>, Component> components;
         HistogramSnapshot duration;
         HistogramSnapshot latency;
@@ -52,7 +54,7 @@ class Figures {
         std::uint64_t frame_overruns = 0;
         std::uint64_t catching_up = 0;
         std::uint64_t log_dropped = 0;
-        // Not held, as their rings are large.
+        // Weak, as the taps' rings are large.
         std::map<std::weak_ptr<const Tap>, std::uint64_t, std::owner_less<>> tap_dropped;
         int thread = 0;
         ThreadUsage usage;
@@ -65,7 +67,7 @@ class Figures {
 
     Runner& runner_;
     Log& log_;
-    mutable std::mutex mutex_;  // the graph thread tells a status, too
+    mutable std::mutex mutex_;  // the graph thread makes status messages, too
     std::shared_ptr<const Counted> baseline_ = std::make_shared<Counted>();
 };
 

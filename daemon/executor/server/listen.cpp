@@ -36,7 +36,8 @@ Listener::~Listener() {
     if (reserve_ >= 0) ::close(reserve_);
 }
 
-// Returns a listening socket at the path. Throws std::system_error.
+// Makes a listening socket at the path.
+// @throws std::system_error
 int Listener::bound(bool replace) {
     int fd = -1;
     const auto fail = [&](int error) {
@@ -67,7 +68,7 @@ void Listener::renew(std::int64_t now_ns) noexcept {
     try {
         ::close(std::exchange(fd_, bound(false)));
     } catch (const std::exception&) {
-        // Its folder is gone, too: until it is there again.
+        // The folder is gone, too; try again later.
     }
 }
 

@@ -9,27 +9,28 @@
 
 namespace rtcf::executor {
 
-/// Listens at a path. It keeps a descriptor in reserve: where the process has none left, one client
-/// is let in all the same, and the others wait without being looked at. Somebody may remove its
-/// socket by mistake: it makes another. Not thread-safe.
+/// Listens at a path. It keeps a spare descriptor: if the process has none left, one more client
+/// can connect, and the others wait in the kernel without being polled. If somebody removes the
+/// socket by mistake, it makes a new one. Not thread-safe.
 class Listener {
    public:
-    /// In the place of what an executor that was killed has left there.
-    /// @param mode of the socket; 0 = as the umask says
+    /// Replaces the socket of a killed executor.
+    /// @param mode file mode of the socket; 0 = by the umask
     /// @throws std::system_error
     Listener(std::string path, int backlog, mode_t mode = 0);
-    /// Removes the socket, if it is still its own.
+    /// Removes the socket if it is still this object's.
     ~Listener();
     Listener(const Listener&) = delete;
     Listener& operator=(const Listener&) = delete;
 
     int fd() const noexcept { return fd_; }
-    /// What to poll fd() for; nothing while there is no descriptor for who comes.
+    /// Events to poll fd() for; 0 while there is no free descriptor.
     short events() noexcept;
-    /// @return the client's descriptor, not blocking, closed by exec; -1 if there is none
+    /// Accepts a client.
+    /// @return its descriptor, non-blocking and close-on-exec; -1 if there is none
     int accept() noexcept;
-    /// Makes the socket anew if there is none at its path, at most once a second. Leaves alone what
-    /// somebody else has put there.
+    /// Makes a new socket if there is no file at the path, at most once a second. Does not touch
+    /// other files.
     void renew(std::int64_t now_ns) noexcept;
 
    private:

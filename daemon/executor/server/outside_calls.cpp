@@ -10,7 +10,7 @@ std::uint64_t OutsideCalls::begin() {
 
 OutsideAnswer OutsideCalls::wait(std::uint64_t call, std::chrono::milliseconds timeout,
                                  const std::atomic<bool>& cancel) {
-    constexpr auto kLook = std::chrono::milliseconds(50);  // nobody wakes us to cancel
+    constexpr auto kLook = std::chrono::milliseconds(50);  // `cancel` wakes nobody up
     const auto until = std::chrono::steady_clock::now() + timeout;
     std::unique_lock lock(mutex_);
     Waiting& waiting = waiting_[call];
@@ -18,9 +18,8 @@ OutsideAnswer OutsideCalls::wait(std::uint64_t call, std::chrono::milliseconds t
         answered_.wait_for(lock, kLook);
     }
     OutsideAnswer answer = waiting.answer.value_or(OutsideAnswer{
-        false, cancel
-                   ? "the executor is ending"
-                   : "rtcfd has not answered in time; it may still be done: see rtcfctl status"});
+        false, cancel ? "the executor is ending"
+                      : "rtcfd has not answered in time, but may still act: see rtcfctl status"});
     waiting_.erase(call);
     return answer;
 }
@@ -47,7 +46,7 @@ void OutsideCalls::lost(std::uint64_t connection) {
         const std::lock_guard lock(mutex_);
         for (auto& [call, waiting] : waiting_) {
             if (waiting.connection != connection || waiting.answer) continue;
-            waiting.answer = {false, "rtcfd has gone away; what was asked for may have been done"};
+            waiting.answer = {false, "rtcfd has disconnected; it may have carried out the request"};
         }
     }
     answered_.notify_all();

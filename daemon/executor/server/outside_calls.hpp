@@ -1,7 +1,6 @@
 /// @file
-/// Calls from outside that wait for the daemon's answer. Owned by the server.
-/// The asking threads wait in here; the server's thread says what becomes of
-/// their calls.
+/// Calls from outside that wait for rtcfd's answer. Owned by the server. The calling threads wait
+/// in wait(); the server's thread provides the answers.
 #pragma once
 
 #include <chrono>
@@ -17,22 +16,24 @@ namespace rtcf::executor {
 
 class OutsideCalls {
    public:
-    /// @name By the asking thread
+    /// @name Calling thread
     /// @{
-    /// A call that is about to be sent. @return its number
+    /// Registers a call before it is sent.
+    /// @return its number
     std::uint64_t begin();
-    /// Waits for its answer, at most `timeout` and not long after `cancel` becomes true.
+    /// Waits for the answer, at most `timeout`; returns soon after `cancel` becomes true.
     OutsideAnswer wait(std::uint64_t call, std::chrono::milliseconds timeout,
                        const std::atomic<bool>& cancel);
     /// @}
 
-    /// @name By the server's thread
+    /// @name Server's thread
     /// @{
-    /// It went to this connection, whose end ends it.
+    /// Records the connection to which the call was sent.
     void sent(std::uint64_t call, std::uint64_t connection);
-    /// @return false if nobody waits for it any more
+    /// Provides the answer.
+    /// @return false if the call no longer waits
     bool answer(std::uint64_t call, OutsideAnswer answer);
-    /// The connection has ended: its calls have failed.
+    /// Fails the calls of a closed connection.
     void lost(std::uint64_t connection);
     /// @}
 
@@ -42,7 +43,7 @@ class OutsideCalls {
         std::optional<OutsideAnswer> answer;
     };
 
-    std::mutex mutex_;  // all below
+    std::mutex mutex_;  // protects all members below
     std::condition_variable answered_;
     std::uint64_t next_ = 1;
     std::map<std::uint64_t, Waiting> waiting_;

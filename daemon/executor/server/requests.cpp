@@ -22,8 +22,8 @@ namespace pb = ::rtcf::v1;
 
 namespace {
 
-// Of rtcfd and executor the newer asks for nothing that the older does not know:
-// see link.py of rtcfd. Hello, stop and exit stay as they are for good.
+// Protocol version. The newer side of rtcfd and executor uses only requests that the older one
+// knows, see link.py of rtcfd. Hello, stop and exit never change.
 constexpr std::uint32_t kProtocol = 4;
 constexpr std::int64_t kHookTimeout = 10 * kSecond;
 constexpr std::int64_t kProbeTimeout = kSecond / 2;
@@ -39,7 +39,7 @@ void Server::requireNotStuck() const {
     const std::string where = stuck();
     if (where.empty()) return;
     throw Refusal(RefusalKind::Unavailable,
-                  fmt::format("runner {} is stuck in {}(): only stop and restart it",
+                  fmt::format("runner {} is stuck in {}(): only stop and restart are possible",
                               runner_->name(), where));
 }
 
@@ -144,20 +144,20 @@ bool Server::answerQuery(std::uint64_t connection, const v1::Request& request) {
 
 void Server::submitChange(std::uint64_t connection, const v1::Request& request) {
     const std::uint64_t id = request.id();
-    // Stop never queues behind a hook.
+    // A stop never waits behind a hook.
     if (request.kind_case() == v1::Request::kStop) runner_->requestStop();
     if (request.kind_case() != v1::Request::kStop) requireNotStuck();
     requireStopsKnown(request);
-    // Statistics are of one run of the loop, which has not begun yet.
+    // Statistics belong to one run of the loop, which begins here.
     const bool begins = request.kind_case() == v1::Request::kStart ||
                         (request.kind_case() == v1::Request::kReplay && request.replay().begin()) ||
                         ((request.kind_case() == v1::Request::kStep ||
                           request.kind_case() == v1::Request::kRestoreSnapshot) &&
                          runner_->picture().state != RunnerState::Stepping);
     if (begins && !runner_->loop().running() && !figures_->restart()) {
-        figures_->restartInStep();  // in a step, which this one waits for
+        figures_->restartInStep();  // during a step, which this request waits for
     }
-    // Steps take as long as they take; they report progress.
+    // Steps and replays have no time limit; they report progress.
     const bool endless =
         request.kind_case() == v1::Request::kStep || request.kind_case() == v1::Request::kReplay;
     const auto given_up = std::make_shared<std::atomic<bool>>(false);
@@ -170,18 +170,19 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
     runner_->post([this, connection, id, request, given_up, endless] {
         v1::Response response;
         response.set_id(id);
-        // Whoever asked has been told that it did not happen. Stop is another matter.
+        // If the request was given up, the caller has already received an error. A stop is carried
+        // out anyway.
         const auto require_wanted = [&] {
             if (!given_up->load() || request.kind_case() == v1::Request::kStop) return;
             throw Refusal(RefusalKind::Unavailable,
-                          "given up: its caller has left, or a hook took too long");
+                          "given up: the caller has disconnected, or a hook took too long");
         };
         try {
             require_wanted();
             requireStopsKnown(request);
             const auto progress = [this, connection, id, endless,
                                    &require_wanted](const std::string& line) {
-                if (!endless) require_wanted();  // those end by themselves
+                if (!endless) require_wanted();  // endless ones pause by themselves
                 v1::Response step;
                 step.set_id(id);
                 step.set_progress(line);
@@ -214,12 +215,12 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
             response = errorResponse(id, RefusalKind::FailedPrecondition, "an unknown exception");
         }
         setState(response, runner_->numberedState());
-        log_->drain();  // what the hooks said comes before the answer
+        log_->drain();  // sends log records of hooks before the answer
         post(connection, std::move(response), true);
     });
 }
 
-// What was asked for before somebody stopped the loop past rtcfd does not run it again.
+// Rejects a request to run the loop if it was made before the last direct stop.
 void Server::requireStopsKnown(const v1::Request& request) const {
     const bool runs = request.kind_case() == v1::Request::kStart ||
                       request.kind_case() == v1::Request::kStep ||
@@ -228,13 +229,13 @@ void Server::requireStopsKnown(const v1::Request& request) const {
     const DirectStopReport report = direct_stop_->last();
     if (!runs || request.direct_stops() >= report.count) return;
     throw Refusal(RefusalKind::LoopStopped,
-                  fmt::format("runner {} was stopped at its executor by user {} after this was "
-                              "asked for: ask again",
+                  fmt::format("runner {} was stopped at its executor by user {} after this "
+                              "request: ask again",
                               runner_->name(), report.user));
 }
 
-// A component's picture is at hand; only its ports' values need the graph thread, and are left
-// out if that is busy.
+// Answers GetComponent. The graph view has the component; only values need the graph thread, and
+// are omitted if it is busy.
 void Server::submitProbe(std::uint64_t connection, const v1::Request& request) {
     const std::string name = fullNameOf(request.get_component().component());
     const std::uint64_t id = request.id();
@@ -244,7 +245,7 @@ void Server::submitProbe(std::uint64_t connection, const v1::Request& request) {
         std::find_if(graph->components.begin(), graph->components.end(),
                      [&](const auto& component) { return component->full_name == name; });
     if (found == graph->components.end()) {
-        (void)graph->get(name);  // refuses
+        (void)graph->get(name);  // throws
     }
     v1::Response response;
     response.set_id(id);
@@ -257,13 +258,13 @@ void Server::submitProbe(std::uint64_t connection, const v1::Request& request) {
             addValues(*response.mutable_component(), runner_->probe(name));
             addStates(*response.mutable_component(), runner_->states(name));
         } catch (const std::exception&) {
-            // Unloaded since: the picture of a moment ago is still an answer.
+            // Unloaded meanwhile: answer with the earlier graph view.
         }
         post(connection, std::move(response), true);
     });
 }
 
-// Its values begin once the graph thread has the loop keep them.
+// Begins a stream. Values begin when the graph thread has made the loop keep them.
 void Server::beginWatch(std::uint64_t connection, const v1::Request& request) {
     requireNotStuck();
     const std::uint64_t id = request.id();
@@ -334,7 +335,8 @@ pb::RunnerStatus Server::status() const {
     return status;
 }
 
-// At once, or when the cycle has ended that is being counted: those after it are not, until then.
+// Resets the statistics at once, or at the end of the cycle that is being counted; later cycles are
+// not counted until then.
 void Server::resetStatistics(std::uint64_t connection, std::uint64_t request) {
     constexpr std::int64_t kPeriods = 10;
     const std::int64_t period_ns = runner_->picture().settings.loop.period_ns;
@@ -361,9 +363,10 @@ void Server::goOnWithResets() {
         const std::string activity = runner_->recorder().realtimeActivity();
         answer = errorResponse(
             0, RefusalKind::Unavailable,
-            fmt::format("the loop of {} reaches no cycle boundary: {} does not return; its figures "
-                        "go on",
-                        runner_->name(), activity.empty() ? "a component" : activity + "()"));
+            fmt::format(
+                "the loop of {} reaches no cycle boundary: {} does not return; the statistics "
+                "are not reset",
+                runner_->name(), activity.empty() ? "a component" : activity + "()"));
     }
     for (const Reset& each : answered) {
         answer.set_id(each.request);

@@ -17,16 +17,17 @@ namespace rtcf::executor {
 
 namespace {
 
-constexpr std::chrono::milliseconds kPatience{300};  // with a disk, at the end
+constexpr std::chrono::milliseconds kPatience{300};  // longest wait for the disk in the destructor
 
-// @return the error, or empty. Works on a full disk, too.
+// Removes the file; works on a full disk, too.
+// @return the error; empty = none
 std::string unlinked(const std::string& path) {
     if (::unlink(path.c_str()) == 0 || errno == ENOENT || errno == ENOTDIR) return {};
     const int error = errno;
     struct stat found{};
-    // Nothing but a regular file is a mark.
+    // Only a regular file is a mark.
     if (::lstat(path.c_str(), &found) == 0 && !S_ISREG(found.st_mode)) return {};
-    return std::strerror(error);  // NOLINT(concurrency-mt-unsafe): of glibc it is safe
+    return std::strerror(error);  // safe in glibc
 }
 
 void syncFolderOf(const std::string& path) {
@@ -39,7 +40,7 @@ void syncFolderOf(const std::string& path) {
 
 }  // namespace
 
-// Owned by the thread, too, which may outlive the mark in a call that does not return.
+// Shared with the thread, which may outlive the mark in a call that does not return.
 struct ResumeMark::Shared {
     explicit Shared(std::string of) : path(std::move(of)) {}
 
@@ -70,7 +71,7 @@ void ResumeMark::Shared::threadMain() {
         removed.notify_all();
         if (!problem.empty() || asked != done) continue;
         lock.unlock();
-        // After the answer: a busy disk is no reason to say "stopped" late.
+        // After the answer, so that a busy disk does not delay "stopped".
         syncFolderOf(path);
         lock.lock();
     }
@@ -79,7 +80,7 @@ void ResumeMark::Shared::threadMain() {
 ResumeMark::ResumeMark(std::string path) {
     if (path.empty()) return;
     shared_ = std::make_shared<Shared>(std::move(path));
-    // Detached: a thread in a call that does not return cannot be waited for.
+    // Detached, because the destructor cannot wait for a call that does not return.
     std::thread([shared = shared_] { shared->threadMain(); }).detach();
 }
 

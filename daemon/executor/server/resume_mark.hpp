@@ -1,6 +1,6 @@
 /// @file
-/// The file that makes others resume the loop. Each stop removes it, in a thread of its own: the
-/// disk may hang, and neither a stop nor its answer waits for one.
+/// The file by which rtcfd resumes the loop after a restart. Each stop removes it in a separate
+/// thread, so that a hanging disk delays neither the stop nor its answer.
 #pragma once
 
 #include <cstdint>
@@ -11,19 +11,20 @@ namespace rtcf::executor {
 
 class ResumeMark {
    public:
-    /// @param path empty = none, which counts as removed
+    /// @param path empty = no file, which counts as removed
     explicit ResumeMark(std::string path);
-    /// Leaves a disk that hangs to itself.
+    /// Does not wait for a hanging disk.
     ~ResumeMark();
     ResumeMark(const ResumeMark&) = delete;
     ResumeMark& operator=(const ResumeMark&) = delete;
 
-    /// Begins to remove the file. Does not wait. Not real-time safe, as all here.
+    /// Starts the removal of the file, without waiting. Not real-time safe, like all functions
+    /// here.
     void remove();
 
     struct Removal {
         bool done = true;
-        std::string problem;  ///< why the file is still there; of one that is done
+        std::string problem;  ///< error of a finished removal; empty = none
     };
     /// The result of the last remove(). Any thread.
     Removal last() const;

@@ -20,14 +20,13 @@ namespace rtcf::executor {
 
 namespace {
 
-// Longer than rtcfd takes for one change, those before it included.
+// Longer than rtcfd takes for one change and those queued before it.
 constexpr std::chrono::seconds kAskTimeout{70};
-constexpr std::size_t kLargestOutbox = 10000;  // messages kept while no daemon is connected
+constexpr std::size_t kLargestOutbox = 10000;  // most messages kept while no rtcfd is connected
 constexpr std::size_t kLargestConnections = 8;
 constexpr int kBacklog = 8;
-constexpr int kPortsInterval = 20;  // ms between batches of values
-constexpr std::size_t kMostPorts =
-    std::size_t{4} * 1024 * 1024;  // bytes that wait for their reader
+constexpr int kPortsInterval = 20;                                // ms between batches of values
+constexpr std::size_t kMostPorts = std::size_t{4} * 1024 * 1024;  // most bytes queued for a reader
 
 [[noreturn]] void fail(const std::string& what) {
     throw std::system_error(errno, std::generic_category(), what);
@@ -57,7 +56,7 @@ v1::Response lostRecords(std::uint64_t count) {
     entry.level = LogLevel::Warn;
     entry.time_ns =
         std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
-    entry.message = fmt::format("{} log records were lost: no daemon took them in time", count);
+    entry.message = fmt::format("{} log records were dropped: no rtcfd read them in time", count);
     v1::Response response;
     *response.mutable_log() = logTo(entry);
     return response;
@@ -81,7 +80,7 @@ Server::~Server() {
 void Server::post(std::uint64_t connection, v1::Response response, bool last) {
     {
         const std::lock_guard<std::mutex> lock(outbox_mutex_);
-        // Answers and events always have room: there are few of them.
+        // Answers and events are few, so they are never dropped.
         if (response.has_log() && outbox_.size() >= kLargestOutbox) {
             ++lost_records_;
             return;
@@ -93,7 +92,7 @@ void Server::post(std::uint64_t connection, v1::Response response, bool last) {
 
 void Server::wakeUp() const {
     const std::uint64_t one = 1;
-    // Full means that it is awake already.
+    // If the counter is full, the thread is already awake.
     [[maybe_unused]] const ssize_t count = ::write(wake_, &one, sizeof one);
 }
 
@@ -124,7 +123,7 @@ OutsideAnswer Server::ask(const OutsideCall& call, const std::atomic<bool>& canc
     return calls_.wait(number, kAskTimeout, cancel);
 }
 
-// To one daemon, the one that came last: nothing is to be done twice.
+// Sends a call to one rtcfd only, the last one connected, so that it is not carried out twice.
 void Server::handOn(const v1::Response& call) {
     const std::uint64_t number = call.service_call().call();
     for (auto each = connections_.rbegin(); each != connections_.rend(); ++each) {
@@ -188,7 +187,7 @@ void Server::serve(Runner& runner, Log& log, Access& access, const DirectStop& d
     runner.requestStop();
 }
 
-// No daemon for too long: nobody is left who could stop this loop.
+// True if no rtcfd, which could stop the loop, has been connected for too long.
 bool Server::orphaned() {
     const bool anybody = std::any_of(connections_.begin(), connections_.end(),
                                      [](const auto& entry) { return entry.second->greeted(); });
@@ -231,7 +230,7 @@ void Server::drop(std::uint64_t id) {
         if (of_it && it->second.endless()) it->second.given_up->store(true);
         it = of_it ? waiting_.erase(it) : std::next(it);
     }
-    // Those of others are gone on with; if there are none, the figures go on.
+    // Resets of other connections continue; if there are none, counting resumes.
     const auto gone = std::remove_if(resets_.begin(), resets_.end(),
                                      [id](const Reset& each) { return each.connection == id; });
     if (gone == resets_.end()) return;
@@ -241,13 +240,13 @@ void Server::drop(std::uint64_t id) {
 
 void Server::respond(std::uint64_t connection, const v1::Response& response) {
     if (const std::size_t size = response.ByteSizeLong(); size > Connection::kLargestFrame) {
-        // The daemon would hang up on it, and ask for the same when it is connected again.
+        // rtcfd would close the connection, reconnect and repeat the request.
         const std::string kind = v1::Response::descriptor()
                                      ->FindFieldByNumber(static_cast<int>(response.kind_case()))
                                      ->name();
         const std::string text = fmt::format(
-            "{} of runner {} take {} bytes, {} at most: spread its components over more runners, "
-            "or give them smaller values",
+            "{} of runner {} take {} bytes; the limit is {}: spread its components over more "
+            "runners, or give them smaller values",
             kind, runner_->name(), size, Connection::kLargestFrame);
         if (response.id() == 0) {
             log_->write(LogLevel::Error, {}, text);
@@ -260,7 +259,7 @@ void Server::respond(std::uint64_t connection, const v1::Response& response) {
     if (found != connections_.end() && !found->second->send(response)) drop(connection);
 }
 
-// Sends what other threads have posted. Unasked messages wait for somebody to send them to.
+// Sends messages from other threads. Unsolicited messages wait for a connection.
 void Server::deliver() {
     std::deque<Outgoing> outgoing;
     const bool anybody = std::any_of(connections_.begin(), connections_.end(),
@@ -272,7 +271,8 @@ void Server::deliver() {
             if (lost_records_ != 0) outgoing.push_back({0, lostRecords(lost_records_), false});
             lost_records_ = 0;
         } else {
-            // Answers that nobody waits for, and calls, which cannot wait.
+            // Without a connection, only answers, which are discarded, and calls, which cannot
+            // wait.
             std::deque<Outgoing> kept;
             for (Outgoing& message : outbox_) {
                 const bool now = message.connection != 0 || message.response.has_service_call();
@@ -284,10 +284,10 @@ void Server::deliver() {
     for (Outgoing& message : outgoing) {
         if (message.connection != 0) {
             const auto request = std::make_pair(message.connection, message.response.id());
-            if (waiting_.count(request) == 0) continue;  // given up on, or its daemon has gone
+            if (waiting_.count(request) == 0) continue;  // given up, or the connection has ended
             if (message.last) {
                 waiting_.erase(request);
-                ports_.end(request);  // one that is refused
+                ports_.end(request);  // a rejected stream
             }
             respond(message.connection, message.response);
             continue;
@@ -307,7 +307,7 @@ void Server::deliver() {
 void Server::expire() {
     const std::int64_t now = monotonicNow();
     for (auto it = waiting_.begin(); it != waiting_.end();) {
-        // A change that is slow is waited for; it is given up if a hook hangs.
+        // A slow change may continue; it is given up only if a hook hangs.
         const bool change = it->second.given_up != nullptr;
         if (now < it->second.until_ns || (change && stuck().empty())) {
             ++it;

@@ -1,8 +1,7 @@
 /// @file
-/// The executor's socket. Runs on the main thread: answers queries at once from
-/// snapshots, hands changes to the graph thread and sends their answers when
-/// they come, forwards log records and events. A hook that takes long delays
-/// changes, never a query.
+/// The server of the executor's socket. On the main thread, it answers queries at once from the
+/// graph view, hands changes to the graph thread and sends their answers later, and forwards log
+/// records and events. A slow hook delays changes, but never a query.
 #pragma once
 
 #include <atomic>
@@ -27,36 +26,39 @@ namespace rtcf::executor {
 
 class Server {
    public:
-    /// Listens on `socket_path` and takes SIGTERM and SIGINT. @throws std::system_error
+    /// Listens on `socket_path` and handles SIGTERM and SIGINT.
+    /// @throws std::system_error
     explicit Server(const std::string& socket_path);
     ~Server();
     Server(const Server&) = delete;
     Server& operator=(const Server&) = delete;
 
-    /// @name Any thread: messages to all connected daemons; kept for the next one if there is none
+    /// @name Any thread: sends a message to all connected rtcfd, or keeps it for the next one
     /// @{
     void publish(const LogEntry& entry);
     void publish(const RunnerEvent& event);
     void publish(const DirectStopReport& report);
     /// @}
 
-    /// Hands what a peer outside asks for to the daemon and waits for its answer. Any other thread
-    /// than serve()'s; ends soon after `cancel` becomes true.
+    /// Sends a request of a peer outside to rtcfd and waits for the answer. Any thread but that of
+    /// serve(); returns soon after `cancel` becomes true.
     OutsideAnswer ask(const OutsideCall& call, const std::atomic<bool>& cancel);
 
-    /// Serves until an `exit` request or a signal. @param runner what to serve; outlives the call
-    /// @param access gets the rules that rtcfd sends @param direct_stop what rtcfd is told of
+    /// Serves until an `exit` request or a signal.
+    /// @param runner outlives the call
+    /// @param access receives the rules from rtcfd
+    /// @param direct_stop source of the stops that rtcfd is informed of
     void serve(Runner& runner, Log& log, Access& access, const DirectStop& direct_stop);
-    /// Sends what has been posted. After serve(), for what was logged on the way out.
+    /// Sends queued messages. After serve(), for log records of the shutdown.
     void deliver();
 
    private:
     struct Outgoing {
         std::uint64_t connection;  // 0 = all
         v1::Response response;
-        bool last;  // ends its request
+        bool last;  // the last response to its request
     };
-    struct Reset {  // one that waits for the end of a cycle
+    struct Reset {  // a reset that waits for the end of a cycle
         std::uint64_t connection;
         std::uint64_t request;
         std::int64_t until_ns;
@@ -100,12 +102,12 @@ class Server {
     std::unique_ptr<Figures> figures_;
     std::vector<Reset> resets_;
 
-    // Requests that the graph thread has, by connection and id: when to give up on them.
+    // Requests queued for the graph thread, by connection and id, with their timeouts.
     struct Waiting {
         std::int64_t until_ns;
         std::function<v1::Response()> otherwise;
-        std::shared_ptr<std::atomic<bool>> given_up;  // of a change, which then does not happen
-        // Cycles without real time, which end when they are given up.
+        std::shared_ptr<std::atomic<bool>> given_up;  // set to cancel a change
+        // True for steps and replays, which end when they are given up.
         bool endless() const { return until_ns == INT64_MAX && given_up != nullptr; }
     };
     std::map<std::pair<std::uint64_t, std::uint64_t>, Waiting> waiting_;
@@ -116,7 +118,7 @@ class Server {
 
     std::mutex outbox_mutex_;
     std::deque<Outgoing> outbox_;
-    std::uint64_t lost_records_ = 0;  // log records that found the outbox full
+    std::uint64_t lost_records_ = 0;  // log records dropped because the outbox was full
 };
 
 }  // namespace rtcf::executor

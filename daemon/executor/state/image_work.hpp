@@ -1,6 +1,6 @@
 /// @file
-/// What is copied out of a loop for an image of it (image/image.hpp), and back in, all at one
-/// cycle boundary. The graph thread works out what and where; whoever runs the cycle copies.
+/// Values copied out of a loop for a snapshot (image/image.hpp), and back in, all at one cycle
+/// boundary. The graph thread plans the copies; the cycle thread makes them.
 #pragma once
 
 #include <cstddef>
@@ -14,26 +14,27 @@
 
 namespace rtcf::executor {
 
-/// The loop's own memory between two cycles.
+/// The loop's own state between two cycles.
 struct ClockImage {
-    std::uint64_t iteration = 0;        ///< of the next cycle
-    std::int64_t time_ns = 0;           ///< of the last cycle
-    std::int64_t stamp_ns = 0;          ///< of the last cycle
-    std::int64_t elapsed_ns = 0;        ///< what elapsed() is in the next cycle
-    std::int64_t total_elapsed_ns = 0;  ///< what components that skip cycles count in
+    std::uint64_t iteration = 0;        ///< iteration of the next cycle
+    std::int64_t time_ns = 0;           ///< loop time of the last cycle
+    std::int64_t stamp_ns = 0;          ///< ROS time of the last cycle
+    std::int64_t elapsed_ns = 0;        ///< elapsed() in the next cycle
+    std::int64_t total_elapsed_ns = 0;  ///< time base of components that do not run every cycle
 };
 
-/// Copies out of the loop.
+/// Values to copy out of the loop.
 struct Capture {
-    /// A value: a flat one as it lies in memory, else serialised.
+    /// A port's value: flat ones as in memory, others serialised.
     struct Value {
         const TypeInfo* type;
         const SlotHeader* from;
-        std::vector<std::uint8_t> bytes;  ///< room for it
+        std::vector<std::uint8_t> bytes;  ///< buffer
         SlotHeader header = {};
-        std::uint32_t length = 0;  ///< of what was found
+        std::uint32_t length = 0;  ///< length of the value, bytes
 
-        /// Real-time safe. @return whether there was room
+        /// Copies the value. Real-time safe.
+        /// @return false if the buffer is too small
         bool take() noexcept;
     };
     struct Input {
@@ -57,26 +58,28 @@ struct Capture {
     std::vector<Topic> topics;
     std::vector<Turn> turns;
     ClockImage clock;
-    /// Values of variable size had no room: their lengths are known now, and it is to be done anew.
+    /// Buffers of values of variable size were too small. Their lengths are now known; the caller
+    /// has to repeat the capture.
     bool lacks_room = false;
 
-    /// Of memory that it touches, in whole cache lines.
+    /// Size of the memory that it touches, in whole cache lines, bytes.
     std::size_t bytes() const;
 };
 
-/// Copies back into the loop.
+/// Values to copy back into the loop.
 struct Restoration {
     struct Value {
         const TypeInfo* type;
         SlotHeader* to;
-        std::shared_ptr<SlotHeader> from;  ///< with the room that `to` has
+        std::shared_ptr<SlotHeader> from;  ///< with the capacity of `to`
 
-        /// Real-time safe. What was there is then `from`'s, if it has memory of its own.
+        /// Puts the value into `to`. If the type owns memory, the values are swapped. Real-time
+        /// safe.
         void put() const noexcept;
     };
     struct Input {
         InputBase* input;
-        InputBase::Reading reading;  ///< source or current null: the one that the input has
+        InputBase::Reading reading;  ///< null source or current = keep the input's own
     };
     struct Topic {
         Injector* injector;
@@ -91,19 +94,20 @@ struct Restoration {
     };
     std::vector<StateCopy> states;
     std::vector<Value> values;
-    std::vector<OutputBase*> staged;   ///< outputs whose staged slots are among these
-    std::vector<SlotHeader*> headers;  ///< whose times are to be brought to the loop's
+    std::vector<OutputBase*> staged;   ///< outputs whose staged slots are among `values`
+    std::vector<SlotHeader*> headers;  ///< headers whose times to shift to the loop's time
     std::vector<Input> inputs;
     std::vector<Topic> topics;
     std::vector<Turn> turns;
     ClockImage clock;
-    /// Time is the loop's own and goes on from the image's; else it is the machine's, and what was
-    /// written so long before the image then was written so long before now.
+    /// True = the loop's time continues from the snapshot's (simulated time). False = the loop's
+    /// time is the machine's; the ages of values are kept.
     bool sets_time = false;
-    /// Filled at the boundary: this one was taken out after a fault, and nothing has changed.
+    /// Filled at the boundary: a component that was taken out after a fault; nothing has changed
+    /// then.
     const ComponentContext* taken_out = nullptr;
 
-    /// Of memory that it touches, in whole cache lines.
+    /// Size of the memory that it touches, in whole cache lines, bytes.
     std::size_t bytes() const;
 };
 

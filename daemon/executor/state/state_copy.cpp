@@ -27,11 +27,12 @@ void planHandOver(const Component& previous, const Component& successor,
                   std::vector<StateCopy>& copies, std::vector<std::string>& notes) {
     const std::string& name = successor.fullName();
     if (previous.states().empty() && !successor.states().empty())
-        notes.push_back(name + " begins at its initial state: what it replaces declares none");
+        notes.push_back(name +
+                        " begins at its initial state: the replaced component declares no state");
     for (const StateDeclaration& state : successor.states()) {
         const StateDeclaration* before = find(previous, state.name);
         if (before == nullptr) {
-            if (previous.states().empty()) continue;  // said already
+            if (previous.states().empty()) continue;  // reported above
             notes.push_back(fmt::format("state {} of {} is new: it begins at {}", state.name, name,
                                         state.print(state.initial.data())));
         } else if (before->identity != state.identity || before->size != state.size) {
@@ -44,7 +45,7 @@ void planHandOver(const Component& previous, const Component& successor,
     }
     for (const StateDeclaration& state : previous.states()) {
         if (find(successor, state.name) == nullptr)
-            notes.push_back(fmt::format("state {} of {} is no more", state.name, name));
+            notes.push_back(fmt::format("state {} of {} no longer exists", state.name, name));
     }
 }
 

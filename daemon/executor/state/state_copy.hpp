@@ -1,7 +1,7 @@
 /// @file
-/// Declared state on its way: from a component to its successor, back to its initial values, or to
-/// a place where it can be looked at. What is to be copied is worked out by the graph thread; the
-/// copies are made at one cycle boundary.
+/// Copies of declared state: from a component to its successor, back to its initial values, or to a
+/// buffer that is shown to a user. The graph thread plans the copies; the cycle thread makes them
+/// at one cycle boundary.
 #pragma once
 
 #include <cstddef>
@@ -22,24 +22,25 @@ struct StateCopy {
     void copy() const noexcept { std::memcpy(to, from, size); }
 };
 
-/// Of all of them.
+/// Size of all copies, bytes.
 std::size_t bytesOf(const std::vector<StateCopy>& copies);
 
-/// What of a component's state is copied to one that takes its place: by name and type.
-/// Appends to `copies`, and to `notes` one line for each state that does not go over.
+/// Plans the copies of state to a component's successor, by name and type. Appends to `copies`, and
+/// appends to `notes` one line for each state that is not handed over.
 void planHandOver(const Component& previous, const Component& successor,
                   std::vector<StateCopy>& copies, std::vector<std::string>& notes);
 
-/// Copies that take a component's state back to its initial values.
+/// Plans the copies that reset a component's state to its initial values.
 std::vector<StateCopy> planReset(const Component& component);
 
-/// The state of a component, all of one cycle boundary.
+/// A copy of a component's state, of one cycle boundary.
 class StatePicture {
    public:
     explicit StatePicture(const Component& component);
-    /// What fills it; valid as long as this.
+    /// The copies that fill it; valid as long as this object.
     std::vector<StateCopy> copies();
-    /// After that: the values as text, in the order of declaration. Not real-time safe.
+    /// The values as text, in the order of declaration, after the copies were made. Not real-time
+    /// safe.
     std::vector<std::string> texts() const;
 
    private:

@@ -15,7 +15,7 @@ namespace rtcf::executor {
 
 namespace {
 
-// What a T has of a value; nothing if that is not all of it.
+// Converts a value to T; unset if the conversion is not exact.
 template <typename T>
 std::optional<T> exactly(const ParameterValue& value) {
     if constexpr (std::is_same_v<T, bool>) {
@@ -67,7 +67,7 @@ std::vector<std::byte> stateValue(const std::string& component, const StateDecla
     if (!known) {
         throw Refusal(RefusalKind::FailedPrecondition,
                       fmt::format("state {} of {} is {}: only numbers and bools can be set; "
-                                  "rtcfctl reset {} sets back all",
+                                  "rtcfctl reset {} resets all state",
                                   state.name, component, state.type, component));
     }
     throw Refusal(

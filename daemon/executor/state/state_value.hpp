@@ -1,5 +1,5 @@
 /// @file
-/// A value for a declared state, as somebody outside gives it. Not real-time.
+/// Conversion of a value from a user into the bytes of a declared state. Not real-time.
 #pragma once
 
 #include <cstddef>
@@ -9,9 +9,9 @@
 
 namespace rtcf::executor {
 
-/// The bytes of a value of a state's type, which is a number or a bool.
-/// @param component for messages
-/// @throws Refusal if the state is neither, or the value is none of its type
+/// Converts a value to the bytes of a state, which must be a number or a bool.
+/// @param component name, for errors
+/// @throws Refusal if the state is neither, or the value is not of its type
 std::vector<std::byte> stateValue(const std::string& component, const StateDeclaration& state,
                                   const ParameterValue& value);
 

@@ -1,6 +1,6 @@
 /// @file
-/// A number that one thread adds to and any other reads. Cheaper than an
-/// atomic's fetch_add, whose bus lock only several writers would need.
+/// A counter with one writer and any number of readers. Cheaper than fetch_add(), whose bus lock
+/// only several writers need.
 #pragma once
 
 #include <atomic>
@@ -12,17 +12,17 @@ namespace rtcf::executor {
 
 class Counter {
    public:
-    /// The one writer; real-time safe.
+    /// Only by the writer. Real-time safe.
     void add(std::uint64_t by) noexcept RTCF_NONBLOCKING {
 #if defined(__x86_64__) && !defined(__SANITIZE_THREAD__)
-        // What the portable form means; compilers make three instructions of it.
+        // Same as the portable form, which compilers turn into three instructions.
         asm("addq %1, %0" : "+m"(value_) : "er"(by) : "cc");
 #else
         value_.store(value_.load(std::memory_order_relaxed) + by, std::memory_order_relaxed);
 #endif
     }
 
-    /// While nobody adds.
+    /// While nobody calls add().
     void reset() noexcept { value_.store(0, std::memory_order_relaxed); }
 
     /// Any thread; real-time safe.

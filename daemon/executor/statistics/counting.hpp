@@ -1,9 +1,9 @@
 /// @file
-/// Whether the cycle that runs is counted, so that figures can be begun anew
-/// at one instant. Between two counted cycles all figures are of the same
-/// cycles: whoever copies them sees whether it stayed so (a sequence lock).
-/// Loops that are late leave no time between cycles: meanwhile cycles are not
-/// counted at all, and the loop waits for nobody.
+/// Consistency of statistics: decides whether the running cycle is counted, so that statistics can
+/// be reset at one instant. Between two counted cycles, all statistics are of the same cycles; a
+/// reader can check that no cycle was counted while it copied (a sequence lock). A loop that is
+/// late leaves no time between cycles. A reader then excludes cycles from counting for a while, and
+/// the loop never waits.
 #pragma once
 
 #include <atomic>
@@ -15,8 +15,8 @@ namespace rtcf::executor {
 
 class Counting {
    public:
-    /// A cycle, from before it counts anything until after its overrun is. By whoever runs cycles;
-    /// real-time safe.
+    /// Scope of one cycle, from before its first count to after its overrun is counted. Cycle
+    /// thread; real-time safe.
     class Turn {
        public:
         explicit Turn(Counting& counting) noexcept RTCF_NONBLOCKING : counting_(counting) {
@@ -30,16 +30,16 @@ class Counting {
         Counting& counting_;
     };
 
-    /// In a turn, by who has it: what happens now counts. Real-time safe.
+    /// True if the present cycle is counted. Cycle thread, within a Turn. Real-time safe.
     bool counts() const noexcept RTCF_NONBLOCKING { return counts_; }
 
     /// @name One other thread
     /// @{
-    /// Cycles that begin from here on are not counted, until release().
+    /// Excludes cycles that begin from here on, until release().
     void hold() noexcept { held_.store(true, std::memory_order_relaxed); }
     void release() noexcept { held_.store(false, std::memory_order_relaxed); }
-    /// Calls `copy`. @return whether what it has read is of the same cycles; false while one is
-    /// being counted
+    /// Calls `copy`, which copies the statistics.
+    /// @return false if a cycle was being counted meanwhile, so that the copy may be inconsistent
     template <typename Copy>
     bool read(Copy&& copy) const {
         const std::uint64_t turn = turn_.load(std::memory_order_acquire);
@@ -64,7 +64,8 @@ class Counting {
     }
     static void fence(std::memory_order order) noexcept RTCF_NONBLOCKING {
 #if defined(__SANITIZE_THREAD__)
-        std::atomic_signal_fence(order);  // gcc's knows no others; x86 needs none
+        // ThreadSanitizer with gcc supports no other fence; x86 needs none
+        std::atomic_signal_fence(order);
 #else
         std::atomic_thread_fence(order);
 #endif
@@ -72,7 +73,7 @@ class Counting {
 
     std::atomic<std::uint64_t> turn_{0};  // odd while a cycle counts
     std::atomic<bool> held_{false};
-    bool counts_ = false;  // of whoever runs cycles
+    bool counts_ = false;  // of the cycle thread
 };
 
 }  // namespace rtcf::executor

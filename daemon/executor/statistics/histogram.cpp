@@ -72,7 +72,8 @@ DistributionSummary summarize(const HistogramSnapshot& snapshot, double scale) {
     if (snapshot.buckets.empty()) return result;
     const std::size_t bottom = snapshot.buckets.front().number;
     const std::size_t top = snapshot.buckets.back().number;
-    // The exact maximum may be older than what is summarised: it counts only in the top bucket.
+    // The exact maximum may be older than the values in the snapshot, so it is used only if it is
+    // in the top bucket.
     const double maximum = Histogram::bucketOf(snapshot.maximum) == top
                                ? static_cast<double>(snapshot.maximum)
                                : middle(top);

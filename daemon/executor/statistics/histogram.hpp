@@ -1,9 +1,8 @@
 /// @file
-/// A histogram of durations: small values one by one, larger ones in
-/// logarithmic octaves of linear buckets (as in HdrHistogram, G. Tene). Fixed
-/// memory, relative error below 1.6 %. One thread adds in constant time; any
-/// other reads snapshots, and resets by subtracting an earlier snapshot, so
-/// that the writer is never disturbed.
+/// A histogram of durations: one bucket per small value, and logarithmic octaves of linear buckets
+/// for larger ones (as in HdrHistogram, G. Tene). Fixed memory, relative error below 1.6 %. One
+/// thread adds values in constant time. Any other thread takes snapshots, and resets by subtracting
+/// an earlier snapshot, without disturbing the writer.
 #pragma once
 
 #include <array>
@@ -16,20 +15,21 @@
 
 namespace rtcf::executor {
 
-/// A histogram's counts at one time. Values are in the writer's unit.
+/// Counts of a histogram at one time. Values are in the writer's unit.
 struct HistogramSnapshot {
     struct Bucket {
         std::size_t number;
         std::uint64_t count;
     };
-    /// Those with values, from the smallest on: the others are most, and snapshots are kept.
+    /// Non-empty buckets in ascending order. Most buckets are empty, and snapshots are kept in
+    /// memory.
     std::vector<Bucket> buckets;
     std::uint64_t count = 0;
     std::int64_t sum = 0;
-    std::int64_t maximum = 0;  ///< exact, since the beginning
+    std::int64_t maximum = 0;  ///< exact; since the histogram was created
 };
 
-/// Figures drawn from a snapshot, in the unit of its values times a scale.
+/// Statistics of a snapshot, in the unit of its values times a scale.
 struct DistributionSummary {
     std::uint64_t count = 0;
     double min = 0.0;
@@ -40,24 +40,24 @@ struct DistributionSummary {
     double max = 0.0;
 };
 
-/// What was added between two snapshots; `earlier` may be empty.
+/// The values added between two snapshots; `earlier` may be empty.
 HistogramSnapshot difference(const HistogramSnapshot& now, const HistogramSnapshot& earlier);
 
-/// Minimum, mean, quantiles, maximum. @param scale multiplies every value, e.g. ns per tick
+/// Computes minimum, mean, quantiles and maximum.
+/// @param scale factor for every value, e.g. ns per tick
 DistributionSummary summarize(const HistogramSnapshot& snapshot, double scale);
 
 class Histogram {
    public:
     static constexpr unsigned kExactBits = 8;
-    static constexpr std::size_t kExact = std::size_t{1}
-                                          << kExactBits;  // values with a bucket each
-    static constexpr unsigned kSubBits = 5;               // 32 buckets an octave from there
+    static constexpr std::size_t kExact = std::size_t{1} << kExactBits;  // values with own buckets
+    static constexpr unsigned kSubBits = 5;   // 32 buckets per octave above them
     static constexpr unsigned kOctaves = 28;  // up to 2^36 units: 23 s of a 3 GHz counter
     static constexpr std::size_t kBuckets = kExact + (std::size_t{kOctaves} << kSubBits);
 
-    /// Adds a value; below 0 counts as 0, above the range as the last bucket. Real-time safe.
-    /// A short update() takes a few hundred ticks: those values, which are their own bucket, cost
-    /// one addition, as their sum and maximum follow from the buckets.
+    /// Adds a value. Negative values count as 0; values above the range count in the last bucket.
+    /// Values with a bucket of their own cost one addition, because their sum and maximum follow
+    /// from the buckets; a short update() takes a few hundred ticks. Writer only; real-time safe.
     void add(std::int64_t value) noexcept RTCF_NONBLOCKING {
         if (static_cast<std::uint64_t>(value) < kExact) {
             buckets_[static_cast<std::size_t>(value)].add(1);
@@ -66,8 +66,8 @@ class Histogram {
         }
     }
 
-    /// Any thread; not real-time safe. Counts of a running writer may differ by the last few
-    /// values.
+    /// Copies the counts. While the writer runs, the last few values may be missing in some of
+    /// them. Any thread; not real-time safe.
     HistogramSnapshot snapshot() const;
 
     static std::size_t bucketOf(std::int64_t value) noexcept {
@@ -79,7 +79,7 @@ class Histogram {
             kExact + (static_cast<std::size_t>(magnitude - kExactBits) << kSubBits) + within;
         return index < kBuckets ? index : kBuckets - 1;
     }
-    /// Smallest value of a bucket, and the number of values it holds.
+    /// Smallest value of a bucket, and the number of different values in it.
     static std::int64_t lowerBound(std::size_t bucket) noexcept;
     static std::int64_t width(std::size_t bucket) noexcept;
 
@@ -87,7 +87,7 @@ class Histogram {
     void addLarge(std::int64_t value) noexcept RTCF_NONBLOCKING;
 
     std::array<Counter, kBuckets> buckets_{};
-    // Of the values from kExact on.
+    // For the values from kExact on.
     Counter large_sum_;
     std::atomic<std::int64_t> maximum_{0};
 };

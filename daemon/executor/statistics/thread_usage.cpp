@@ -12,7 +12,7 @@ ThreadUsage readThreadUsage(int thread_id) {
     const std::string folder = "/proc/self/task/" + std::to_string(thread_id);
     std::string line;
     std::getline(std::ifstream(folder + "/stat"), line);
-    // The thread's name stands in parentheses and may hold anything; field 3 follows it.
+    // The thread's name, in parentheses, may contain any character; field 3 follows it.
     if (const std::size_t end = line.rfind(')'); end != std::string::npos) {
         std::istringstream fields(line.substr(end + 1));
         std::string skipped;

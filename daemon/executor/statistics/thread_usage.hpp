@@ -1,6 +1,5 @@
 /// @file
-/// What the kernel counts of one of our threads: proc(5), /proc/self/task/TID.
-/// Not real-time.
+/// The kernel's counters of a thread of this process: proc(5), /proc/self/task/TID. Not real-time.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +12,7 @@ struct ThreadUsage {
     std::uint64_t involuntary_switches = 0;
 };
 
-/// @return all 0 if there is no such thread
+/// @return all 0 if the thread does not exist
 ThreadUsage readThreadUsage(int thread_id);
 
 }  // namespace rtcf::executor

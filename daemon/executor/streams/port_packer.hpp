@@ -1,6 +1,6 @@
 /// @file
-/// Values of one column of a frame, as they travel: of outputs as ROS messages, of states as they
-/// lie in memory. One thread; not real-time safe.
+/// Serialises the values of one column of frames: outputs as ROS messages, states as in memory. One
+/// thread; not real-time safe.
 #pragma once
 
 #include <cstdint>
@@ -13,15 +13,15 @@ namespace rtcf::executor {
 
 class PortPacker {
    public:
-    /// @param column outlives this
-    /// @param offset of its values in a frame, bytes
+    /// @param column outlives this object
+    /// @param offset offset of its values in a frame, bytes
     PortPacker(const FrameColumn& column, std::size_t offset);
 
-    /// Bytes of each value.
+    /// Size of each value, bytes.
     std::size_t length() const noexcept {
         return column_.output == nullptr ? column_.size : length_;
     }
-    /// Appends the value of a frame.
+    /// Appends the value of a frame to `to`.
     void pack(const std::uint8_t* values, std::string& to) const;
 
    private:

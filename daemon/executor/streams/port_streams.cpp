@@ -14,9 +14,10 @@ namespace pb = ::rtcf::v1;
 
 namespace {
 
-constexpr std::size_t kLargestBatch = std::size_t{512} * 1024;  // bytes of values, about
-constexpr int kMostCycles = 4096;                               // of a batch
-constexpr std::size_t kMostTables = 8;                          // that a stream is behind
+// Approximate size of values in a batch, bytes.
+constexpr std::size_t kLargestBatch = std::size_t{512} * 1024;
+constexpr int kMostCycles = 4096;       // most cycles in a batch
+constexpr std::size_t kMostTables = 8;  // most frame tables that a stream may be behind
 
 std::vector<PortPacker> packersOf(const FrameTable& table,
                                   const std::vector<std::size_t>& columns) {
@@ -27,7 +28,7 @@ std::vector<PortPacker> packersOf(const FrameTable& table,
     return packers;
 }
 
-// What is about to be written anew is left to the writer.
+// Skips frames that the writer is about to overwrite.
 void skipGone(std::uint64_t& next, std::uint64_t& lost, const FrameRing& ring, std::uint32_t step) {
     const std::uint64_t kept = ring.capacity() - ring.capacity() / 8;
     const std::uint64_t waiting = ring.end() - next;
@@ -43,8 +44,8 @@ void PortStreams::begin(const Id& id, std::uint64_t watch, const PortSelection& 
                         std::uint32_t every, bool min_max) {
     if (streams_.size() >= kMost) {
         throw Refusal(RefusalKind::ResourceExhausted,
-                      fmt::format("{} streams of ports are open, which is all that there can be: "
-                                  "end another",
+                      fmt::format("{} streams of ports are open, which is the limit: "
+                                  "end another one",
                                   kMost));
     }
     streams_.try_emplace(id, id, watch, selection, every == 0 ? 1 : every, min_max);
@@ -84,18 +85,18 @@ std::vector<PortStreams::Table> PortStreams::serve(const std::vector<Table>& tab
         for (const Table& table : tables) {
             if (table->watches.count(stream.watch) == 0) continue;
             stream.tables.push_back(table);
-            // Its reader has not read for long.
+            // The reader has not read for long.
             if (stream.tables.size() > kMostTables) goOn(stream);
             if (stream.begun) continue;
             stream.begun = true;
-            stream.next = table->ring->end();  // others may have watched before
+            stream.next = table->ring->end();  // the ring may have frames of earlier watches
             chooseColumns(stream);
         }
         ids.push_back(id);
         if (!stream.tables.empty()) noteTaken(*stream.tables.front()->ring);
     }
     for (const Id& id : ids) {
-        // Sending may end streams of a peer that has gone.
+        // Sending may end the streams of a disconnected peer.
         const auto found = streams_.find(id);
         if (found != streams_.end() && room(id)) serve(found->second, send);
     }
@@ -129,7 +130,7 @@ void PortStreams::chooseColumns(Stream& stream) {
 }
 
 void PortStreams::serve(Stream& stream, const Send& send) {
-    const Id id = stream.id;  // which may go with a peer that has gone
+    const Id id = stream.id;  // a copy, as sending may destroy the stream
     while (!stream.tables.empty()) {
         if (!stream.told) {
             stream.told = true;
@@ -146,7 +147,7 @@ void PortStreams::serve(Stream& stream, const Send& send) {
     }
 }
 
-// Leaves the first of several tables.
+// Moves a stream from its first table to the next one.
 void PortStreams::goOn(Stream& stream) {
     retired_.push_back(std::move(stream.tables.front()));
     stream.tables.pop_front();
@@ -158,7 +159,9 @@ void PortStreams::goOn(Stream& stream) {
     chooseColumns(stream);
 }
 
-// @return whether all that is in the ring has been sent; if not, the stream may be gone
+// Sends frames.
+// @return true if all frames in the ring have been sent; if false, the stream may have been
+// destroyed
 bool PortStreams::sendFrames(Stream& stream, const Send& send) {
     const Id id = stream.id;
     const FrameTable& table = *stream.tables.front();
@@ -210,7 +213,7 @@ bool PortStreams::sendFrames(Stream& stream, const Send& send) {
     return true;
 }
 
-// The same of minima and maxima: a window that is not whole waits for more.
+// Like sendFrames(), for minima and maxima. An incomplete window waits for more cycles.
 bool PortStreams::sendWindows(Stream& stream, const Send& send) {
     const Id id = stream.id;
     const std::vector<PortPacker> packers = packersOf(*stream.tables.front(), stream.columns);
@@ -223,7 +226,8 @@ bool PortStreams::sendWindows(Stream& stream, const Send& send) {
     }
 }
 
-// @return whether there is a window in the batch
+// Fills a batch with windows.
+// @return true if the batch contains a window
 bool PortStreams::fill(Stream& stream, v1::Response& response,
                        const std::vector<PortPacker>& packers, std::uint64_t end) {
     const FrameRing& ring = *stream.tables.front()->ring;

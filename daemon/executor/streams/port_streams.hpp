@@ -1,6 +1,6 @@
 /// @file
-/// The streams of ports' values that rtcfd has asked for: frames out of the loop's ring, packed
-/// column by column. Main thread only. A peer that does not read loses frames and is told how many.
+/// The streams of port values requested by rtcfd: frames from the loop's ring, packed by column.
+/// Main thread only. Slow readers lose frames, and the stream contains the number of lost ones.
 #pragma once
 
 #include <cstdint>
@@ -19,28 +19,33 @@ namespace rtcf::executor {
 
 class PortStreams {
    public:
-    /// Of connection and request.
+    /// Numbers of the connection and the request.
     using Id = std::pair<std::uint64_t, std::uint64_t>;
     using Table = std::shared_ptr<const FrameTable>;
-    /// Whether the peer has room for more; not if it has enough to read for now, or has gone.
+    /// True if the peer has room for more; false if its socket buffer is full or it has
+    /// disconnected.
     using Room = std::function<bool(const Id& id)>;
-    /// Takes what is to be sent. @return whether there is room for more
+    /// Sends a response.
+    /// @return true if there is room for more
     using Send = std::function<bool(const Id& id, const v1::Response& response)>;
 
     static constexpr std::size_t kMost = 64;
 
-    /// Begins a stream; it is silent until a table is for `watch`.
-    /// @param min_max minima and maxima of each window of `every` cycles, not each `every`-th cycle
-    /// @throws Refusal if there are too many
+    /// Begins a stream. It sends nothing before a table for `watch` arrives.
+    /// @param min_max true = minima and maxima of each window of `every` cycles; false = each
+    /// `every`-th cycle
+    /// @throws Refusal if there are too many streams
     void begin(const Id& id, std::uint64_t watch, const PortSelection& selection,
                std::uint32_t every, bool min_max);
+    /// Ends a stream.
     /// @return the number of its watch; 0 = there is no such stream
     std::uint64_t end(const Id& id);
-    /// Ends those of a connection. @return the numbers of their watches
+    /// Ends the streams of a connection.
+    /// @return the numbers of their watches
     std::vector<std::uint64_t> endAll(std::uint64_t connection);
 
-    /// Takes new tables, packs what has come since, and sends it. @return tables that nobody needs
-    /// any more, to be let go of on the graph thread
+    /// Takes new tables, and sends new frames.
+    /// @return unused tables, which the graph thread must release
     std::vector<Table> serve(const std::vector<Table>& tables, const Room& room, const Send& send);
 
    private:
@@ -57,15 +62,16 @@ class PortStreams {
         PortSelection selection;
         std::uint32_t every;
         bool min_max;
-        std::deque<Table> tables;              // the first one is being read
-        std::vector<std::size_t> columns;      // of it
-        std::unique_ptr<PortWindows> windows;  // of minima and maxima; null = of each cycle
-        bool begun = false;                    // the first one has come
-        bool told = false;                     // its schema
-        std::uint64_t next = 0;                // frame of it
-        std::uint64_t lost = 0;                // cycles, since the last batch
+        std::deque<Table> tables;          // the first one is being read
+        std::vector<std::size_t> columns;  // columns of the first table
+        // Open window of minima and maxima; null = single cycles.
+        std::unique_ptr<PortWindows> windows;
+        bool begun = false;      // the first table has arrived
+        bool told = false;       // the schema was sent
+        std::uint64_t next = 0;  // next frame of the first table
+        std::uint64_t lost = 0;  // lost cycles since the last batch
 
-        // Of so many cycles one is told, or would be: lost ones are counted like this.
+        // Cycles per sent value; lost cycles are counted in this unit.
         std::uint32_t step() const noexcept { return min_max ? 1 : every; }
     };
 

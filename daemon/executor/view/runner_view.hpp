@@ -1,6 +1,6 @@
 /// @file
-/// What a bridge may show of its runner: graph, state, figures, and every cycle.
-/// Implemented by the runner. Nothing here waits for a hook or for the loop.
+/// View of a runner for its bridge: graph, state, statistics, and every cycle. Implemented by the
+/// runner. No function waits for a hook or for the loop.
 #pragma once
 
 #include <cstdint>
@@ -25,8 +25,9 @@ class RunnerView {
     virtual std::uint64_t logRecordsDropped() const = 0;
     /// @}
 
-    /// Takes the oldest cycle record. One thread, which takes them often: the loop drops what
-    /// finds no room. @return false if there is none
+    /// Takes the oldest cycle record. One thread, which must call it often: the loop drops records
+    /// when the ring is full.
+    /// @return false if there is none
     virtual bool popCycle(CycleRecord& record) = 0;
 
    protected:

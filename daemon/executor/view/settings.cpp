@@ -20,7 +20,7 @@ namespace {
 
 template <typename T>
 void requireRange(const char* name, T value, T lowest, T highest, const char* unit) {
-    // Written so that NaN is out of range.
+    // This form rejects NaN.
     if (value >= lowest && value <= highest) return;
     refuse(fmt::format("{} {} {} is out of range: {} to {} {}", name, value, unit, lowest, highest,
                        unit));
@@ -31,8 +31,8 @@ void requireCpu(int cpu) {
     const std::vector<int>& allowed = processCpus();
     if (std::find(allowed.begin(), allowed.end(), cpu) != allowed.end()) return;
     refuse(fmt::format(
-        "cpu {} is none that this daemon may use: {}, or -1 for the last that has no other loop",
-        cpu, fmt::join(allowed, ", ")));
+        "cpu {} is not available to this daemon: use one of {}, or -1 for an automatic choice", cpu,
+        fmt::join(allowed, ", ")));
 }
 
 }  // namespace

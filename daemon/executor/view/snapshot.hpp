@@ -1,7 +1,6 @@
 /// @file
-/// What queries are answered from: an immutable picture of the graph that the
-/// graph thread publishes after every change. A query never waits for a hook or
-/// for the loop.
+/// The graph view: an immutable copy of the graph that answers queries. The graph thread publishes
+/// a new one after every change, so that a query never waits for a hook or for the loop.
 #pragma once
 
 #include <map>
@@ -24,8 +23,7 @@ struct PortSnapshot {
     std::string unit;
 };
 
-/// One component. What its pointers point to is never unloaded (types) or is
-/// shared (figures), so a snapshot may outlive the component.
+/// A declared state of a component.
 struct StateSnapshot {
     std::string name;
     std::string type;
@@ -34,10 +32,12 @@ struct StateSnapshot {
     std::string initial;
 };
 
+/// One component. Its types are never unloaded and its statistics are shared, so it may outlive the
+/// component.
 struct ComponentSnapshot : ParameterSet {
     const Instance* instance;  ///< for comparison only
     std::shared_ptr<const ComponentFigures> figures;
-    ComponentDefinition definition;  ///< with the breaks of now
+    ComponentDefinition definition;  ///< with the present loop breaks
     std::string library;
     std::string doc;
     std::vector<PortSnapshot> ports;
@@ -54,7 +54,7 @@ struct EndpointSnapshot {
 struct ConnectionSnapshot {
     std::string type;
     std::optional<EndpointSnapshot> writer;
-    std::vector<EndpointSnapshot> other_writers;  ///< of a name that no input reads
+    std::vector<EndpointSnapshot> other_writers;  ///< further writers of a name without a reader
     std::vector<EndpointSnapshot> readers;
     bool published;
     bool subscribed;
@@ -67,12 +67,12 @@ struct GraphSnapshot {
     std::vector<std::shared_ptr<Tap>> taps;
     std::vector<std::shared_ptr<const Injector>> injectors;
 
-    /// @throws Refusal if there is none of that name
+    /// @throws Refusal if there is no such component
     const ComponentSnapshot& get(const std::string& full_name) const;
 };
 
-/// A picture of `plan`; components that have not changed are shared with `previous`.
-/// @param changed full names of components to picture anew
+/// Makes the graph view of `plan`. Unchanged components are shared with `previous`.
+/// @param changed full names of components to copy again
 std::shared_ptr<const GraphSnapshot> takeSnapshot(const Plan& plan, const GraphSnapshot& previous,
                                                   const std::set<std::string>& changed);
 

@@ -9,7 +9,7 @@ namespace rtcf::executor {
 
 namespace {
 
-// NaN is above all numbers: a cycle that has it is not hidden.
+// NaN counts as larger than all numbers, so that it is not hidden.
 template <typename T>
 bool isBelow(T a, T b) {
     if constexpr (std::is_floating_point_v<T>) {

@@ -1,5 +1,5 @@
 /// @file
-/// One of the values that a frame holds. Made by the graph thread, never changed.
+/// One value of a frame. Made by the graph thread; immutable.
 #pragma once
 
 #include <cstddef>
@@ -17,9 +17,9 @@ struct FrameColumn {
     std::string name;
     std::string type;
     std::string unit;
-    std::string mapped;                ///< of an output: the name of its connection
-    const TypeInfo* output = nullptr;  ///< null: a state
-    std::size_t size = 0;              ///< bytes in the frame
+    std::string mapped;                ///< outputs only: the name of its connection
+    const TypeInfo* output = nullptr;  ///< null = a state
+    std::size_t size = 0;              ///< size in the frame, bytes
     std::shared_ptr<const Library> library;
 
     std::string fullName() const { return component + "." + name; }

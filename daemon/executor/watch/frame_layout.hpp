@@ -1,5 +1,5 @@
 /// @file
-/// What the values of frames mean, for who reads them when this process is gone: a FrameLayout of
+/// Layout of the values in frames, for reading them after the end of this process: a FrameLayout of
 /// executor.proto. Graph thread.
 #pragma once
 
@@ -11,9 +11,9 @@
 
 namespace rtcf::executor {
 
-/// @return the layout of a ring, serialised
-/// @param columns its sources, in their order
-/// @param notes   what is left out, a line each
+/// Serialises the layout of a ring.
+/// @param columns its sources, in order
+/// @param notes   omitted values, one line each
 std::string frameLayout(const FrameRing& ring, const std::vector<FrameColumn>& columns,
                         const std::vector<std::string>& notes);
 

@@ -15,11 +15,11 @@ namespace {
 constexpr double kSeconds = 1.0;
 constexpr std::size_t kNamesInMessage = 8;
 
-// A column and where its value lies.
+// A column and the address of its value.
 struct Candidate {
     FrameColumn column;
     const void* from;
-    bool needed;  // to be put back after an update() that throws
+    bool needed;  // needed to restore the output after an update() that throws
 };
 
 std::vector<Candidate> candidatesOf(const Plan& plan) {
@@ -59,7 +59,8 @@ bool watched(const Candidate& candidate, const Watches& watches) {
                        [&](const auto& watch) { return watch.second.matches(name); });
 }
 
-// Required candidates, and others while there is room, watched ones first. In schedule order.
+// Chooses all needed candidates, and others while there is room, watched ones first. The result is
+// in schedule order.
 std::vector<Candidate> chosenOf(const Plan& plan, const FrameDemand& demand, FrameTable& table) {
     std::vector<Candidate> candidates = candidatesOf(plan);
     const bool all = demand.most_bytes != 0;
@@ -79,7 +80,7 @@ std::vector<Candidate> chosenOf(const Plan& plan, const FrameDemand& demand, Fra
     }
     if (left_out != 0) {
         table.notes.push_back(fmt::format(
-            "{} outputs and states are left out: a cycle copies {} bytes of such at most: {}",
+            "{} outputs and states are omitted: a cycle copies at most {} bytes of them: {}",
             left_out, most, all ? "raise frame_kb of the runner" : "select fewer"));
     }
     std::vector<Candidate> found;
@@ -94,8 +95,8 @@ std::string shortnessOf(std::size_t kept, const std::vector<FrameRing::Source>& 
     std::size_t bytes = 0;
     for (const FrameRing::Source& source : sources) bytes += source.size;
     return fmt::format(
-        "frames hold the last {} cycles ({:.2g} s), not a second: each has {:.1f} KiB of values, "
-        "and all together take {} MiB at most: lower frame_kb of the runner, or watch less",
+        "frames hold the last {} cycles ({:.2g} s), not one second: each has {:.1f} KiB of values, "
+        "and the ring is limited to {} MiB: lower frame_kb of the runner, or watch fewer values",
         kept, static_cast<double>(kept) / frequency_hz, static_cast<double>(bytes) / 1024.0,
         FrameRing::kLargestRing >> 20U);
 }
@@ -149,9 +150,10 @@ void requireMatches(const PortSelection& selection, const Plan& plan) {
         }
         const bool all = names.size() <= kNamesInMessage;
         if (!all) names.resize(kNamesInMessage);
-        throw Refusal(RefusalKind::PortNotFound,
-                      fmt::format("{} matches no output of fixed size and no state; there is {}{}",
-                                  pattern.given(), fmt::join(names, ", "), all ? "" : ", …"));
+        throw Refusal(
+            RefusalKind::PortNotFound,
+            fmt::format("{} matches no output of fixed size and no state; available: {}{}",
+                        pattern.given(), fmt::join(names, ", "), all ? "" : ", …"));
     }
 }
 

@@ -1,7 +1,7 @@
 /// @file
-/// What the frames of a loop hold: which outputs and states, in which order, and the ring itself.
-/// Made by the graph thread for one plan and never changed; others read it, and give it back to
-/// that thread, as it keeps component libraries loaded.
+/// The contents of a loop's frames: outputs and states in order, and the ring. Made by the graph
+/// thread for one plan, and immutable. Other threads read it and return it to the graph thread,
+/// which destroys it, because it keeps component libraries loaded.
 #pragma once
 
 #include <cstdint>
@@ -17,38 +17,39 @@
 
 namespace rtcf::executor {
 
-/// Selections by the number of the watch that made them.
+/// Selections, by number of the watch.
 using Watches = std::map<std::uint64_t, PortSelection>;
 
 struct FrameTable {
-    std::vector<FrameColumn> columns;  ///< in schedule order, as the ring's sources
-    std::vector<std::string> notes;    ///< what is left out, a line each
-    std::string shortness;             ///< if less than a second is kept: how much; else empty
+    std::vector<FrameColumn> columns;  ///< in schedule order, like the ring's sources
+    std::vector<std::string> notes;    ///< omitted values, one line each
+    std::string shortness;             ///< message if less than one second is kept; else empty
     std::shared_ptr<FrameRing> ring;
-    Watches watches;    ///< its readers
-    bool kept = false;  ///< for them or an incident; else the last frame alone counts, for the loop
+    Watches watches;  ///< watches that read the ring
+    /// Frames are kept for watches or an incident; else only the last one is used, by the loop.
+    bool kept = false;
 };
 
-/// What is wanted of frames.
+/// Input of makeFrameTable().
 struct FrameDemand {
     const Watches& watches;
-    double frequency_hz;  ///< of the loop; the ring holds about a second
-    /// Of states and staged outputs in each cycle, watched or not; 0 = watched ones alone. The
-    /// other outputs are always there: the loop puts them back after an update() that throws.
+    double frequency_hz;  ///< frequency of the loop; the ring holds about one second
+    /// Most bytes of states and staged outputs per frame, watched or not; 0 = only watched ones.
+    /// Other outputs are always in the frame: the loop restores them after an update() that throws.
     std::size_t most_bytes;
-    FrameMemory* memory;         ///< that outlives the process; may be null
-    const FrameTable* previous;  ///< whose ring is kept if that copies the same; may be null
+    FrameMemory* memory;  ///< memory that outlives the process; may be null
+    /// Table whose ring is reused if the sources are the same; may be null.
+    const FrameTable* previous;
 };
 
-/// The most bytes of such values that a cycle copies, where those that are watched alone are
-/// copied.
+/// Most bytes of states and staged outputs per frame, if only watched ones are copied.
 constexpr std::size_t kLargestFrame = std::size_t{64} * 1024;
 
-/// Makes the table for a plan. What is watched comes first where there is not room for all.
+/// Makes the table for a plan. If there is not room for all values, watched ones have priority.
 std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const FrameDemand& demand);
 
-/// Refuses a selection that has a pattern which matches nothing in the plan, and says what there
-/// is.
+/// Requires that each pattern of a selection matches something in the plan.
+/// @throws Refusal that lists the available names
 void requireMatches(const PortSelection& selection, const Plan& plan);
 
 }  // namespace rtcf::executor

@@ -36,10 +36,10 @@ bool isNameCharacter(char character) {
 struct Line {
     std::string type;
     bool array = false;
-    std::optional<std::size_t> length;  // of an array that has one
+    std::optional<std::size_t> length;  // of an array of fixed length
 };
 
-// Nothing for what is no field: a constant, a comment, an empty line.
+// Parses a line; unset if it is not a field but a constant, a comment or empty.
 std::optional<Line> fieldOf(std::string text) {
     text = text.substr(0, text.find('#'));
     std::istringstream words(text);
@@ -59,7 +59,7 @@ std::optional<Line> fieldOf(std::string text) {
     return line;
 }
 
-// One way through a message.
+// Walks through one message by its definition.
 class Walk {
    public:
     Walk(const std::string& definition, const std::string& sample) : sample_(sample) {
@@ -84,7 +84,7 @@ class Walk {
     std::vector<NumberField> all() {
         message("");
         if (at_ != sample_.size())
-            throw std::invalid_argument("a message is not as its definition says");
+            throw std::invalid_argument("a message does not match its definition");
         return std::move(fields_);
     }
 
@@ -130,7 +130,7 @@ class Walk {
 
     void skip(std::size_t bytes) {
         if (bytes > sample_.size() - at_)
-            throw std::invalid_argument("a message is shorter than its definition says");
+            throw std::invalid_argument("a message is shorter than its definition");
         at_ += bytes;
     }
 

@@ -1,6 +1,6 @@
 /// @file
-/// Where the numbers of a value lie that is copied out of the loop: of an output in the ROS message
-/// that it travels as, of a state in memory. For whoever compares values without their types.
+/// Positions of the numbers in a value copied out of the loop: outputs as serialised ROS messages,
+/// states as in memory. For code that compares values without knowing their types.
 #pragma once
 
 #include <cstddef>
@@ -24,25 +24,25 @@ enum class NumberKind : std::uint8_t {
     Float64,
 };
 
-/// Bytes of one.
+/// Size of a number, bytes.
 std::size_t sizeOf(NumberKind kind) noexcept;
 
-/// Some numbers, one after the other.
+/// Consecutive numbers of one kind.
 struct NumberField {
     NumberKind kind;
     std::size_t offset;  ///< bytes
     std::size_t count;
 };
 
-/// The numbers of a serialised ROS message, in order; a time is two.
-/// @param definition its text with those of the messages in it, as genmsg writes it
-/// @param sample     one such message: strings and lists are as long in each as in this one
-/// @throws std::invalid_argument if one is not that of the other
+/// The numbers of a serialised ROS message, in order; a time counts as two.
+/// @param definition text of the message definition with those of nested messages, as from genmsg
+/// @param sample     a message; all others must have strings and lists of the same lengths
+/// @throws std::invalid_argument if the message does not match the definition
 std::vector<NumberField> numbersOfMessage(const std::string& definition, const std::string& sample);
 
-/// The numbers of a state, in order; none of a structure, whose fields nobody has told.
+/// The numbers of a state, in order; empty for a struct, whose fields are not known here.
 /// @param type e.g. "double", "float[3x1]", "quaternion"
-/// @param size bytes of it
+/// @param size size of the state, bytes
 std::vector<NumberField> numbersOfState(const std::string& type, std::size_t size);
 
 }  // namespace rtcf::executor

@@ -7,7 +7,7 @@
 
 namespace rtcf::executor {
 
-// A '[' without ']' stands for itself.
+// Parses a pattern. A '[' without ']' matches itself.
 PortSelection::Pattern::Pattern(const std::string& text) : given_(text) {
     std::string pattern = text;
     if (pattern[0] != '/' && pattern[0] != '*') pattern.insert(0, "/");
@@ -43,15 +43,15 @@ PortSelection::Pattern::Pattern(const std::string& text) : given_(text) {
 }
 
 void PortSelection::Pattern::add(const Element& element) {
-    // Any number of them and once more any number are any number of both.
+    // Merges consecutive elements that match any number of characters.
     if (element.many && !elements_.empty() && elements_.back().many)
         elements_.back().characters |= element.characters;
     else
         elements_.push_back(element);
 }
 
-// Which lengths of the name the elements so far take: time and memory are bounded whatever they
-// are.
+// Tracks the prefix lengths of the name that the elements so far match, so time and memory are
+// bounded for any pattern.
 bool PortSelection::Pattern::matches(const std::string& name) const {
     std::vector<char> taken(name.size() + 1, 0);
     taken[0] = 1;
@@ -60,7 +60,7 @@ bool PortSelection::Pattern::matches(const std::string& name) const {
             return element.characters[static_cast<unsigned char>(name[length - 1])];
         };
         if (element.many) {
-            // What was taken still is, and each length makes the next one possible.
+            // Matched lengths stay matched, and each can be extended by one character.
             for (std::size_t length = 1; length <= name.size(); ++length) {
                 if (taken[length - 1] != 0 && takes(length)) taken[length] = 1;
             }
@@ -81,7 +81,7 @@ PortSelection::PortSelection(const std::vector<std::string>& patterns) {
     for (const std::string& given : patterns) {
         if (given.empty()) {
             throw Refusal(RefusalKind::NameMissing,
-                          "a selection of ports is empty: name ports as in /arm/pid.effort, or "
+                          "a selection of ports is empty: name ports, e.g. /arm/pid.effort, or "
                           "leave it out for all");
         }
         requireLength("a selection of ports", given, kLongestPattern);

@@ -1,5 +1,5 @@
 /// @file
-/// Which outputs and states somebody watches, as a person writes it: with the wildcards of a shell.
+/// A user's selection of outputs and states, with shell wildcards.
 #pragma once
 
 #include <bitset>
@@ -11,23 +11,26 @@ namespace rtcf::executor {
 
 class PortSelection {
    public:
-    /// @param patterns e.g. "/arm/*.effort": `*` stops at '/', `**` does not, `?` is one character,
+    /// @param patterns e.g. "/arm/*.effort". `*` matches any characters but '/', `**` any
+    /// characters, `?` one character, [abc] and [a-z] one of these. A pattern without '.' matches
+    /// all outputs and states of the components. Empty = everything
+    /// @throws Refusal if a pattern is empty or too long
     ///                 [abc] and [a-z] one of these. Without '.' it means all of such components.
     ///                 Empty = everything
     /// @throws Refusal of one that is empty or too long
     explicit PortSelection(const std::vector<std::string>& patterns);
 
-    /// Of whole names.
+    /// A pattern for whole names.
     class Pattern {
        public:
         explicit Pattern(const std::string& text);
-        /// What was asked for.
+        /// The text of the user.
         const std::string& given() const noexcept { return given_; }
-        /// @param name as of PortSelection::matches()
+        /// @param name see PortSelection::matches()
         bool matches(const std::string& name) const;
 
        private:
-        // What one character may be, or any number of them.
+        // Matches one character of a set, or any number of them.
         struct Element {
             std::bitset<UCHAR_MAX + 1> characters;
             bool many;
@@ -38,7 +41,7 @@ class PortSelection {
         std::vector<Element> elements_;
     };
     const std::vector<Pattern>& patterns() const noexcept { return patterns_; }
-    /// @param name full name of the component, '.', and of the output or state
+    /// @param name full name of the component, '.', and name of the output or state
     bool matches(const std::string& name) const;
 
    private:

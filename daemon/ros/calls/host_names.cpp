@@ -15,7 +15,7 @@ namespace rtcf::ros1 {
 
 namespace {
 
-constexpr auto kRetryAfter = std::chrono::seconds(10);  // after one that failed, or is in doubt
+constexpr auto kRetryAfter = std::chrono::seconds(10);  // after a failed or doubtful look-up
 
 std::string lookUpHost(const std::string& host) {
     addrinfo hints{};
@@ -40,7 +40,7 @@ bool isNumeric(const std::string& host) {
 
 struct HostNames::Shared {
     struct Host {
-        std::string address;  // empty: not known
+        std::string address;  // empty = unknown
         bool looking = false;
         std::chrono::steady_clock::time_point last;
     };
@@ -78,7 +78,7 @@ void HostNames::doubt(const std::string& host) {
         known.looking = true;
         known.last = now;
     }
-    // Nobody can end a lookup: it is left to itself, and what it finds stays for others.
+    // A look-up cannot be cancelled, so its thread is detached; later calls use its result.
     quietThread("ros-resolve", [shared = shared_, host] {
         std::string address = lookUpHost(host);
         {

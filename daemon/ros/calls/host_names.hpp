@@ -1,6 +1,6 @@
 /// @file
-/// Addresses of hosts. Looking one up may take a slow resolver longer than anything here may wait:
-/// each name is looked up once, by a thread of its own, and kept.
+/// Addresses of hosts. A slow resolver may take longer than any caller may wait, so each name is
+/// looked up once, in a separate thread, and the address is kept.
 #pragma once
 
 #include <chrono>
@@ -15,17 +15,17 @@ class HostNames {
    public:
     HostNames();
 
-    /// The address of a host, numeric. One that is not known yet is looked up, and waited for as
-    /// long as `patience`. @return nothing if it is not known by then
+    /// The numeric address of a host. Waits at most `patience` for a look-up.
+    /// @return nothing if the address is not known by then
     std::optional<std::string> address(const std::string& host, std::chrono::milliseconds patience);
 
-    /// The host does not answer there: what is known of it may be old. Any lookup goes on
-    /// meanwhile; at most one each 10 s.
+    /// Starts a new look-up, because the host does not answer at the known address. Returns at
+    /// once; at most one look-up per 10 s.
     void doubt(const std::string& host);
 
    private:
     struct Shared;
-    std::shared_ptr<Shared> shared_;  // with lookups that nobody waits for any more
+    std::shared_ptr<Shared> shared_;  // shared with detached look-up threads
 };
 
 }  // namespace rtcf::ros1

@@ -13,7 +13,7 @@ constexpr auto kTimeout = std::chrono::milliseconds(1000);
 constexpr std::int64_t kDeafness = 1000;  // ms
 constexpr std::int64_t kRecent = 10'000;  // ms
 
-// roscpp calls a function, not an object.
+// Global, because roscpp calls a function without an object.
 std::atomic<MasterCalls*> current_calls{nullptr};
 
 struct Note {
@@ -29,8 +29,8 @@ std::int64_t nowMs() {
         .count();
 }
 
-// What roscpp asks about its statistics each time it subscribes a topic, with five calls.
-// @return a name of the call; empty if it is another one
+// Detects the five calls about statistics that roscpp makes for each subscription.
+// @return a key for the call; empty for other calls
 std::string aboutStatistics(const std::string& method, const XmlRpc::XmlRpcValue& arguments) {
     if (method != "hasParam" && method != "getParam") return {};
     XmlRpc::XmlRpcValue values = arguments;
@@ -61,7 +61,7 @@ void MasterCalls::beginNote() noexcept {
 }
 
 std::string MasterCalls::endNote() noexcept {
-    constexpr auto kPatience = std::chrono::seconds(5);  // with a slow master and much to tell
+    constexpr auto kPatience = std::chrono::seconds(5);  // for a slow master and many registrations
     note.open = false;
     MasterCalls* const calls = current();
     if (note.registered && note.unanswered.empty() && calls != nullptr && !calls->ended_ &&
@@ -95,7 +95,7 @@ bool MasterCalls::call(const std::string& method, const XmlRpc::XmlRpcValue& arg
                        XmlRpc::XmlRpcValue& value) {
     if (registrar_.note(method, arguments)) {
         note.registered = true;
-        value.setSize(0);  // the publishers of a topic, which are connected when they are known
+        value.setSize(0);  // no publishers yet; the registrar connects them when the master answers
         return true;
     }
     MasterAnswer answer;
@@ -109,7 +109,8 @@ bool MasterCalls::call(const std::string& method, const XmlRpc::XmlRpcValue& arg
             return static_cast<bool>(found->second.answer);
         }
     }
-    // One that hangs is not waited for again by each of a hundred calls.
+    // After a timeout, calls fail at once for a while, so that a hundred calls do not wait one
+    // after another.
     if (!ended_ && begin >= deaf_until_ms_) {
         MasterAddress address;
         {
@@ -140,7 +141,7 @@ bool MasterCalls::call(const std::string& method, const XmlRpc::XmlRpcValue& arg
 
 namespace ros::master {
 
-// Takes the place of roscpp's own, which its other parts call by this name.
+// Replaces roscpp's function of this name.
 bool execute(const std::string& method, const XmlRpc::XmlRpcValue& request,
              XmlRpc::XmlRpcValue& response, XmlRpc::XmlRpcValue& payload,
              bool /*wait_for_master*/) {

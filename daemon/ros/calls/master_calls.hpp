@@ -1,9 +1,8 @@
 /// @file
-/// roscpp's own calls to its master, made here instead. roscpp waits for an
-/// answer as long as it takes, and tells most of its callers nothing if none
-/// comes: here each takes a second at most, and what got no answer is noted.
-/// Registrations are not waited for at all: the registrar makes them.
-/// ros::master::execute() of this program takes the place of the library's.
+/// Replacement of roscpp's calls to its master. roscpp waits for an answer without limit, and does
+/// not report a missing answer to most callers. Here, a call takes one second at most, and calls
+/// without an answer are noted. Registrations do not wait at all: the registrar makes them. The
+/// function ros::master::execute() of this program replaces that of the library.
 #pragma once
 
 #include <xmlrpcpp/XmlRpcValue.h>
@@ -19,53 +18,54 @@
 
 namespace rtcf::ros1 {
 
-/// All calls by way of roscpp, while it lives. One at a time in a process, as roscpp is. Any
-/// thread; not real-time.
+/// Handles all of roscpp's calls to the master during its life. One object per process, like
+/// roscpp. Any thread; not real-time.
 class MasterCalls {
    public:
-    /// @param connect of the registrar
+    /// @param connect passed to the registrar
     explicit MasterCalls(Registrar::Connect connect);
     ~MasterCalls();
     MasterCalls(const MasterCalls&) = delete;
     MasterCalls& operator=(const MasterCalls&) = delete;
 
-    /// The master to call, which knows nothing of us yet.
+    /// Sets a new master, at which nothing is registered yet.
     void useMaster(const std::string& uri, const MasterAddress& address);
-    /// The same master at another address.
+    /// Changes the address of the same master.
     void moveTo(const MasterAddress& address);
 
-    /// From now on no call gets an answer; those under way end within 50 ms. Registrations are
-    /// noted all the same.
+    /// Fails all calls from now on; present ones end within 50 ms. Registrations are still noted.
     void end() noexcept { ended_ = true; }
 
-    /// What the master is told of topics and services.
+    /// The registrations at the master.
     Registrar& registrar() noexcept { return registrar_; }
 
     /// @name Of the calling thread
     /// @{
+    /// Begins to note calls without an answer.
     static void beginNote() noexcept;
-    /// Waits until the master has been told of what was registered since beginNote().
-    /// @return the first call since then that got no answer, one line; empty = none
+    /// Waits until the master has the registrations made since beginNote().
+    /// @return the first call since then without an answer, one line; empty = none
     static std::string endNote() noexcept;
     /// @}
 
-    /// Makes a call. @return false if it got no answer, or a refusal
+    /// Makes a call.
+    /// @return false if it got no answer, or an error
     bool call(const std::string& method, const XmlRpc::XmlRpcValue& arguments,
               XmlRpc::XmlRpcValue& value);
-    /// The one there is; null = none.
+    /// The object of this process; null = none.
     static MasterCalls* current() noexcept;
 
    private:
     std::atomic<bool> ended_{false};
-    std::atomic<std::int64_t> deaf_until_ms_{0};  // the master left a call without an answer
+    std::atomic<std::int64_t> deaf_until_ms_{0};  // no calls before this time, after a timeout
     struct Recent {
         MasterAnswer answer;
         std::int64_t at_ms;
     };
-    mutable std::mutex mutex_;  // down to recent_
+    mutable std::mutex mutex_;  // protects uri_ to recent_
     std::string uri_;
     MasterAddress address_;
-    std::map<std::string, Recent> recent_;  // what roscpp asks again and again
+    std::map<std::string, Recent> recent_;  // answers to repeated calls of roscpp
     Registrar registrar_;
 };
 

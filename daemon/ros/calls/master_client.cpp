@@ -10,8 +10,8 @@ namespace rtcf::ros1 {
 
 namespace {
 
-// Answers of the ROS APIs are [code, message, value]; 1 is success. A fault is one to a call that
-// the server could not read.
+// Unpacks an answer of the ROS APIs: [code, message, value]; code 1 is success. A fault means that
+// the server could not parse the call.
 MasterAnswer unpack(XmlRpc::XmlRpcValue& response) {
     MasterAnswer answer;
     if (response.getType() == XmlRpc::XmlRpcValue::TypeStruct &&
@@ -42,13 +42,14 @@ MasterAnswer silence() {
     return answer;
 }
 
-// A call that has been begun. @return its answer; nothing = not yet
+// Checks a call in progress.
+// @return its answer; nothing = no answer yet
 std::optional<MasterAnswer> look(XmlRpc::XmlRpcClient& client, double wait_s) {
     try {
         client._disp.work(wait_s);
         XmlRpc::XmlRpcValue response;
         if (client.executeCheckDone(response)) return unpack(response);
-        // The dispatcher lets go of a connection that failed.
+        // The dispatcher removes a failed connection.
         if (client._disp._sources.empty()) return silence();
     } catch (const XmlRpc::XmlRpcException& error) {
         MasterAnswer answer;
@@ -87,7 +88,7 @@ MasterClient::MasterClient(const MasterAddress& server, std::chrono::millisecond
       cancel_(cancel) {}
 
 MasterAnswer MasterClient::call(const char* method, const XmlRpc::XmlRpcValue& arguments) {
-    constexpr double kSlice = 0.05;  // s, between looks at cancel_
+    constexpr double kSlice = 0.05;  // s between checks of cancel_
     const auto deadline = Clock::now() + timeout_;
     if (!begin(client_, method, arguments)) return silence();
     while (!cancel_ && Clock::now() < deadline) {
@@ -105,7 +106,7 @@ struct ParallelCalls::Line {
         : client(server.address.c_str(), static_cast<int>(server.port), "/") {}
 
     XmlRpc::XmlRpcClient client;
-    std::optional<std::size_t> call;  // under way
+    std::optional<std::size_t> call;  // call in progress
     Clock::time_point begun;
 };
 
@@ -123,7 +124,7 @@ std::vector<MasterAnswer> ParallelCalls::run(const std::vector<MasterCall>& call
     while (lines_.size() < std::min(calls.size(), kMost))
         lines_.push_back(std::make_unique<Line>(server_));
     std::size_t next = 0;
-    bool deaf = false;  // no more are begun
+    bool deaf = false;  // true = begin no more calls
     for (bool busy = true; busy;) {
         busy = false;
         deaf = deaf || cancel_ || Clock::now() > deadline;

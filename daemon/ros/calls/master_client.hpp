@@ -1,7 +1,6 @@
 /// @file
-/// Calls to a ROS master, or to any XML-RPC server that answers in its manner,
-/// that never take longer than they are allowed. roscpp's own calls wait for
-/// an answer as long as it takes.
+/// Calls with timeouts to a ROS master, or to any XML-RPC server with the same form of answers.
+/// roscpp's own calls wait for an answer without limit.
 #pragma once
 
 #include <xmlrpcpp/XmlRpcClient.h>
@@ -17,24 +16,24 @@
 
 namespace rtcf::ros1 {
 
-/// What came of a call.
+/// Result of a call.
 struct MasterAnswer {
     enum class Kind {
         Success,
-        Refused,  ///< answered that it will not or cannot
+        Refused,  ///< the answer is an error
         Silent,   ///< no answer
     };
     Kind kind = Kind::Silent;
-    std::string message;        ///< of the answer
-    XmlRpc::XmlRpcValue value;  ///< of the answer
+    std::string message;        ///< message of the answer
+    XmlRpc::XmlRpcValue value;  ///< value of the answer
 
     explicit operator bool() const { return kind == Kind::Success; }
     bool silent() const { return kind == Kind::Silent; }
-    /// The value as a string; empty if it is none.
+    /// The value as a string; empty if it is not a string.
     std::string text();
 };
 
-/// For one answer of a master.
+/// Timeout of one answer of a master.
 inline constexpr std::chrono::milliseconds kMasterAnswerTimeout{1000};
 
 /// A method and an array of arguments.
@@ -43,10 +42,10 @@ struct MasterCall {
     XmlRpc::XmlRpcValue arguments;
 };
 
-/// Arguments that are all texts.
+/// Makes an argument array of strings.
 XmlRpc::XmlRpcValue texts(const std::vector<std::string>& arguments);
 
-/// Where a server is: an address, as looking up a name may take longer than any call.
+/// Numeric address of a server, because looking up a name may take longer than a call.
 struct MasterAddress {
     std::string address;  ///< numeric
     std::uint32_t port = 0;
@@ -57,8 +56,8 @@ class MasterClient {
    public:
     using Clock = std::chrono::steady_clock;
 
-    /// @param timeout for one call
-    /// @param cancel  if it becomes true, the call ends within 50 ms; must outlive this
+    /// @param timeout timeout of one call
+    /// @param cancel  when it becomes true, a call ends within 50 ms; outlives this object
     MasterClient(const MasterAddress& server, std::chrono::milliseconds timeout,
                  const std::atomic<bool>& cancel);
 
@@ -71,21 +70,22 @@ class MasterClient {
     const std::atomic<bool>& cancel_;
 };
 
-/// Several calls at a time, each over a connection of its own: what one answer takes, all take.
-/// One thread at a time; not real-time.
+/// Parallel calls, each on its own connection, so that all together take as long as the slowest
+/// answer. One thread at a time; not real-time.
 class ParallelCalls {
    public:
     using Clock = std::chrono::steady_clock;
 
-    /// @param cancel if it becomes true, calls end within 5 ms; must outlive this
+    /// @param cancel when it becomes true, calls end within 5 ms; outlives this object
     ParallelCalls(MasterAddress server, const std::atomic<bool>& cancel);
     ~ParallelCalls();
     ParallelCalls(const ParallelCalls&) = delete;
     ParallelCalls& operator=(const ParallelCalls&) = delete;
 
-    /// @param each     how long one answer may take; after one that took longer none is asked for
-    /// @param deadline of all
-    /// @return the answers in the order of the calls
+    /// Makes the calls.
+    /// @param each     timeout of one answer; after a timeout, no more calls are begun
+    /// @param deadline end of all calls
+    /// @return the answers, in the order of the calls
     std::vector<MasterAnswer> run(const std::vector<MasterCall>& calls,
                                   std::chrono::milliseconds each, Clock::time_point deadline);
 
@@ -97,7 +97,8 @@ class ParallelCalls {
     std::vector<std::unique_ptr<Line>> lines_;
 };
 
-/// Host and port of a master's URI. @return false if it is none
+/// Splits a master's URI into host and port.
+/// @return false if the URI is invalid
 bool splitMasterUri(const std::string& uri, std::string& host, std::uint32_t& port);
 
 }  // namespace rtcf::ros1

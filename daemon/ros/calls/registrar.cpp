@@ -63,7 +63,7 @@ void Registrar::forget() {
         for (auto entry = entries_.begin(); entry != entries_.end();) {
             entry->second.told = Told::No;
             entry->second.renewed = false;
-            ++entry->second.version;  // what is being told does not count
+            ++entry->second.version;  // the present call does not count
             entry = entry->second.wanted ? std::next(entry) : entries_.erase(entry);
         }
     }
@@ -122,14 +122,15 @@ Registrar::Step Registrar::due(const Entry& entry) const {
     return wanted && entry.told != Told::Yes ? Step::Register : Step::None;
 }
 
-// With the lock.
+// With mutex_ held.
 bool Registrar::settled() const {
     return !telling_ && std::all_of(entries_.begin(), entries_.end(), [this](const auto& each) {
         return due(each.second) == Step::None;
     });
 }
 
-// With the lock. The arguments of a withdrawal are caller, name, and the URI it was registered by.
+// With mutex_ held. The arguments of a withdrawal are caller, name, and the URI of the
+// registration.
 std::vector<Registrar::Task> Registrar::tasks(std::vector<MasterCall>& calls) {
     std::vector<Task> tasks;
     for (auto& [key, entry] : entries_) {
@@ -137,7 +138,7 @@ std::vector<Registrar::Task> Registrar::tasks(std::vector<MasterCall>& calls) {
         if (step == Step::None) continue;
         tasks.push_back({key, step, entry.version});
         if (step == Step::Register) {
-            entry.told = Told::Maybe;  // it may be heard although no answer comes
+            entry.told = Told::Maybe;  // the master may receive it even if no answer arrives
             calls.push_back({"register" + key.first, entry.arguments});
             continue;
         }
@@ -149,7 +150,7 @@ std::vector<Registrar::Task> Registrar::tasks(std::vector<MasterCall>& calls) {
     return tasks;
 }
 
-// With the lock.
+// With mutex_ held.
 void Registrar::apply(const Task& task, MasterAnswer& answer,
                       std::vector<std::pair<std::string, XmlRpc::XmlRpcValue>>& connections) {
     const auto found = entries_.find(task.key);
@@ -165,7 +166,7 @@ void Registrar::apply(const Task& task, MasterAnswer& answer,
         if (!entry.wanted) entries_.erase(found);
         return;
     }
-    // Refused: asking again would not help.
+    // Also if the master rejects it: repeating it would not help.
     entry.told = entry.version == task.version ? Told::Yes : Told::Maybe;
     const bool subscribed = task.key.first == "Subscriber" && entry.wanted;
     if (subscribed && answer.value.getType() == XmlRpc::XmlRpcValue::TypeArray)
@@ -198,7 +199,8 @@ void Registrar::run() {
         changed_.notify_all();
         for (const auto& [topic, publishers] : connections) connect_(topic, publishers);
         lock.lock();
-        if (settled()) master.reset();  // a master has a thread for each connection
+        // Closes the connections, because a master has a thread for each.
+        if (settled()) master.reset();
     }
 }
 

@@ -1,8 +1,8 @@
 /// @file
-/// What the master is told of this process's topics and services. roscpp would tell it itself, one
-/// by one and with its locks held, once: here its calls are noted, and a thread tells the master as
-/// many at a time as it takes, again when the master is another one, and takes back all of it at
-/// the end, whether roscpp still knows of it or not.
+/// Registration of this process's topics and services at the master. roscpp registers them one by
+/// one, with its locks held, and only once. Here, roscpp's calls are only noted; a thread makes
+/// many registrations in parallel, repeats them at a new master, and withdraws all of them at the
+/// end, even those that roscpp has forgotten.
 #pragma once
 
 #include <atomic>
@@ -24,8 +24,7 @@ namespace rtcf::ros1 {
 class Registrar {
    public:
     using Clock = std::chrono::steady_clock;
-    /// Called by its thread with the publishers that the master knows of a topic that this
-    /// process has subscribed.
+    /// Called by the registrar's thread with the publishers of a newly subscribed topic.
     using Connect =
         std::function<void(const std::string& topic, const XmlRpc::XmlRpcValue& publishers)>;
 
@@ -34,36 +33,39 @@ class Registrar {
     Registrar(const Registrar&) = delete;
     Registrar& operator=(const Registrar&) = delete;
 
-    /// A call of roscpp's to its master. @return false if it is no registration
+    /// Notes a call of roscpp to its master.
+    /// @return false if the call is not a registration
     bool note(const std::string& method, const XmlRpc::XmlRpcValue& arguments);
 
-    /// Where the master is to be told from now on.
+    /// Sets the address of the master.
     void useMaster(const MasterAddress& master);
-    /// The master has lost what it was told.
+    /// Repeats all registrations, because the master has lost them.
     void forget();
-    /// Whether the master is to know of us; if not, all is taken back.
+    /// Registers everything (true) or withdraws everything (false).
     void show(bool shown);
-    /// The master answers: what it gave no answer to is told again.
+    /// Repeats calls without an answer, because the master answers again.
     void retry();
 
-    /// Waits until the master has been told all. @return false if it was not, in time
+    /// Waits until all registrations are made.
+    /// @return false if that takes longer than the deadline
     bool flush(Clock::time_point deadline);
-    /// True if the master has been told anything, as far as we know.
+    /// True if the master has confirmed any registration.
     bool hasTold() const;
-    /// Takes all back, and tells nothing more. @return how many the master may still have
+    /// Withdraws everything and registers nothing more.
+    /// @return number of registrations that the master may still have
     std::size_t withdraw(Clock::time_point deadline);
 
    private:
     enum class Told { No, Maybe, Yes };
-    // Of a topic that is published or subscribed, or a service.
+    // A registration of a published topic, a subscribed topic or a service.
     struct Entry {
-        XmlRpc::XmlRpcValue arguments;  // of the registration
+        XmlRpc::XmlRpcValue arguments;  // arguments of the registration
         bool wanted = false;
-        bool renewed = false;  // taken back and registered again: the master is to hear of both
+        bool renewed = false;  // withdrawn and registered again: both go to the master
         Told told = Told::No;
-        std::uint64_t version = 0;  // counts registrations
+        std::uint64_t version = 0;  // number of registrations
     };
-    using Key = std::pair<std::string, std::string>;  // what it is, as in the method's name; name
+    using Key = std::pair<std::string, std::string>;  // kind, as in the method's name; name
     enum class Step { None, Register, Withdraw };
     struct Task {
         Key key;
@@ -80,16 +82,16 @@ class Registrar {
 
     const Connect connect_;
     std::atomic<bool> cancel_{false};
-    mutable std::mutex mutex_;  // down to deadline_
+    mutable std::mutex mutex_;  // protects entries_ to deadline_
     std::condition_variable changed_;
     std::map<Key, Entry> entries_;
     MasterAddress master_;
     std::uint64_t master_version_ = 0;
     bool shown_ = true;
-    bool silent_ = false;  // the master, when it was told last
+    bool silent_ = false;  // the master did not answer the last call
     bool telling_ = false;
     bool stop_ = false;
-    Clock::time_point deadline_ = Clock::time_point::max();  // of the last calls
+    Clock::time_point deadline_ = Clock::time_point::max();  // deadline of the last calls
     std::thread thread_;
 };
 

@@ -16,20 +16,21 @@ namespace rtcf::ros1 {
 
 namespace {
 
-// rosconsole calls functions, and keeps what they give for the life of the process.
+// Global, because rosconsole calls functions without an object, and keeps the handles for the life
+// of the process.
 struct Console {
     std::mutex mutex;
     ConsoleBackend* backend = nullptr;
-    std::set<std::string> loggers;  // handles are their addresses
+    std::set<std::string> loggers;  // rosconsole's handles are their addresses
     std::vector<ros::console::LogAppender*> appenders;
 };
 
 Console& console() {
-    static auto* const only = new Console;  // outlives the statics of all libraries
+    static auto* const only = new Console;  // outlives static objects of all libraries
     return *only;
 }
 
-// roscpp's loggers tell of the node, whoever calls it.
+// roscpp's own loggers are about the node, even in a component's hook.
 bool isOfNode(const std::string& logger) { return logger.rfind("ros.roscpp", 0) == 0; }
 
 const std::string& nameOf(void* handle) { return *static_cast<const std::string*>(handle); }
@@ -45,7 +46,7 @@ ros::console::Level levelTo(LogLevel level) {
 }  // namespace
 
 ConsoleBackend::ConsoleBackend(executor::Log& log) : log_(log) {
-    // What roscpp says for those who debug roscpp.
+    // Messages for developers of roscpp.
     log_.levels().set("ros.roscpp.superdebug", LogLevel::Warn);
     if (const char* file = std::getenv("ROSCONSOLE_CONFIG_FILE"); file != nullptr && *file != '\0')
         applyConsoleConfig(file, log_);
@@ -54,7 +55,7 @@ ConsoleBackend::ConsoleBackend(executor::Log& log) : log_(log) {
         console().backend = this;
         for (const std::string& logger : console().loggers) log_.levels().know(logger);
     }
-    // Places that have logged before know no level yet.
+    // Call sites that have logged before have cached no level yet.
     ros::console::notifyLoggerLevelsChanged();
 }
 
@@ -65,7 +66,7 @@ ConsoleBackend::~ConsoleBackend() {
 
 bool ConsoleBackend::enabled(const std::string& logger, LogLevel level) const {
     if (isOfNode(logger)) return level >= log_.levels().of(logger);
-    // One place may be in the hooks of several components: print() knows which.
+    // One call site may run in hooks of several components; print() checks the component's level.
     return level >= std::min(log_.levels().of(logger), log_.levels().lowest());
 }
 
@@ -86,8 +87,8 @@ void ConsoleBackend::print(const std::string& logger, LogLevel level, const char
 
 }  // namespace rtcf::ros1
 
-// The interface between rosconsole and its backend; librosconsole finds these
-// before those of its log4cxx library.
+// The interface between rosconsole and its backend. librosconsole finds these functions before
+// those of its log4cxx library.
 namespace ros::console::impl {
 
 using rtcf::ros1::console;

@@ -1,9 +1,8 @@
 /// @file
-/// The backend of rosconsole in this process: what is said by ROS_* macros,
-/// in components' hooks, their callbacks and roscpp itself, goes into our log,
-/// and the levels are those of our log. It takes the place of the log4cxx
-/// backend, of which Debian 12's crashes once somebody has asked for the
-/// loggers: roscpp's services ~get_loggers and ~set_logger_level end here.
+/// The backend of rosconsole in this process. Messages of ROS_* macros, in components' hooks, their
+/// callbacks and roscpp itself, go into the executor's log, with its levels. It replaces the
+/// log4cxx backend: that of Debian 12 crashes after a query of the loggers. So roscpp's services
+/// ~get_loggers and ~set_logger_level end here.
 #pragma once
 
 #include <ros/console.h>
@@ -14,16 +13,17 @@
 
 namespace rtcf::ros1 {
 
-/// One at a time in a process, as rosconsole is; without one, nothing is logged. Any thread.
+/// One object per process, like rosconsole; without one, nothing is logged. Any thread.
 class ConsoleBackend {
    public:
-    /// Takes the levels of ROSCONSOLE_CONFIG_FILE over into `log`, which outlives this.
+    /// Copies the levels of ROSCONSOLE_CONFIG_FILE to `log`.
+    /// @param log outlives this object
     explicit ConsoleBackend(executor::Log& log);
     ~ConsoleBackend();
     ConsoleBackend(const ConsoleBackend&) = delete;
     ConsoleBackend& operator=(const ConsoleBackend&) = delete;
 
-    /// @name What rosconsole asks for
+    /// @name Called by rosconsole
     /// @{
     bool enabled(const std::string& logger, LogLevel level) const;
     void print(const std::string& logger, LogLevel level, const char* text, const char* file,

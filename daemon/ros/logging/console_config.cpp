@@ -29,8 +29,9 @@ void applyConsoleConfig(const std::string& file, executor::Log& log) {
     constexpr const char* kPrefix = "log4j.logger.";
     std::ifstream stream(file);
     if (!stream) {
-        log.write(LogLevel::Warn, {},
-                  fmt::format("ROSCONSOLE_CONFIG_FILE {} cannot be read: levels stay", file));
+        log.write(
+            LogLevel::Warn, {},
+            fmt::format("cannot read ROSCONSOLE_CONFIG_FILE {}: log levels are unchanged", file));
         return;
     }
     std::string line;
@@ -50,9 +51,10 @@ void applyConsoleConfig(const std::string& file, executor::Log& log) {
         if (level != levels.end()) {
             log.levels().set(logger, level->second);
         } else if (!word.empty()) {
-            log.write(LogLevel::Warn, {},
-                      fmt::format("{}:{}: '{}' is no level: DEBUG, INFO, WARN, ERROR or FATAL",
-                                  file, number, word));
+            log.write(
+                LogLevel::Warn, {},
+                fmt::format("{}:{}: '{}' is not a level: use DEBUG, INFO, WARN, ERROR or FATAL",
+                            file, number, word));
         }
     }
 }

@@ -43,16 +43,16 @@ void Rosout::publish(const executor::LogEntry& entry) {
     message.file = entry.file;
     message.function = entry.function;
     message.line = entry.line;
-    if (message.file.empty()) {  // what the executor itself says of a component or of the loop
+    if (message.file.empty()) {  // a message of the executor about a component or the loop
         message.file = "rtcf-executor";
         message.function = "report";
     }
     const std::lock_guard lock(mutex_);
     if (!publisher_) return;
-    // Of a simulation only the present is known, which is hardly later than the call. Without a
-    // node there is no time of ROS.
+    // Under simulated time, only the present time is known, which is hardly later than the call.
+    // Without a node, there is no ROS time.
     message.header.stamp = ros::Time::isSimTime() ? ros::Time::now() : timeOf(entry);
-    // What the node itself says is under the node's name, as for any node.
+    // The node's own messages have the node's name, as for any node.
     message.name = entry.component.empty() ? node_ : entry.component;
     message.topics = topicsOf(entry.component);
     publisher_.publish(message);
@@ -63,7 +63,7 @@ void Rosout::show(const executor::RunnerView* runner) {
     runner_ = runner;
 }
 
-// Made anew when the graph has changed.
+// The topics of a component; updated when the graph has changed.
 const std::vector<std::string>& Rosout::topicsOf(const std::string& component) {
     static const std::vector<std::string> none;
     if (runner_ == nullptr) return none;
@@ -85,7 +85,7 @@ const std::vector<std::string>& Rosout::topicsOf(const std::string& component) {
 }
 
 void Rosout::open(ros::NodeHandle& handle, const std::string& node) {
-    // As roscpp does: a console that comes late gets the last record.
+    // Latched, as in roscpp: a console that starts later gets the last record.
     const ros::Publisher publisher = handle.advertise<rosgraph_msgs::Log>("/rosout", kQueue, true);
     const std::lock_guard lock(mutex_);
     publisher_ = publisher;

@@ -1,7 +1,7 @@
 /// @file
-/// The log on its way to /rosout: under the component's name, as if it were a
-/// node, with the time of the call and the component's topics. roscpp's own way there is not used,
-/// as it goes by log4cxx.
+/// Publishes the log on /rosout, with the component's name as if it were a node, the time of the
+/// call, and the component's topics. It does not use roscpp's own publisher, which depends on
+/// log4cxx.
 #pragma once
 
 #include <ros/publisher.h>
@@ -24,18 +24,19 @@ struct GraphSnapshot;
 
 namespace rtcf::ros1 {
 
-/// Owned by the program, as the log and the node both need it. Any thread.
+/// Owned by main(), because both the log and the node use it. Any thread.
 class Rosout {
    public:
-    /// Publishes one record, or nothing while there is no node. Waits for nobody.
+    /// Publishes one record; does nothing while there is no node. Never waits for subscribers.
     void publish(const executor::LogEntry& entry);
 
-    /// @name By the node
+    /// @name Called by the node
     /// @{
     void open(ros::NodeHandle& handle, const std::string& node);
     void close();
     bool isOpen() const;
-    /// Whose topics are told; outlives all calls of publish(), or null before that.
+    /// Sets the runner whose topics records list; null = none. It must outlive later calls of
+    /// publish().
     void show(const executor::RunnerView* runner);
     /// @}
 
@@ -44,9 +45,9 @@ class Rosout {
 
     const std::vector<std::string>& topicsOf(const std::string& component);
 
-    mutable std::mutex mutex_;  // all below
+    mutable std::mutex mutex_;  // protects all members below
     const executor::RunnerView* runner_ = nullptr;
-    std::shared_ptr<const executor::GraphSnapshot> graph_;  // that topics_ are of
+    std::shared_ptr<const executor::GraphSnapshot> graph_;  // graph view of topics_
     Topics topics_;
     ros::Publisher publisher_;
     std::string node_;

@@ -8,7 +8,7 @@ namespace {
 
 constexpr auto kCheckPeriod = std::chrono::seconds(10);
 
-// The nodes that have this topic or service.
+// The nodes with this topic or service.
 std::vector<std::string> holders(XmlRpc::XmlRpcValue& state, int kind, const std::string& name) {
     std::vector<std::string> nodes;
     XmlRpc::XmlRpcValue& list = state[kind];
@@ -26,7 +26,7 @@ std::vector<std::string> holders(XmlRpc::XmlRpcValue& state, int kind, const std
 }  // namespace
 
 const std::string& Claim::of(MasterLink& link, const std::string& wanted) {
-    constexpr int kPublishers = 0;  // of the three lists that make a system's state
+    constexpr int kPublishers = 0;  // index in the three lists of getSystemState
     constexpr int kServices = 2;
     const std::string own = link.name().full();
     const auto now = std::chrono::steady_clock::now();
@@ -42,7 +42,8 @@ const std::string& Claim::of(MasterLink& link, const std::string& wanted) {
         if (used_.empty()) used_ = own;
         return used_;
     }
-    // Soon again at first: two that begin together may both have found it free.
+    // The first repetition is early: two nodes that start together may both have found the
+    // namespace free.
     next_ = now + (wanted == wanted_ ? kCheckPeriod : kMasterAnswerTimeout);
     wanted_ = wanted;
     used_ = wanted;
@@ -52,8 +53,8 @@ const std::string& Claim::of(MasterLink& link, const std::string& wanted) {
         for (const std::string& node : holders(answers[0].value, kind, wanted + name)) {
             if (node == own || !link.lives(node)) continue;
             used_ = own;
-            problem_ = "the names below " + wanted + " are node " + node +
-                       "'s: services and iteration_info of this runner are below " + own;
+            problem_ = "node " + node + " uses the names below " + wanted +
+                       ": the services and iteration_info of this runner are below " + own;
         }
     }
     return used_;

@@ -1,7 +1,7 @@
 /// @file
 /// The namespace of a runner's services and of its topic iteration_info. The node's own name is
-/// nobody else's; one that was asked for may be another node's, as of a second robot that was
-/// launched from the same file: a service registered there would take the other's place.
+/// unique. A configured namespace may belong to another node, for example of a second robot
+/// launched from the same file; services registered there would replace those of the other node.
 #pragma once
 
 #include <chrono>
@@ -11,23 +11,22 @@
 
 namespace rtcf::ros1 {
 
-/// Owned by the subjects; watch thread.
+/// Owned by Subjects; watch thread.
 class Claim {
    public:
-    /// The namespace to use now: the one that was asked for, unless another node that lives has
-    /// its names; then, and where none was asked for, the node's own. Asks the master if it was
-    /// not asked of late.
-    /// @param wanted empty: the node's own
+    /// The namespace to use now: the configured one, unless a live node uses its names; otherwise
+    /// the node's own. Queries the master unless it did so recently.
+    /// @param wanted configured namespace; empty = the node's own
     const std::string& of(MasterLink& link, const std::string& wanted);
 
-    /// Why it is not the one that was asked for, one line; empty if it is.
+    /// The reason for not using the configured namespace, one line; empty = it is used.
     const std::string& problem() const { return problem_; }
 
    private:
     std::string wanted_;
     std::string used_;
     std::string problem_;
-    std::chrono::steady_clock::time_point next_;  // when the master is asked again
+    std::chrono::steady_clock::time_point next_;  // time of the next query
 };
 
 }  // namespace rtcf::ros1

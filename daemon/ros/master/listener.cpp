@@ -15,7 +15,7 @@ namespace rtcf::ros1 {
 
 namespace {
 
-// As /proc/net/tcp has it: words of the machine's byte order, in capitals.
+// The format of /proc/net/tcp: words in the machine's byte order, in capitals.
 std::string hexadecimal(const void* bytes, std::size_t words) {
     std::string text;
     for (std::size_t i = 0; i < words; ++i) {
@@ -28,7 +28,7 @@ std::string hexadecimal(const void* bytes, std::size_t words) {
     return text;
 }
 
-// The user of the listening socket in one of the kernel's tables; any of `addresses` will do.
+// The user of the socket that listens at one of the addresses, in one of the kernel's tables.
 std::optional<uid_t> ownerIn(const char* table, std::initializer_list<std::string> addresses,
                              std::uint32_t port) {
     constexpr const char* kListening = "0A";
@@ -65,7 +65,7 @@ bool isOfThisMachine(const std::string& address) {
     auto& four = reinterpret_cast<sockaddr_in&>(storage);
     auto& six = reinterpret_cast<sockaddr_in6&>(storage);
     if (inet_pton(AF_INET, address.c_str(), &four.sin_addr) == 1) {
-        // The whole of 127/8 is, whether it can be bound or not.
+        // All of 127/8 is local, even if it cannot be bound.
         if (ntohl(four.sin_addr.s_addr) >> 24U == 127U) return true;
         four.sin_family = AF_INET;
         size = sizeof four;
@@ -77,7 +77,7 @@ bool isOfThisMachine(const std::string& address) {
     }
     const int probe = socket(storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (probe < 0) return false;
-    // Only one's own addresses can be bound.
+    // Only addresses of this machine can be bound.
     const bool ours = bind(probe, reinterpret_cast<sockaddr*>(&storage), size) == 0;
     close(probe);
     return ours;
@@ -89,7 +89,7 @@ std::optional<uid_t> ownerOfListener(const MasterAddress& server) {
     in_addr four{};
     in6_addr six{};
     if (inet_pton(AF_INET, server.address.c_str(), &four) == 1) {
-        // The kernel gives a connection to the closest match.
+        // The kernel prefers the most specific match.
         const std::string exact = hexadecimal(&four, 1);
         if (auto owner = ownerIn("/proc/net/tcp", {exact}, server.port)) return owner;
         if (auto owner =

@@ -1,5 +1,5 @@
 /// @file
-/// Who listens at an address: whether that is this machine, and whose process it is there.
+/// Owner of a listening socket on this machine.
 #pragma once
 
 #include <sys/types.h>
@@ -12,11 +12,11 @@
 
 namespace rtcf::ros1 {
 
-/// Whether a numeric address is one of this machine's. Not real-time.
+/// True if a numeric address belongs to this machine. Not real-time.
 bool isOfThisMachine(const std::string& address);
 
-/// The user whose process listens on a port of this machine at this address; nothing if none does,
-/// or it is not this machine's. Not real-time.
+/// The user whose process listens at this address of this machine; nothing if there is none, or if
+/// the address is not of this machine. Not real-time.
 std::optional<uid_t> ownerOfListener(const MasterAddress& server);
 
 }  // namespace rtcf::ros1

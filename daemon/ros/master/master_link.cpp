@@ -14,10 +14,10 @@ constexpr auto kResolving = std::chrono::milliseconds(500);
 
 }  // namespace
 
-// What a master says when it is looked at.
+// Answers of a master to one check.
 struct MasterLink::Sight {
     bool silent = true;
-    std::string node_uri;  // of the node that has our name; empty: none
+    std::string node_uri;  // URI of the node with our name; empty = none
     std::optional<int> pid;
     std::optional<bool> simulated;
 };
@@ -57,7 +57,7 @@ MasterLink::State MasterLink::look(const executor::BridgeSettings& settings) {
     if (!node_.alive()) {
         failed_ = true;
         problem_ =
-            "something in this process has shut down ROS: restart the executor to have it again";
+            "something in this process has shut down ROS: restart the executor to use ROS again";
         return State::Failed;
     }
     if (uri != uri_) {
@@ -70,7 +70,7 @@ MasterLink::State MasterLink::look(const executor::BridgeSettings& settings) {
         hostname_ = settings.hostname;
         say_("the new ROS hostname takes effect at the next start of the executor");
     }
-    // Before the look, whose answers are to be newer.
+    // Read before the check, so that the master's answers are newer.
     const bool told = node_.registrar().hasTold();
     const bool asked_to_go = takeShutdownRequest();
     const Sight found = sight();
@@ -79,8 +79,8 @@ MasterLink::State MasterLink::look(const executor::BridgeSettings& settings) {
         hosts_.doubt(host_);
         was_silent_ = true;
         if (off_ != Why::No) return State::Off;
-        problem_ = "no ROS master answers at " + uri_ + "; open connections go on";
-        say_("the ROS master at " + uri_ + " does not answer any more: open connections go on");
+        problem_ = "no ROS master answers at " + uri_ + "; open connections continue";
+        say_("the ROS master at " + uri_ + " no longer answers: open connections continue");
         return State::Silent;
     }
     const bool is_new = found.pid && master_pid_ && *master_pid_ != *found.pid;
@@ -91,17 +91,17 @@ MasterLink::State MasterLink::look(const executor::BridgeSettings& settings) {
     }
     simulated_ = found.simulated;
     const bool returned = std::exchange(was_silent_, false);
-    // A hook may have registered something at a new master before we have looked.
+    // A hook may have registered something at a new master before this check.
     const bool lost = is_new || (told && found.node_uri != node_.uri());
     if (lost) new_ = true;
-    // One that was out of reach has told us nothing of publishers that came or went meanwhile.
+    // A master that was out of reach has not reported new or lost publishers meanwhile.
     if (lost || returned) node_.registrar().forget();
     master_pid_ = found.pid;
     node_.registrar().show(true);
     node_.registrar().retry();
     if (lost || returned) {
         if (!node_.registrar().flush(Clock::now() + kCallTimeout))
-            return away("the ROS master at " + uri_ + " did not take all registrations");
+            return away("the ROS master at " + uri_ + " did not accept all registrations");
         say_(lost ? "ROS node " + name().full() + " is registered again at " + uri_
                   : "the ROS master at " + uri_ + " answers again");
     }
@@ -145,7 +145,7 @@ MasterLink::State MasterLink::away(const std::string& problem) {
 bool MasterLink::locate(const std::string& uri, MasterAddress& address) {
     std::string host;
     if (!splitMasterUri(uri, host, address.port)) {
-        away("the ROS master's URI '" + uri + "' is none; it has the form http://HOST:PORT");
+        away("the ROS master's URI '" + uri + "' is invalid; use the form http://HOST:PORT");
         return false;
     }
     host_ = host;
@@ -159,20 +159,19 @@ bool MasterLink::locate(const std::string& uri, MasterAddress& address) {
     return true;
 }
 
-// Anybody can start a master where ours is expected, and be all of its nodes. What its owner may
-// not do here, nobody may by way of it.
+// Any user can start a master at the expected address, and act as all of its nodes. So the owner of
+// the master must have the right that ROS peers have.
 bool MasterLink::mayFollow(const std::string& uri, const MasterAddress& address,
                            executor::Right needed) {
     const std::optional<uid_t> owner = ownerOfListener(address);
-    if (!owner) return true;  // on another machine, or there is none
+    if (!owner) return true;  // on another machine, or no master
     const executor::Right right = access_.ofUser(*owner);
     if (right >= needed) return true;
     away("the ROS master at " + uri + " belongs to user " + std::to_string(*owner) +
-         " of this machine, whose right is '" + executor::wordOf(right) +
-         "': it is not followed "
-         "where ROS peers have '" +
+         " of this machine, who has the right '" + executor::wordOf(right) +
+         "': the runner does not use it, because its ROS peers have the right '" +
          executor::wordOf(needed) +
-         "'; give that user the right in [access], or fewer to peers: rtcfctl runner set "
+         "'; give that user this right in [access], or reduce that of peers: rtcfctl runner set "
          "--ros-peers");
     say_(problem_);
     return false;
@@ -190,7 +189,7 @@ bool MasterLink::start(const std::string& uri, const MasterAddress& address,
         node_.start(uri, address, settings.hostname);
     } catch (const std::exception& error) {
         failed_ = true;
-        problem_ = std::string("the ROS node could not be started: ") + error.what();
+        problem_ = std::string("cannot start the ROS node: ") + error.what();
         say_(problem_);
         return false;
     }
@@ -202,8 +201,9 @@ bool MasterLink::start(const std::string& uri, const MasterAddress& address,
     return true;
 }
 
-// The name that is wanted, else the runner's own, or the first one after it that no other node has:
-// a second node of a name would end the first. @return false if the master does not answer
+// Chooses the configured name, else the runner's own, or the first free name after it: a second
+// node of a name would end the first one.
+// @return false if the master does not answer
 bool MasterLink::chooseName(ParallelCalls& master) {
     constexpr int kMost = 9;
     const NodeName wanted = node_.name();
@@ -263,7 +263,7 @@ MasterLink::Sight MasterLink::sight() {
     if (node) sight.node_uri = node.text();
     if (pid && pid.value.getType() == XmlRpc::XmlRpcValue::TypeInt)
         sight.pid = static_cast<int&>(pid.value);
-    // As it may be set at any time before a loop starts, it is asked for again and again.
+    // Queried again each time, because it may be set at any time before a loop starts.
     if (!time.silent()) {
         sight.simulated = time && time.value.getType() == XmlRpc::XmlRpcValue::TypeBoolean &&
                           static_cast<bool&>(time.value);
@@ -277,7 +277,7 @@ bool MasterLink::lives(const std::string& node) {
     return found[0] && mayLive(found[0].text());
 }
 
-// One of this machine that does not answer has died, and what no URI leads to is none.
+// A node on this machine that does not answer is dead, and so is a node without a valid URI.
 bool MasterLink::mayLive(const std::string& node_uri) {
     std::string host;
     std::uint32_t port = 0;
@@ -286,13 +286,13 @@ bool MasterLink::mayLive(const std::string& node_uri) {
     return answers(node_uri, here) || !here;
 }
 
-// @param here set if the node is on this machine
+// @param here set to true if the node is on this machine
 bool MasterLink::answers(const std::string& node_uri, bool& here) {
     std::string host;
     MasterAddress address;
     if (!splitMasterUri(node_uri, host, address.port)) return false;
     const std::optional<std::string> found = hosts_.address(host, kResolving);
-    if (!found) return true;  // who cannot be asked may be alive
+    if (!found) return true;  // the node cannot be reached, but may be alive
     address.address = *found;
     here = isOfThisMachine(address.address);
     MasterClient node(address, kCallTimeout, hurry_);
@@ -305,10 +305,10 @@ bool MasterLink::takeShutdownRequest() {
     return std::exchange(shutdown_request_, false);
 }
 
-// The node itself stays, so that it can come back; roscpp cannot be started twice. The master asks
-// for it when another node takes the name, anybody else by `rosnode kill`.
+// Switches the node off. The roscpp node itself stays, because roscpp cannot be started twice. The
+// master requests a shutdown when another node takes the name; others do by `rosnode kill`.
 void MasterLink::obeyShutdownRequest(const Sight& sight) {
-    if (sight.silent) {  // who it was will be seen later
+    if (sight.silent) {  // the reason is found at the next check
         const std::lock_guard lock(mutex_);
         shutdown_request_ = true;
         return;
@@ -321,17 +321,17 @@ void MasterLink::obeyShutdownRequest(const Sight& sight) {
 std::string MasterLink::whyOff() const {
     if (off_ == Why::Killed) {
         return "ROS node " + name().full() +
-               " was asked to shut down: it is off until there is a new master, or `rtcfctl runner "
-               "set --ros`";
+               " received a shutdown request: it is off until there is a new master, or `rtcfctl "
+               "runner set --ros`";
     }
     return "another node named " + name().full() +
-           " runs at this ROS master: give its host or runner another name";
+           " runs at this ROS master: rename its host or runner";
 }
 
-// True if another node has our name and we are not to fight for it: until the
-// master has told us to go, or, afterwards, until that node does not answer.
+// True if another node has our name and we must not take it back: before the master's shutdown
+// request, or afterwards while that node answers.
 bool MasterLink::nameIsTaken(const Sight& sight) {
-    constexpr int kPatience = 3;  // looks
+    constexpr int kPatience = 3;  // checks
     if (sight.node_uri.empty() || sight.node_uri == node_.uri()) {
         taken_ = 0;
         off_ = Why::No;

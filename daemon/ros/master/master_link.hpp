@@ -1,7 +1,7 @@
 /// @file
-/// Being a node at a ROS master: where the master is, whether it answers and is to be followed,
-/// which name the node has, whether another node took it or somebody asked the node to go, and
-/// that the master knows of its topics and services. What topics there are is not its matter.
+/// The node's relation to a ROS master: the master's address and state, whether its owner is
+/// trusted, the node's name and whether another node has taken it, shutdown requests, and the
+/// registrations of topics and services. It does not know which topics exist.
 #pragma once
 
 #include <atomic>
@@ -22,63 +22,64 @@
 
 namespace rtcf::ros1 {
 
-/// Owned by the master watch, whose thread calls it unless said otherwise.
+/// Owned by the master watch. Watch thread, unless stated otherwise.
 class MasterLink {
    public:
     using Clock = std::chrono::steady_clock;
-    /// Says what changed, one line; the same twice counts once.
+    /// Reports a change, one line; a repetition counts once.
     using Say = std::function<void(const std::string&)>;
 
     enum class State {
-        Away,    ///< no node yet, or none that may be at this master; see problem()
-        Up,      ///< the master answers and knows of the node
-        Silent,  ///< the master does not answer; open connections go on
-        Off,     ///< the node has no right to its name, or was asked to go
-        Failed,  ///< no node any more in this process
+        Away,    ///< no node yet, or this master is not trusted; see problem()
+        Up,      ///< the master answers, and the node is registered
+        Silent,  ///< the master does not answer; open connections continue
+        Off,     ///< another node has the name, or a peer requested a shutdown
+        Failed,  ///< roscpp has been shut down in this process
     };
 
-    /// @param access whose masters of this machine are followed; outlives this
+    /// @param access rights of users, which decide on masters of this machine; outlives this object
     /// @param wake called from any thread when look() has something to do
     /// @param written called from any thread when a parameter has been written
     MasterLink(NodeName name, const executor::Access& access, Say say,
                const std::function<void()>& wake, const RoscppNode::ParameterWritten& written);
 
-    /// Where the settings say that the master is.
+    /// The master's URI of the settings.
     static std::string uriOf(const executor::BridgeSettings& settings);
 
-    /// Looks at the master and does what is to be done to be its node. Waits for one answer, a
+    /// Checks the master, and starts or registers the node as necessary. Waits for one answer, a
     /// second at most.
     State look(const executor::BridgeSettings& settings);
-    /// The settings were given anew: whoever asked the node to go is overruled.
+    /// Cancels a shutdown request of a peer, because the settings were set again.
     void revive();
-    /// The master begins to forget of the node; leave() or end() comes next.
+    /// Begins to withdraw registrations; leave() or end() comes next.
     void hide() { node_.registrar().show(false); }
-    /// Off until the next look(): the master is to forget of the node. @return how many
-    /// registrations it may still have
+    /// Withdraws all registrations; the node is off until the next look().
+    /// @return number of registrations that the master may still have
     std::size_t leave(Clock::time_point deadline);
-    /// For good: takes everything back, and the node ends. @return as leave()
+    /// Withdraws all registrations and ends the node for good.
+    /// @return as leave()
     std::size_t end(Clock::time_point deadline);
 
-    /// Lets no call to the master take any longer. Any thread.
+    /// Ends all calls to the master soon. Any thread.
     void hurry() noexcept;
 
-    /// Why it is not Up, one line; empty if it is.
+    /// The reason for a state other than Up, one line; empty = Up.
     const std::string& problem() const { return problem_; }
-    /// Whether a peer has asked the node to go.
+    /// True if a peer has requested a shutdown.
     bool killed() const { return off_ == Why::Killed; }
-    /// True once for each master that knows nothing of the node yet.
+    /// True once for each master at which the node is new.
     bool takeNew() { return std::exchange(new_, false); }
-    /// Whether the master says that time is simulated; nothing = it has not been asked.
+    /// The master's /use_sim_time; nothing = not queried yet.
     std::optional<bool> simulated() const { return simulated_; }
-    /// Whether the master knows of the node, or may.
+    /// True if the node is, or may be, registered.
     bool up() const { return up_; }
-    /// Whether a node of the master's answers.
+    /// True if a node of the master answers.
     bool lives(const std::string& node);
-    /// Waits until the master has been told of all topics and services, half a second at most.
+    /// Waits until all topics and services are registered, half a second at most.
     void tell();
-    /// What was to be withdrawn and could not is tried again.
+    /// Retries failed withdrawals.
     void retry() { node_.registrar().retry(); }
-    /// By which to call the master; what is called ends with hurry(), unless it is to leave.
+    /// For calls to the master. They end with hurry(), unless `leaving` is true.
     ParallelCalls calls(bool leaving = false) const {
         return {address_, leaving ? never_ : hurry_};
     }
@@ -108,23 +109,23 @@ class MasterLink {
 
     const executor::Access& access_;
     const Say say_;
-    std::mutex mutex_;  // shutdown_request_ and revived_
+    std::mutex mutex_;  // protects shutdown_request_ and revived_
     bool shutdown_request_ = false;
     bool revived_ = false;
     std::atomic<bool> hurry_{false};
     const std::atomic<bool> never_{false};
-    const NodeName own_name_;  // where settings name none
+    const NodeName own_name_;  // without a name in the settings
     RoscppNode node_;
     HostNames hosts_;
-    std::string host_;  // of the master that the settings name
-    std::string uri_;   // of the running node's master
+    std::string host_;  // host of the configured master
+    std::string uri_;   // URI of the running node's master
     MasterAddress address_;
-    std::unique_ptr<ParallelCalls> looks_;  // there
-    std::string hostname_;                  // as it was at the node's start
-    std::optional<int> master_pid_;         // of the master that was told last
+    std::unique_ptr<ParallelCalls> looks_;  // calls to the master, for checks
+    std::string hostname_;                  // as at the node's start
+    std::optional<int> master_pid_;         // of the last master with our registrations
     std::optional<bool> simulated_;
     Why off_ = Why::No;
-    int taken_ = 0;  // looks since another node got our name, or does not answer
+    int taken_ = 0;  // checks since another node got our name, or since it stopped answering
     bool up_ = false;
     bool was_silent_ = false;
     bool new_ = false;

@@ -9,8 +9,8 @@ namespace rtcf::ros1 {
 namespace {
 
 constexpr auto kPeriod = std::chrono::milliseconds(500);
-constexpr auto kFresh = std::chrono::milliseconds(1000);    // what a master answered so long ago
-constexpr auto kLeaving = std::chrono::milliseconds(1500);  // for all that is said to a master
+constexpr auto kFresh = std::chrono::milliseconds(1000);    // longest age of a master's answer
+constexpr auto kLeaving = std::chrono::milliseconds(1500);  // for all calls while leaving a master
 
 }  // namespace
 
@@ -88,17 +88,17 @@ void MasterWatch::wake() {
 }
 
 void MasterWatch::awaitNode() {
-    constexpr auto kPatience = std::chrono::seconds(5);  // a step may wait for several calls
+    constexpr auto kPatience = std::chrono::seconds(5);  // a step may make several calls
     std::unique_lock lock(mutex_);
     const auto off = [&] { return settings_ && !settings_->enabled; };
-    // A hook's own calls say if it has gone since.
+    // If the master has gone since, the hook's own calls fail.
     const auto there = [&] {
         return status_.connected && MasterLink::Clock::now() < answered_ + kFresh;
     };
     if (!off() && there()) return;
     due_ = true;
     changed_.notify_all();
-    // What a step that has begun already found may be old.
+    // The result of a running step may be old, so wait for the next one.
     const std::uint64_t wanted = steps_begun_ + 1;
     const auto known = [&] { return stop_ || off() || there() || steps_ended_ >= wanted; };
     const bool in_time = changed_.wait_for(lock, kPatience, known);
@@ -122,13 +122,13 @@ void MasterWatch::run() {
             if (!settings_) continue;
             ++steps_begun_;
         }
-        // What a master answers must never end the executor.
+        // An answer of a master must never end the executor.
         try {
             step();
         } catch (const std::exception& error) {
             setProblem(std::string("ROS: ") + error.what());
         } catch (const XmlRpc::XmlRpcException& error) {  // not a std::exception
-            setProblem("the ROS master's answer is not understood: " + error.getMessage());
+            setProblem("cannot parse the ROS master's answer: " + error.getMessage());
         }
         {
             const std::lock_guard lock(mutex_);
@@ -171,7 +171,7 @@ void MasterWatch::step() {
 void MasterWatch::serve(const executor::BridgeSettings& looked) {
     executor::BridgeSettings settings;
     {
-        // Starting a node takes its time: topics are opened as is wanted by now.
+        // Starting a node takes time, so use the newest settings.
         const std::lock_guard lock(mutex_);
         settings = *settings_;
         if (settings.enabled != looked.enabled) return;
@@ -186,7 +186,8 @@ void MasterWatch::serve(const executor::BridgeSettings& looked) {
     for (const std::string& refusal : subjects_.refusals()) say(refusal);
 }
 
-// Closes all topics and withdraws what is left; the node stays, as roscpp cannot be started twice.
+// Closes all topics and withdraws all registrations. The node stays, because roscpp cannot be
+// started twice.
 void MasterWatch::leave() {
     if (!link_.up()) return;
     const auto deadline = MasterLink::Clock::now() + kLeaving;

@@ -1,7 +1,7 @@
 /// @file
-/// The life of the node: waits for a master, has what the runner shows opened and closed at it,
-/// lets hooks through to it, and ends it all in order. The ROS node owns it; run() has a thread of
-/// its own.
+/// The life of the node: waits for a master, opens and closes the runner's topics and services,
+/// grants hooks access to the node, and shuts everything down in order. Owned by the ROS node;
+/// run() has its own thread, the watch thread.
 #pragma once
 
 #include <atomic>
@@ -22,12 +22,13 @@ namespace rtcf::ros1 {
 
 class MasterWatch {
    public:
-    /// @param log what is said by ROS_* macros goes there; outlives this
-    /// @param rosout opened and closed with the node; outlives this
+    /// @param log receives messages of ROS_* macros; outlives this object
+    /// @param rosout opened and closed with the node; outlives this object
     MasterWatch(NodeName name, const executor::Access& access, executor::BridgeReport report,
                 executor::Log& log, Rosout& rosout);
 
-    /// Once, before configure(): the runner to show, and whom to ask for changes of it.
+    /// Sets the runner, and the function that requests changes from rtcfd. Once, before
+    /// configure().
     void attach(executor::RunnerView& runner, const executor::AskSupervisor& ask);
 
     /// @name Any thread; return at once
@@ -38,17 +39,17 @@ class MasterWatch {
     executor::BridgeStatus status() const;
     bool feeds(const executor::Injector& injector) const { return subjects_.feeds(injector); }
     void serveParameters(executor::ParameterRequest request);
-    /// Lets run() end, soon whatever the master does.
+    /// Ends run() soon, even if the master hangs.
     void stop();
     /// @}
 
-    /// Waits until the node is up and its master answers, at most some seconds. Any thread.
+    /// Waits until the node is up and its master answers, at most five seconds. Any thread.
     /// @throws NoMaster
     void awaitNode();
-    /// By which components' hooks come to the node; as long as this.
+    /// Access of components' hooks to the node; lives as long as this object.
     executor::HookGate& hooks() noexcept { return hooks_; }
 
-    /// Serves until stop(). Called once. Leaves the master within 2 s.
+    /// Serves until stop(), then leaves the master within 2 s. Called once.
     void run();
 
    private:
@@ -64,20 +65,20 @@ class MasterWatch {
 
     std::atomic<bool> stop_{false};
 
-    mutable std::mutex mutex_;  // down to status_
+    mutable std::mutex mutex_;  // protects changed_ to status_
     std::condition_variable changed_;
     std::optional<executor::BridgeSettings> settings_;
     bool due_ = false;  // something changed since the last step
     std::uint64_t steps_begun_ = 0;
     std::uint64_t steps_ended_ = 0;
-    MasterLink::Clock::time_point answered_;  // when the master did, last
+    MasterLink::Clock::time_point answered_;  // time of the master's last answer
     executor::BridgeStatus status_;
 
-    const std::string runner_;  // as ROS may write it
+    const std::string runner_;  // name in ROS form
     const executor::BridgeReport report_;
     Hooks hooks_{[this] { awaitNode(); }};
 
-    // The watch thread's alone, but for what is thread-safe in itself.
+    // Watch thread only, except for thread-safe functions.
     const ConsoleBackend console_;
     MasterLink link_;
     Subjects subjects_;

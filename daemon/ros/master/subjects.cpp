@@ -9,7 +9,7 @@ Subjects::Subjects(Rosout& rosout, executor::Log& log)
       log_(log),
       publishing_([&log](const std::string& line) { log.write(LogLevel::Warn, {}, line); }),
       reconfiguring_([&log](const std::string& component, const std::string& line) {
-          log.write(LogLevel::Warn, component, line + " (asked for by dynamic_reconfigure)");
+          log.write(LogLevel::Warn, component, line + " (requested by dynamic_reconfigure)");
       }) {}
 
 void Subjects::attach(executor::RunnerView& runner, const executor::AskSupervisor& ask) {
@@ -63,7 +63,8 @@ Reconciled Subjects::reconcile(MasterLink& link, const executor::BridgeSettings&
         introspection_->open(handle, link.name().full(), claim_.of(link, settings.name_space),
                              settings.peers >= executor::Right::Observe);
     if (!rosout_.isOpen()) rosout_.open(handle, link.name().full());
-    // What a stranger says is the loop's matter only if strangers may operate it, time included.
+    // Peers are unauthenticated, so the loop takes their values and their time only if they may
+    // operate it.
     const bool operates = settings.peers >= executor::Right::Operate;
     reconfiguring_.allow(settings.peers >= executor::Right::Tune);
     const Reconciled topics =
@@ -78,7 +79,7 @@ void Subjects::reconcileWithoutMaster(MasterLink& link) {
 }
 
 void Subjects::closeAll(MasterLink& link, MasterLink::Clock::time_point deadline) {
-    // Registrations matter more at a slow master.
+    // At a slow master, withdrawing registrations is more important.
     constexpr auto kReserve = std::chrono::milliseconds(500);
     if (!std::exchange(open_, false)) return;
     link.hide();

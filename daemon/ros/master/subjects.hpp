@@ -1,7 +1,7 @@
 /// @file
-/// All that a runner has at a ROS master once it has a node there: topics in both directions,
-/// parameters, the log, services and reports. Each is brought to what is wanted again and again,
-/// as a master may have come or gone meanwhile.
+/// Everything that a runner has at a ROS master: topics in both directions, parameters, the log,
+/// services and reports. Each is reconciled repeatedly with the wanted state, because a master may
+/// have come or gone meanwhile.
 #pragma once
 
 #include <memory>
@@ -24,11 +24,11 @@
 
 namespace rtcf::ros1 {
 
-/// Owned by the master watch; its thread, unless said otherwise.
+/// Owned by the master watch. Watch thread, unless stated otherwise.
 class Subjects {
    public:
-    /// @param rosout opened and closed with the node; outlives this
-    /// @param log gets why changes were refused; outlives this
+    /// @param rosout opened and closed with the node; outlives this object
+    /// @param log receives the reasons of rejected changes; outlives this object
     Subjects(Rosout& rosout, executor::Log& log);
 
     /// @name Any thread; return at once
@@ -39,33 +39,33 @@ class Subjects {
     void setClock(std::shared_ptr<executor::SimulatedClock> clock);
     void serveParameters(executor::ParameterRequest request);
     void noteParameterWritten(const std::string& key);
-    /// Fills in what it knows.
+    /// Fills in its part of a status.
     void show(executor::BridgeStatus& status) const;
     bool feeds(const executor::Injector& injector) const { return subscribing_.feeds(injector); }
-    /// Calls that wait for the loop end now.
+    /// Ends calls that wait for the loop.
     void end() { reconfiguring_.end(); }
     /// @}
 
-    /// Forgets closed topics that are not wanted any more.
+    /// Removes closed topics that are no longer wanted.
     void tidy() { publishing_.tidy(); }
-    /// Opens and closes topics until they are as wanted. The node is up.
+    /// Opens and closes topics as wanted. The node is up.
     Reconciled reconcile(MasterLink& link, const executor::BridgeSettings& settings);
-    /// What can be done without a master.
+    /// Does the part of reconcile() that needs no master.
     void reconcileWithoutMaster(MasterLink& link);
-    /// Closes all; reconcile() opens it again.
-    /// @param deadline of what is said to the master
+    /// Closes everything; reconcile() opens it again.
+    /// @param deadline end of calls to the master
     void closeAll(MasterLink& link, MasterLink::Clock::time_point deadline);
-    /// The runner is not looked at any more.
+    /// Releases the runner.
     void detach();
-    /// Nothing is to be opened any more.
+    /// Removes all taps, so that nothing is opened again.
     void drop() { publishing_.setTaps({}); }
 
-    /// Connections that were refused, which have not been told yet.
+    /// Rejected connections that have not been reported yet.
     std::vector<std::string> refusals() {
         return refusals_ ? refusals_->take() : std::vector<std::string>();
     }
-    /// What is to be said although all is open: a roscpp that is not as we know it, a name that is
-    /// another's, a connection that was refused. Empty = nothing.
+    /// A warning although everything is open: an unknown version of roscpp, a namespace of another
+    /// node, or a rejected connection. Empty = none.
     std::string notice() const {
         if (!broken_.empty()) return broken_.front();
         if (!claim_.problem().empty()) return claim_.problem();
@@ -78,11 +78,11 @@ class Subjects {
     Publishing publishing_;
     Subscribing subscribing_;
     Reconfiguring reconfiguring_;
-    std::mutex mutex_;                              // introspection_, until it is taken
+    std::mutex mutex_;                              // protects introspection_ until the first use
     std::unique_ptr<Introspection> introspection_;  // null without a runner
     const std::vector<std::string> broken_ = broken(dependences());
     Claim claim_;
-    std::unique_ptr<Refusals> refusals_;  // since the node is up
+    std::unique_ptr<Refusals> refusals_;  // since the start of the node
     bool open_ = false;
 };
 

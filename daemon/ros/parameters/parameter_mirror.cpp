@@ -13,7 +13,7 @@ namespace {
 
 XmlRpc::XmlRpcValue toXmlRpc(const ParameterValue& value) {
     if (const auto* truth = std::get_if<bool>(&value)) return {*truth};
-    // XML-RPC has 32 bits.
+    // Integers of XML-RPC have 32 bits.
     if (const auto* integer = std::get_if<std::int64_t>(&value)) {
         const auto narrow = static_cast<int>(*integer);
         return narrow == *integer ? XmlRpc::XmlRpcValue(narrow)
@@ -23,7 +23,7 @@ XmlRpc::XmlRpcValue toXmlRpc(const ParameterValue& value) {
     return {std::get<std::string>(value)};
 }
 
-// Whether it is of the declared type, the loop knows and says. Nothing for what no parameter is.
+// Converts a value; unset if a parameter cannot have this type. The loop checks the declared type.
 std::optional<ParameterValue> fromXmlRpc(XmlRpc::XmlRpcValue& value, const std::string& type) {
     switch (value.getType()) {
         case XmlRpc::XmlRpcValue::TypeBoolean:
@@ -34,7 +34,7 @@ std::optional<ParameterValue> fromXmlRpc(XmlRpc::XmlRpcValue& value, const std::
             return std::int64_t{integer};
         }
         case XmlRpc::XmlRpcValue::TypeDouble: {
-            constexpr double kExact = 9007199254740992.0;  // integers up to there
+            constexpr double kExact = 9007199254740992.0;  // largest exact integer
             const double real = static_cast<double&>(value);
             const bool whole = std::abs(real) <= kExact && std::trunc(real) == real;
             if (type == "int" && whole) return static_cast<std::int64_t>(real);
@@ -47,11 +47,12 @@ std::optional<ParameterValue> fromXmlRpc(XmlRpc::XmlRpcValue& value, const std::
     }
 }
 
-// XML cannot carry control characters, nor what is no UTF-8; it changes carriage returns.
+// True if XML can carry the value: it cannot carry control characters and invalid UTF-8, and
+// changes carriage returns.
 bool canBeSent(const ParameterValue& value) {
     const auto* const text = std::get_if<std::string>(&value);
     if (text == nullptr) return true;
-    int following = 0;  // bytes of a character that has begun
+    int following = 0;  // remaining bytes of the present character
     for (const char each : *text) {
         const auto byte = static_cast<unsigned char>(each);
         const bool follows = (byte & 0xC0U) == 0x80U;
@@ -73,7 +74,7 @@ bool canBeSent(const ParameterValue& value) {
     return following == 0;
 }
 
-constexpr std::size_t kMost = 400;  // calls in one turn
+constexpr std::size_t kMost = 400;  // most calls in one reconcile()
 
 std::chrono::steady_clock::time_point soon() {
     return std::chrono::steady_clock::now() + kMasterAnswerTimeout;
@@ -83,8 +84,8 @@ std::chrono::steady_clock::time_point soon() {
 
 void ParameterMirror::noteWritten(const std::string& key) {
     const std::lock_guard lock(pending_->mutex);
-    // It is the component's own, with a slash at its end, or one below it. Anybody may say it, and
-    // as long as a message may be: what it costs does not grow with its slashes.
+    // The key is a component's namespace with a slash at its end, or below it. Any peer may send
+    // any key, of any length, so the cost must not depend on its slashes.
     for (const std::string& component : pending_->followed) {
         if (key.size() > component.size() && key[component.size()] == '/' &&
             key.compare(0, component.size(), component) == 0)
@@ -114,7 +115,7 @@ Reconciled ParameterMirror::reconcile(ParallelCalls& master, const Caller& calle
         const std::lock_guard lock(pending_->mutex);
         for (const Component& component : components) {
             const std::string& name = component.set->full_name;
-            // While the loop is asked, nobody knows which value is to hold.
+            // While a request to the loop is pending, the value is undecided.
             if (pending_->asked.count(name) != 0 || owed_.count(name) != 0) continue;
             present.push_back(component);
             if (pending_->refused.count(name) != 0) refused.push_back(component);
@@ -122,7 +123,7 @@ Reconciled ParameterMirror::reconcile(ParallelCalls& master, const Caller& calle
     }
     const Reconciled owing = owed_.empty() ? Reconciled::Done : Reconciled::Later;
     Reconciled result = Reconciled::Done;
-    // Before it is read again, and asked for again.
+    // Before the rejected value is read and requested again.
     if (!refused.empty()) {
         if (!write(master, caller, refused, result)) return result & owing;
         const std::lock_guard lock(pending_->mutex);
@@ -135,7 +136,8 @@ Reconciled ParameterMirror::reconcile(ParallelCalls& master, const Caller& calle
     if (!read(master, caller, present, asked, result)) return result & owing;
     {
         const std::lock_guard lock(pending_->mutex);
-        // Of what the loop was asked just now it may have answered, but our values are from before.
+        // Skips components with new requests: the loop may have answered, but these values are
+        // older.
         const auto waits = [&](const Component& component) {
             const std::string& name = component.set->full_name;
             return asked.count(name) != 0 || pending_->followed.count(name) == 0;
@@ -146,8 +148,8 @@ Reconciled ParameterMirror::reconcile(ParallelCalls& master, const Caller& calle
     return result & owing;
 }
 
-// @param asked takes the names of components of which the loop is asked something
-// @return false if nothing more is to be done in this turn
+// @param asked receives the names of components with requests to the loop
+// @return false if nothing more can be done now
 bool ParameterMirror::read(ParallelCalls& master, const Caller& caller,
                            const std::vector<Component>& components, std::set<std::string>& asked,
                            Reconciled& result) {
@@ -159,7 +161,7 @@ bool ParameterMirror::read(ParallelCalls& master, const Caller& caller,
         for (const Component& component : components) {
             const std::string& name = component.set->full_name;
             const bool followed = pending_->followed.count(name) != 0;
-            // What is written from now on is looked at again.
+            // Later writes are read again.
             if (followed && pending_->written.erase(name) == 0) continue;
             if (calls.size() == kMost) {
                 if (followed) pending_->written.insert(name);
@@ -190,9 +192,10 @@ bool ParameterMirror::read(ParallelCalls& master, const Caller& caller,
     return result != Reconciled::Later;
 }
 
-// @param values the master's of the component's namespace, a struct if there are any
-// @param first  for the first time at this master
-// @return whether the loop is asked to take any of them
+// Compares the master's values with those of the loop, and requests changes.
+// @param values the master's values of the component's namespace; a struct if there are any
+// @param first  true = for the first time at this master
+// @return true if the loop is asked to change values
 bool ParameterMirror::take(XmlRpc::XmlRpcValue& values, const Component& component, bool first) {
     const executor::ParameterSet& set = *component.set;
     Known& known = known_[set.full_name];
@@ -235,7 +238,8 @@ void ParameterMirror::ask(const std::string& component, executor::ParameterBatch
              });
 }
 
-// @return false if nothing more is to be done in this turn
+// Writes values of the loop to the master.
+// @return false if nothing more can be done now
 bool ParameterMirror::write(ParallelCalls& master, const Caller& caller,
                             const std::vector<Component>& components, Reconciled& result) {
     struct Written {
@@ -251,8 +255,9 @@ bool ParameterMirror::write(ParallelCalls& master, const Caller& caller,
             const std::string& name = parameter.declaration.name;
             const std::string full = component.set->full_name + "/" + name;
             if (!canBeSent(parameter.value)) {
-                problem = "the parameter server cannot have the value of " + full +
-                          ": it has characters that XML-RPC cannot carry";
+                problem = "cannot store the value of " + full +
+                          " on the parameter server: it contains characters that XML-RPC cannot "
+                          "carry";
                 continue;
             }
             const auto found = known.values.find(name);
@@ -265,7 +270,7 @@ bool ParameterMirror::write(ParallelCalls& master, const Caller& caller,
             arguments[2] = toXmlRpc(parameter.value);
             calls.push_back({"setParam", arguments});
             writing.push_back({&known, &parameter});
-            known.ours.insert(name);  // also if its answer does not come
+            known.ours.insert(name);  // even if there is no answer
         }
     }
     {
@@ -278,7 +283,7 @@ bool ParameterMirror::write(ParallelCalls& master, const Caller& caller,
             result = Reconciled::Later;
             continue;
         }
-        // Of one that is refused there is no use in asking again either.
+        // A rejected call is not repeated either.
         const std::string& name = writing[i].parameter->declaration.name;
         writing[i].known->values[name] = writing[i].parameter->value;
     }

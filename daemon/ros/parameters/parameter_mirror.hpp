@@ -1,7 +1,7 @@
 /// @file
-/// Components' parameters at the master's parameter server, in step both ways: the values that hold
-/// in the loop are written there, and what somebody else writes there is asked of the loop. What it
-/// refuses is written over. Which of two wins, docs/ros.md says row by row.
+/// Synchronises components' parameters with the master's parameter server: it writes the loop's
+/// values there, and requests values written there by others from the loop. Rejected values are
+/// overwritten. docs/ros.md lists which value wins in each case.
 #pragma once
 
 #include <chrono>
@@ -18,60 +18,59 @@
 
 namespace rtcf::ros1 {
 
-/// Owned by Reconfiguring. Watch thread, unless said otherwise.
+/// Owned by Reconfiguring. Watch thread, unless stated otherwise.
 class ParameterMirror {
    public:
-    /// Our node, as the master knows it.
+    /// This node's name and URI.
     struct Caller {
         std::string name;
         std::string uri;
     };
-    /// A component, and whether it came while this master was there: what it was given then is
-    /// newer than what the master has.
+    /// A component. If it is new since this master was met, its values are newer than the master's.
     struct Component {
         std::shared_ptr<const executor::ParameterSet> set;
         bool is_new = false;
     };
 
-    /// By which changes are asked for. Before all else.
+    /// Sets the function that requests changes. Called first.
     void serve(executor::ParameterRequest request) { request_ = std::move(request); }
-    /// Whether what is written at the master is asked of the loop. Else it is written over.
+    /// Sets whether values written at the master are requested from the loop, or overwritten.
     void follow(bool follows) { follows_ = follows; }
 
-    /// The master says that a parameter or a namespace has been written. Any thread.
+    /// Notes that a parameter or a namespace has been written. Any thread.
     void noteWritten(const std::string& key);
 
-    /// Brings components and the master in step.
+    /// Synchronises components and the master.
     Reconciled reconcile(ParallelCalls& master, const Caller& caller,
                          const std::vector<Component>& components);
 
-    /// Minds components no more: what was written for them is taken back, or, where somebody else
-    /// had put a value before, that is put back.
+    /// Removes components: deletes the values written for them, or restores earlier values of
+    /// others.
     void leave(ParallelCalls& master, const Caller& caller, const std::set<std::string>& components,
                std::chrono::steady_clock::time_point deadline);
-    /// The same for all.
+    /// Removes all components.
     void leaveAll(ParallelCalls& master, const Caller& caller,
                   std::chrono::steady_clock::time_point deadline);
-    /// The master is another one, which knows nothing.
+    /// Starts again with a new master.
     void forget();
 
-    /// A value that the parameter server cannot have, one line; empty = none. Any thread.
+    /// A value that the parameter server cannot store, one line; empty = none. Any thread.
     std::string problem() const;
 
    private:
-    // What the master has of a component, as far as we know.
+    // The known state of a component at the master.
     struct Known {
         std::map<std::string, ParameterValue> values;       // by parameter
-        std::map<std::string, XmlRpc::XmlRpcValue> others;  // what others had put there, at last
-        std::set<std::string> ours;  // parameters whose value we have written
+        std::map<std::string, XmlRpc::XmlRpcValue> others;  // last values written by others
+        std::set<std::string> ours;                         // parameters written by us
     };
-    // Components, by full name. Shared with answers that come late.
+    // Components, by full name. Shared with late answers.
     struct Pending {
-        std::mutex mutex;                // all below
-        std::set<std::string> followed;  // the master tells of what is written
-        std::set<std::string> written;   // of these, and not looked at yet
-        std::set<std::string> asked;     // of the loop, and not answered yet
-        std::set<std::string> refused;   // by the loop, and not written over yet
+        std::mutex mutex;                // protects all members below
+        std::set<std::string> followed;  // the master reports writes
+        std::set<std::string> written;   // written since the last read
+        std::set<std::string> asked;     // with a pending request to the loop
+        std::set<std::string> refused;   // rejected by the loop and not overwritten yet
         std::string problem;
     };
 
@@ -85,8 +84,8 @@ class ParameterMirror {
     executor::ParameterRequest request_;
     bool follows_ = true;
     std::map<std::string, Known> known_;  // by component
-    // What the master is still to be told of components that left, before anything of others of
-    // their names.
+    // Calls still to make for removed components, before calls for new components of the same
+    // names.
     std::map<std::string, std::vector<MasterCall>> owed_;
     std::shared_ptr<Pending> pending_ = std::make_shared<Pending>();
 };

@@ -16,7 +16,7 @@ namespace {
 using executor::ParameterSet;
 using executor::ParameterSnapshot;
 
-// The whole is one group, as of a .cfg file without groups.
+// All parameters are in one group, as with a .cfg file without groups.
 constexpr const char* kGroup = "Default";
 
 constexpr double kLowest = std::numeric_limits<std::int32_t>::min();
@@ -26,8 +26,8 @@ std::int32_t narrowed(double value) {
     return static_cast<std::int32_t>(std::clamp(value, kLowest, kHighest));
 }
 
-// An integer of dynamic_reconfigure has 32 bits. One that is not declared to stay within them is a
-// double there, which is exact up to 2^53.
+// Integers of dynamic_reconfigure have 32 bits. An integer whose bounds are wider is sent as a
+// double, which is exact up to 2^53.
 bool isWide(const ParameterDeclaration& declaration) {
     const auto* normal = std::get_if<std::int64_t>(&declaration.default_value);
     if (normal == nullptr) return false;
@@ -85,7 +85,7 @@ ParameterValue bound(const ParameterDeclaration& declaration, bool upper) {
     return std::string();
 }
 
-// As Python literals, which is what its readers take it for.
+// Python literals, as readers of edit_method expect.
 std::string quoted(const std::string& text) {
     std::string result = "'";
     for (const char c : text) {
@@ -148,7 +148,7 @@ dynamic_reconfigure::ConfigDescription descriptionOf(const ParameterSet& set) {
 
 executor::ParameterBatch batchOf(const dynamic_reconfigure::Config& asked,
                                  const ParameterSet& set) {
-    // As peers see it: who sends all values back changes none of them.
+    // The values as peers see them, so that sending them back changes nothing.
     const dynamic_reconfigure::Config shown = valuesOf(set);
     executor::ParameterBatch batch;
     const auto take = [&](const auto& list, const auto& known, const auto& value_of) {
@@ -190,7 +190,7 @@ std::vector<std::string> bringWithinBounds(executor::ParameterBatch& batch,
         const auto number = static_cast<double>(value);
         const double low = declaration.minimum.value_or(number);
         const double high = declaration.maximum.value_or(number);
-        if (!(number < low) && !(number > high)) return;  // one that is no number stays
+        if (!(number < low) && !(number > high)) return;  // NaN stays
         const Number asked = value;
         // The nearest integer within the bounds.
         const double nearest = number < low ? low : high;

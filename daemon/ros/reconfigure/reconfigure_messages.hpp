@@ -1,5 +1,5 @@
 /// @file
-/// Declared parameters in the messages of dynamic_reconfigure. Pure functions.
+/// Conversion of declared parameters to and from messages of dynamic_reconfigure. Pure functions.
 #pragma once
 
 #include <dynamic_reconfigure/Config.h>
@@ -18,13 +18,12 @@ dynamic_reconfigure::Config valuesOf(const executor::ParameterSet& set);
 /// Types, bounds, defaults, descriptions, and the enumerators of enums.
 dynamic_reconfigure::ConfigDescription descriptionOf(const executor::ParameterSet& set);
 
-/// What `asked` would change; values that are as they are already are left out, and so are those
-/// that valuesOf() could not show as they are.
+/// The changes that `asked` requests, without values that are unchanged in the form of valuesOf().
 executor::ParameterBatch batchOf(const dynamic_reconfigure::Config& asked,
                                  const executor::ParameterSet& set);
 
-/// Brings each number of the batch within its parameter's bounds, to the nearest that is.
-/// @return a line for each that was not
+/// Clamps each number of the batch to its parameter's bounds.
+/// @return a line for each clamped value
 std::vector<std::string> bringWithinBounds(executor::ParameterBatch& batch,
                                            const executor::ParameterSet& set);
 

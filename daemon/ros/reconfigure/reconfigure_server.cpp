@@ -12,7 +12,7 @@ namespace rtcf::ros1 {
 
 namespace {
 
-constexpr auto kPatience = std::chrono::seconds(10);  // as long as a hook may take
+constexpr auto kPatience = std::chrono::seconds(10);  // longest time of a hook
 constexpr auto kSlice = std::chrono::milliseconds(20);
 
 }  // namespace
@@ -44,11 +44,11 @@ void ReconfigureServer::open(ros::NodeHandle& handle, ros::CallbackQueueInterfac
             handle.advertise<dynamic_reconfigure::Config>(name + "/parameter_updates", 1, true);
         service = handle.advertiseService(options);
         if (!descriptions || !updates || !service)
-            problem = "one of its names is taken in this process";
+            problem = "this process already uses one of its names";
     } catch (const std::exception& error) {
         problem = error.what();
     }
-    if (!problem.empty()) problem = "no dynamic_reconfigure of " + name + ": " + problem;
+    if (!problem.empty()) problem = "cannot offer dynamic_reconfigure for " + name + ": " + problem;
     if (descriptions) descriptions.publish(descriptionOf(*opening));
     const std::lock_guard lock(mutex_);
     descriptions_ = descriptions;
@@ -89,16 +89,17 @@ ReconfigureServer::Set ReconfigureServer::set() const {
     return set_;
 }
 
-// The answer has the values that hold then: those that were asked for, or, of a change that was
-// refused, those of before. Who wants to be told has the call fail instead.
+// The answer contains the resulting values: the requested ones, or the previous ones if the change
+// was rejected. With refuse_out_of_range, a rejected call fails instead.
 bool ReconfigureServer::change(const dynamic_reconfigure::ReconfigureRequest& asked,
                                dynamic_reconfigure::ReconfigureResponse& answer) {
     const Set before = set();
     executor::ParameterBatch batch = batchOf(asked.config, *before);
-    if (!range_.allowed) {  // the answer has what holds
-        range_.warn(before->full_name,
-                    "parameters stay as they are: ROS peers have not the right 'tune'; allow it by "
-                    "rtcfctl runner set --ros-peers tune");
+    if (!range_.allowed) {  // the answer contains the present values
+        range_.warn(
+            before->full_name,
+            "parameters are unchanged: ROS peers do not have the right 'tune'; to allow it: "
+            "rtcfctl runner set --ros-peers tune");
         answer.config = valuesOf(*before);
         return true;
     }
@@ -115,14 +116,15 @@ bool ReconfigureServer::change(const dynamic_reconfigure::ReconfigureRequest& as
                  [done](const std::string& refusal) { done->set_value(!refusal.empty()); });
         const auto deadline = std::chrono::steady_clock::now() + kPatience;
         while (outcome.wait_for(kSlice) != std::future_status::ready) {
-            // A hook that hangs: whether it will be changed nobody can say.
+            // A hook hangs: the result is unknown.
             if (ending_ || std::chrono::steady_clock::now() > deadline) return false;
         }
         refused = outcome.get();
     }
     const std::lock_guard lock(mutex_);
     answer.config = valuesOf(*set_);
-    if (refused && updates_) updates_.publish(answer.config);  // what others show holds no more
+    // Corrects the display of other clients.
+    if (refused && updates_) updates_.publish(answer.config);
     return !(refused && refuse);
 }
 

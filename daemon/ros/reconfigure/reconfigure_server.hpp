@@ -1,7 +1,7 @@
 /// @file
-/// The dynamic_reconfigure server of one component, made of its declared
-/// parameters: the service `set_parameters` and the latched topics
-/// `parameter_descriptions` and `parameter_updates` below its name.
+/// The dynamic_reconfigure server of one component, based on its declared parameters: the service
+/// `set_parameters` and the latched topics `parameter_descriptions` and `parameter_updates` below
+/// its name.
 #pragma once
 
 #include <dynamic_reconfigure/Reconfigure.h>
@@ -24,11 +24,11 @@ class NodeHandle;
 
 namespace rtcf::ros1 {
 
-/// What is done about values out of range. Owned by Reconfiguring.
+/// Policy for values out of range. Owned by Reconfiguring.
 struct RangePolicy {
-    std::atomic<bool> refuse{false};  ///< fail the call; else the nearest value is taken
+    std::atomic<bool> refuse{false};  ///< true = the call fails; false = values are clamped
     std::function<void(const std::string& component, const std::string& line)> warn;
-    std::atomic<bool> allowed{true};  ///< peers may change anything at all
+    std::atomic<bool> allowed{true};  ///< peers may change parameters
 };
 
 /// Owned by Reconfiguring.
@@ -36,21 +36,21 @@ class ReconfigureServer {
    public:
     using Set = std::shared_ptr<const executor::ParameterSet>;
 
-    /// @param request by which a change is asked for
-    /// @param ending  becomes true when nobody answers requests any more
+    /// @param request requests a change
+    /// @param ending  becomes true when requests get no more answers
     ReconfigureServer(Set set, executor::ParameterRequest request, const RangePolicy& range,
                       const std::atomic<bool>& ending);
 
-    /// Opens and closes service and topics. Watch thread.
+    /// Opens the service and the topics. Watch thread.
     void open(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue);
     void close();
     bool isOpen() const;
-    /// It is to be opened: it is not yet, and has not failed just now.
+    /// True if it is not open and has not failed just now.
     bool isDue() const;
-    /// Why it could not be opened, one line; empty if it could.
+    /// The error of the last open(), one line; empty = none.
     std::string problem() const;
 
-    /// The values from now on; tells the peers if they differ. Any thread; returns at once.
+    /// Sets the values, and publishes changed ones. Any thread; returns at once.
     void update(Set set);
     Set set() const;
 
@@ -61,7 +61,7 @@ class ReconfigureServer {
     const executor::ParameterRequest request_;
     const RangePolicy& range_;
     const std::atomic<bool>& ending_;
-    mutable std::mutex mutex_;  // all below
+    mutable std::mutex mutex_;  // protects all members below
     Set set_;
     std::string problem_;
     ros::Publisher descriptions_;

@@ -12,7 +12,7 @@ namespace rtcf::ros1 {
 
 namespace {
 
-// For what components that have left take back.
+// Timeout of the removal of components.
 constexpr auto kLeaveTimeout = std::chrono::milliseconds(1000);
 
 bool sameChoices(const std::vector<Choice>& one, const std::vector<Choice>& other) {
@@ -40,7 +40,7 @@ void Reconfiguring::setSets(const Sets& sets) {
     Servers wanted;
     for (const auto& set : sets) {
         const auto found = wanted_.find(set->full_name);
-        // The same component with other values, or another one of that name.
+        // True for the same component with other values; false for another one of that name.
         const auto declares_same = [&](const executor::ParameterSet& known) {
             if (known.parameters.size() != set->parameters.size()) return false;
             for (std::size_t i = 0; i < known.parameters.size(); ++i) {

@@ -1,6 +1,6 @@
 /// @file
-/// Parameters on ROS: a dynamic_reconfigure server for each component that has
-/// any, and their values on the parameter server.
+/// Parameters on ROS: a dynamic_reconfigure server for each component with parameters, and their
+/// values on the parameter server.
 #pragma once
 
 #include <ros/callback_queue.h>
@@ -27,50 +27,50 @@ class NodeHandle;
 
 namespace rtcf::ros1 {
 
-/// Owned by the master watch. A thread of its own answers the services.
+/// Owned by the master watch. A separate thread answers the services.
 class Reconfiguring {
    public:
     using Sets = std::vector<std::shared_ptr<const executor::ParameterSet>>;
 
-    /// @param warn hears of values that were out of range; any thread
+    /// @param warn receives warnings on values out of range; any thread
     explicit Reconfiguring(
         std::function<void(const std::string& component, const std::string& line)> warn);
     ~Reconfiguring();
     Reconfiguring(const Reconfiguring&) = delete;
     Reconfiguring& operator=(const Reconfiguring&) = delete;
 
-    /// By which changes are asked for. Before all else.
+    /// Sets the function that requests changes. Called first.
     void serve(executor::ParameterRequest request) {
         request_ = request;
         mirror_.serve(std::move(request));
     }
-    /// Whether a call with a value out of range fails. Any thread.
+    /// Sets whether a call with a value out of range fails. Any thread.
     void refuseOutOfRange(bool refuse) noexcept { range_.refuse = refuse; }
-    /// The parameters to offer from now on. Any thread; returns at once.
+    /// Sets the parameters to offer. Any thread; returns at once.
     void setSets(const Sets& sets);
-    /// Nobody answers requests any more: those under way fail. Any thread.
+    /// Fails pending calls, because requests get no more answers. Any thread.
     void end() noexcept { stop_ = true; }
 
-    /// Opens, closes and uploads what is wanted. Watch thread, with a master.
+    /// Opens and closes servers, and synchronises parameters. Watch thread, with a master.
     Reconciled reconcile(ros::NodeHandle& handle, ParallelCalls& master,
                          const ParameterMirror::Caller& caller);
-    /// Whether peers may change parameters; if not, they are shown. Watch thread.
+    /// Sets whether peers may change parameters, or only read them. Watch thread.
     void allow(bool allowed);
-    /// The master says that a parameter or a namespace has been written. Any thread.
+    /// Notes that a parameter or a namespace has been written at the master. Any thread.
     void noteWritten(const std::string& key) { mirror_.noteWritten(key); }
-    /// The master is another one. Watch thread.
+    /// Starts again with a new master. Watch thread.
     void forget();
-    /// Closes all; reconcile() opens them again. Watch thread.
+    /// Closes everything; reconcile() opens it again. Watch thread.
     void closeAll(ParallelCalls& master, const ParameterMirror::Caller& caller,
                   std::chrono::steady_clock::time_point deadline);
 
-    /// Why one could not be opened; empty if all could. Any thread.
+    /// The error of a server; empty = none. Any thread.
     std::string problem() const;
 
    private:
     using Servers = std::map<std::string, std::shared_ptr<ReconfigureServer>>;
 
-    /// Components that come from now on are new to a master that comes then.
+    /// Forgets which components are new.
     void unmeet();
     void run();
 
@@ -78,11 +78,11 @@ class Reconfiguring {
     RangePolicy range_;
     ros::CallbackQueue queue_;
     std::atomic<bool> stop_{false};
-    mutable std::mutex mutex_;   // all down to new_
+    mutable std::mutex mutex_;   // protects wanted_ to new_
     Servers wanted_;             // by component
-    Servers servers_;            // that have been opened
-    bool met_ = false;           // the components that were there when the master came
-    std::set<std::string> new_;  // components that came later
+    Servers servers_;            // opened servers
+    bool met_ = false;           // the master has been met, with the components of that time
+    std::set<std::string> new_;  // components added later
     ParameterMirror mirror_;
     std::thread thread_;
 };

@@ -1,6 +1,6 @@
 /// @file
-/// Handles of roscpp (ros::Publisher and its like) that one thread opens and closes while others
-/// use them.
+/// Helpers for handles of roscpp (e.g. ros::Publisher) that one thread opens and closes while
+/// others use them.
 #pragma once
 
 #include <chrono>
@@ -9,8 +9,8 @@
 
 namespace rtcf::ros1 {
 
-/// Closes a handle that is used under a lock, without that lock: closing may wait for a callback
-/// that takes it.
+/// Closes a handle that is protected by a mutex, without holding the mutex: closing may wait for a
+/// callback that takes it.
 template <typename Handle>
 void shutDown(std::mutex& mutex, Handle& handle) {
     Handle closing;
@@ -21,10 +21,10 @@ void shutDown(std::mutex& mutex, Handle& handle) {
     closing.shutdown();
 }
 
-/// When what could not be opened is tried again. One thread at a time.
+/// Delay before the next attempt to open something. One thread at a time.
 class Retry {
    public:
-    /// It was opened, or not.
+    /// Records the result of an attempt.
     void note(bool opened) {
         constexpr auto kPause = std::chrono::seconds(2);
         next_ = opened ? Clock::time_point{} : Clock::now() + kPause;

@@ -1,6 +1,5 @@
 /// @file
-/// What components' hooks have to do with the node: their way in, and what
-/// went wrong under them.
+/// Access of components' hooks to the node, and the failures of their calls.
 #pragma once
 
 #include <functional>
@@ -22,7 +21,7 @@ class Hooks final : public executor::HookGate {
     void enter(const std::string& component) noexcept override;
     std::string leave() noexcept override;
 
-    /// Full name of the component whose hook the calling thread is in; null = none.
+    /// Full name of the component whose hook the calling thread runs; null = none.
     static const std::string* component() noexcept;
 
    private:

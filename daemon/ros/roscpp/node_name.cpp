@@ -13,7 +13,7 @@ std::string legal(const std::string& text, const char* if_empty) {
     if (text.empty()) return if_empty;
     std::string name = text;
     for (char& c : name) {
-        // Not std::isalnum: a locale may count letters that ROS does not.
+        // Not std::isalnum(), because a locale may allow letters that ROS does not.
         const bool allowed =
             (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
         if (!allowed) c = '_';

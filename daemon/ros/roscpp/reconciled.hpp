@@ -1,16 +1,16 @@
 /// @file
-/// What came of bringing something to what is wanted of it.
+/// Result of a reconcile step.
 #pragma once
 
 namespace rtcf::ros1 {
 
 enum class Reconciled {
-    Done,   ///< it is what is wanted
-    Again,  ///< there is more to do, at once
-    Later,  ///< somebody did not answer, or could not: to be tried again after a while
+    Done,   ///< the wanted state is reached
+    Again,  ///< repeat at once
+    Later,  ///< a call failed or got no answer: repeat later
 };
 
-/// The worse of two.
+/// The worse of two results.
 inline Reconciled operator&(Reconciled one, Reconciled other) { return one < other ? other : one; }
 
 }  // namespace rtcf::ros1

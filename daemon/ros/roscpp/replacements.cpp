@@ -10,9 +10,9 @@ namespace rtcf::ros1 {
 
 namespace {
 
-// A library that is loaded, and what of it can only be read.
+// A loaded library and its read-only segments.
 struct Loaded {
-    const char* part;  // of its name
+    const char* part;  // part of its file name
     std::string file;
     std::vector<std::string_view> constant;
 };
@@ -27,14 +27,14 @@ int find(dl_phdr_info* info, std::size_t /*size*/, void* data) {
         const bool constant = segment.p_type == PT_LOAD && (segment.p_flags & PF_W) == 0 &&
                               (segment.p_flags & PF_R) != 0;
         if (!constant) continue;
-        // NOLINTNEXTLINE(performance-no-int-to-ptr): where the loader has put it
+        // NOLINTNEXTLINE(performance-no-int-to-ptr): address from the loader
         const auto* begin = reinterpret_cast<const char*>(info->dlpi_addr + segment.p_vaddr);
         wanted.constant.emplace_back(begin, segment.p_memsz);
     }
     return 1;
 }
 
-// The library has such a function, and who calls it by name gets ours.
+// True if the library has a function of this name, and callers by name get ours.
 bool isReplaced(const char* name, const Loaded& library) {
     void* const ours = dlsym(RTLD_DEFAULT, name);
     Dl_info there{};
@@ -56,20 +56,20 @@ const std::vector<Dependence>& dependences() {
     constexpr const char* kRoscpp = "libroscpp.so";
     constexpr const char* kRosconsole = "librosconsole";
     constexpr const char* kLevels = "levels of loggers, ROS_* messages in the log";
-    constexpr const char* kRefusals = "telling of connections that were refused";
-    constexpr const char* kNetworkMemory = "bounds to the memory that the network takes";
+    constexpr const char* kRefusals = "reports of rejected connections";
+    constexpr const char* kNetworkMemory = "limits on network memory";
     constexpr auto kFunction = Dependence::Kind::Function;
     static const std::vector<Dependence> list{
         {kFunction,
          "_ZN3ros6master7executeERKNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEERKN6XmlRpc"
          "11XmlRpcValueERSA_SD_b",
-         kRoscpp, "calls to the ROS master that end in time, and registrations"},
+         kRoscpp, "timeouts of calls to the ROS master, and registrations"},
         {kFunction, "_ZN3ros9this_node12getNamespaceB5cxx11Ev", kRoscpp,
          "names of components' topics and parameters outside a namespace"},
         {kFunction, "_ZN3ros12TransportTCP12setKeepAliveEbjjj", kRoscpp,
-         "noticing within seconds that a cable was cut"},
+         "detection of a cut cable within seconds"},
         {kFunction, "_ZN3ros22TransportPublisherLink12onRetryTimerERKNS_16SteadyTimerEventE",
-         kRoscpp, "connecting again within seconds after a cable was cut"},
+         kRoscpp, "reconnection within seconds after a cut cable"},
         {kFunction,
          "_ZN3ros10Connection4readEjRKN5boost8functionIFvRKNS1_10shared_ptrIS0_EERKNS1_12shared_"
          "arrayIhEEjbEEE",
@@ -81,9 +81,9 @@ const std::vector<Dependence>& dependences() {
         {kFunction,
          "_ZN3ros22TransportPublisherLink15onMessageLengthERKN5boost10shared_ptrINS_10ConnectionEEE"
          "RKNS1_12shared_arrayIhEEjb",
-         kRoscpp, "passing over messages that are too large"},
+         kRoscpp, "skipping of messages that are too large"},
         {kFunction, "_ZN3ros23TransportSubscriberLink14enqueueMessageERKNS_17SerializedMessageEbb",
-         kRoscpp, "a bound to what waits for slow subscribers"},
+         kRoscpp, "a limit on messages queued for slow subscribers"},
         {kFunction,
          "_ZN6XmlRpc12XmlRpcSocket6nbReadEiRNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEEPb",
          "libxmlrpcpp.so", kNetworkMemory},
@@ -109,10 +109,10 @@ const std::vector<Dependence>& dependences() {
          kRefusals},
         {kFunction, "_ZN3ros7console4impl19deregister_appenderEPNS0_11LogAppenderE", kRosconsole,
          kRefusals},
-        // Refusals::log() looks for these; there is no other way to hear of a refusal.
+        // Refusals::log() searches for this text, the only sign of a rejection.
         {Dependence::Kind::Text, "error message in header", kRoscpp,
-         "telling that a peer refused a subscription"},
-        // So for " wants topic ", which compilers put into the code: it cannot be looked for.
+         "reports of subscriptions rejected by a peer"},
+        // Also for " wants topic ", which compilers embed in code, so it cannot be found here.
     };
     return list;
 }
@@ -129,8 +129,8 @@ std::vector<std::string> broken(const std::vector<Dependence>& list) {
                 works = works || constant.find(each.name) != std::string_view::npos;
         }
         if (works) continue;
-        lines.push_back(std::string(each.library) + " is not as rtcf knows it (" + each.name +
-                        "): this does not work: " + each.use);
+        lines.push_back(std::string(each.library) + " has another version than rtcf expects (" +
+                        each.name + "): not available: " + each.use);
     }
     return lines;
 }

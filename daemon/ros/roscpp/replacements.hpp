@@ -1,8 +1,8 @@
 /// @file
-/// The one list of what depends on the inside of roscpp and rosconsole: functions of theirs that
-/// this program replaces by its own of the same name, and English texts of theirs that it looks
-/// for. Another version of them may have others, and then what stands here would silently not
-/// work: so it is checked when the node starts, and the status says what failed.
+/// The list of dependences on internals of roscpp and rosconsole: functions that this program
+/// replaces by its own of the same name, and texts that it searches for. In another version of
+/// these libraries, they may differ, and the features that use them would silently fail. So they
+/// are checked when the node starts, and the status reports failures.
 #pragma once
 
 #include <string>
@@ -10,19 +10,19 @@
 
 namespace rtcf::ros1 {
 
-/// A function or a text, and what would not work without it.
+/// A function or a text, and the feature that uses it.
 struct Dependence {
     enum class Kind { Function, Text };
     Kind kind;
-    const char* name;     ///< as the linker has it; or a part of the text
-    const char* library;  ///< a part of its file's name
-    const char* use;
+    const char* name;     ///< linker symbol, or a part of the text
+    const char* library;  ///< part of the library's file name
+    const char* use;      ///< feature that uses it
 };
 
-/// All there are.
+/// All dependences.
 const std::vector<Dependence>& dependences();
 
-/// What of these is not as it was when they were written, a line each. Any thread; not real-time.
+/// The dependences that are not met, one line each. Any thread; not real-time.
 std::vector<std::string> broken(const std::vector<Dependence>& list);
 
 }  // namespace rtcf::ros1

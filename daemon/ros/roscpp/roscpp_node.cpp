@@ -26,9 +26,8 @@ namespace ros::param {
 void paramUpdateCallback(XmlRpc::XmlRpcValue& parameters, XmlRpc::XmlRpcValue& result);
 }
 
-// Takes the place of roscpp's own: what components do without a namespace of
-// theirs is to be in "/", not in the one that our node's name needs. roscpp
-// resolves even NodeHandle("/") against this.
+// Replaces roscpp's function: names of components without a namespace belong to "/", not to the
+// namespace that the node's name needs. roscpp resolves even NodeHandle("/") against it.
 namespace ros::this_node {
 
 const std::string& getNamespace() {
@@ -42,7 +41,7 @@ namespace rtcf::ros1 {
 
 namespace {
 
-// roscpp's own threads have the name of the one that starts them. It starts these, in this order.
+// Names the threads that roscpp starts, in this order; they inherit the name of the calling thread.
 void nameThreads(const std::set<pid_t>& before) {
     const std::array<const char*, 3> names{"roscpp-poll", "roscpp-xmlrpc", "roscpp-queue"};
     std::size_t next = 0;
@@ -53,13 +52,13 @@ void nameThreads(const std::set<pid_t>& before) {
     }
 }
 
-// The URIs of the nodes whose messages on a topic arrive in this process.
+// The URIs of the publishers to which this process is connected for a topic.
 std::vector<std::string> connectedPublishers(MasterClient& node, const std::string& topic) {
     std::vector<std::string> uris;
     MasterAnswer answer = node.call("getBusInfo", texts({"/master"}));
     if (!answer || answer.value.getType() != XmlRpc::XmlRpcValue::TypeArray) return uris;
     for (int i = 0; i < answer.value.size(); ++i) {
-        // Number, the other node, direction, transport, topic, and more.
+        // The fields are: number, the other node, direction, transport, topic, and more.
         XmlRpc::XmlRpcValue& link = answer.value[i];
         if (static_cast<std::string&>(link[2]) == "i" &&
             static_cast<std::string&>(link[4]) == topic)
@@ -95,10 +94,10 @@ void RoscppNode::start(const std::string& master_uri, const MasterAddress& addre
         ros::start();
         nameThreads(before);
     } catch (const XmlRpc::XmlRpcException& error) {  // not a std::exception
-        throw std::runtime_error("the master's answer is not understood: " + error.getMessage());
+        throw std::runtime_error("cannot parse the master's answer: " + error.getMessage());
     }
 
-    // roscpp's own answer to a request to shut down cannot be undone in this process.
+    // Replaces roscpp's handler of shutdown requests, which cannot be undone in this process.
     const auto& server = ros::XMLRPCManager::instance();
     server->unbind("shutdown");
     const ShutdownRequest request = on_shutdown_request_;
@@ -130,19 +129,19 @@ bool RoscppNode::alive() const { return ros::ok() && !ros::isShuttingDown(); }
 
 void RoscppNode::useMaster(const std::string& master_uri, const MasterAddress& address) {
     calls_.useMaster(master_uri, address);
-    ros::master::init({{"__master", master_uri}});  // what components may ask roscpp for
+    ros::master::init({{"__master", master_uri}});  // components may query it from roscpp
 }
 
 std::string RoscppNode::uri() const { return ros::XMLRPCManager::instance()->getServerURI(); }
 
 std::uint32_t RoscppNode::port() const { return ros::XMLRPCManager::instance()->getServerPort(); }
 
-// As the master itself does when publishers come and go. It may have done so since it gave this
-// answer: whoever is connected stays, until it says otherwise.
+// Calls publisherUpdate of this node, as the master does when publishers come or go. The master may
+// have done so after this answer, so present connections stay until the next update.
 void RoscppNode::connect(const std::string& topic, const XmlRpc::XmlRpcValue& publishers) const {
     if (publishers.size() == 0) return;
     for (int i = 0; i < publishers.size(); ++i) {
-        // What a master answers must never end the executor.
+        // An answer of a master must never end the executor.
         if (publishers[i].getType() != XmlRpc::XmlRpcValue::TypeString) return;
     }
     constexpr auto kTimeout = std::chrono::milliseconds(1000);

@@ -1,7 +1,6 @@
 /// @file
-/// This process's roscpp node. roscpp has one per process and one start per
-/// process, so there is one of these at a time; the master watch owns it, and
-/// only its thread calls it unless said otherwise.
+/// This process's roscpp node. roscpp allows one node and one start per process, so there is one of
+/// these objects at a time. Owned by the master watch; watch thread, unless stated otherwise.
 #pragma once
 
 #include <atomic>
@@ -21,11 +20,10 @@ namespace rtcf::ros1 {
 
 class RoscppNode {
    public:
-    /// Called with the reason when somebody asks the node to shut down: the
-    /// master, for a second node of its name, or `rosnode kill`. From roscpp's threads.
+    /// Called with the reason of a shutdown request: from the master, for a second node of the same
+    /// name, or from `rosnode kill`. In roscpp's threads.
     using ShutdownRequest = std::function<void(const std::string& reason)>;
-    /// Called with the key when the master tells of a parameter that has been written. From
-    /// roscpp's threads.
+    /// Called with the key when the master reports a written parameter. In roscpp's threads.
     using ParameterWritten = std::function<void(const std::string& key)>;
 
     RoscppNode(NodeName name, ShutdownRequest on_shutdown_request,
@@ -36,19 +34,19 @@ class RoscppNode {
 
     const NodeName& name() const { return name_; }
 
-    /// Another name, until the node is started.
+    /// Changes the name; before start().
     void rename(NodeName name) { name_ = std::move(name); }
 
     /// Starts the node; its master must be there.
-    /// @param hostname name or address that peers are told; empty: of the environment
-    /// @throws std::exception if roscpp cannot
+    /// @param hostname name or address of this host for peers; empty = from the environment
+    /// @throws std::exception if roscpp fails
     void start(const std::string& master_uri, const MasterAddress& address,
                const std::string& hostname);
     bool started() const { return handle_ != nullptr; }
-    /// False if roscpp has been shut down by someone in this process.
+    /// False if something in this process has shut down roscpp.
     bool alive() const;
 
-    /// Another master from now on, which knows nothing of the node yet.
+    /// Sets a new master, at which nothing is registered yet.
     void useMaster(const std::string& master_uri, const MasterAddress& address);
 
     /// The URI by which peers call the node, and its port on this host.
@@ -57,16 +55,16 @@ class RoscppNode {
 
     ros::NodeHandle& handle() { return *handle_; }
 
-    /// No master from now on: closing topics does not wait for one that has hung.
-    /// Registrations are to be withdrawn before, and stop() comes next. Any thread.
+    /// Ends calls to the master, so that closing topics does not wait for a hanging one.
+    /// Registrations must be withdrawn before; stop() comes next. Any thread.
     void leaveMaster() noexcept { calls_.end(); }
 
-    /// What is said to the master by way of roscpp.
+    /// roscpp's calls to the master.
     MasterCalls& calls() noexcept { return calls_; }
-    /// What it is told of topics and services.
+    /// The registrations of topics and services.
     Registrar& registrar() noexcept { return calls_.registrar(); }
 
-    /// Ends the node for good, without a word to any master.
+    /// Ends the node for good, without calls to a master.
     void stop();
 
    private:
@@ -78,7 +76,7 @@ class RoscppNode {
     MasterCalls calls_;
     std::unique_ptr<ros::NodeHandle> handle_;
     std::atomic<bool> ending_{false};
-    std::thread spinner_;  // of the callbacks of what components subscribe and advertise
+    std::thread spinner_;  // runs callbacks of components' own subscriptions and services
 };
 
 }  // namespace rtcf::ros1

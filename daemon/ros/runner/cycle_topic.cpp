@@ -16,7 +16,7 @@ namespace rtcf::ros1 {
 
 namespace {
 
-constexpr std::uint32_t kQueue = 20000;  // messages for a slow subscriber: a second at the most
+constexpr std::uint32_t kQueue = 20000;  // messages kept for a slow subscriber: at least 0.4 s
 
 ros::Time timeOf(std::int64_t ns) {
     return ros::Time().fromNSec(static_cast<std::uint64_t>(std::max<std::int64_t>(ns, 0)));
@@ -65,7 +65,7 @@ void CycleTopic::close() {
 
 void CycleTopic::run() {
     constexpr auto kBusy = std::chrono::milliseconds(5);
-    constexpr auto kIdle = std::chrono::milliseconds(50);  // no loop: no cycles
+    constexpr auto kIdle = std::chrono::milliseconds(50);  // without a loop
     while (!stop_) {
         publishAll();
         std::this_thread::sleep_for(runner_.loop().joinable() ? kBusy : kIdle);

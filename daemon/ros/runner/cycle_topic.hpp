@@ -1,6 +1,6 @@
 /// @file
-/// The topics `<namespace>/cycles` and `<namespace>/iteration_info`, which is RTCF 2021's: one
-/// message for each cycle.
+/// The topics `<namespace>/cycles` and, for RTCF 2021, `<namespace>/iteration_info`: one message
+/// per cycle.
 #pragma once
 
 #include <ros/publisher.h>
@@ -18,8 +18,8 @@ class RunnerView;
 
 namespace rtcf::ros1 {
 
-/// Owned by the introspection. Its thread takes all cycle records, with or
-/// without a master, so that none is lost in the executor's ring.
+/// Owned by Introspection. Its thread consumes all cycle records, with or without a master, so that
+/// the executor's ring does not overflow.
 class CycleTopic {
    public:
     explicit CycleTopic(executor::RunnerView& runner);
@@ -38,7 +38,7 @@ class CycleTopic {
     void publishAll();
 
     executor::RunnerView& runner_;
-    std::mutex mutex_;  // publisher_
+    std::mutex mutex_;  // protects cycles_ and iteration_info_
     ros::Publisher cycles_;
     ros::Publisher iteration_info_;
     std::atomic<bool> stop_{false};

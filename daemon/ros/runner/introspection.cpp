@@ -86,12 +86,13 @@ void Introspection::tell() {
     ros::serialization::serialize(stream, array);
     try {
         diagnostics_.publish(RawView{bytes.data(), size, &departures_});
-    } catch (const std::bad_alloc&) {  // the network has all the memory that is for it
+    } catch (const std::bad_alloc&) {  // the network memory is exhausted
         told_.reset();
     }
 }
 
-// A topic that closes drops what waits in roscpp.
+// Publishes the last state and waits until it is sent, because closing a topic drops queued
+// messages.
 void Introspection::tellLast() {
     constexpr auto kPatience = std::chrono::milliseconds(500);
     constexpr auto kPause = std::chrono::milliseconds(1);

@@ -1,6 +1,6 @@
 /// @file
-/// What ROS peers see of a runner besides its ports: every cycle on
-/// `<namespace>/cycles` and `iteration_info`, its health on `/diagnostics`, and services.
+/// The ROS interface of a runner besides its ports: every cycle on `<namespace>/cycles` and
+/// `iteration_info`, its health on `/diagnostics`, and services.
 #pragma once
 
 #include <ros/publisher.h>
@@ -24,18 +24,17 @@ enum class RunnerState;
 
 namespace rtcf::ros1 {
 
-/// Owned by the ROS node; all but the constructor and the destructor by the watch thread. The
-/// health has a thread of its own: once a second, and at once when the loop's state changes, as the
-/// node may be about to go.
+/// Owned by Subjects; watch thread. A separate thread reports the health once a second, and at once
+/// when the loop's state changes, because the node may be about to end.
 class Introspection {
    public:
-    /// @param log gets why services refused; outlives this
+    /// @param log receives the reasons of failed service calls; outlives this object
     Introspection(executor::RunnerView& runner, const executor::AskSupervisor& ask,
                   executor::Log& log);
 
-    /// Opens what is not open yet, in this namespace and no other. Watch thread.
-    /// @param node   full name of the node: what the health is reported of
-    /// @param serves whether there are services; what the callers may do the supervisor decides
+    /// Opens topics and services in this namespace; closes those in another one. Watch thread.
+    /// @param node   full name of the node, for the names of diagnostics
+    /// @param serves true = offer services; rtcfd checks the rights of callers
     void open(ros::NodeHandle& handle, const std::string& node, const std::string& name_space,
               bool serves);
     void close();
@@ -48,8 +47,8 @@ class Introspection {
     using Clock = std::chrono::steady_clock;
 
     void watchHealth();
-    void tell();      // under the lock, with a topic
-    void tellLast();  // the state that the node goes with
+    void tell();      // with mutex_ held and the topic open
+    void tellLast();  // publishes the last state
 
     executor::RunnerView& runner_;
     CycleTopic cycles_;
@@ -58,7 +57,7 @@ class Introspection {
     bool serves_ = false;
     bool open_ = false;
     std::atomic<bool> stop_{false};
-    std::mutex mutex_;  // all down to report_
+    std::mutex mutex_;  // protects diagnostics_ to report_
     ros::Publisher diagnostics_;
     Departures departures_{false};
     std::optional<executor::RunnerState> told_;

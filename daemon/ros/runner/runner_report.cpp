@@ -13,10 +13,10 @@ namespace {
 
 using diagnostic_msgs::DiagnosticStatus;
 
-constexpr std::int64_t kLongEnough = 500'000'000;  // ns, to tell a rate
+constexpr std::int64_t kLongEnough = 500'000'000;  // ns; shortest time for a rate
 constexpr double kEnoughCycles = 5.0;
-constexpr double kSlow = 0.9;     // of the rate that is wanted: a warning,
-constexpr double kFailing = 0.5;  // an error
+constexpr double kSlow = 0.9;     // share of the wanted rate below which there is a warning,
+constexpr double kFailing = 0.5;  // and an error
 using executor::RunnerState;
 
 const char* stateName(RunnerState state) {
@@ -59,7 +59,7 @@ std::string counted(std::uint64_t count, const char* one, const char* many) {
     return fmt::format("{} {}", count, count == 1 ? one : many);
 }
 
-// The worse of two: an error hides a warning, not the other way round.
+// Raises a status to a more severe level; never lowers it.
 void raise(DiagnosticStatus& status, DiagnosticStatus::_level_type level,
            const std::string& message) {
     if (level <= status.level) return;
@@ -150,7 +150,7 @@ rtcf_msgs::RunnerInfo runnerInfo(const rtcf_msgs::GetLoop::Response& loop) {
         info.components.push_back(std::move(to));
     }
     for (const rtcf_msgs::LoopConnection& connection : loop.connections) {
-        // Of RTCF 2021 a port without a peer in the loop makes no connection.
+        // In RTCF 2021, a port without a peer in the loop is not a connection.
         if (connection.writer.empty() || connection.readers.empty()) continue;
         rtcf_msgs::ConnectionInfo to;
         to.name = connection.name;
@@ -215,7 +215,7 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
     const std::uint64_t dropped = growth(taps + logs + cycles, dropped_);
     if (dropped != 0) {
         raise(status, DiagnosticStatus::WARN,
-              fmt::format("{}: {} lost in full rings", stateName(picture.state),
+              fmt::format("{}: {} dropped in full rings", stateName(picture.state),
                           counted(dropped, "record", "records")));
     }
     if (overruns != 0) {
@@ -226,14 +226,14 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
     }
     if (!picture.degraded.empty()) {
         status.message += ", not in real time: " + joined(picture.degraded);
-        // Once: it is no news afterwards, and hides what is.
+        // Only once, so that it does not hide later warnings.
         if (picture.degraded != degraded_) raise(status, DiagnosticStatus::WARN, status.message);
     }
     degraded_ = picture.degraded;
     const double wanted_hz = picture.settings.frequency_hz;
     const double done_hz =
         elapsed_ns > 0 ? static_cast<double>(done) * 1e9 / static_cast<double>(elapsed_ns) : 0.0;
-    // Over a report's time in which it ran all along; the pace of a simulation is the clock's.
+    // Only if the loop ran during the whole report interval, and in real time.
     const bool runs = loop.running();
     if (runs && ran_ && !picture.simulated && elapsed_ns >= kLongEnough &&
         wanted_hz * static_cast<double>(elapsed_ns) * 1e-9 >= kEnoughCycles) {

@@ -1,6 +1,6 @@
 /// @file
-/// A runner as ROS messages: its graph for those who ask, its health for
-/// `/diagnostics`. Pure functions of what the runner shows.
+/// A runner as ROS messages: its graph for services, its health for `/diagnostics`. Pure functions
+/// of the runner's view.
 #pragma once
 
 #include <diagnostic_msgs/DiagnosticArray.h>
@@ -22,27 +22,27 @@ class RunnerView;
 
 namespace rtcf::ros1 {
 
-/// The whole graph, and what the runner does.
+/// The whole graph and the runner's state.
 rtcf_msgs::GetLoop::Response describeRunner(const executor::RunnerView& runner);
 
-/// The part of it that RTCF 2021 tells, as it tells it.
+/// The part of it that RTCF 2021 reports, in its format.
 rtcf_msgs::RunnerInfo runnerInfo(const rtcf_msgs::GetLoop::Response& loop);
 
-/// The runner's health, and what its figures were since the last report.
+/// The runner's health and its statistics since the last report.
 class DiagnosticReport {
    public:
-    /// @param hardware names the machine
+    /// @param hardware name of the machine
     DiagnosticReport(const executor::RunnerView& runner, std::string hardware);
 
-    /// What statuses are named after: unique among all that report.
+    /// Sets the prefix of status names, which must be unique on /diagnostics.
     void nameAfter(const std::string& node) { name_ = node.substr(node.find_first_not_of('/')); }
 
-    /// One status for the loop, one for each component; without a stamp.
+    /// Makes one status for the loop and one for each component; without a stamp.
     diagnostic_msgs::DiagnosticArray take();
 
    private:
     using Figures = std::shared_ptr<const executor::ComponentFigures>;
-    struct Counts {  // what was counted at the last report
+    struct Counts {  // counts at the last report
         executor::HistogramSnapshot duration;
         std::uint64_t overruns = 0;
     };
@@ -52,7 +52,7 @@ class DiagnosticReport {
                                                              const std::string& fault,
                                                              const executor::ComponentFigures& now,
                                                              double ns_per_tick, Counts& last);
-    /// @return how much a counter has grown; it begins anew with the loop
+    /// @return growth of a counter, which restarts from 0 with the loop
     static std::uint64_t growth(std::uint64_t now, std::uint64_t& last);
 
     const executor::RunnerView& runner_;
@@ -66,7 +66,7 @@ class DiagnosticReport {
     std::uint64_t iteration_ = 0;
     std::int64_t time_ns_ = 0;
     bool ran_ = false;                   // at the last report
-    std::vector<std::string> degraded_;  // as it was said last
+    std::vector<std::string> degraded_;  // as last reported
     std::map<Figures, Counts> components_;
 };
 

@@ -22,8 +22,8 @@ namespace {
 
 using executor::OutsideCall;
 
-// A peer names a component by its base name and its namespace, or by its full name alone, as RTCF
-// 2021's rt_launcher does.
+// Sets a component's name from base name and namespace, or from a full name alone, as from RTCF
+// 2021's rt_launcher.
 void setName(executor::ComponentDefinition& component, const std::string& name,
              const std::string& name_space) {
     const std::size_t slash = name.rfind('/');
@@ -32,7 +32,7 @@ void setName(executor::ComponentDefinition& component, const std::string& name,
     component.ns = full ? name.substr(0, std::max<std::size_t>(slash, 1)) : name_space;
 }
 
-// @return false, and says why, if a remap is not one
+// @return false and sets `why` if a remap is invalid
 bool loadCall(const rtcf_msgs::LoadComponent::Request& request, OutsideCall& call,
               std::string& why) {
     call.kind = OutsideCall::Kind::Load;
@@ -45,7 +45,7 @@ bool loadCall(const rtcf_msgs::LoadComponent::Request& request, OutsideCall& cal
     for (const std::string& remap : request.remaps) {
         const std::size_t at = remap.find(":=");
         if (at == std::string::npos) {
-            why = "'" + remap + "' is no remap: write it as from:=to";
+            why = "'" + remap + "' is not a remap: write it as from:=to";
             return false;
         }
         component.remaps.emplace_back(remap.substr(0, at), remap.substr(at + 2));
@@ -112,11 +112,11 @@ bool RunnerServices::change(const OutsideCall& call, Response& response) {
     return true;
 }
 
-// RTCF 2021's answers have no room for the reason.
+// Logs the reason, because RTCF 2021's responses have no field for it.
 void RunnerServices::changeAndLog(const OutsideCall& call, std_msgs::Bool& success) {
     const executor::OutsideAnswer answer = ask_(call, cancel_);
     success.data = answer.success ? 1 : 0;
-    if (!answer.success) log_.write(LogLevel::Error, "", "refused by service: " + answer.message);
+    if (!answer.success) log_.write(LogLevel::Error, "", "service call failed: " + answer.message);
 }
 
 template <typename Service, typename Callback>
@@ -154,7 +154,7 @@ void RunnerServices::open(ros::NodeHandle& handle, const std::string& name_space
                        [this](Trigger::Request&, Trigger::Response& response) {
                            return change(simpleCall(OutsideCall::Kind::Start), response);
                        });
-    // Does not wait behind a change that takes long.
+    // In its own queue, so that a stop does not wait behind a slow change.
     advertise<Trigger>(handle, at("deactivate_rt_loop"), stops_,
                        [this](Trigger::Request&, Trigger::Response& response) {
                            return change(simpleCall(OutsideCall::Kind::Stop), response);
@@ -185,7 +185,7 @@ void RunnerServices::openLikeRtcf2021(ros::NodeHandle& handle, const std::string
 }
 
 void RunnerServices::close() {
-    // A server waits for the call that it is in.
+    // Cancels pending calls, because closing a server waits for them.
     cancel_ = true;
     for (ros::ServiceServer& server : servers_) server.shutdown();
     servers_.clear();

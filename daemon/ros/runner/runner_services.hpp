@@ -1,7 +1,7 @@
 /// @file
-/// The services of a runner, by which ROS peers look at a loop and ask for
-/// changes. Looks are answered here; changes are handed to the supervisor, who
-/// decides. Those that RTCF 2021 has answer as it does; ours tell more.
+/// The services of a runner, by which ROS peers query a loop and request changes. Queries are
+/// answered here; changes are passed to rtcfd, which checks rights. Services of RTCF 2021 answer in
+/// its format; our own have more fields.
 #pragma once
 
 #include <ros/callback_queue.h>
@@ -25,12 +25,13 @@ class RunnerView;
 
 namespace rtcf::ros1 {
 
-/// Owned by the introspection. Threads of its own, so that a change that
-/// takes long keeps nobody from looking, or from stopping the loop.
+/// Owned by Introspection. It has three threads, so that a slow change delays neither queries nor a
+/// stop.
 class RunnerServices {
    public:
-    /// @param ask called by a thread of this object, which waits for the answer
-    /// @param log gets what answers have no room for; outlives this
+    /// @param ask requests a change from rtcfd; called in a thread of this object, which waits for
+    /// the answer
+    /// @param log receives reasons that responses have no field for; outlives this object
     RunnerServices(const executor::RunnerView& runner, executor::AskSupervisor ask,
                    executor::Log& log);
     ~RunnerServices();
@@ -56,7 +57,7 @@ class RunnerServices {
     const executor::AskSupervisor ask_;
     executor::Log& log_;
     std::atomic<bool> stop_{false};
-    std::atomic<bool> cancel_{false};  // waits for the supervisor
+    std::atomic<bool> cancel_{false};  // ends waits for rtcfd
     ros::CallbackQueue looks_;
     ros::CallbackQueue changes_;
     ros::CallbackQueue stops_;

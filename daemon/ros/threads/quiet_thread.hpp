@@ -1,5 +1,5 @@
 /// @file
-/// Threads that leave the process's signals to the thread that waits for them.
+/// Threads that do not handle the process's signals, which the main thread receives.
 #pragma once
 
 #include <functional>
@@ -7,9 +7,9 @@
 
 namespace rtcf::ros1 {
 
-/// Starts a thread with all signals blocked but those that a fault raises in
-/// it; threads that it creates, such as roscpp's, inherit that.
-/// @param name shown by ps and top, at most 15 characters
+/// Starts a thread with all signals blocked, except those of faults. Threads that it creates, such
+/// as roscpp's, inherit the mask.
+/// @param name name in ps and top, at most 15 characters
 std::thread quietThread(const char* name, std::function<void()> body);
 
 }  // namespace rtcf::ros1

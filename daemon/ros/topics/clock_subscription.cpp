@@ -34,12 +34,12 @@ Reconciled ClockSubscription::reconcile(ros::NodeHandle& handle, ros::CallbackQu
         deliver(static_cast<std::int64_t>(message->clock.toNSec()));
     };
     ros::SubscribeOptions options;
-    // No tick is to be lost, and none is large.
+    // No tick may be lost, and messages are small.
     constexpr std::uint32_t kQueue = 100'000;
     options.init<rosgraph_msgs::Clock>("/clock", kQueue, take);
     options.callback_queue = &queue;
     options.transport_hints = ros::TransportHints().tcpNoDelay();
-    ros::Time::setNow({});  // until the first tick, as for any node
+    ros::Time::setNow({});  // 0 until the first tick, as for any node
     subscriber_ = handle.subscribe(options);
     open_ = static_cast<bool>(subscriber_);
     if (!open_) ros::Time::init();
@@ -49,7 +49,8 @@ Reconciled ClockSubscription::reconcile(ros::NodeHandle& handle, ros::CallbackQu
 void ClockSubscription::close() {
     const bool was_open = open_.exchange(false);
     subscriber_.shutdown();
-    if (was_open) ros::Time::init();  // the machine's again; it has no other function for that
+    // Back to the machine's time; there is no other function for it.
+    if (was_open) ros::Time::init();
 }
 
 void ClockSubscription::deliver(std::int64_t now_ns) {

@@ -1,6 +1,6 @@
 /// @file
-/// The subscription of /clock, by which a simulation gives its time: to the loop if that follows
-/// it, and to all in this process that asks for ros::Time.
+/// The subscription of /clock, the time of a simulation. It sets the loop's clock if the loop
+/// follows it, and ros::Time in this process.
 #pragma once
 
 #include <ros/subscriber.h>
@@ -19,29 +19,28 @@ class NodeHandle;
 
 namespace rtcf::ros1 {
 
-/// Owned by Subscribing, whose thread delivers the ticks: in the order in which they came among
-/// the other messages.
+/// Owned by Subscribing, whose thread delivers ticks and other messages in order of arrival.
 class ClockSubscription {
    public:
-    /// Who gets the ticks from now on; null = nobody. Any thread; returns at once.
+    /// Sets the receiver of ticks; null = none. Any thread; returns at once.
     void setClock(std::shared_ptr<executor::SimulatedClock> clock);
 
-    /// Subscribes or unsubscribes, as is wanted. Speaks to the master.
-    /// @param simulated whether the master says that time is simulated
+    /// Subscribes or unsubscribes as wanted. Calls the master.
+    /// @param simulated the master's /use_sim_time
     Reconciled reconcile(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue,
                          bool simulated);
     void close();
 
-    /// Somebody gets the ticks from now on. Any thread.
+    /// True if ticks are delivered to a receiver. Any thread.
     bool delivers() const;
 
    private:
     void deliver(std::int64_t now_ns);
 
     std::atomic<bool> open_{false};
-    mutable std::mutex mutex_;  // clock_
+    mutable std::mutex mutex_;  // protects clock_
     std::shared_ptr<executor::SimulatedClock> clock_;
-    ros::Subscriber subscriber_;  // the watch thread's
+    ros::Subscriber subscriber_;  // watch thread only
 };
 
 }  // namespace rtcf::ros1

@@ -13,7 +13,8 @@ namespace rtcf::ros1 {
 
 namespace {
 
-constexpr int kMost = 1000;  // a tap that fills as fast as it is emptied starves no other
+// Most messages per tap and turn, so that a fast tap does not starve others.
+constexpr int kMost = 1000;
 
 }  // namespace
 
@@ -65,8 +66,8 @@ void Publishing::setTaps(Taps taps) {
     changed_.notify_all();
 }
 
-// A value may be written before the watch thread looks at the master: there is a publisher to keep
-// it from the beginning.
+// Makes publishers for new taps at once, so that latched values are kept even before the watch
+// thread opens the topics.
 void Publishing::makeReady() {
     if (!deliveries_) return;
     for (const auto& tap : taps_) {
@@ -102,7 +103,7 @@ Reconciled Publishing::reconcile(ros::NodeHandle& handle) {
         ++generation_;
     }
     changed_.notify_all();
-    // Without the lock: peers come and go.
+    // Without the lock, because opening and closing wait for peers and the master.
     close(closing);
     Reconciled result = Reconciled::Done;
     for (const auto& publisher : opening) {
@@ -125,14 +126,14 @@ void Publishing::tidy() {
 void Publishing::closeAll() {
     Publishers closing;
     {
-        // They stay, with the last messages of those that are latched.
+        // The publishers stay, with the last messages of latched topics.
         const std::lock_guard lock(mutex_);
         for (const auto& [key, publisher] : publishers_) closing.push_back(publisher);
     }
     close(closing);
 }
 
-// A subscriber that takes nothing holds up no more than this: what waits for it is lost.
+// Waits at most this long for slow subscribers; messages still queued are then lost.
 void Publishing::close(const Publishers& closing) {
     constexpr auto kPatience = std::chrono::milliseconds(500);
     if (closing.empty()) return;
@@ -161,7 +162,7 @@ std::string Publishing::problem() const {
     for (const auto& [key, publisher] : publishers_) {
         if (publisher->lost() != 0)
             return std::get<0>(key) +
-                   ": messages were lost, as too much waits for slow subscribers";
+                   ": messages were dropped, because too many wait for slow subscribers";
     }
     return {};
 }
@@ -184,7 +185,7 @@ void Publishing::drain(const Stream& stream, int most) {
     }
 }
 
-// The last values of taps that leave: nobody fills them any more.
+// Publishes the last values of removed taps completely.
 void Publishing::leave(const std::vector<Stream>& streams, const std::vector<Stream>& next) {
     std::set<const executor::Tap*> staying;
     for (const Stream& stream : next) staying.insert(stream.tap.get());
@@ -204,7 +205,8 @@ void Publishing::makeRoom() {
     if (disconnected_ == 0 || now - room_told_ < kSilence) return;
     room_told_ = now;
     warn_(std::to_string(std::exchange(disconnected_, 0)) +
-          " subscribers that took nothing were disconnected, as too much memory waited for them");
+          " subscribers that read nothing were disconnected, because their messages used too much "
+          "memory");
 }
 
 void Publishing::run() {
@@ -214,7 +216,7 @@ void Publishing::run() {
     while (true) {
         {
             std::unique_lock lock(mutex_);
-            // Nothing to empty: no need to wake up a thousand times a second.
+            // Without taps, the thread sleeps.
             while (!stop_ && serving.empty() && generation == generation_) changed_.wait(lock);
             if (stop_) return;
             if (generation != generation_) {

@@ -1,5 +1,5 @@
 /// @file
-/// The way out: takes the values out of all taps and publishes them.
+/// Publishes the values of all taps.
 #pragma once
 
 #include <chrono>
@@ -23,38 +23,38 @@
 
 namespace rtcf::ros1 {
 
-/// Owned by the master watch. A thread of its own empties the taps each
-/// millisecond, with or without a master, so that none overflows.
+/// Owned by Subjects. A separate thread empties the taps every millisecond, with or without a
+/// master, so that they do not overflow.
 class Publishing {
    public:
     using Taps = std::vector<std::shared_ptr<executor::Tap>>;
 
-    /// @param warn gets a line for the log; any thread
+    /// @param warn receives lines for the log; any thread
     explicit Publishing(std::function<void(const std::string&)> warn);
     ~Publishing();
     Publishing(const Publishing&) = delete;
     Publishing& operator=(const Publishing&) = delete;
 
-    /// Sets how subscribers get messages; reconcile() opens topics anew that are open otherwise.
-    /// Any thread; returns at once. @throws executor::Refusal for an expression that is not one
+    /// Sets the delivery to subscribers; reconcile() reopens topics with another delivery. Any
+    /// thread; returns at once.
+    /// @throws executor::Refusal if an expression is invalid
     void configure(const executor::BridgeSettings& settings);
-    /// Sets the taps to empty from now on, after configure(). A topic that is open already goes
-    /// on with its new tap at once; one that is latched keeps its last value until it is opened.
-    /// Any thread; returns at once.
+    /// Sets the taps. After configure(). An open topic continues at once with its new tap; a
+    /// latched one keeps its last value until it is opened. Any thread; returns at once.
     void setTaps(Taps taps);
 
-    /// Opens and closes topics until they are those of the taps. One that closes first sends what
-    /// its tap has given: the last is what safe() wrote. Watch thread, with a node.
+    /// Opens and closes topics to match the taps. Before a topic closes, it publishes the remaining
+    /// values of its tap; the last one is from safe(). Watch thread, with a node.
     Reconciled reconcile(ros::NodeHandle& handle);
-    /// Closes all topics, after what the taps that were set have given so far was sent; reconcile()
-    /// opens them again. Watch thread.
+    /// Publishes the remaining values of all taps, and closes all topics; reconcile() opens them
+    /// again. Watch thread.
     void closeAll();
-    /// Forgets closed topics that have no tap any more. Watch thread.
+    /// Removes closed topics without a tap. Watch thread.
     void tidy();
 
-    /// Topics that are open. Any thread.
+    /// Number of open topics. Any thread.
     std::uint32_t open() const;
-    /// Why a topic could not be opened; empty if all could. Any thread.
+    /// The error of a topic; empty = none. Any thread.
     std::string problem() const;
 
    private:
@@ -62,7 +62,7 @@ class Publishing {
         std::shared_ptr<executor::Tap> tap;
         std::shared_ptr<TopicPublisher> publisher;
     };
-    // How subscribers of each topic get messages.
+    // The delivery of each topic.
     class Deliveries {
        public:
         explicit Deliveries(const executor::BridgeSettings& settings);
@@ -73,35 +73,35 @@ class Publishing {
         executor::NamePattern latched_;
         executor::NamePattern stamped_;
     };
-    // A topic that changes its type closes before it opens again.
+    // Contains the type, so that a topic that changes its type is closed first.
     using Key = std::tuple<std::string, std::string, std::string>;  // topic, type, MD5 sum
     using Publishers = std::vector<std::shared_ptr<TopicPublisher>>;
 
     static Key keyOf(const executor::Tap& tap);
-    void makeReady();  // under the lock
+    void makeReady();  // with mutex_ held
 
     void run();
-    // Sends those away who use up the memory for all.
+    // Disconnects subscribers that exhaust the shared memory.
     void makeRoom();
     static void drain(const Stream& stream, int most);
     static void leave(const std::vector<Stream>& streams, const std::vector<Stream>& next);
     std::vector<Stream> streams() const;
     void close(const Publishers& closing);
 
-    mutable std::mutex mutex_;  // all below
+    mutable std::mutex mutex_;  // protects all members below
     std::condition_variable changed_;
     Taps taps_;
-    std::optional<Deliveries> deliveries_;                       // none before configure()
-    std::map<Key, std::shared_ptr<TopicPublisher>> publishers_;  // one for each tap, and more
+    std::optional<Deliveries> deliveries_;  // unset before configure()
+    // One for each tap, and for closing topics.
+    std::map<Key, std::shared_ptr<TopicPublisher>> publishers_;
     std::uint64_t generation_ = 0;
-    std::uint64_t served_ =
-        0;  // the generation that the thread is at; it is done with those before
+    std::uint64_t served_ = 0;  // generation that the thread serves
     bool stop_ = false;
     std::function<void(const std::string&)> warn_;
-    // The thread's alone.
+    // Publishing thread only.
     std::chrono::steady_clock::time_point room_looked_at_;
     std::chrono::steady_clock::time_point room_told_;
-    std::size_t disconnected_ = 0;  // since it was told
+    std::size_t disconnected_ = 0;  // since the last report
     std::thread thread_;
 };
 

@@ -51,7 +51,7 @@ const MessageType* stampedType(const std::string& ros_type) {
 
 void stampBytes(const std::uint8_t* bytes, std::uint32_t size, std::int64_t stamp_ns,
                 std::vector<std::uint8_t>& stamped) {
-    std_msgs::Header header;  // its sequence number is roscpp's
+    std_msgs::Header header;  // roscpp sets the sequence number
     header.stamp.fromNSec(static_cast<std::uint64_t>(std::max<std::int64_t>(stamp_ns, 0)));
     const std::uint32_t length = ros::serialization::serializationLength(header);
     stamped.resize(length + size);

@@ -1,6 +1,6 @@
 /// @file
-/// The messages that carry a number or a bool together with the time of the cycle that wrote it:
-/// those of std_msgs have no header, by which tools that plot know a message's time.
+/// Messages with a number or a bool and the stamp of its cycle. The types of std_msgs have no
+/// header, which plotting tools need.
 #pragma once
 
 #include <cstdint>
@@ -9,18 +9,19 @@
 
 namespace rtcf::ros1 {
 
-/// As ROS describes a type of message.
+/// Description of a ROS message type.
 struct MessageType {
     std::string name;
     std::string md5;
     std::string definition;
 };
 
-/// The message of ours that has a header and then the bytes of a message of std_msgs.
-/// @return null if `ros_type` is none of a number or a bool
+/// The type of rtcf_msgs with a header followed by the bytes of a message of std_msgs.
+/// @return null if `ros_type` is not a number or a bool
 const MessageType* stampedType(const std::string& ros_type);
 
-/// The bytes of such a message. @param stamp_ns ROS time
+/// Makes the bytes of such a message.
+/// @param stamp_ns ROS time, ns
 void stampBytes(const std::uint8_t* bytes, std::uint32_t size, std::int64_t stamp_ns,
                 std::vector<std::uint8_t>& stamped);
 

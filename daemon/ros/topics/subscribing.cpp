@@ -10,7 +10,7 @@ namespace rtcf::ros1 {
 
 namespace {
 
-using Connection = std::pair<std::string, std::string>;  // topic and MD5 of its type
+using Connection = std::pair<std::string, std::string>;  // topic and MD5 sum of its type
 
 Connection connection(const executor::Injector& injector) {
     return {injector.topic(), injector.type().ros_md5};
@@ -44,7 +44,7 @@ Reconciled Subscribing::reconcileTopics(ros::NodeHandle& handle, bool master) {
     std::vector<std::shared_ptr<TopicSubscriber>> closing;
     {
         const std::lock_guard lock(mutex_);
-        // roscpp calls the master for the first and the last subscriber of a topic only.
+        // roscpp calls the master only for the first and the last subscriber of a topic.
         std::set<Connection> served;
         for (const auto& [injector, subscriber] : subscribers_) {
             if (subscriber->isOpen()) served.insert(connection(*injector));
@@ -67,16 +67,17 @@ Reconciled Subscribing::reconcileTopics(ros::NodeHandle& handle, bool master) {
             const auto topic = topics.find(injector->topic());
             const bool goes_on = topic != topics.end() && topic->second == connection(*injector);
             if (!master && !goes_on) {
-                wanted[injector] = subscriber;  // until there is a master; it is mute already
+                wanted[injector] = subscriber;  // keep it, muted, until there is a master
             } else if (topic != topics.end() && !goes_on) {
-                closing_first.push_back(subscriber);  // roscpp has one type per topic
+                closing_first.push_back(subscriber);  // roscpp allows one type per topic
             } else {
-                closing.push_back(subscriber);  // after the opening, so that peers stay connected
+                // Closed after others are opened, so that peers stay connected.
+                closing.push_back(subscriber);
             }
         }
         subscribers_ = std::move(wanted);
     }
-    // Without the lock, as closing waits for callbacks.
+    // Without the lock, because closing waits for callbacks.
     for (const auto& subscriber : closing_first) subscriber->close();
     Reconciled result = Reconciled::Done;
     for (const auto& subscriber : opening) {

@@ -1,5 +1,5 @@
 /// @file
-/// The way in: subscribes topics and delivers what arrives to the injectors.
+/// Subscribes topics and delivers messages to the injectors.
 #pragma once
 
 #include <ros/callback_queue.h>
@@ -25,7 +25,7 @@ namespace rtcf::ros1 {
 
 class TopicSubscriber;
 
-/// Owned by the master watch. A thread of its own delivers the messages.
+/// Owned by Subjects. A separate thread delivers the messages.
 class Subscribing {
    public:
     using Injectors = std::vector<std::shared_ptr<executor::Injector>>;
@@ -35,33 +35,33 @@ class Subscribing {
     Subscribing(const Subscribing&) = delete;
     Subscribing& operator=(const Subscribing&) = delete;
 
-    /// The injectors to feed from now on; others get nothing more. Any thread; returns at once.
+    /// Sets the injectors; others get no more messages. Any thread; returns at once.
     void setInjectors(Injectors injectors);
-    /// Who gets the ticks of /clock from now on; null = nobody. Any thread; returns at once.
+    /// Sets the receiver of the ticks of /clock; null = none. Any thread; returns at once.
     void setClock(std::shared_ptr<executor::SimulatedClock> clock) {
         clock_.setClock(std::move(clock));
     }
 
-    /// Ticks of /clock are delivered. Any thread.
+    /// True if ticks of /clock are delivered. Any thread.
     bool followsClock() const { return clock_.delivers(); }
 
-    /// Subscribes and unsubscribes until the topics are those of the injectors. Watch thread.
-    /// @param simulated whether the master says that time is simulated
-    /// @param allowed whether peers may give the loop anything; if not, nothing is subscribed
+    /// Subscribes and unsubscribes topics to match the injectors. Watch thread.
+    /// @param simulated the master's /use_sim_time
+    /// @param allowed true = peers may write inputs of the loop; false = nothing is subscribed
     Reconciled reconcile(ros::NodeHandle& handle, bool simulated, bool allowed) {
         allowed_ = allowed;
         return reconcileTopics(handle, true) & clock_.reconcile(handle, queue_, simulated);
     }
-    /// The same without a master: only new injectors of topics that are subscribed.
+    /// The same without a master: only new injectors of subscribed topics.
     void reconcileWithoutMaster(ros::NodeHandle& handle) { reconcileTopics(handle, false); }
-    /// Unsubscribes all; reconcile() subscribes them again. Watch thread.
+    /// Unsubscribes all topics; reconcile() subscribes them again. Watch thread.
     void closeAll();
 
-    /// Whether a peer that publishes the injector's topic is connected. Any thread.
+    /// True if a peer that publishes the injector's topic is connected. Any thread.
     bool feeds(const executor::Injector& injector) const;
-    /// Topics that are subscribed. Any thread.
+    /// Number of subscribed topics. Any thread.
     std::uint32_t open() const;
-    /// Why a topic could not be subscribed; empty if all could. Any thread.
+    /// The error of a topic; empty = none. Any thread.
     std::string problem() const;
 
    private:
@@ -75,9 +75,9 @@ class Subscribing {
     ClockSubscription clock_;
     std::atomic<bool> stop_{false};
     bool allowed_ = true;       // watch thread
-    mutable std::mutex mutex_;  // injectors_ and subscribers_
+    mutable std::mutex mutex_;  // protects injectors_ and subscribers_
     Injectors injectors_;
-    // By injector: a new one on the same topic subscribes anew, and so gets a latched value too.
+    // By injector: a new one on the same topic subscribes again, so that it gets a latched value.
     Subscribers subscribers_;
     std::thread thread_;
 };

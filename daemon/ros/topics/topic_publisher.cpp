@@ -68,7 +68,7 @@ void TopicPublisher::open(ros::NodeHandle& handle) {
     std::string problem;
     try {
         publisher = handle.advertise(options);
-        if (!publisher) problem = "it is published in this process with another type";
+        if (!publisher) problem = "this process publishes it with another type";
     } catch (const std::exception& error) {
         problem = error.what();
     }

@@ -1,5 +1,5 @@
 /// @file
-/// One topic that the node publishes: any type, given as bytes.
+/// One published topic of any type, whose messages are bytes.
 #pragma once
 
 #include <ros/publisher.h>
@@ -22,68 +22,68 @@ class NodeHandle;
 
 namespace rtcf::ros1 {
 
-/// How subscribers get what is published.
+/// Delivery of messages to subscribers.
 struct Delivery {
-    std::uint32_t queue = 0;  ///< messages kept for a slow one
-    bool latch = false;       ///< those that come later get the last message
-    bool stamped = false;     ///< a number or a bool goes with the time of its cycle
+    std::uint32_t queue = 0;  ///< messages kept for a slow subscriber
+    bool latch = false;       ///< later subscribers get the last message
+    bool stamped = false;     ///< send numbers and bools with the stamp of their cycle
 
     bool operator==(const Delivery& other) const {
         return queue == other.queue && latch == other.latch && stamped == other.stamped;
     }
 };
 
-/// Owned by Publishing. open() and close() speak to the master; publish()
-/// comes from another thread and never waits for them.
+/// Owned by Publishing. open() and close() call the master; publish() comes from another thread and
+/// never waits for them.
 class TopicPublisher {
    public:
-    /// @param type of the values it is given
+    /// @param type type of the values
     TopicPublisher(std::string topic, const TypeInfo& type, Delivery delivery);
 
-    /// Sets how subscribers get messages. Subscribers see the change once the topic is closed and
-    /// opened again; a topic that becomes latched keeps values from now on. Any thread.
+    /// Sets the delivery. It takes effect when the topic is closed and opened again; a topic that
+    /// becomes latched keeps values at once. Any thread.
     void setDelivery(const Delivery& delivery);
     bool isOpen() const;
-    /// True if it is open with a delivery other than the one that is set.
+    /// True if it is open with another delivery than the one set.
     bool isOutdated() const;
-    /// It is to be opened: it is not yet, and has not failed just now. Watch thread.
+    /// True if it is not open and has not failed just now. Watch thread.
     bool isDue() const;
-    /// Why it could not be opened, one line; empty if it could.
+    /// The error of the last open(), one line; empty = none.
     std::string problem() const;
-    /// Messages lost as too much waited for slow subscribers, of all topics.
+    /// Number of messages dropped because too many, of all topics, waited for slow subscribers.
     std::uint64_t lost() const;
 
     void open(ros::NodeHandle& handle);
-    /// Waits until subscribers have been sent all that was published.
-    /// @return false if one does not take it until then
+    /// Waits until all published messages are sent.
+    /// @return false if a subscriber does not read them by the deadline
     bool flush(std::chrono::steady_clock::time_point deadline);
-    /// What has not been sent is lost.
+    /// Closes the topic. Messages that are not sent yet are lost.
     void close();
 
-    /// Sends one message. While it is closed none is sent; of a latched topic the last one is
-    /// kept, and sent whenever it opens. The bytes are copied only for that, or for a subscriber.
+    /// Publishes one message, if the topic is open. A latched topic keeps the last message and
+    /// sends it when it opens. The bytes are copied only for these purposes and for subscribers.
     /// Any thread.
-    /// @param stamp_ns of the cycle, ROS time
+    /// @param stamp_ns ROS time of the cycle, ns
     void publish(const std::uint8_t* bytes, std::uint32_t size, std::int64_t stamp_ns);
 
    private:
     struct Kept {
-        std::vector<std::uint8_t> bytes;  // of the value
+        std::vector<std::uint8_t> bytes;  // bytes of the value
         std::int64_t stamp_ns = 0;
     };
 
     void send(const std::uint8_t* bytes, std::uint32_t size, std::int64_t stamp_ns);
 
     const std::string topic_;
-    const MessageType type_;                // of the values
-    mutable std::mutex mutex_;              // all below
-    Delivery delivery_;                     // that is wanted
-    Delivery opened_;                       // that it is open with
-    const MessageType* stamped_ = nullptr;  // it is open with; null: the values are the messages
+    const MessageType type_;                // type of the values
+    mutable std::mutex mutex_;              // protects all members below
+    Delivery delivery_;                     // wanted delivery
+    Delivery opened_;                       // delivery of the open topic
+    const MessageType* stamped_ = nullptr;  // stamped type of the open topic; null = not stamped
     std::string problem_;
     std::uint64_t lost_ = 0;
-    std::optional<Kept> kept_;           // of a latched topic: its last value
-    std::vector<std::uint8_t> message_;  // that is being stamped
+    std::optional<Kept> kept_;           // last value of a latched topic
+    std::vector<std::uint8_t> message_;  // buffer for a stamped message
     Departures departures_{false};
     ros::Publisher publisher_;
     Retry retry_;  // watch thread

@@ -19,7 +19,8 @@ bool TopicSubscriber::open(ros::NodeHandle& handle, ros::CallbackQueueInterface&
     };
     ros::SubscribeOptions options;
     options.topic = injector_->topic();
-    // The injector knows if only the newest counts; here none is lost before it gets there.
+    // Large, so that no message is lost before the injector, which decides whether only the newest
+    // counts.
     constexpr std::uint32_t kQueue = 1000;
     options.queue_size = kQueue;
     options.md5sum = injector_->type().ros_md5;

@@ -1,5 +1,5 @@
 /// @file
-/// One topic that the node subscribes: any type, taken as bytes.
+/// One subscribed topic of any type, whose messages are bytes.
 #pragma once
 
 #include <ros/subscriber.h>
@@ -19,31 +19,32 @@ class NodeHandle;
 
 namespace rtcf::ros1 {
 
-/// Owned by Subscribing. open() and close() speak to the master; messages come
-/// from the thread that empties the callback queue.
+/// Owned by Subscribing. open() and close() call the master; the thread of the callback queue
+/// delivers messages.
 class TopicSubscriber {
    public:
     explicit TopicSubscriber(std::shared_ptr<executor::Injector> injector);
 
-    /// Delivers nothing from now on. Any thread; returns at once.
+    /// Stops delivering messages. Any thread; returns at once.
     void mute() { *muted_ = true; }
 
-    /// @return false if it could not: to be tried again
+    /// Subscribes the topic.
+    /// @return false if that failed; the caller repeats it later
     bool open(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue);
     void close();
 
     bool isOpen() const;
-    /// Peers that publish the topic are connected. Any thread.
+    /// True if a peer that publishes the topic is connected. Any thread.
     bool hasPeers() const;
-    /// It is to be opened: it is not yet, and has not failed just now. Watch thread.
+    /// True if it is not open and has not failed just now. Watch thread.
     bool isDue() const;
-    /// Why it could not be opened, one line; empty if it could.
+    /// The error of the last open(), one line; empty = none.
     std::string problem() const;
 
    private:
     std::shared_ptr<executor::Injector> injector_;
-    std::shared_ptr<std::atomic<bool>> muted_;  // shared with callbacks that are under way
-    mutable std::mutex mutex_;                  // all below
+    std::shared_ptr<std::atomic<bool>> muted_;  // shared with running callbacks
+    mutable std::mutex mutex_;                  // protects all members below
     ros::Subscriber subscriber_;
     std::string problem_;
     Retry retry_;  // watch thread

@@ -25,25 +25,27 @@ namespace rtcf::ros1 {
 namespace {
 
 constexpr std::uint32_t kMega = 1024 * 1024;
-// Of a connection that we made: messages for components' own subscribers are among them.
+// Limit for connections that this process has opened, also for components' own subscribers.
 constexpr std::uint32_t kMostRead = 65 * kMega;
-// Of one that a peer made: it asks for a topic, or calls a service.
+// Limit for connections that a peer has opened, to request a topic or to call a service.
 constexpr std::uint32_t kMostReadOfServer = 8 * kMega;
 constexpr std::uint32_t kMostHeader = kMega;
 constexpr std::uint32_t kMostHeaderOfServer = 64 * 1024;
-constexpr std::size_t kMostWaiting = 4 * kMega;  // for one slow subscriber
-// A call, or the answer of a master; as a text that grows, it takes some times that.
+constexpr std::size_t kMostWaiting = 4 * kMega;  // bytes queued for one slow subscriber
+// Limit of a call or an answer of XML-RPC; as a growing string, it takes several times as much
+// memory.
 constexpr std::size_t kMostXmlRpc = 4 * kMega;
 constexpr std::uint32_t kSkippedAtOnce = 16 * 1024;
 
-// Which injector has a topic. By topic, as that is all that roscpp's links know.
+// Injectors by topic, as roscpp's links know only the topic.
 struct Topics {
     std::mutex mutex;
     std::map<std::string, std::weak_ptr<executor::Injector>> injectors;
 };
 
 Topics& topics() {
-    static auto& all = *new Topics;  // NOLINT(cppcoreguidelines-owning-memory): as roscpp's threads
+    // NOLINT(cppcoreguidelines-owning-memory): for roscpp's threads
+    static auto& all = *new Topics;
     return all;
 }
 
@@ -53,7 +55,7 @@ std::shared_ptr<executor::Injector> injectorOf(const std::string& topic) {
     return found != topics().injectors.end() ? found->second.lock() : nullptr;
 }
 
-// Null if there is no room.
+// Allocates network memory; null if there is none left.
 boost::shared_array<std::uint8_t> tryNetworkBytes(std::size_t bytes) {
     try {
         return networkBytes(bytes);
@@ -74,7 +76,7 @@ void boundTopic(const std::string& topic, const std::shared_ptr<executor::Inject
 
 }  // namespace rtcf::ros1
 
-// What follows is called by roscpp and xmlrpcpp, in the place of their own.
+// The following functions replace those of roscpp and xmlrpcpp.
 
 namespace ros {
 
@@ -84,7 +86,8 @@ void Connection::read(std::uint32_t size, const ReadFinishedFunc& callback) {
     const auto buffer =
         size <= most ? rtcf::ros1::tryNetworkBytes(size) : boost::shared_array<std::uint8_t>();
     if (!buffer) {
-        drop(size <= most ? TransportDisconnect : HeaderError);  // is tried again, or not
+        // A disconnect is retried, a header error is not.
+        drop(size <= most ? TransportDisconnect : HeaderError);
         return;
     }
     {
@@ -96,7 +99,7 @@ void Connection::read(std::uint32_t size, const ReadFinishedFunc& callback) {
         has_read_callback_ = 1;
     }
     transport_->enableRead();
-    readTransport();  // what is there already
+    readTransport();  // reads data that has already arrived
 }
 
 void Connection::onHeaderLengthRead(const ConnectionPtr& /*self*/,
@@ -123,7 +126,7 @@ void TransportPublisherLink::onMessageLength(const ConnectionPtr& connection,
                       std::uint32_t count,
                       bool read_all) { onMessageLength(link, bytes, count, read_all); });
     };
-    // Reads on and forgets, a piece at a time.
+    // Reads and discards a message, piece by piece.
     struct Skip {
         TransportPublisherLink* link;
         decltype(read_length) then;
@@ -154,7 +157,7 @@ void TransportPublisherLink::onMessageLength(const ConnectionPtr& connection,
         const bool admitted = !injector || injector->admits(length);
         const bool room = length <= rtcf::ros1::kMostRead && rtcf::ros1::tryNetworkBytes(length);
         if (admitted && !room && injector) injector->refuse();
-        // More than roscpp ever allows is no length at all.
+        // A length above roscpp's own limit is invalid; roscpp handles it.
         if (length <= kNoLength && !(admitted && room)) {
             Skip{this, read_length, length}.next();
             return;
@@ -162,7 +165,8 @@ void TransportPublisherLink::onMessageLength(const ConnectionPtr& connection,
     }
     using Function = void (*)(TransportPublisherLink*, const ConnectionPtr&,
                               const boost::shared_array<std::uint8_t>&, std::uint32_t, bool);
-    // Roscpp's own does the rest. A method is called as a function with `this` before all else.
+    // roscpp's function does the rest. A member function is called as a function with `this` as
+    // first argument.
     static const auto original = reinterpret_cast<Function>(dlsym(
         RTLD_NEXT,
         "_ZN3ros22TransportPublisherLink15onMessageLengthERKN5boost10shared_ptrINS_10ConnectionEEE"
@@ -172,7 +176,7 @@ void TransportPublisherLink::onMessageLength(const ConnectionPtr& connection,
 
 void TransportSubscriberLink::enqueueMessage(const SerializedMessage& message, bool serialized,
                                              bool no_copy) {
-    // To reach what a queue holds.
+    // Gives access to the elements of a std::queue.
     struct Queue : std::queue<SerializedMessage> {
         static std::size_t bytes(const std::queue<SerializedMessage>& queue) {
             std::size_t sum = 0;
@@ -191,7 +195,7 @@ void TransportSubscriberLink::enqueueMessage(const SerializedMessage& message, b
         std::size_t bytes = outbox_.size() > 1 ? Queue::bytes(outbox_) : 0;
         while (outbox_.size() > 1 && bytes + message.num_bytes > rtcf::ros1::kMostWaiting) {
             bytes -= outbox_.front().num_bytes;
-            outbox_.pop();  // the oldest, as when there are too many
+            outbox_.pop();  // drops the oldest, as roscpp does for too many messages
         }
     }
     using Function = void (*)(TransportSubscriberLink*, const SerializedMessage&, bool, bool);
@@ -227,7 +231,7 @@ bool XmlRpcSocket::nbRead(int socket, std::string& text, bool* eof) {
             return false;
         }
     }
-    return false;  // the connection is closed
+    return false;  // the caller closes the connection
 }
 
 }  // namespace XmlRpc

@@ -1,14 +1,14 @@
 /// @file
-/// How much the network may bring and leave here. Takes the place of functions of roscpp and
-/// xmlrpcpp, which allocate what a peer says it will send, in memory that is locked:
+/// Limits on the memory of the network. Replaces functions of roscpp and xmlrpcpp, which allocate
+/// any length that a peer announces, in locked memory:
 ///
-/// - `Connection::read`: buffers come from unlocked memory; no more than a connection may bring
-/// - `Connection::onHeaderLengthRead`: no more than a header has
-/// - `TransportPublisherLink::onMessageLength`: a message that its input does not take is passed
-///   over without being kept
-/// - `TransportSubscriberLink::enqueueMessage`: what waits for a slow subscriber is bounded in
-///   bytes; who takes nothing is noted when memory is scarce
-/// - `XmlRpcSocket::nbRead`: a call or an answer is bounded
+/// - `Connection::read`: limits the length, and uses unlocked memory
+/// - `Connection::onHeaderLengthRead`: limits the length of a header
+/// - `TransportPublisherLink::onMessageLength`: skips messages that the injector does not accept,
+///   without storing them
+/// - `TransportSubscriberLink::enqueueMessage`: limits the bytes queued for a slow subscriber, and
+///   notes idle subscribers when memory is scarce
+/// - `XmlRpcSocket::nbRead`: limits the length of a call or an answer
 #pragma once
 
 #include <memory>
@@ -18,8 +18,8 @@
 
 namespace rtcf::ros1 {
 
-/// Messages of that topic which are larger than the injector takes are passed over, as long as
-/// there is an injector. Any thread.
+/// Skips messages of the topic that are larger than the injector accepts, during the life of the
+/// injector. Any thread.
 void boundTopic(const std::string& topic, const std::shared_ptr<executor::Injector>& injector);
 
 }  // namespace rtcf::ros1

@@ -9,7 +9,7 @@ namespace rtcf::ros1 {
 
 IdleSubscribers& IdleSubscribers::ofProcess() {
     static auto& all =
-        *new IdleSubscribers;  // NOLINT(cppcoreguidelines-owning-memory): as roscpp's threads
+        *new IdleSubscribers;  // NOLINT(cppcoreguidelines-owning-memory): for roscpp's threads
     return all;
 }
 
@@ -27,7 +27,7 @@ void IdleSubscribers::note(const ros::SubscriberLinkPtr& link, const void* befor
         return;
     }
     Queue& queue = queues_[link.get()];
-    // An address may be that of a link that is gone.
+    // The address may belong to an earlier link.
     if (queue.oldest != before || queue.link.lock() != link) queue = {link, after, now, now};
     queue.oldest = after;
     queue.until = now;
@@ -41,7 +41,7 @@ std::size_t IdleSubscribers::disconnect() {
         if (queues_.empty()) return 0;
         const std::size_t used = executor::UnlockedMemory::ofProcess().used();
         if (!scarce()) queues_.clear();
-        // Without room there is no message either by which to see who takes it.
+        // If no memory is left, there are no new messages to detect idle subscribers by.
         const bool none_left = used > executor::UnlockedMemory::kMost / 16 * 15;
         const auto now = Clock::now();
         for (auto each = queues_.begin(); each != queues_.end();) {

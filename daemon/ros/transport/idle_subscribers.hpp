@@ -1,7 +1,7 @@
 /// @file
-/// Subscribers that take nothing of what they asked for. Each holds a message that no other holds
-/// any more, so that enough of them use up the memory for all. Nobody is sent away for being slow
-/// as long as there is room.
+/// Detection of idle subscribers, which read none of their messages. Each keeps a message alive
+/// that others have already read, so many of them exhaust the memory. They are disconnected only
+/// when memory is scarce.
 #pragma once
 
 #include <ros/subscriber_link.h>
@@ -14,21 +14,21 @@
 
 namespace rtcf::ros1 {
 
-/// Those of the process, as is the memory that they use up. Any thread; not real-time.
+/// The idle subscribers of the process. Any thread; not real-time.
 class IdleSubscribers {
    public:
     static IdleSubscribers& ofProcess();
 
-    /// Memory for what waits is getting short: only then subscribers are looked at.
+    /// True if network memory is scarce; only then subscribers are checked.
     static bool scarce();
 
-    /// To be called for each message that is put into a subscriber's queue while memory is scarce.
-    /// @param before, after the oldest that waited before and after that
+    /// Notes a message added to a subscriber's queue. To be called while memory is scarce.
+    /// @param before, after oldest queued message before and after the addition
     void note(const ros::SubscriberLinkPtr& link, const void* before, const void* after);
 
-    /// Disconnects those that took nothing for a second, if memory is scarce. They may ask again.
-    /// Not to be called by roscpp, which holds locks.
-    /// @return how many
+    /// If memory is scarce, disconnects subscribers that have read nothing for a second. They may
+    /// subscribe again. Not for roscpp's threads, which hold locks.
+    /// @return number of disconnected subscribers
     std::size_t disconnect();
 
    private:
@@ -36,12 +36,12 @@ class IdleSubscribers {
     struct Queue {
         boost::weak_ptr<ros::SubscriberLink> link;
         const void* oldest;
-        Clock::time_point since;  // nothing was taken between this
-        Clock::time_point until;  // and this
+        Clock::time_point since;  // no message was read from this time
+        Clock::time_point until;  // to this time
     };
 
     std::mutex mutex_;
-    std::map<const ros::SubscriberLink*, Queue> queues_;  // looked at while memory is scarce
+    std::map<const ros::SubscriberLink*, Queue> queues_;  // used while memory is scarce
 };
 
 }  // namespace rtcf::ros1

@@ -15,11 +15,11 @@ bool startsWithHeader(const std::string& definition) {
         std::istringstream words(line.substr(0, line.find('#')));
         std::string type;
         std::string name;
-        if (!(words >> type)) continue;  // blank or comment
+        if (!(words >> type)) continue;  // blank line or comment
         words >> name;
-        // Constants are no fields: `uint8 X=1`.
+        // Skips constants, e.g. `uint8 X=1`.
         if (line.find('=') != std::string::npos && line.find('=') < line.find('#')) {
-            // The parts of a concatenated definition are separated by a line of `=`.
+            // A line of `=` separates the parts of a concatenated definition.
             if (type.find_first_not_of('=') == std::string::npos) return false;
             continue;
         }
@@ -50,7 +50,8 @@ Departures::Until Departures::mark() {
 
 bool Departures::gone(const Until& marked) const {
     if (marked.expired()) return true;
-    // What is latched stays: with us and with roscpp, and with nobody else once it is sent.
+    // A latched message stays with this object and with roscpp; when it is sent, there are no other
+    // owners.
     return latch_ && marked.use_count() == 1 && last_ && last_.use_count() <= 2;
 }
 

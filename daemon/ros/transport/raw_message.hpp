@@ -1,6 +1,6 @@
 /// @file
-/// Messages of any type as roscpp sees them here: bytes that are serialised
-/// already. roscpp's traits take a type of `*` for any.
+/// Messages of any type for roscpp: bytes that are already serialised. roscpp's traits use `*` for
+/// any type.
 #pragma once
 
 #include <ros/message_traits.h>
@@ -16,52 +16,53 @@ namespace rtcf::ros1 {
 
 class Departures;
 
-/// A message to be sent: bytes that live until publish() has returned.
+/// A message to send; the bytes must live until publish() returns.
 struct RawView {
     const std::uint8_t* bytes;
     std::uint32_t size;
-    Departures* departures = nullptr;  ///< told of the message; null = nobody waits for it
+    Departures* departures = nullptr;  ///< tracks the message; null = not tracked
 };
 
-/// A message that was received.
+/// A received message.
 struct RawBytes {
     boost::shared_array<std::uint8_t> bytes;
     std::uint32_t size = 0;
 };
 
-/// Bytes that wait, or are on their way, outside of the memory that is locked for the loop.
-/// @param owner kept as long as they are
-/// @throws std::bad_alloc if there are too many
+/// Allocates memory for messages that are queued or in transfer, outside of locked memory.
+/// @param owner kept alive as long as the bytes
+/// @throws std::bad_alloc if the limit is reached
 boost::shared_array<std::uint8_t> networkBytes(std::size_t bytes,
                                                const std::shared_ptr<void>& owner = nullptr);
 
-/// The messages of a topic that roscpp has not handed to the kernel yet, for each of its
-/// subscribers: a topic that closes drops what waits in roscpp. Not thread-safe; the bytes may go
-/// in any thread.
+/// Tracks the messages of a topic that roscpp has not yet passed to the kernel for all subscribers,
+/// because closing a topic drops queued messages. Not thread-safe; the bytes may be freed in any
+/// thread.
 class Departures {
    public:
-    /// Those of one moment.
+    /// The messages until one moment.
     using Until = std::weak_ptr<void>;
 
-    /// @param latch roscpp keeps the last message
+    /// @param latch true = roscpp keeps the last message
     explicit Departures(bool latch) : latch_(latch) {}
-    /// Bytes for one more message. @throws std::bad_alloc as networkBytes() does
+    /// Allocates bytes for one more message.
+    /// @throws std::bad_alloc as networkBytes() does
     boost::shared_array<std::uint8_t> add(std::size_t bytes);
-    /// All messages so far.
+    /// Marks all messages so far.
     Until mark();
-    /// They are with the kernel, or lost.
+    /// True if the marked messages are with the kernel, or lost.
     bool gone(const Until& marked) const;
-    /// Roscpp does not keep the last message any more.
+    /// roscpp no longer keeps the last message.
     void release() { last_.reset(); }
 
    private:
     bool latch_;
     std::shared_ptr<void> now_ = std::make_shared<char>();
-    boost::shared_array<std::uint8_t> last_;  // if roscpp keeps it
+    boost::shared_array<std::uint8_t> last_;  // last message, if roscpp keeps it
 };
 
-/// True if a message definition's first field is `Header header`, whose
-/// sequence number roscpp counts when it publishes.
+/// True if the first field of a message definition is `Header header`, whose sequence number roscpp
+/// sets.
 bool startsWithHeader(const std::string& definition);
 
 }  // namespace rtcf::ros1
@@ -112,7 +113,7 @@ struct Serializer<rtcf::ros1::RawBytes> {
     }
 };
 
-/// As roscpp's, but for where the bytes are.
+/// Like roscpp's function, but with network memory.
 template <>
 inline SerializedMessage serializeMessage(const rtcf::ros1::RawView& message) {
     const std::uint32_t size = message.size + 4;

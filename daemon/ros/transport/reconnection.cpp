@@ -14,18 +14,18 @@ namespace rtcf::ros1 {
 
 namespace {
 
-// A peer is asked for a sign of life when it has been silent for the first, then each second;
-// the connection ends when there was none for the last, its beginning included.
+// TCP keep-alive: the first probe is sent after kSilence without data, further ones each kBetween;
+// the connection ends after kUnanswered probes without an answer.
 constexpr int kSilence = 1;     // s
 constexpr int kBetween = 1;     // s
-constexpr int kUnanswered = 3;  // questions
+constexpr int kUnanswered = 3;  // probes
 constexpr int kUnanswered_ms = 3000;
-constexpr double kLongestPause = 1.0;  // s, between two attempts
+constexpr double kLongestPause = 1.0;  // s between two attempts
 
 std::atomic<bool> soon{false};
 
 void set(int socket, int level, int option, int value) {
-    // One that the kernel does not know leaves the connection as patient as it was.
+    // If the kernel does not know the option, the connection keeps its defaults.
     setsockopt(socket, level, option, &value, sizeof value);
 }
 
@@ -37,13 +37,13 @@ void reconnectSoon() noexcept { soon = true; }
 
 namespace ros {
 
-// Take the place of roscpp's own, which its other parts call by these names.
+// These functions replace roscpp's functions of the same names.
 
 void TransportTCP::setKeepAlive(bool use, std::uint32_t idle, std::uint32_t interval,
                                 std::uint32_t count) {
     using namespace rtcf::ros1;
-    // Those that others have opened are theirs to open again: dropping one here would leave
-    // them waiting for what will never come.
+    // Only for connections opened here: a peer reopens its own, and dropping one here would leave
+    // the peer waiting.
     const bool ours = soon && !connected_host_.empty();
     set(sock_, SOL_SOCKET, SO_KEEPALIVE, use ? 1 : 0);
     if (!use) return;
@@ -60,10 +60,10 @@ void TransportPublisherLink::onRetryTimer(const SteadyTimerEvent& event) {
         dlsym(RTLD_NEXT, "_ZN3ros22TransportPublisherLink12onRetryTimerERKNS_16SteadyTimerEventE"));
     if (retry == nullptr) return;
     const ConnectionPtr before = connection_;
-    // It doubles the pause before it tries.
+    // roscpp's function doubles the pause before its attempt.
     if (soon) retry_period_ = std::min(retry_period_, WallDuration(kLongestPause / 2));
     retry(this, event);
-    // An attempt that failed at once is not repeated by roscpp: there was no route.
+    // roscpp does not repeat an attempt that fails at once, e.g. without a route.
     const bool gave_up = !dropping_ && !needs_retry_ && connection_ == before;
     if (soon && gave_up && connection_->isDropped()) {
         needs_retry_ = true;

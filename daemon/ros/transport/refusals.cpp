@@ -23,15 +23,15 @@ std::string Refusals::recent() const {
 void Refusals::log(ros::console::Level level, const char* text, const char* /*file*/,
                    const char* /*function*/, int /*line*/) {
     if (level < ros::console::levels::Error || text == nullptr) return;
-    // We are the publisher, or the subscriber, of a pair that does not match.
+    // This node is the publisher (first text) or the subscriber (second text) of a mismatched pair.
     const std::string_view view(text);
     if (view.find(" wants topic ") == std::string_view::npos &&
         view.find("error message in header") == std::string_view::npos) {
         return;
     }
-    constexpr std::size_t kMost = 100;  // texts with numbers in them must not fill the memory
+    constexpr std::size_t kMost = 100;  // limits memory, as texts may contain changing numbers
     const std::lock_guard lock(mutex_);
-    last_ = "a ROS connection was refused: " + std::string(view);
+    last_ = "a ROS connection was rejected: " + std::string(view);
     for (char& c : last_) {
         if (c == '\n') c = ' ';
     }

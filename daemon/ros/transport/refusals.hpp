@@ -1,6 +1,6 @@
 /// @file
-/// Connections that roscpp refused, mostly for types that differ. roscpp tells
-/// nobody but its log, so this listens there.
+/// Connections that roscpp rejected, mostly because of different types. roscpp reports them only in
+/// its log, so this class reads the log.
 #pragma once
 
 #include <ros/console.h>
@@ -13,7 +13,7 @@
 
 namespace rtcf::ros1 {
 
-/// Collects refusals while it lives. Owned by the master watch; roscpp's threads feed it.
+/// Collects rejections during its life. Owned by Subjects; called in roscpp's threads.
 class Refusals final : private ros::console::LogAppender {
    public:
     Refusals();
@@ -21,10 +21,10 @@ class Refusals final : private ros::console::LogAppender {
     Refusals(const Refusals&) = delete;
     Refusals& operator=(const Refusals&) = delete;
 
-    /// Refusals that were not taken yet, each text once.
+    /// Rejections since the last call, each text once.
     std::vector<std::string> take();
 
-    /// The last one, for a minute; empty without one.
+    /// The last rejection of the last minute; empty = none.
     std::string recent() const;
 
    private:

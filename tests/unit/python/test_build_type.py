@@ -24,7 +24,7 @@ def _configure(folder: Path, *options: str) -> tuple[str, str]:
 
 def test_a_build_without_a_type_is_optimised_has_lines_and_says_so(tmp_path: Path) -> None:
     said, command = _configure(tmp_path)
-    assert "rtcf: no CMAKE_BUILD_TYPE is set: components are built as by RelWithDebInfo" in said
+    assert "rtcf: CMAKE_BUILD_TYPE is not set: components are built as with RelWithDebInfo" in said
     assert {"-O2", "-g", "-DNDEBUG"} <= set(command.split())
 
 

@@ -237,7 +237,7 @@ TEST_F(RosNodeTest, StaysOffOnceKilledUntilConfiguredAgain) {
     serve({&source}, {});
     ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
     run({"rosnode", "kill", rosNode().status().node});
-    EXPECT_TRUE(eventually([&] { return reported("asked to shut down"); }));
+    EXPECT_TRUE(eventually([&] { return reported("received a shutdown request"); }));
     EXPECT_EQ(rosNode().status().publications, 0U);
     rtcf::executor::BridgeSettings settings;
     settings.master_uri = masterUri();
@@ -254,7 +254,7 @@ TEST_F(RosNodeTest, ComesBackAtANewMasterOnceKilled) {
     serve({&source}, {});
     ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
     run({"rosnode", "kill", rosNode().status().node});
-    ASSERT_TRUE(eventually([&] { return reported("asked to shut down"); }));
+    ASSERT_TRUE(eventually([&] { return reported("received a shutdown request"); }));
     stopMaster();
     startMaster();
     EXPECT_TRUE(eventually([&] { return rosNode().status().connected; }));

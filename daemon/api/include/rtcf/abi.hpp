@@ -1,8 +1,8 @@
 /// @file
-/// The binary interface between components and the executor as one number: made of the sizes,
-/// places and order of all that both sides touch, so that nobody has to remember to raise it. A
-/// component that was built with other headers, or with compiler options that change a layout
-/// (as -D_GLIBCXX_DEBUG does), has another number and is refused. Included by component.hpp.
+/// Fingerprint of the binary interface between components and the executor: a hash of the sizes,
+/// offsets and order of all that both sides use. A component built with other headers, or with
+/// compiler options that change a layout (e.g. -D_GLIBCXX_DEBUG), has another fingerprint, and the
+/// executor rejects it. Included by component.hpp.
 #pragma once
 
 #include <cstddef>
@@ -18,13 +18,14 @@
 
 namespace rtcf {
 
-/// Offsets of a port's members, in bytes, for machine code that no C++ compiler makes.
+/// Offsets of a port's members, bytes, for code that is not compiled by a C++ compiler (components
+/// in Python).
 struct PortPlaces {
-    std::size_t source;   ///< in an input: the slot that its writer writes
-    std::size_t current;  ///< in an input: the slot with its value
-    std::size_t seen;     ///< in an input: the source's sequence at the last read
-    std::size_t raw;      ///< in an output: the slot that it writes
-    std::size_t clock;    ///< in an output: that stamps it
+    std::size_t source;   ///< inputs: pointer to the writer's slot
+    std::size_t current;  ///< inputs: pointer to the slot with the value
+    std::size_t seen;     ///< inputs: the source's sequence at the last read
+    std::size_t raw;      ///< outputs: pointer to the slot that it writes
+    std::size_t clock;    ///< outputs: pointer to the clock that stamps it
     constexpr bool operator==(const PortPlaces& other) const noexcept {
         return source == other.source && current == other.current && seen == other.seen &&
                raw == other.raw && clock == other.clock;
@@ -37,7 +38,7 @@ struct AbiProbe {
                 offsetof(InputBase, seen_), offsetof(OutputBase, raw_),
                 offsetof(OutputBase, clock_)};
     }
-    /// @param meaning raised by hand where what is meant changes, but no layout
+    /// @param meaning RTCF_ABI_VERSION, raised by hand when a meaning changes but no layout
     static std::uint32_t fingerprint(std::uint32_t meaning) noexcept {
         std::uint64_t hash = detail::stateHash(meaning, detail::stateHash("rtcf"));
         const auto add = [&hash](std::initializer_list<std::size_t> numbers) {
@@ -112,7 +113,7 @@ struct AbiProbe {
     }
 
    private:
-    // A virtual function's pointer to member holds its place in the table of such functions.
+    // A pointer to a virtual member function contains its index in the vtable.
     template <typename Function>
     static std::size_t placeOf(Function function) noexcept {
         std::size_t place = 0;
@@ -125,7 +126,7 @@ struct AbiProbe {
 
 #pragma GCC diagnostic pop
 
-// Weak, as every source file with a component has one; they are all the same.
+// Weak, because every source file with a component defines it; all definitions are the same.
 extern "C" __attribute__((weak, visibility("default"))) const rtcf::PluginDescriptor*
 RTCF_ENTRY_POINT() {
     static rtcf::PluginDescriptor descriptor{rtcf::AbiProbe::fingerprint(RTCF_ABI_VERSION),

@@ -1,7 +1,7 @@
 /// @file
-/// Types of a component's own as port types: trivially copyable structs, enums, std::array, and
-/// std::string and std::vector of such. They stay inside the runner, unless they are given a ROS
-/// message (MappedPortType in message_type.hpp):
+/// User-defined port types: trivially copyable structs, enums, std::array, std::string, and
+/// std::vector of trivially copyable types. They stay inside the runner unless they are mapped to a
+/// ROS message (MappedPortType in message_type.hpp):
 ///
 ///     struct GainsOnRos {
 ///         static const char* name() { return "Gains"; }
@@ -11,13 +11,14 @@
 ///     template <>
 ///     struct rtcf::PortType<Gains> : rtcf::MappedPortType<Gains, my_msgs::Gains, GainsOnRos> {};
 ///
-/// If toMessage() only copies bytes, GainsOnRos may say so, and recordings of incidents then have
-/// such values, too (ByteCopy); rtcf runs no conversion where the loop has none running:
+/// If toMessage() only copies bytes, GainsOnRos can declare the copies (ByteCopy). Recordings of
+/// incidents then contain these values too; rtcf runs no conversion only for a recording:
 ///
 ///         static std::vector<rtcf::ByteCopy> copies() { return {{0, 0, sizeof(Gains)}}; }
 ///
-/// Two components exchange such a type if both were built with the same definition of it: compared
-/// are its name, size and alignment. It must hold no pointers: values are copied byte by byte.
+/// Two components can exchange values of such a type if both were built with the same definition;
+/// rtcf compares name, size and alignment. The type must contain no pointers, as values are copied
+/// byte by byte.
 #pragma once
 
 #include <cxxabi.h>
@@ -40,7 +41,7 @@ namespace rtcf {
 
 namespace detail {
 
-/// A type's name as C++ spells it, the same in every library.
+/// The demangled name of a type; the same in every library.
 template <typename T>
 const char* cppName() {
     static const std::string name = [] {
@@ -57,7 +58,7 @@ template <typename T>
 constexpr bool kIsBytes = std::is_trivially_copyable_v<T> && std::is_default_constructible_v<T> &&
                           !std::is_pointer_v<T> && !std::is_reference_v<T>;
 
-/// How the values of a type are stored byte by byte: those of one size, and sequences of them.
+/// Conversion of values to bytes: for types of fixed size, and for sequences of them.
 template <typename T>
 struct Bytes {
     static constexpr bool kPossible = kIsBytes<T>;
@@ -94,10 +95,10 @@ struct Bytes<std::vector<Element, Allocator>>
     : SequenceBytes<std::vector<Element, Allocator>, Element> {};
 template <typename Allocator>
 struct Bytes<std::vector<bool, Allocator>> {
-    static constexpr bool kPossible = false;  // has no bytes to copy
+    static constexpr bool kPossible = false;  // its elements are bits
 };
 
-/// A value as text: numbers, lists of them and strings as they are read, others as hexadecimals.
+/// Prints a value: numbers, strings and sequences as text, other types as hexadecimal bytes.
 template <typename T>
 void printAny(std::string& text, const T& value) {
     if constexpr (std::is_enum_v<T>) {
@@ -143,7 +144,7 @@ struct PortType<T, std::enable_if_t<detail::Bytes<T>::kPossible && !std::is_arit
     static constexpr bool kFixedSize = Bytes::kFixedSize;
     static const char* name() { return detail::cppName<T>(); }
     static const char* md5() { return ""; }
-    /// @name No ROS message carries it
+    /// @name Empty: there is no ROS message
     /// @{
     static const char* rosType() { return ""; }
     static const char* rosMd5() { return ""; }

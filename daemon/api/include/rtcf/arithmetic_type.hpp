@@ -1,6 +1,6 @@
 /// @file
-/// bool, integers and floating-point numbers as port types; on ROS they are
-/// the std_msgs message of the same width.
+/// bool, integers and floating-point numbers as port types. On ROS, each is the std_msgs message of
+/// the same width, e.g. std_msgs/Float64 for double.
 #pragma once
 
 #include <std_msgs/Bool.h>
@@ -36,7 +36,7 @@ struct ArithmeticConversion {
 
 }  // namespace detail
 
-/// Declares an arithmetic type as a port type; ends at the end of this file.
+/// Declares an arithmetic type as a port type. Undefined at the end of this file.
 #define RTCF_ARITHMETIC_TYPE(TYPE, NAME, MESSAGE)                                      \
     namespace detail {                                                                 \
     template <>                                                                        \
@@ -47,7 +47,7 @@ struct ArithmeticConversion {
     template <>                                                                        \
     struct PortType<TYPE>                                                              \
         : MappedPortType<TYPE, MESSAGE, detail::ArithmeticConversion<TYPE, MESSAGE>> { \
-        /* a bool is not any byte that a message may bring */                          \
+        /* a byte of a message may be neither true nor false */                        \
         static constexpr bool kPlain = !std::is_same_v<TYPE, bool>;                    \
     }
 

@@ -3,9 +3,10 @@
 /// loop, with a lifecycle, typed ports and parameters.
 ///
 /// The hooks run in the order configure, start, update…, stop, cleanup. Only
-/// update() and safe() run in the real-time thread: they must not allocate,
-/// lock, block or call the system. Ports and parameters are members, declared
-/// before the component is configured.
+/// update(), safe() and takeOver() run in the real-time thread: they must not
+/// allocate, lock, block or make system calls. Ports, parameters and state are
+/// members, which register themselves with the component. The component cannot
+/// register any more members after configure().
 #pragma once
 
 #include <algorithm>
@@ -31,31 +32,34 @@
 
 namespace rtcf {
 
-/// What a component's device has cost so far, see RTCF_DEVICE_IO. Written in the cycle.
+/// Device input and output of a component, see RTCF_DEVICE_IO. The cycle thread writes it; any
+/// thread may read it.
 struct DeviceFigures {
-    std::atomic<std::uint64_t> calls{0};   ///< scopes
-    std::atomic<std::int64_t> time_ns{0};  ///< spent in them
+    std::atomic<std::uint64_t> calls{0};   ///< number of RTCF_DEVICE_IO scopes
+    std::atomic<std::int64_t> time_ns{0};  ///< total time spent in these scopes, ns
 };
 
-/// What the executor lends to a component; outlives it.
+/// A component's name, clock and links to the executor. Owned by the executor; outlives the
+/// component.
 struct ComponentContext {
     std::string full_name;             ///< namespace and name, e.g. "/arm/H1"
     std::string name;                  ///< base name, e.g. "H1"
     std::string ns = "/";              ///< namespace
     std::string runner;                ///< name of the runner
     const LoopClock* clock = nullptr;  ///< the loop's clock
-    std::int64_t period_ns = 0;        ///< of this component, ns
-    std::int64_t elapsed_ns = 0;       ///< if it does not run every cycle: as the clock's, its own
-    std::int64_t updated_ns =
-        -1;                 ///< loop time in whole periods at its last update, ns; -1 = not yet
-    bool disabled = false;  ///< taken out after a fault; written by the loop
-    std::uint32_t recorder_slot = 0;                          ///< in the flight recorder
-    DeviceFigures* device = nullptr;                          ///< null outside an executor
-    LogSink* log = nullptr;                                   ///< null: nothing is logged
-    NodeGate* gate = nullptr;                                 ///< to the ROS node; null without one
-    std::vector<std::pair<std::string, std::string>> remaps;  ///< resolved names, from and to
-    std::atomic<LogLevel> log_level{LogLevel::Info};          ///< calls below it are not logged
-    LogMemory said;                                           ///< of _ONCE and _THROTTLE
+    std::int64_t period_ns = 0;        ///< nominal period of this component, ns
+    std::int64_t elapsed_ns = 0;       ///< time since its last update, ns; 0 if it runs every cycle
+    /// Sum of the clock's elapsed_ns at its last update, ns; -1 before the first one. Only for
+    /// components that do not run every cycle.
+    std::int64_t updated_ns = -1;
+    bool disabled = false;            ///< taken out after a fault; written by the cycle thread
+    std::uint32_t recorder_slot = 0;  ///< slot number in the flight recorder
+    DeviceFigures* device = nullptr;  ///< null outside an executor
+    LogSink* log = nullptr;           ///< null = no log
+    NodeGate* gate = nullptr;         ///< access to the ROS node; null without one
+    std::vector<std::pair<std::string, std::string>> remaps;  ///< resolved names (from, to)
+    std::atomic<LogLevel> log_level{LogLevel::Info};          ///< least severe level that is logged
+    LogMemory said;  ///< state of the _ONCE and _THROTTLE macros
 };
 
 /// Base class of all components.
@@ -67,56 +71,65 @@ class Component {
     Component& operator=(const Component&) = delete;
 
     /// @name Hooks
-    /// A hook that returns false or throws refuses what was asked for; fail() says why.
+    /// A hook fails by returning false or by throwing. The executor then rejects the change that
+    /// called it; fail() sets the error text.
     /// @{
-    /// Checks a batch of parameters as a whole and computes what derives from it into Derived
-    /// members; before configure(), and whenever parameters are to change. Not real-time.
+    /// Checks a batch of parameter values as a whole, and stages the values computed from them in
+    /// Derived members. Called before configure() and before each change of parameters. Not
+    /// real-time.
     virtual bool prepare(const Values& proposed) {
         (void)proposed;
         return true;
     }
-    virtual bool configure() { return true; }  ///< Acquire what is needed. Not real-time.
-    virtual bool start() { return true; }      ///< The loop is about to run. Not real-time.
-    virtual void update() = 0;                 ///< One cycle. Real-time.
-    /// Once, when the loop ends for any reason but a crash, after an update() of this component
-    /// that threw, and when it is unloaded or replaced while the loop runs: write safe commands
-    /// here. It is a cycle like others, in schedule order: inputs are to be read, and what is
-    /// written reaches the components after this one and ROS. It may come after any part of an
-    /// update(). Real-time.
+    /// Opens devices and allocates memory. Not real-time.
+    virtual bool configure() { return true; }
+    virtual bool start() { return true; }  ///< Called before the loop runs. Not real-time.
+    virtual void update() = 0;             ///< Runs one cycle. Real-time.
+    /// Writes safe commands. Called once instead of update():
+    /// - when the loop ends for any reason but a crash,
+    /// - after an update() of this component that threw,
+    /// - when the component is unloaded or replaced while the loop runs.
+    /// It is an ordinary cycle, in schedule order: the component can read its inputs, and later
+    /// components and ROS receive its outputs. update() may have thrown anywhere, so safe() must
+    /// not rely on values that update() leaves half done. Real-time.
     virtual void safe() noexcept {}
-    virtual void stop() {}     ///< The loop has ended. Not real-time.
-    virtual void cleanup() {}  ///< Undo configure(). Not real-time.
-    /// At the cycle boundary in which this component takes the place of another, before its first
-    /// update(). State of the same name and type is there already: here is for what changed its
-    /// name, type or meaning. Real-time.
+    virtual void stop() {}     ///< Called after the loop has ended. Not real-time.
+    virtual void cleanup() {}  ///< Undoes configure(). Not real-time.
+    /// Takes over values from the component that this one replaces. Called at the cycle boundary of
+    /// the replacement, before the first update(). The executor has already copied state of the
+    /// same name and type; this hook converts state whose name, type or meaning has changed.
+    /// Real-time.
     virtual void takeOver(const Predecessor& previous) noexcept { (void)previous; }
     /// @}
 
-    /// @name Identity; valid from configure() on
+    /// @name Identity; real-time safe; valid from configure() on
     /// @{
-    const std::string& name() const noexcept { return context_->name; }  ///< e.g. "H1"
-    const std::string& fullName() const noexcept {
-        return context_->full_name;
-    }  ///< e.g. "/arm/H1"
-    const std::string& runner() const noexcept { return context_->runner; }  ///< e.g. "rt_runner"
+    /// Base name, e.g. "H1".
+    const std::string& name() const noexcept { return context_->name; }
+    /// Name with namespace, e.g. "/arm/H1".
+    const std::string& fullName() const noexcept { return context_->full_name; }
+    /// Name of the runner, e.g. "rt_runner".
+    const std::string& runner() const noexcept { return context_->runner; }
     /// @}
 
-    /// @name Time; real-time safe. There is no other clock in a loop.
+    /// @name Time; real-time safe
+    /// Constant during a cycle and the same for all components. Components use no other clock, so
+    /// that they also work in simulation and replay.
     /// @{
-    std::int64_t time() const noexcept RTCF_NONBLOCKING {
-        return context_->clock->time_ns;
-    }  ///< Monotonic, ns.
-    std::int64_t stamp() const noexcept RTCF_NONBLOCKING {
-        return context_->clock->stamp_ns;
-    }  ///< ROS time, ns.
+    /// Monotonic loop time of this cycle, ns; simulated under simulated time.
+    std::int64_t time() const noexcept RTCF_NONBLOCKING { return context_->clock->time_ns; }
+    /// ROS time of this cycle, for message headers, ns since 1970.
+    std::int64_t stamp() const noexcept RTCF_NONBLOCKING { return context_->clock->stamp_ns; }
+    /// Cycles since the loop started; 0 in the first one.
     std::uint64_t iteration() const noexcept RTCF_NONBLOCKING { return context_->clock->iteration; }
     /// This component's nominal period, ns.
     std::int64_t period() const noexcept RTCF_NONBLOCKING { return context_->period_ns; }
-    /// Time since this component's last update in whole periods, as long as they were, ns.
+    /// Time since this component's last update, in whole periods, ns. Always positive. In the cycle
+    /// in which the frequency changes, it still counts the previous period.
     std::int64_t elapsed() const noexcept RTCF_NONBLOCKING {
         return std::max<std::int64_t>(context_->clock->elapsed_ns, context_->elapsed_ns);
     }
-    /// elapsed() in seconds: what an integral or a derivative is taken over.
+    /// elapsed() in s: the step of an integral or a derivative.
     double dt() const noexcept RTCF_NONBLOCKING { return 1e-9 * static_cast<double>(elapsed()); }
     /// This component's nominal frequency, Hz.
     double frequency() const noexcept RTCF_NONBLOCKING {
@@ -126,6 +139,7 @@ class Component {
 
     /// @name For the logging macros; real-time safe
     /// @{
+    /// True if the component logs records of this level.
     bool logs(LogLevel level) const noexcept RTCF_NONBLOCKING {
         return context_->log != nullptr &&
                level >= context_->log_level.load(std::memory_order_relaxed);
@@ -134,13 +148,14 @@ class Component {
     LogMemory& logMemory() const noexcept RTCF_NONBLOCKING { return context_->said; }
     /// @}
 
-    /// @name For the executor
+    /// @name For the executor; not for components
     /// @{
+    /// Sets the context. Before configure(); not real-time.
     void attach(ComponentContext& context) noexcept {
         context_ = &context;
         for (OutputBase* output : rest_->outputs) output->setClock(clock());
     }
-    /// Nothing can be declared from here on.
+    /// Rejects further declarations. After configure(); not real-time.
     void freeze() noexcept { rest_->frozen = true; }
     const std::vector<InputBase*>& inputs() const noexcept { return rest_->inputs; }
     const std::vector<OutputBase*>& outputs() const noexcept { return rest_->outputs; }
@@ -148,10 +163,10 @@ class Component {
     const std::vector<DerivedBase*>& derived() const noexcept { return rest_->derived; }
     const std::vector<MailboxBase*>& mailboxes() const noexcept { return rest_->mailboxes; }
     const std::vector<StateDeclaration>& states() const noexcept { return rest_->states; }
-    /// Outputs whose values nobody reads before the executor has let them pass.
+    /// Outputs whose values become visible to readers only when the executor commits them.
     const std::vector<OutputBase*>& stagedOutputs() const noexcept { return rest_->staged_outputs; }
-    /// Makes those outputs such of which `which(const OutputBase&)` is true, before anybody reads
-    /// them.
+    /// Stages the outputs for which `which(const OutputBase&)` is true. Before they have readers;
+    /// not real-time.
     template <typename Which>
     void stageOutputs(const Which& which) {
         rest_->staged_outputs.clear();
@@ -166,7 +181,8 @@ class Component {
     /// @}
 
     /// @name Called by the members' constructors
-    /// Throw std::logic_error on a name that is taken or not a ROS base name, and after freeze().
+    /// Not real-time.
+    /// @throws std::logic_error if the name is taken or not a ROS base name, and after freeze()
     /// @{
     void declare(InputBase* input) { declareIn(rest_->inputs, input, input->name(), "port"); }
     void declare(OutputBase* output) { declareIn(rest_->outputs, output, output->name(), "port"); }
@@ -180,9 +196,10 @@ class Component {
     /// @}
 
    protected:
-    /// Says why a hook fails: `return fail("no reply from {}", device);`. A text without arguments
-    /// is taken as it is. RTCF_FAIL(this, …) has its format checked when compiled. Not real-time.
-    /// @return false, for the hook to return
+    /// Sets the error text of a hook: `return fail("no reply from {}", device);`. Without
+    /// arguments, the text is used verbatim. RTCF_FAIL(this, …) checks the format at compile time.
+    /// Not real-time.
+    /// @return false, as the result of the hook
     template <typename... Arguments>
     [[nodiscard]] bool fail(std::string_view text, const Arguments&... arguments) {
         if constexpr (sizeof...(arguments) == 0) {
@@ -191,7 +208,7 @@ class Component {
             try {
                 rest_->failure = fmt::vformat(text, fmt::make_format_args(arguments...));
             } catch (const fmt::format_error&) {
-                rest_->failure = text;  // better than a complaint about the complaint
+                rest_->failure = text;  // the format is wrong: use it verbatim
             }
         }
         return false;
@@ -211,7 +228,8 @@ class Component {
 
     ComponentContext* context_ =
         detail::under_construction != nullptr ? detail::under_construction : &detached();
-    // What the cycle does not touch, apart from what it does: the derived class's ports.
+    // Kept outside the object, so that the derived class's ports, which each cycle touches, lie
+    // close together.
     struct Rest {
         bool frozen = false;
         std::vector<InputBase*> inputs;
@@ -310,7 +328,7 @@ inline InputBase::InputBase(Component* owner, std::string name, const TypeInfo& 
 }
 
 inline std::int64_t InputBase::age() const noexcept RTCF_NONBLOCKING {
-    // The loop's time goes back when a simulated clock begins anew.
+    // Loop time goes back when a simulated clock is reset.
     return current_->sequence == 0
                ? -1
                : std::max<std::int64_t>(0, identity_->owner->time() - current_->time_ns);
@@ -365,7 +383,7 @@ inline std::string ParameterBase::check(ParameterValue& value) const {
     double number = 0.0;
     if (const auto* real = std::get_if<double>(&value)) {
         if (!std::isfinite(*real)) {
-            // No values to set, but for who takes back what it was declared with.
+            // Only the declared default may be infinite or NaN.
             return sameValue(value, initial) ? std::string()
                                              : fmt::format("parameter {} must be finite", name);
         }
@@ -393,19 +411,22 @@ inline std::string ParameterBase::check(ParameterValue& value) const {
     return {};
 }
 
-/// A component that waits for its device and so paces the loop: at most one in
-/// a runner. The runner's frequency is then nominal.
+/// A component whose device paces the loop. A runner has at most one; its frequency is then
+/// nominal.
 class Source : public Component {
    public:
-    /// Called in the real-time thread instead of its sleep. @param deadline_ns CLOCK_MONOTONIC, ns;
-    /// it must return by then. @return true if the device is ready: a cycle begins
+    /// Waits for the device. Called in the real-time thread instead of its sleep. Real-time; it may
+    /// block until the deadline, but no longer.
+    /// @param deadline_ns latest time to return, CLOCK_MONOTONIC, ns
+    /// @return true if the device is ready and a cycle begins
     virtual bool wait(std::int64_t deadline_ns) noexcept = 0;
 };
 
 }  // namespace rtcf
 
-/// Component::fail() with its format checked when compiled: `return RTCF_FAIL(this, "no reply from
-/// {}", device);`, in a hook. Not real-time. @return false
+/// Component::fail() with a format that is checked at compile time, for hooks: `return
+/// RTCF_FAIL(this, "no reply from {}", device);`. Not real-time.
+/// @return false
 #define RTCF_FAIL(self, text, ...)                                                   \
     (false ? ::rtcf::detail::formatCheck(FMT_STRING(text), ##__VA_ARGS__) : (void)0, \
      (self)->fail(text, ##__VA_ARGS__))

@@ -1,7 +1,7 @@
 /// @file
-/// What a component computes from its parameters: filter coefficients, a
-/// discretised model, a table. Built by prepare(), outside the real-time
-/// thread, and exchanged together with the parameters at one cycle boundary.
+/// Values that a component computes from its parameters: filter coefficients, a discretised model,
+/// a table. prepare() computes them outside the real-time thread; they take effect together with
+/// the parameters, at one cycle boundary.
 #pragma once
 
 #include <memory>
@@ -14,14 +14,15 @@ namespace rtcf {
 
 class Component;
 
-/// What the executor handles of any derived value.
+/// Base class of derived values of all types.
 class DerivedBase : public StagedValue {
    protected:
     explicit DerivedBase(Component* owner);
     ~DerivedBase() = default;
 };
 
-/// A value of any type, also one that owns memory: it is freed outside the real-time thread.
+/// A derived value of any type. If it owns memory, that memory is freed outside the real-time
+/// thread.
 template <typename T>
 class Derived final : public DerivedBase {
    public:
@@ -32,10 +33,12 @@ class Derived final : public DerivedBase {
 
     /// The value, constant during a cycle. Real-time safe.
     const T& value() const noexcept RTCF_NONBLOCKING { return *value_; }
+    /// Like value(). Real-time safe.
     const T& operator*() const noexcept RTCF_NONBLOCKING { return *value_; }
+    /// Like value(). Real-time safe.
     const T* operator->() const noexcept RTCF_NONBLOCKING { return value_.get(); }
 
-    /// Gives the successor. In prepare(); not real-time safe.
+    /// Stages the next value. In prepare(); not real-time safe.
     void stage(T value) {
         other_ = std::make_unique<T>(std::move(value));
         is_staged_ = true;
@@ -52,7 +55,7 @@ class Derived final : public DerivedBase {
 
    private:
     std::unique_ptr<T> value_;
-    std::unique_ptr<T> other_;  // staged, or replaced and not yet freed
+    std::unique_ptr<T> other_;  // the staged value, or the replaced one before it is freed
 };
 
 }  // namespace rtcf

@@ -1,5 +1,5 @@
 /// @file
-/// A component's talk with its device, in the cycle: system calls that are meant.
+/// Device input and output in the cycle: the only place where a component may make system calls.
 ///
 ///     void update() override {
 ///         RTCF_DEVICE_IO(this);
@@ -13,7 +13,7 @@
 
 #include "rtcf/component.hpp"
 
-// Of the RealtimeSanitizer's run time; only the checking executor has them.
+// Functions of the RealtimeSanitizer's run time; only the executor of `rtcfctl check` has them.
 extern "C" {
 __attribute__((weak)) void __rtsan_disable();  // NOLINT: the name is clang's
 __attribute__((weak)) void __rtsan_enable();   // NOLINT
@@ -21,8 +21,8 @@ __attribute__((weak)) void __rtsan_enable();   // NOLINT
 
 namespace rtcf {
 
-/// A scope that `rtcfctl check` does not complain about, and whose time `rtcfctl stats` shows.
-/// Real-time safe itself; what stands in it is the component's affair.
+/// A scope in which `rtcfctl check` allows system calls, and whose time `rtcfctl stats` shows. The
+/// class itself is real-time safe; the component must bound the time of the calls in the scope.
 class DeviceIo {
    public:
     explicit DeviceIo(Component* component) noexcept

@@ -1,14 +1,14 @@
 /// @file
-/// Fixed-size Eigen types as port types. Include it beside component.hpp in a
-/// component that has such ports.
+/// Fixed-size Eigen types as port types. Include this header beside component.hpp in components
+/// with such ports.
 ///
 /// | C++ | on ROS |
 /// | --- | --- |
 /// | `Eigen::Vector3d` | geometry_msgs/Vector3 |
 /// | `Eigen::Quaterniond` | geometry_msgs/Quaternion |
 /// | `Eigen::Isometry3d` | geometry_msgs/Pose |
-/// | any other fixed-size matrix of double or float | std_msgs/Float64MultiArray or
-/// Float32MultiArray, row by row |
+/// | other fixed-size matrices of double | std_msgs/Float64MultiArray, row by row |
+/// | other fixed-size matrices of float | std_msgs/Float32MultiArray, row by row |
 #pragma once
 
 #include <geometry_msgs/Pose.h>
@@ -52,7 +52,7 @@ struct QuaternionConversion {
     static void fromMessage(const geometry_msgs::Quaternion& message, Eigen::Quaterniond& value) {
         value = Eigen::Quaterniond(message.w, message.x, message.y, message.z);
     }
-    // In memory x, y, z, w, as there.
+    // Both are x, y, z, w in memory.
     static std::vector<ByteCopy> copies() { return {{0, 0, sizeof(Eigen::Quaterniond)}}; }
 };
 
@@ -87,8 +87,8 @@ struct MultiArray<float> {
     static constexpr const char* scalar = "float";
 };
 
-/// A matrix on the wire, before its elements: two labelled dimensions, an offset of 0, and the
-/// number of elements.
+/// Header of a serialised matrix: two labelled dimensions, an offset of 0, and the number of
+/// elements.
 class MatrixHead {
    public:
     // dim count, two dims of (label length, label, size, stride), offset, data count
@@ -116,7 +116,8 @@ class MatrixHead {
     }
 };
 
-/// The elements of a message, row by row. @throws std::length_error if it has not as many
+/// The elements of a message, row by row.
+/// @throws std::length_error if the message has another number of elements
 template <typename Message>
 const auto* matrixElements(const Message& message, std::size_t count) {
     const std::size_t offset = message.layout.data_offset;
@@ -141,8 +142,8 @@ template <>
 struct PortType<Eigen::Isometry3d>
     : MappedPortType<Eigen::Isometry3d, geometry_msgs::Pose, detail::IsometryConversion> {};
 
-/// Any other fixed-size matrix. Written to the wire by hand, since filling a
-/// MultiArray message would allocate.
+/// Any other fixed-size matrix. It is serialised without a MultiArray message, which would
+/// allocate.
 template <typename Scalar, int Rows, int Cols, int Options, int MaxRows, int MaxCols>
 struct PortType<Eigen::Matrix<Scalar, Rows, Cols, Options, MaxRows, MaxCols>,
                 std::enable_if_t<(Rows > 0 && Cols > 0 &&
@@ -210,8 +211,8 @@ struct PortType<Eigen::Matrix<Scalar, Rows, Cols, Options, MaxRows, MaxCols>,
     }
 
    private:
-    // Another type, as readers take values from the writer's memory; a vector is the same either
-    // way.
+    // A row-major matrix is a port type of its own, because readers use the writer's memory. The
+    // order does not matter for a vector.
     static constexpr bool kTransposed = (Options & Eigen::RowMajor) != 0 && Rows > 1 && Cols > 1;
     static constexpr std::uint32_t kHead = detail::MatrixHead::kSize;
 };

@@ -1,5 +1,5 @@
 /// @file
-/// Numbers as text without loss: the shortest one that reads back the same.
+/// Lossless conversion of numbers to text: the shortest text that reads back as the same number.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace rtcf::detail {
 
-/// Writes floating-point numbers, in a stream whose locale has it.
+/// Facet of a stream's locale that prints floating-point numbers without loss.
 class ExactNumbers final : public std::num_put<char> {
    protected:
     iter_type do_put(iter_type out, std::ios_base& stream, char_type fill,
@@ -25,7 +25,7 @@ class ExactNumbers final : public std::num_put<char> {
     }
 };
 
-/// Makes a stream exact. Not real-time safe.
+/// Makes a stream print floating-point numbers without loss. Not real-time safe.
 inline void makeExact(std::ostream& stream) {
     stream.imbue(std::locale(std::locale::classic(), new ExactNumbers));  // the locale owns it
 }

@@ -1,7 +1,7 @@
 /// @file
-/// Whether a value holds no NaN and no infinity: numbers, Eigen types, any ROS message
-/// (roscpp's own serializer visits its fields), structs that name their fields (as in
-/// state_type.hpp), and sequences of these. Outputs of other types cannot be declared Finite.
+/// Check of values for NaN and infinity. It covers numbers, Eigen types, any ROS message (roscpp's
+/// serializer visits its fields), structs that name their fields (as in state_type.hpp), and
+/// sequences of these. Outputs of other types cannot be declared Finite.
 #pragma once
 
 #include <ros/message_traits.h>
@@ -17,14 +17,14 @@
 
 namespace rtcf {
 
-/// What happens to a value that is not finite, on an output that is declared so.
+/// Policy for values that are not finite, on an output declared Finite.
 enum class OnNonFinite {
-    Hold,  ///< the output keeps its last value, and its component is reported as faulted
-    Stop,  ///< besides, the loop stops in order
+    Hold,  ///< readers keep the last finite value, and the component is reported as faulted
+    Stop,  ///< the loop also stops in order
 };
 
-/// Option of an output: its values are checked after each update(), before anybody reads them. A
-/// struct has to name its fields for that.
+/// Option of an output: the executor checks each value after update(), before readers see it. A
+/// struct must name its fields.
 struct Finite {
     Finite() = default;
     explicit Finite(OnNonFinite on_non_finite) : policy(on_non_finite) {}
@@ -36,7 +36,7 @@ namespace detail {
 template <typename T>
 bool isFinite(const T& value) noexcept;
 
-/// Takes the place of a stream in a message's serializer and looks at each field.
+/// Replaces the stream in a message's serializer, and checks each field.
 class FiniteVisitor {
    public:
     template <typename T>
@@ -49,7 +49,7 @@ class FiniteVisitor {
     bool finite_ = true;
 };
 
-/// Looks at the fields that a struct names.
+/// Checks the named fields of a struct.
 struct FiniteFields {
     bool finite = true;
     template <typename Field>
@@ -102,10 +102,10 @@ bool isFinite(const T& value) noexcept {
         return true;
     } else if constexpr (NamesFields<T>::value) {
         FiniteFields visitor;
-        const_cast<T&>(value).fields(visitor);  // the visitor only looks at them
+        const_cast<T&>(value).fields(visitor);  // the visitor does not change the fields
         return visitor.finite;
     } else {
-        return true;  // without floating-point numbers, or not declared Finite (IsCheckable)
+        return true;  // either without floating-point numbers, or not declared Finite
     }
 }
 
@@ -122,8 +122,8 @@ constexpr bool kHasItems =
 template <typename T>
 using ItemOf = std::decay_t<decltype(*std::declval<const T&>().begin())>;
 
-/// Whether isFinite() looks at all numbers of a type; of a struct requireCheckable() looks at its
-/// fields.
+/// True if isFinite() checks all numbers of a type. For a struct, requireCheckable() tests each
+/// field.
 template <typename T, typename = void>
 struct IsCheckable
     : std::bool_constant<std::is_arithmetic_v<T> || std::is_enum_v<T> || HasMatrix<T>::value ||
@@ -144,16 +144,16 @@ struct CheckableFields {
     }
 };
 
-/// Does not compile for a type that isFinite() cannot look into.
+/// Fails to compile for a type that isFinite() cannot check.
 template <typename T>
 void requireCheckable() {
     static_assert(IsCheckable<T>::value,
-                  "rtcf::Finite cannot look into this type: name its fields by a member "
+                  "rtcf::Finite cannot check this type: name its fields by a member "
                   "`template <typename Visit> void fields(Visit&& visit)`, see state_type.hpp");
     if constexpr (kHasItems<T>) {
         (void)&requireCheckable<ItemOf<T>>;
     } else if constexpr (NamesFields<T>::value) {
-        // Compiled, and never called.
+        // Compiled, but never called.
         (void)static_cast<void (*)(T&)>([](T& value) { value.fields(CheckableFields{}); });
     }
 }

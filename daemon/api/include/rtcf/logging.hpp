@@ -1,8 +1,7 @@
 /// @file
-/// Logging that is safe in the cycle. A call stores its arguments in a fixed
-/// record; the text is made later, outside the real-time thread. Format
-/// strings are libfmt's and checked at compile time.
-///
+/// Real-time safe logging. A call stores its arguments in a record of fixed size; a worker thread
+/// formats the text later. Format strings are those of libfmt, checked at compile time. Arguments
+/// are numbers, enums, pointers and strings; strings are cut to 94 bytes.
 ///     RTCF_INFO(this, "gripper at {:.3f} m", position);
 ///     RTCF_WARN_THROTTLE(this, 1.0, "{} lost packets", lost);   // at most once a second
 ///     RTCF_ERROR_ONCE(this, "no reply from {}", device);
@@ -31,7 +30,7 @@ namespace rtcf {
 /// Severity, as in ROS.
 enum class LogLevel : std::uint8_t { Debug = 1, Info = 2, Warn = 3, Error = 4, Fatal = 5 };
 
-/// Where a logging call stands in the source.
+/// Place of a logging call in the source.
 struct LogSite {
     LogLevel level;
     const char* file;
@@ -40,40 +39,41 @@ struct LogSite {
     const char* format;
 };
 
-/// Bytes that one record has for its arguments.
+/// Size of a record's arguments, bytes.
 constexpr std::size_t kLogPayload = 320;
 
-/// One call on its way to the log.
+/// The record of one logging call.
 struct LogRecord {
     const LogSite* site;
     const char* component;    ///< full name; lives until the record is consumed
     std::int64_t time_ns;     ///< CLOCK_REALTIME at the call, ns since 1970
-    std::uint64_t iteration;  ///< of the loop at the call
-    bool realtime;            ///< called by the real-time thread
-    /// Makes the text; not real-time safe.
+    std::uint64_t iteration;  ///< the loop's iteration at the call
+    bool realtime;            ///< true = called by the real-time thread
+    /// Formats the text. Not real-time safe.
     void (*render)(const LogRecord& record, std::string& text);
     alignas(std::max_align_t) std::array<std::byte, kLogPayload> payload;
 };
 
-/// Where records go; implemented by the executor.
+/// Receiver of log records; implemented by the executor.
 class LogSink {
    public:
-    /// A record to fill, its time, iteration and thread already noted; null if the log is
-    /// full, which is counted and reported. Real-time safe in the cycle; other threads share a
+    /// A record to fill, or null if the log is full; the log counts and reports such drops. Time,
+    /// iteration and thread are already set. Real-time safe in the cycle; other threads share a
     /// lock.
     virtual LogRecord* claim() noexcept = 0;
-    /// Hands over the record that claim() gave. Real-time safe.
+    /// Hands over the record from claim(). Real-time safe.
     virtual void commit(LogRecord* record) noexcept = 0;
 
    protected:
     ~LogSink() = default;
 };
 
-/// What _ONCE and _THROTTLE remember for one component: when each of its calls may speak again.
+/// State of the _ONCE and _THROTTLE macros for one component: for each call, the earliest time of
+/// its next record.
 class LogMemory {
    public:
-    /// The time from which a call may pass. Real-time safe; any thread. @return null if so many
-    /// other calls are known that there is no room for this one
+    /// The earliest time of the next record of a call, ns. Real-time safe; any thread.
+    /// @return null if the table is full of other calls
     std::atomic<std::int64_t>* of(const LogSite& site) noexcept RTCF_NONBLOCKING {
         const std::size_t begin = reinterpret_cast<std::uintptr_t>(&site) / sizeof(LogSite);
         for (std::size_t i = 0; i < entries_.size(); ++i) {
@@ -95,7 +95,7 @@ class LogMemory {
 
 namespace detail {
 
-/// A text argument, cut to what a record can hold.
+/// A string argument, cut to the capacity of a record.
 struct LogText {
     static constexpr std::size_t kCapacity = 94;
     std::uint16_t size;
@@ -130,13 +130,13 @@ const T& logLoad(const T& value) noexcept {
     return value;  // NOLINT(bugprone-return-const-ref-from-parameter): read before the call ends
 }
 
-/// Checks a format at compile time; never called.
+/// Checks a format at compile time. Never called.
 template <typename Format, typename... Arguments>
 void formatCheck(const Format& format, const Arguments&... arguments) {
     (void)fmt::formatted_size(format, arguments...);
 }
 
-/// Checks a call's format at compile time, with the arguments as they are stored; never called.
+/// Checks a call's format at compile time, for the stored types of the arguments. Never called.
 template <typename Format, typename... Arguments>
 void logCheck(const Format& format, const Arguments&... arguments) {
     (void)fmt::formatted_size(format, logLoad(logStore(arguments))...);
@@ -174,17 +174,17 @@ void logCall(LogSink& sink, const char* component, const LogSite& site,
     sink.commit(record);
 }
 
-/// Lets one call in `period_ns` pass, over all threads. Real-time safe.
+/// True for one call per `period_ns`, over all threads. Real-time safe.
 inline bool logThrottle(std::atomic<std::int64_t>& next_ns, std::int64_t now_ns,
                         std::int64_t period_ns) noexcept {
     std::int64_t due = next_ns.load(std::memory_order_relaxed);
-    // Further away than a period: a simulated clock has begun anew since.
+    // If `due` is more than a period ahead, a simulated clock was reset.
     const bool passes = now_ns >= due || due - now_ns > period_ns;
     return passes &&
            next_ns.compare_exchange_strong(due, now_ns + period_ns, std::memory_order_relaxed);
 }
 
-/// Lets a call pass once. Real-time safe.
+/// True for the first call only. Real-time safe.
 inline bool logOnce(std::atomic<std::int64_t>& next_ns) noexcept {
     constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
     return next_ns.exchange(kNever, std::memory_order_relaxed) != kNever;
@@ -210,8 +210,8 @@ inline bool logOnce(std::atomic<std::int64_t>& next_ns) noexcept {
 #define RTCF_LOG_FUNCTION_ static_cast<const char*>(__builtin_FUNCTION())
 #define RTCF_LOG_(self, log_level, text, ...) \
     RTCF_LOG_IF_(self, log_level, true, text, ##__VA_ARGS__)
-// Of a component that has more such calls than are remembered, the others are one with those of
-// its class.
+// If a component has more such calls than its LogMemory holds, the remaining calls share one time
+// per call site, over all components of the class.
 #define RTCF_LOG_NEXT_                                                                          \
     ([](::rtcf::LogMemory& memory, const ::rtcf::LogSite& site) -> std::atomic<std::int64_t>& { \
         static std::atomic<std::int64_t> shared{std::numeric_limits<std::int64_t>::min()};      \
@@ -228,8 +228,8 @@ inline bool logOnce(std::atomic<std::int64_t>& next_ns) noexcept {
 /// @}
 
 /// @name Logging, usable in every hook; real-time safe
-/// `self` is the component, usually `this`; throttled by loop time. _ONCE and _THROTTLE count for
-/// each component of its own.
+/// `self` is the component, usually `this`. _ONCE logs the first call per component; _THROTTLE logs
+/// at most one record per component in `s` seconds of loop time.
 /// @{
 #define RTCF_DEBUG(self, ...) RTCF_LOG_(self, ::rtcf::LogLevel::Debug, __VA_ARGS__)
 #define RTCF_INFO(self, ...) RTCF_LOG_(self, ::rtcf::LogLevel::Info, __VA_ARGS__)

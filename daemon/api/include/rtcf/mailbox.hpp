@@ -1,11 +1,16 @@
 /// @file
-/// From a service or action callback into update() and back. The callback, in a thread that is not
-/// real-time, hands over a request and waits; update() finds it, works on it for as many cycles as
-/// it needs, and replies. The real-time side never waits.
+/// A request from a service or action callback to update(), and its reply. The callback runs in a
+/// thread that is not real-time: it hands over a request and waits. update() finds the request,
+/// works on it for as many cycles as it needs, and replies. The real-time side never waits.
 ///
-///     rtcf::Mailbox<double, bool> move{this};               // a position, and whether it was
-///     reached … if (const double* target = move.request(); target != nullptr && there(*target))
-///     move.reply(true); … bool reached = false;                                 // in the callback
+///     rtcf::Mailbox<double, bool> move{this};  // request: a position; reply: reached or not
+///
+///     // in update()
+///     if (const double* target = move.request(); target != nullptr && there(*target))
+///         move.reply(true);
+///
+///     // in the callback
+///     bool reached = false;
 ///     switch (move.call(request.target, reached, std::chrono::seconds(5))) { … }
 #pragma once
 
@@ -21,14 +26,14 @@ namespace rtcf {
 
 class Component;
 
-/// What came of a call.
+/// Result of a call.
 enum class MailStatus {
-    Answered,  ///< the reply is there
-    TimedOut,  ///< update() has not replied in time, and does not find the request any more
-    Ended,     ///< the loop does not run, or ended before the reply
+    Answered,  ///< update() has replied
+    TimedOut,  ///< update() has not replied in time; the request is withdrawn
+    Ended,     ///< the loop does not run, or it ended before the reply
 };
 
-/// What the executor handles of any mailbox: it is open while its component may be updated.
+/// Base class of mailboxes of all types. A mailbox is open while its component may be updated.
 class MailboxBase {
    public:
     MailboxBase(const MailboxBase&) = delete;
@@ -36,13 +41,15 @@ class MailboxBase {
 
     /// @name For the executor; not real-time
     /// @{
+    /// Accepts calls from here on. Before the component's first cycle.
     void open() {
         const std::lock_guard lock(mutex_);
         state_.store(State::Free, std::memory_order_relaxed);
         open_ = true;
         ++run_;
     }
-    /// Who waits is answered. After the component's last cycle.
+    /// Ends waiting calls with MailStatus::Ended and rejects new ones. After the component's last
+    /// cycle.
     void close() {
         const std::lock_guard lock(mutex_);
         open_ = false;
@@ -54,7 +61,7 @@ class MailboxBase {
     explicit MailboxBase(Component* owner);
     ~MailboxBase() = default;
 
-    /// Returns once nobody is in a call any more; while request and reply are still there.
+    /// Waits for the end of all calls. By the destructor, while request and reply still exist.
     void finish() {
         std::unique_lock lock(mutex_);
         open_ = false;
@@ -62,13 +69,15 @@ class MailboxBase {
         changed_.wait(lock, [this] { return callers_ == 0; });
     }
 
-    // Asked, and then one of the others, is what callers and update() tell each other. Callers take
-    // it from Free to Asked to Abandoned, update() from Asked to Answered and from Abandoned to
-    // Free, so that no request or reply changes under the other's eyes.
+    // The state belongs to one side at a time. A caller sets Free → Asked → Abandoned, and Answered
+    // → Free. update() sets Asked → Answered, and Abandoned → Free. So neither side changes a
+    // request or a reply while the other reads it.
     enum class State { Free, Asked, Answered, Abandoned };
 
-    /// One call at a time is asked; others wait for their turn, which their timeout includes.
-    /// @param ask, take called with the lock held
+    /// Calls update() and waits for the reply. One call is active at a time; others wait, and their
+    /// timeout includes that wait.
+    /// @param ask writes the request; called with the lock held
+    /// @param take reads the reply; called with the lock held
     template <typename Ask, typename Take>
     MailStatus exchange(std::chrono::nanoseconds timeout, const Ask& ask, const Take& take) {
         const auto until = std::chrono::steady_clock::now() +
@@ -77,7 +86,7 @@ class MailboxBase {
         const Caller caller(*this);
         const unsigned run = run_;
         const auto ended = [&] { return !open_ || run_ != run; };
-        // The real-time thread wakes nobody up: it is looked at.
+        // The real-time thread must not wake threads up, so callers poll.
         const auto wait = [&](const auto& done) {
             while (!ended() && !done()) {
                 const auto now = std::chrono::steady_clock::now();
@@ -95,7 +104,7 @@ class MailboxBase {
         ask();
         state_.store(State::Asked, std::memory_order_release);
         wait([&] { return is(State::Answered); });
-        if (run_ != run) return MailStatus::Ended;  // the state is of another run
+        if (run_ != run) return MailStatus::Ended;  // the state belongs to another run
         State asked = State::Asked;
         if (state_.compare_exchange_strong(asked, State::Abandoned, std::memory_order_acq_rel))
             return open_ ? MailStatus::TimedOut : MailStatus::Ended;
@@ -136,12 +145,13 @@ class MailboxBase {
     std::condition_variable changed_;
     bool open_ = false;
     bool asking_ = false;
-    unsigned run_ = 0;  // of the loop, counted
+    unsigned run_ = 0;  // runs of the loop so far
     unsigned callers_ = 0;
 };
 
-/// Requests from callbacks, one at a time. Declared as a member of the component; it outlives the
-/// component's services, which are shut down in stop() or cleanup().
+/// Passes requests from callbacks to update(), one at a time. Declare it as a member of the
+/// component, and shut the component's services down in stop() or cleanup(), before the mailbox is
+/// destroyed.
 template <typename Request, typename Reply>
 class Mailbox final : public MailboxBase {
    public:
@@ -151,31 +161,32 @@ class Mailbox final : public MailboxBase {
 
     /// @name In update()
     /// @{
-    /// The request that waits for a reply: the same one in each cycle until reply(), or until its
-    /// caller has given it up. Valid for this update(). Real-time safe, wait-free. @return null if
-    /// there is none
+    /// The request that waits for a reply, or null. It is the same one in each cycle until reply(),
+    /// or until its caller gives up. Valid until the end of this update(). Real-time safe,
+    /// wait-free.
     const Request* request() noexcept RTCF_NONBLOCKING {
         const State state = state_.load(std::memory_order_acquire);
         if (state == State::Asked) return &request_;
         if (state == State::Abandoned) state_.store(State::Free, std::memory_order_release);
         return nullptr;
     }
-    /// Answers it; without a request nothing happens. Wait-free; real-time safe for types whose
-    /// assignment is.
+    /// Replies to the request; does nothing if there is none. Wait-free; real-time safe if the
+    /// assignment of Reply is.
     void reply(const Reply& reply) noexcept {
         if (state_.load(std::memory_order_acquire) != State::Asked) return;
         reply_ = reply;
         State asked = State::Asked;
-        // Else it has been given up just now, which request() finds.
+        // If this fails, the caller has just given up; the next request() resets the state.
         state_.compare_exchange_strong(asked, State::Answered, std::memory_order_acq_rel);
     }
     /// @}
 
-    /// Asks update() and waits for its reply. For callbacks of services and actions and other
-    /// threads of the component's own, any number of them at once; never in a hook, which the loop
-    /// may wait for. Not real-time.
-    /// @param reply   filled if Answered
-    /// @param timeout of waiting for other callers and for the reply; at most a year
+    /// Sends a request to update() and waits for the reply. For callbacks of services and actions
+    /// and for other threads of the component, any number of them at once. Never call it in a hook:
+    /// the loop may wait for the hook. Not real-time.
+    /// @param request copied before the call waits
+    /// @param reply   set if the result is Answered
+    /// @param timeout for other callers and for the reply; at most a year
     MailStatus call(const Request& request, Reply& reply, std::chrono::nanoseconds timeout) {
         return exchange(timeout, [&] { request_ = request; }, [&] { reply = reply_; });
     }

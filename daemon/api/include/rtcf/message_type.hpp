@@ -1,5 +1,5 @@
 /// @file
-/// ROS messages as port types, any message, by roscpp's own traits.
+/// All ROS messages as port types, by roscpp's traits.
 #pragma once
 
 #include <ros/message_operations.h>
@@ -21,7 +21,7 @@ namespace rtcf {
 
 namespace detail {
 
-/// ROS prints a message over several lines; a port's value is shown on one.
+/// Joins the lines of a printed message, as a port's value is shown on one line.
 inline std::string joinLines(const std::string& lines) {
     std::string joined;
     for (const char c : lines) {
@@ -35,8 +35,8 @@ inline std::string joinLines(const std::string& lines) {
     return joined;
 }
 
-/// Bytes of a message. roscpp makes room for as many elements as a vector says it has, and then
-/// looks whether they are there: twelve bytes could take gigabytes.
+/// A stream that limits memory: roscpp resizes a vector to the received element count before it
+/// checks the remaining bytes, so twelve bytes could allocate gigabytes.
 struct BoundedStream : ros::serialization::IStream {
     using IStream::IStream;
     template <typename T>
@@ -50,7 +50,8 @@ struct BoundedStream : ros::serialization::IStream {
     }
 };
 
-/// Found by argument; everything but vectors roscpp deserialises, vectors' elements included.
+/// Checks the element count of a vector before roscpp deserialises it. Found by argument-dependent
+/// lookup; roscpp handles all other types, and the elements of vectors.
 template <typename T, typename Allocator>
 void deserialize(BoundedStream& stream, std::vector<T, Allocator>& values) {
     static const std::uint32_t least = std::max(1U, ros::serialization::serializationLength(T()));
@@ -62,7 +63,7 @@ void deserialize(BoundedStream& stream, std::vector<T, Allocator>& values) {
     ros::serialization::deserialize(stream, values);
 }
 
-/// Takes the place of a stream in a message's serializer and notes where each field lies.
+/// Replaces the stream in a message's serializer, and records the address of each field.
 class CopyVisitor {
    public:
     /// @param object the message, of `size` bytes in memory
@@ -90,7 +91,7 @@ class CopyVisitor {
 
    private:
     void add(const std::uint8_t* field, std::uint32_t bytes) {
-        // A custom serializer may write computed values.
+        // A custom serializer may write computed values, which are not in the message object.
         known_ = known_ && !std::less<>()(field, object_) &&
                  !std::less<>()(object_ + size_, field + bytes);
         if (!known_) return;
@@ -148,9 +149,9 @@ struct PortType<T, std::enable_if_t<ros::message_traits::IsMessage<T>::value>> {
     }
 };
 
-/// The base of a PortType that travels on ROS as `Message`. `Conversion` has
-/// `name()`, `toMessage(const T&, Message&)` and `fromMessage(const Message&, T&)`, and may have
-/// `static std::vector<ByteCopy> copies()`, if copying these bytes into a default-constructed
+/// Base of a PortType whose ROS message is `Message`. `Conversion` has the static functions
+/// `name()`, `toMessage(const T&, Message&)` and `fromMessage(const Message&, T&)`. It may also
+/// have `static std::vector<ByteCopy> copies()`, if copying these bytes into a default-constructed
 /// message is equivalent to toMessage().
 template <typename T, typename Message, typename Conversion>
 struct MappedPortType {

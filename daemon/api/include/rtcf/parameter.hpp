@@ -1,6 +1,6 @@
 /// @file
-/// Parameters: declared once as members, then set when the component is
-/// loaded and changed while the loop runs, with bounds checked beforehand.
+/// Parameters: members with a default value and bounds. They are set when the component is loaded
+/// and may change while the loop runs. Bounds are checked before a value is applied.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,8 @@ namespace rtcf {
 
 class Component;
 
-/// A parameter's value on its way in or out. An enumerator travels by name.
+/// A parameter's value outside the component. The value of an enum parameter is the enumerator's
+/// name.
 using ParameterValue = std::variant<bool, std::int64_t, double, std::string>;
 
 /// @name Options of a parameter's declaration
@@ -52,14 +53,14 @@ struct Choice {
 };
 /// @}
 
-/// True for two NaN too, which do not equal each other.
+/// True if two values are equal; two NaN count as equal. Not real-time.
 inline bool sameValue(const ParameterValue& a, const ParameterValue& b) noexcept {
     const auto* x = std::get_if<double>(&a);
     const auto* y = std::get_if<double>(&b);
     return a == b || (x != nullptr && y != nullptr && std::isnan(*x) && std::isnan(*y));
 }
 
-/// How a parameter was declared.
+/// Declaration of a parameter.
 struct ParameterDeclaration {
     std::string name;
     std::string type;  ///< "bool", "int", "double", "string" or "enum"
@@ -71,17 +72,19 @@ struct ParameterDeclaration {
     std::vector<Choice> choices;
 };
 
-/// A value of a component with a successor, which takes its place at a cycle
-/// boundary. Staged, discarded and released by the graph thread.
+/// A value with a staged successor, which replaces it at a cycle boundary. The graph thread stages
+/// and releases; the cycle thread commits.
 class StagedValue {
    public:
     StagedValue() = default;
     StagedValue(const StagedValue&) = delete;
     StagedValue& operator=(const StagedValue&) = delete;
 
-    virtual void commit() noexcept RTCF_NONBLOCKING = 0;  ///< At the boundary; real-time safe.
-    /// Lets go of what is staged, or of the value that commit() has replaced. Not real-time safe.
+    /// Makes the staged value the present one. Cycle boundary only; real-time safe.
+    virtual void commit() noexcept RTCF_NONBLOCKING = 0;
+    /// Frees the staged value, or the one that commit() has replaced. Not real-time safe.
     virtual void release() noexcept = 0;
+    /// True if there is a staged value. Real-time safe.
     bool staged() const noexcept RTCF_NONBLOCKING { return is_staged_; }
 
    protected:
@@ -89,18 +92,20 @@ class StagedValue {
     bool is_staged_ = false;
 };
 
-/// What the executor handles of any parameter.
+/// Base class of parameters of all types.
 class ParameterBase : public StagedValue {
    public:
+    /// Name, type, default and bounds. Real-time safe.
     const ParameterDeclaration& declaration() const noexcept { return declaration_; }
 
-    /// Checks type, bounds and enumerators. @return empty if the value can be
-    /// staged, else what is wrong with it. Converts int to double where a
-    /// double is declared. NaN and infinity are for defaults alone, as "no limit".
-    /// Not real-time safe.
+    /// Checks the type, bounds and enumerators of a value, and converts int to double if the
+    /// parameter is a double. NaN and infinity are only valid as a declared default, for "no
+    /// limit". Not real-time safe.
+    /// @return empty if the value can be staged, else the error in one line
     std::string check(ParameterValue& value) const;
 
-    virtual void stage(const ParameterValue& checked) = 0;  ///< A successor. Not real-time safe.
+    /// Stages a value that has passed check(). Not real-time safe.
+    virtual void stage(const ParameterValue& checked) = 0;
 
    protected:
     ParameterBase(Component* owner, ParameterDeclaration declaration);
@@ -115,7 +120,7 @@ class Parameter final : public ParameterBase {
    public:
     /// @param owner the component, `this`
     /// @param name  ROS base name, unique among the component's parameters
-    /// @param initial value unless the loader gives another
+    /// @param initial default value
     /// @param options any of Min, Max, Unit, Doc, Choice
     template <typename... Options>
     Parameter(Component* owner, std::string name, T initial, Options... options)
@@ -123,13 +128,13 @@ class Parameter final : public ParameterBase {
           value_(initial),
           staged_(std::move(initial)) {}
 
-    /// The value, constant during a cycle. Real-time safe.
+    /// The value; constant during a cycle. Real-time safe.
     const T& value() const noexcept RTCF_NONBLOCKING { return value_; }
     operator const T&() const noexcept RTCF_NONBLOCKING {
         return value_;
     }  // NOLINT(google-explicit-constructor)
 
-    /// The value as it will be if the batch is adopted that prepare() is about.
+    /// The staged value, or the present one if none is staged. In prepare(); not real-time safe.
     const T& proposed() const noexcept { return is_staged_ ? staged_ : value_; }
 
     void stage(const ParameterValue& checked) override {
@@ -179,7 +184,7 @@ class Parameter final : public ParameterBase {
         } else if constexpr (std::is_integral_v<T>) {
             declaration.type = "int";
             declaration.default_value = static_cast<std::int64_t>(initial);
-            // A value must fit the C++ type, whatever bounds were declared.
+            // A value must fit the C++ type, even if the declared bounds are wider.
             narrow(declaration, static_cast<double>(std::numeric_limits<T>::min()),
                    static_cast<double>(std::numeric_limits<T>::max()));
         } else {
@@ -190,7 +195,7 @@ class Parameter final : public ParameterBase {
         }
         return declaration;
     }
-    // Bounds of T, where it is smaller than what values travel as.
+    // Adds the bounds of T if T is narrower than the type in ParameterValue.
     static void narrow(ParameterDeclaration& declaration, double lowest, double highest) {
         constexpr bool kSmaller = sizeof(T) < sizeof(std::int64_t);
         if constexpr (kSmaller || std::is_unsigned_v<T>) {
@@ -220,8 +225,8 @@ class Parameter final : public ParameterBase {
     T staged_;
 };
 
-/// The values of a component's parameters as a batch proposes them:
-/// `proposed[kp]`. Those that the batch leaves alone have their present value.
+/// The values that a component's parameters will have if a batch is applied: `proposed[kp]`. A
+/// parameter that is not in the batch has its present value. Not real-time.
 class Values {
    public:
     template <typename T>

@@ -1,7 +1,7 @@
 /// @file
-/// Ports: how components exchange values. Declare them as members; they
-/// register themselves with their component. Inside a runner a connection is a
-/// pointer to the writer's value.
+/// Ports: the inputs and outputs by which components exchange values. Declare them as members; they
+/// register themselves with their component. Inside a runner, a connection is a pointer to the
+/// writer's value: there is no copy.
 #pragma once
 
 #include <cstdint>
@@ -21,53 +21,55 @@ namespace rtcf {
 class Component;
 class QueueBase;
 
-/// What a read found. Ordered, so that `status >= DataStatus::Old` means "there is a value".
+/// Result of a read. The values are ordered: `status >= DataStatus::Old` means "there is a value".
 enum class DataStatus {
     None,  ///< never written
-    Old,   ///< nothing new since this input's last read
+    Old,   ///< not written since this input's last read
     New,   ///< written since this input's last read
 };
 
-/// What a port is. Kept apart from what the cycle touches, so that the ports of
-/// a component lie close together in the processor's caches.
+/// Name, type and connection of a port. Kept outside the port object, so that the members that each
+/// cycle touches lie close together in the processor's caches.
 struct PortIdentity {
     Component* owner;
     std::string name;
     std::string unit;
     const TypeInfo& type;
-    bool connected = false;  ///< an input's: something feeds it; an output's: something reads it
-    bool kept_is_new =
-        false;  ///< an input's: its component has not read what an earlier writer left
-    QueueBase* queue = nullptr;  ///< an input's that keeps every message: itself
+    bool connected = false;  ///< an input has a writer; an output has a reader
+    /// Inputs: the value is of an earlier writer, and the component has not read it yet.
+    bool kept_is_new = false;
+    QueueBase* queue = nullptr;  ///< inputs: the input itself if it is a Queue
 };
 
-/// What the executor handles of any input.
+/// Base class of inputs of all types.
 class InputBase {
    public:
     InputBase(Component* owner, std::string name, const TypeInfo& type, const SlotHeader& empty);
     InputBase(const InputBase&) = delete;
     InputBase& operator=(const InputBase&) = delete;
 
+    /// Name within the component. Real-time safe.
     const std::string& name() const noexcept { return identity_->name; }
+    /// Description of the value's type. Real-time safe.
     const TypeInfo& type() const noexcept { return identity_->type; }
 
     /// True if an output or a ROS topic feeds this input. Real-time safe.
     bool connected() const noexcept RTCF_NONBLOCKING { return identity_->connected; }
-    /// Loop time since the current value was written, ns; -1 without a value. Real-time safe.
+    /// Loop time since the current value was written, ns; -1 if there is none. Real-time safe.
     std::int64_t age() const noexcept RTCF_NONBLOCKING;
-    /// Writes of its source that this input has read so far. Real-time safe.
+    /// Sequence number, in the source, of the last value that this input has read. Real-time safe.
     std::uint64_t seen() const noexcept RTCF_NONBLOCKING { return seen_; }
 
-    /// @name For the executor, at a cycle boundary
+    /// @name For the executor, at a cycle boundary; real-time safe
     /// @{
-    /// Itself as a queue; null if it is none.
+    /// This input as a queue; null if it is none.
     QueueBase* queue() const noexcept RTCF_NONBLOCKING { return identity_->queue; }
-    /// Reads from `source` on. A new writer's value counts once it writes; until then the last
-    /// value stays, as new data if it has not been read. `continued`: the same writer's values by
-    /// another slot.
+    /// Connects the input to `source`. The last value stays until the new writer writes; if the
+    /// component has not read it, it is still new data.
+    /// @param continued `source` is another slot with values of the same writer
     void rewire(const SlotHeader* source, bool continued) noexcept RTCF_NONBLOCKING {
         if (continued) {
-            // A value kept of an earlier writer stays, as before.
+            // A value of an earlier writer stays.
             if (current_ == source_) current_ = source;
         } else if (current_->sequence == 0 && seen_ == 0) {
             current_ = source;
@@ -81,21 +83,21 @@ class InputBase {
         source_ = source;
         identity_->connected = true;
     }
-    /// Has no writer any more; the present value stays.
+    /// Removes the writer; the last value stays.
     void disconnect() noexcept RTCF_NONBLOCKING { identity_->connected = false; }
-    /// A value from outside the loop has arrived in `source`; the slot of the last one is given
-    /// back.
+    /// Sets a value that arrived from outside the loop, in `source`. The slot of the previous value
+    /// is free again.
     void inject(const SlotHeader* source) noexcept RTCF_NONBLOCKING {
         source_ = source;
         current_ = source;
     }
-    /// The slot whose value the component has, or would get by read().
+    /// The slot with the newest value: the one that the next read() returns.
     const SlotHeader& newest() const noexcept {
         return source_->sequence != seen_ ? *source_ : *current_;
     }
-    /// The slot whose value the component has.
+    /// The slot with the value of the last read().
     const SlotHeader* current() const noexcept RTCF_NONBLOCKING { return current_; }
-    /// How far the component has read.
+    /// Read position of the component.
     struct Reading {
         const SlotHeader* source = nullptr;
         const SlotHeader* current = nullptr;
@@ -133,9 +135,9 @@ class InputBase {
 
    private:
     friend struct AbiProbe;
-    const SlotHeader* source_;   // where the writer writes
-    const SlotHeader* current_;  // where the component's value is
-    std::uint64_t seen_ = 0;     // the source's sequence at the last read
+    const SlotHeader* source_;   // slot of the writer
+    const SlotHeader* current_;  // slot of the value of the last read
+    std::uint64_t seen_ = 0;     // source_->sequence at the last read
     std::unique_ptr<PortIdentity> identity_;
 };
 
@@ -148,18 +150,19 @@ class Input final : public InputBase {
     Input(Component* owner, std::string name)
         : InputBase(owner, std::move(name), typeInfo<T>(), empty()) {}
 
-    /// Takes note of the newest value, which value() then gives. Real-time safe.
+    /// Makes the newest value the one that value() returns. Real-time safe.
     DataStatus read() noexcept RTCF_NONBLOCKING { return readStatus(); }
 
-    /// As read(), and copies the value if there is a new one, or any with `copy_old`.
-    /// Real-time safe for types whose assignment is.
+    /// Like read(), and copies the value if it is new; with `copy_old`, also an old one. Real-time
+    /// safe if the assignment of T is.
     DataStatus read(T& copy, bool copy_old = true) {
         const DataStatus status = readStatus();
         if (status == DataStatus::New || (copy_old && status == DataStatus::Old)) copy = value();
         return status;
     }
 
-    /// The value of the last read(); default-constructed before there was one. Real-time safe.
+    /// The value of the last read(); default-constructed before the first value. The reference is
+    /// valid until update() returns. Real-time safe.
     const T& value() const noexcept RTCF_NONBLOCKING {
         return static_cast<const Slot<T>*>(current())->value;
     }
@@ -171,7 +174,7 @@ class Input final : public InputBase {
     }
 };
 
-/// What the executor handles of any output.
+/// Base class of outputs of all types.
 class OutputBase {
    public:
     OutputBase(Component* owner, std::string name, std::string unit, const TypeInfo& type,
@@ -179,43 +182,54 @@ class OutputBase {
     OutputBase(const OutputBase&) = delete;
     OutputBase& operator=(const OutputBase&) = delete;
 
+    /// Name within the component. Real-time safe.
     const std::string& name() const noexcept { return rest_->identity.name; }
+    /// Unit of the value, e.g. "N m". Real-time safe.
     const std::string& unit() const noexcept { return rest_->identity.unit; }
+    /// Description of the value's type. Real-time safe.
     const TypeInfo& type() const noexcept { return rest_->identity.type; }
-    /// True if an input or a ROS topic gets what this output writes. Real-time safe.
+    /// True if an input or a ROS topic reads this output. Real-time safe.
     bool connected() const noexcept RTCF_NONBLOCKING { return rest_->identity.connected; }
-    /// For the executor, at a cycle boundary. Real-time safe.
+    /// Sets connected(). For the executor, at a cycle boundary. Real-time safe.
     void setConnected(bool connected) noexcept RTCF_NONBLOCKING {
         rest_->identity.connected = connected;
     }
-    /// The slot that this output writes; inputs may keep it alive beyond the component.
+    /// The slot that readers see. It may outlive the component while an input refers to it.
+    /// Real-time safe.
     const std::shared_ptr<SlotHeader>& slot() const noexcept { return rest_->slot; }
-    /// What the component writes into: the slot, or the staged one. For the executor.
+    /// The slot that the component writes: slot(), or the staged one. For the executor. Real-time
+    /// safe.
     SlotHeader* written() const noexcept RTCF_NONBLOCKING { return raw_; }
-    /// A slot with the capacity that reserve() gave this output, for copies of its values.
+    /// A slot with the capacity set by reserve(), to make copies of the output's values from. For
+    /// the executor; not real-time.
     const SlotHeader* sample() const noexcept {
         return rest_->sample != nullptr ? rest_->sample.get() : rest_->slot.get();
     }
-    /// The clock that stamps what is written; for the executor.
+    /// Sets the clock that stamps written values. For the executor; not real-time.
     void setClock(const LoopClock& clock) noexcept { clock_ = &clock; }
 
-    /// @name Of an output that is staged, as one declared Finite is; for the executor
+    /// @name Staged outputs; for the executor
+    /// Readers of a staged output see a written value only after commit(). Outputs declared Finite
+    /// are staged, and so are those that the executor stages.
     /// @{
     bool staged() const noexcept RTCF_NONBLOCKING { return rest_->staged != nullptr; }
-    /// True if it is declared Finite.
+    /// True if the output is declared Finite. Real-time safe.
     bool checked() const noexcept RTCF_NONBLOCKING { return rest_->checked; }
-    /// From here on readers see nothing before commit(). Before there are any; not real-time safe.
+    /// Stages the output. Only before it has readers. Not real-time safe.
     void stage() {
         if (rest_->staged != nullptr) return;
-        // The component keeps its object, to which it may have a reference; readers get the other.
+        // The component may hold a reference to its value, so it keeps the object; readers get a
+        // new one.
         std::shared_ptr<SlotHeader> seen = type().make_slot(sample());
         type().copy(*seen, *rest_->slot);
         rest_->staged = std::exchange(rest_->slot, std::move(seen));
         rest_->examined = rest_->staged->sequence;
     }
-    /// Lets readers see what was written; if it is declared Finite, only a finite value. After
-    /// update(); real-time safe as TypeInfo::copy is. @return false if it is not
-    /// @throws any exception of a copy; readers then have the previous value, or this one
+    /// Publishes the written value to readers. Called after update(). Real-time safe if
+    /// TypeInfo::copy is.
+    /// @return false if the output is declared Finite and the value is not finite; readers keep the
+    /// previous value
+    /// @throws any exception of a copy; readers then have the previous value or the new one
     bool commit() {
         Rest& rest = *rest_;
         if (rest.staged->sequence == rest.examined) return true;
@@ -227,18 +241,20 @@ class OutputBase {
         }
         type().exchange(*rest.slot, *rest.staged);
         *rest.slot = *rest.staged;
-        type().copy(*rest.staged, *rest.slot);  // the component goes on from the value it wrote
+        type().copy(*rest.staged, *rest.slot);  // the component keeps the value that it wrote
         return true;
     }
-    /// What was written since the last commit() is never seen. Real-time safe.
+    /// Hides the value written since the last commit() from readers. Real-time safe.
     void discard() noexcept RTCF_NONBLOCKING { rest_->examined = rest_->staged->sequence; }
-    /// As discard(), and the component has the last value that readers saw. Real-time safe as
-    /// TypeInfo::copy is. @throws any exception of a copy
+    /// Like discard(), and resets the component's value to the one that readers see. Real-time safe
+    /// if TypeInfo::copy is.
+    /// @throws any exception of a copy
     void takeBack() {
         discard();
         type().copy(*rest_->staged, *rest_->slot);
         discard();
     }
+    /// Policy for values that are not finite. Real-time safe.
     OnNonFinite nonFinitePolicy() const noexcept RTCF_NONBLOCKING { return rest_->policy; }
     /// @}
 
@@ -254,16 +270,16 @@ class OutputBase {
     }
 
     friend struct AbiProbe;
-    SlotHeader* raw_;  // what is written: the slot's object, or the staged one's
+    SlotHeader* raw_;  // the slot that write() fills: rest_->staged, or rest_->slot
 
    private:
     struct Rest {
         PortIdentity identity;
         std::shared_ptr<SlotHeader> slot;
-        std::shared_ptr<SlotHeader> staged;  // null = readers see at once what is written
-        std::shared_ptr<SlotHeader> sample;  // null = none was given to reserve()
+        std::shared_ptr<SlotHeader> staged;  // null = readers see written values at once
+        std::shared_ptr<SlotHeader> sample;  // null = reserve() was not called
         bool checked = false;                // declared Finite
-        std::uint64_t examined = 0;          // the staged one's sequence at the last check
+        std::uint64_t examined = 0;          // staged->sequence at the last check
         OnNonFinite policy = OnNonFinite::Hold;
     };
 
@@ -277,29 +293,29 @@ class Output final : public OutputBase {
    public:
     /// @param owner the component, `this`
     /// @param name  ROS base name, unique among the component's ports
-    /// @param unit  what a value means, for people
+    /// @param unit  unit of the value, for people
     Output(Component* owner, std::string name, std::string unit = {})
         : OutputBase(owner, std::move(name), std::move(unit), typeInfo<T>(), nullptr) {}
-    /// An output whose values are checked for NaN and infinity before anybody reads them.
+    /// An output whose values the executor checks for NaN and infinity before readers see them.
     Output(Component* owner, std::string name, std::string unit, Finite finite)
         : OutputBase(owner, std::move(name), std::move(unit), typeInfo<T>(), &finite) {
         detail::requireCheckable<T>();
     }
 
-    /// Writes a value. Real-time safe for types whose assignment is; for messages
-    /// of variable size once reserve() has been given the largest one.
+    /// Writes a value and stamps it with the loop's time. Real-time safe if the assignment of T is;
+    /// for messages of variable size, only up to the size given to reserve().
     void write(const T& value) noexcept(std::is_nothrow_copy_assignable_v<T>) {
         static_cast<Slot<T>*>(raw_)->value = value;
         stampWrite();
     }
 
-    /// The value in place, to be changed and then published. Real-time safe.
+    /// The value in place: change it, then call publish(). Real-time safe.
     T& value() noexcept RTCF_NONBLOCKING { return static_cast<Slot<T>*>(raw_)->value; }
-    /// Makes what value() gave a new value. Real-time safe.
+    /// Stamps the value changed in place as a new value. Real-time safe.
     void publish() noexcept RTCF_NONBLOCKING { stampWrite(); }
 
-    /// Takes the capacity of `sample`, so that later values up to its size are
-    /// written without allocation. For constructor and configure(); not real-time safe.
+    /// Reserves memory for values up to the size of `sample`, so that writing them does not
+    /// allocate. In the constructor or in configure(); not real-time safe.
     void reserve(const T& sample) {
         static_cast<Slot<T>*>(raw_)->value = sample;
         static_cast<Slot<T>*>(slot().get())->value = sample;

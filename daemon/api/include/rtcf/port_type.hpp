@@ -1,7 +1,6 @@
 /// @file
-/// What the executor knows of a port's type: its identity, and the functions
-/// that handle its values without knowing the type. One TypeInfo exists per
-/// type and component library.
+/// Run-time description of a port's type: its identity, and functions that handle its values
+/// without knowing the type. One TypeInfo exists per type and component library.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +18,7 @@
 
 namespace rtcf {
 
-/// Bytes of a value that its message has as they lie in memory.
+/// A range of bytes that is the same in a value and in its serialised message.
 struct ByteCopy {
     std::uint32_t from;  ///< bytes from the beginning of the value
     std::uint32_t to;    ///< bytes from the beginning of the serialised message
@@ -29,73 +28,74 @@ struct ByteCopy {
     }
 };
 
-/// How a value becomes its message by copying: all bytes that differ between messages of the type.
-/// Unset if that needs the type's code.
+/// The copies that turn a value into its message: all bytes that differ between messages of the
+/// type. Unset if only the type's code can make the message.
 using ByteCopies = std::optional<std::vector<ByteCopy>>;
 
-/// Type-erased description of a port's type. All functions take slots of this
-/// very type.
+/// Type-erased description of a port's type. All functions take slots of this type.
 struct TypeInfo {
-    /// @name Identity: two ports can be connected if all four are equal, or both are plain and of
-    /// one message, size and alignment.
+    /// @name Identity
+    /// Two ports can be connected if all four are equal, or if both are plain and have the same
+    /// message, size and alignment.
     /// @{
     const char* name;  ///< e.g. "std_msgs/Float64", "double"
-    const char* md5;   ///< of the ROS definition; of the mapped message for other types
+    const char* md5;   ///< MD5 of the ROS definition; for other types, of the mapped message
     std::size_t size;
     std::size_t alignment;
     /// @}
 
-    /// @name The ROS message that carries such values
+    /// @name The ROS message of these values; empty if there is none
     /// @{
     const char* ros_type;
     const char* ros_md5;
     const char* ros_definition;
     /// @}
 
-    /// The value lies in memory as the message of `ros_type` does: `double` and std_msgs/Float64.
+    /// The value has the same memory layout as the message `ros_type`, e.g. `double` and
+    /// std_msgs/Float64.
     bool plain;
     bool fixed_size;  ///< flat, and every value has the same serialised length
-    /// The value has no memory beside its `size` bytes: these are all of it, and copying never
-    /// allocates.
+    /// The value owns no memory outside its `size` bytes, so copying it never allocates.
     bool flat;
-    /// length() and serialize() build a message of variable size first: they may allocate.
+    /// length() and serialize() build a message of variable size first, so they may allocate.
     bool builds_message;
 
-    /// A new slot, with a copy of the sample's value if there is one. Not real-time safe.
+    /// Makes a slot, with a copy of the sample's value unless `sample` is null. Not real-time safe.
     std::shared_ptr<SlotHeader> (*make_slot)(const SlotHeader* sample);
-    /// Copies value and header. Real-time safe for fixed-size types, and for
-    /// others as long as the target's capacity suffices.
+    /// Copies value and header. Real-time safe for fixed-size types, and for other types if the
+    /// target's capacity suffices.
     void (*copy)(SlotHeader& to, const SlotHeader& from);
-    /// Exchanges the values, not the headers, of two slots. Real-time safe.
+    /// Swaps the values, but not the headers, of two slots. Real-time safe.
     void (*exchange)(SlotHeader& a, SlotHeader& b);
     /// Serialised length in bytes. Real-time safe unless `builds_message`.
     std::uint32_t (*length)(const SlotHeader& slot);
     /// Writes length() bytes. Real-time safe unless `builds_message`.
     void (*serialize)(const SlotHeader& slot, std::uint8_t* to, std::uint32_t size);
-    /// Reads a message into the slot's value; false if the bytes are not one. Not real-time safe.
+    /// Deserialises a message into the slot's value. Not real-time safe.
+    /// @return false if the bytes are not a valid message
     bool (*deserialize)(SlotHeader& slot, const std::uint8_t* from, std::uint32_t size);
-    /// The value as text of one line. Not real-time safe.
+    /// Prints the value on one line. Not real-time safe.
     std::string (*print)(const SlotHeader& slot);
-    /// True if the value holds no NaN and no infinity. Real-time safe.
+    /// True if the value contains no NaN and no infinity. Real-time safe.
     bool (*finite)(const SlotHeader& slot);
-    /// A serialised message of no particular value: no conversion of a component's own runs. Not
+    /// A serialised message of any value, made without the component's conversion functions. Not
     /// real-time safe.
     std::string (*sample)();
-    /// How a message is made of a value and the sample, for types of fixed size. Not real-time
-    /// safe.
+    /// The copies that turn the sample and a value into a message, for types of fixed size. Not
+    /// real-time safe.
     ByteCopies (*copies)();
 };
 
-/// True if values of the two types may share a connection.
+/// True if ports of the two types can be connected. Not real-time: it compares texts.
 bool sameType(const TypeInfo& a, const TypeInfo& b) noexcept;
 
-/// True if a value of the type has memory of its own, and its message, too: only a copy can be
-/// turned into a message, outside the cycle.
+/// True if both the value and its message own memory. The message then has to be built from a copy,
+/// outside the cycle. Real-time safe.
 inline bool allocatesMessage(const TypeInfo& type) noexcept RTCF_NONBLOCKING {
     return type.builds_message && !type.flat;
 }
 
-/// Where a slot's value lies. Real-time safe.
+/// Address of a slot's value. Real-time safe.
 inline const std::uint8_t* valueOf(const TypeInfo& type, const SlotHeader& slot) noexcept
     RTCF_NONBLOCKING {
     const std::size_t offset = (sizeof slot + type.alignment - 1) / type.alignment * type.alignment;
@@ -105,16 +105,15 @@ inline std::uint8_t* valueOf(const TypeInfo& type, SlotHeader& slot) noexcept RT
     return const_cast<std::uint8_t*>(valueOf(type, static_cast<const SlotHeader&>(slot)));
 }
 
-/// How a type becomes a port's type; specialised in message_type.hpp,
-/// arithmetic_type.hpp and eigen_type.hpp. A specialisation has
+/// Makes a type a port type. Specialised in message_type.hpp, arithmetic_type.hpp, eigen_type.hpp
+/// and any_type.hpp. The members correspond to those of TypeInfo. A specialisation has
 ///  - `static const char* name()`, `md5()`, `rosType()`, `rosMd5()`, `rosDefinition()`
-///  - `static constexpr bool kFixedSize`, and `kPlain` and `kBuildsMessage` if the type is or does
-///    (TypeInfo)
+///  - `static constexpr bool kFixedSize`; `kPlain` and `kBuildsMessage`, if true
 ///  - `static std::uint32_t length(const T&)`
 ///  - `static void serialize(const T&, std::uint8_t*, std::uint32_t)`
 ///  - `static void deserialize(T&, const std::uint8_t*, std::uint32_t)`, which throws on bad bytes
 ///  - `static std::string print(const T&)`
-/// and, if it can tell (TypeInfo),
+/// and optionally
 ///  - `static std::string sample()`; without it, the message of a default-constructed value
 ///  - `static ByteCopies copies()`; without it, only the type's own code makes its messages
 template <typename T, typename Enable = void>
@@ -204,7 +203,7 @@ ByteCopies copiesOf() {
     }
 }
 
-/// A type that frees no memory owns none.
+/// A trivially destructible type owns no memory.
 template <typename T>
 constexpr bool kIsFlat = PortType<T>::kFixedSize || std::is_trivially_destructible_v<T>;
 
@@ -221,7 +220,7 @@ std::string printSlot(const SlotHeader& slot) {
 
 }  // namespace detail
 
-/// The description of T. Not real-time safe on the first call.
+/// The description of T. Not real-time safe at the first call.
 template <typename T>
 const TypeInfo& typeInfo() {
     static const TypeInfo info{PortType<T>::name(),
@@ -249,7 +248,7 @@ const TypeInfo& typeInfo() {
 }
 
 inline bool sameType(const TypeInfo& a, const TypeInfo& b) noexcept {
-    // Libraries have TypeInfo objects of their own, so identity is by content.
+    // Each library has its own TypeInfo objects, so compare the content.
     if (&a == &b) return true;
     if (a.size != b.size || a.alignment != b.alignment) return false;
     if (std::string_view(a.name) == b.name) return std::string_view(a.md5) == b.md5;

@@ -1,10 +1,10 @@
 /// @file
-/// An input that keeps every message, in order: for trajectories, joystick events, commands, of
-/// which each one counts. An Input has the newest value alone.
+/// An input that keeps every message, in order: for trajectories, joystick events and commands.
+/// An Input keeps only the newest value.
 ///
 ///     rtcf::Queue<trajectory_msgs::JointTrajectory, 8> goals{this, "goals"};
-///     …  while (const auto* goal = goals.front()) { begin(*goal); goals.pop(); }     // in
-///     update()
+///
+///     for (; const auto* goal = goals.front(); goals.pop()) begin(*goal);  // in update()
 #pragma once
 
 #include <array>
@@ -18,32 +18,33 @@
 
 namespace rtcf {
 
-/// What the executor handles of any queue. Of an output a message is what it holds when its
-/// component has run: one a cycle. Only whoever runs cycles touches it.
+/// Base class of queues of all types. If an output feeds the queue, the queue gets one message per
+/// cycle: the output's value after its component has run. Only the cycle thread uses it.
 class QueueBase : public InputBase {
    public:
-    /// Messages that are there. Real-time safe.
+    /// Number of messages in the queue. Real-time safe if the assignment of T is.
     std::size_t size() noexcept {
         receive();
         return ring_->count;
     }
-    /// Removes the oldest message; without one nothing happens. Real-time safe.
+    /// Removes the oldest message; does nothing if the queue is empty. Real-time safe.
     void pop() noexcept RTCF_NONBLOCKING {
         if (ring_->count == 0) return;
         ring_->oldest = (ring_->oldest + 1) % ring_->capacity;
         --ring_->count;
     }
-    /// Loop time since the oldest message was written, ns; -1 without one. Real-time safe.
+    /// Loop time since the oldest message was written, ns; -1 if the queue is empty. Real-time safe
+    /// if the assignment of T is.
     std::int64_t age() noexcept;
-    /// Messages that were lost: they came while there were as many as it keeps, or no memory.
-    /// Real-time safe.
+    /// Number of messages lost so far, because the queue was full or memory ran out. Real-time
+    /// safe.
     std::uint64_t dropped() const noexcept RTCF_NONBLOCKING { return ring_->dropped; }
-    /// As many as it keeps.
+    /// Most messages that the queue keeps. Real-time safe.
     std::size_t capacity() const noexcept RTCF_NONBLOCKING { return ring_->capacity; }
 
-    /// @name For the executor; real-time safe as TypeInfo::copy is
+    /// @name For the executor; real-time safe if TypeInfo::copy is
     /// @{
-    /// Takes the source's value if it is new. A value that finds no memory counts as dropped.
+    /// Appends the source's value if it is new. If memory runs out, the message counts as dropped.
     void receive() noexcept {
         if (readStatus() != DataStatus::New) return;
         SlotHeader* const to = claim();
@@ -55,29 +56,31 @@ class QueueBase : public InputBase {
             ++ring_->dropped;
         }
     }
-    /// A slot with the capacity that reserve() gave each message; null without it.
+    /// A slot with the capacity set by reserve(); null without it.
     const SlotHeader* sample() const noexcept { return ring_->sample.get(); }
-    /// Takes a message out of `from`, which gets another value. @param time_ns of the loop
+    /// Appends the value of `from` by swapping; `from` then has an unspecified value.
+    /// @param time_ns loop time of the message, ns
     void take(SlotHeader& from, std::int64_t time_ns) noexcept {
         SlotHeader* const to = claim();
         if (to == nullptr) return;
         type().exchange(*to, from);
         to->time_ns = time_ns;
     }
-    /// What its source holds now is no message for it: a trajectory is not begun anew because its
-    /// reader was loaded again.
+    /// Ignores the present value of the source, so that a reloaded component does not get an old
+    /// trajectory again.
     void skip() noexcept RTCF_NONBLOCKING {
         const SlotHeader* const source = reading().source;
         setReading({source, source, source->sequence, false});
     }
-    /// So many were lost on their way here.
+    /// Counts messages that were lost before they reached the queue.
     void noteDropped(std::uint64_t count) noexcept RTCF_NONBLOCKING { ring_->dropped += count; }
-    /// Forgets what is there; no drop.
+    /// Empties the queue without counting drops.
     void clear() noexcept RTCF_NONBLOCKING { ring_->count = 0; }
     /// @}
 
    protected:
-    // Apart from the component's own memory, which tells what it remembers, see State.
+    // Kept outside the component's object: `rtcfctl check` compares the object's bytes to find
+    // undeclared state.
     struct Ring {
         std::size_t capacity;
         SlotHeader* (*at)(void* slots, std::size_t index);
@@ -107,7 +110,7 @@ class QueueBase : public InputBase {
    private:
     friend struct AbiProbe;
 
-    // The place of the next message; null, and counted, if there is none.
+    // The slot for the next message. If the queue is full, counts a drop and returns null.
     SlotHeader* claim() noexcept {
         Ring& ring = *ring_;
         if (ring.count == ring.capacity) {
@@ -131,15 +134,16 @@ class Queue final : public QueueBase {
     Queue(Component* owner, std::string name)
         : Queue(owner, std::move(name), std::make_unique<Slots>()) {}
 
-    /// The oldest message, until pop(); null if there is none. Real-time safe.
+    /// The oldest message; null if the queue is empty. The pointer is valid until pop(). Real-time
+    /// safe if the assignment of T is.
     const T* front() noexcept {
         const SlotHeader* const slot = oldest();
         return slot == nullptr ? nullptr : &static_cast<const Slot<T>*>(slot)->value;
     }
 
-    /// Takes the capacity of `sample`, so that messages of a component up to its size are kept
-    /// without allocation; those of ROS allocate outside the cycle. For constructor and
-    /// configure(); not real-time safe.
+    /// Reserves memory for messages up to the size of `sample`, so that messages from an output are
+    /// kept without allocation. (Messages from ROS are allocated outside the cycle.) In the
+    /// constructor or in configure(); not real-time safe.
     void reserve(const T& sample) {
         for (Slot<T>& slot : *slots_) slot.value = sample;
         setSample(type().make_slot(&(*slots_)[0]));

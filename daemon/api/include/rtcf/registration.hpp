@@ -1,6 +1,6 @@
 /// @file
-/// How a library offers its component types. `RTCF_COMPONENT(Pid, "…")`, once
-/// per type in any source file, is all that is needed.
+/// Registration of a library's component types. `RTCF_COMPONENT(Pid, "…")`, once per type in any
+/// source file, is all that a component needs.
 #pragma once
 
 #include <cstdint>
@@ -12,22 +12,23 @@ namespace rtcf {
 class Component;
 struct ComponentContext;
 
-/// One component type of a library; static, in a list.
+/// One component type of a library: an element of a static list.
 struct ComponentRecord {
     const char* type;  ///< e.g. "Pid"
-    const char* doc;   ///< one line
-    /// A new component, which the caller owns. `name` is the one that it will have; few components
-    /// want to know it so early. `context` lets its constructor log; null where nobody listens.
-    /// One call at a time.
+    const char* doc;   ///< description, one line
+    /// Makes a component, which the caller owns. Not real-time; one call at a time.
+    /// @param name the component's name, for the few constructors that need it
+    /// @param context lets the constructor log; null = no log
     Component* (*create)(const char* name, ComponentContext* context);
     const ComponentRecord* next;
 };
 
-/// What a library's entry point gives. Its first two members never change.
+/// Result of a library's entry point. The first two members never change.
 struct PluginDescriptor {
-    std::uint32_t abi_version;  ///< AbiProbe::fingerprint() of the headers it was built with
-    std::uint32_t size;         ///< of this struct
-    const char* version;        ///< release of the headers it was built with
+    /// AbiProbe::fingerprint() of the headers that the library was built with
+    std::uint32_t abi_version;
+    std::uint32_t size;   ///< size of this struct, bytes
+    const char* version;  ///< release of these headers
     const ComponentRecord* components;
 };
 
@@ -37,7 +38,7 @@ struct PluginDescriptor {
 
 namespace detail {
 
-/// The list of this library's types. Hidden, so that each library has its own.
+/// The list of this library's types. Hidden, because each library needs its own.
 __attribute__((visibility("hidden"))) inline const ComponentRecord* component_records = nullptr;
 
 struct __attribute__((visibility("hidden"))) Registration {
@@ -47,10 +48,10 @@ struct __attribute__((visibility("hidden"))) Registration {
     }
 };
 
-/// What the component that is being constructed in this library has from the beginning.
+/// Context of the component that is being constructed in this library.
 __attribute__((visibility("hidden"))) inline ComponentContext* under_construction = nullptr;
 
-/// Makes a component whose constructor may log.
+/// Constructs a component whose constructor may log.
 template <typename T, typename... Arguments>
 T* construct(ComponentContext* context, const Arguments&... arguments) {
     struct Guard {
@@ -67,12 +68,13 @@ T* construct(ComponentContext* context, const Arguments&... arguments) {
 
 }  // namespace rtcf
 
-/// Registers a component class, in the global namespace or by its qualified
-/// name with RTCF_COMPONENT_NAMED.
+/// Registers a component class of the global namespace under its own name. DOC is a description of
+/// one line. For a class in a namespace, use RTCF_COMPONENT_NAMED.
 #define RTCF_COMPONENT(CLASS, DOC) RTCF_COMPONENT_NAMED(CLASS, #CLASS, DOC, CLASS)
 
-/// As RTCF_COMPONENT for a class in a namespace: `RTCF_COMPONENT_NAMED(arm::Pid, "Pid", "…",
-/// ArmPid)`; TAG is any identifier unique in the source file.
+/// Registers a component class under another name, e.g. one in a namespace:
+/// `RTCF_COMPONENT_NAMED(arm::Pid, "Pid", "…", ArmPid)`. TAG is any identifier that is unique in
+/// the source file.
 #define RTCF_COMPONENT_NAMED(CLASS, NAME, DOC, TAG)                                \
     namespace {                                                                    \
     ::rtcf::ComponentRecord rtcf_record_##TAG{                                     \

@@ -1,15 +1,15 @@
 /// @file
-/// ROS for the hooks of a component: standard node handles that see names as
-/// the component does, with its namespace and its remaps.
+/// ROS for the hooks of a component: standard node handles with the component's namespace and
+/// remaps.
 ///
 ///     bool configure() override {
 ///         client_ = rtcf::nodeHandle(this).serviceClient<std_srvs::Trigger>("calibrate");
 ///         return rtcf::privateNodeHandle(this).getParam("offset", offset_) || fail("no ~offset");
 ///     }
 ///
-/// For configure(), start(), stop() and cleanup(); never for update(), as all
-/// that a handle does may block. Callbacks come from a thread of the node.
-/// Build with `rtcf_add_components(… LINK rtcf::ros)`.
+/// For configure(), start(), stop() and cleanup(). Never use a handle in update(): any call may
+/// block. Callbacks run in a thread of the node. Build with `rtcf_add_components(… LINK
+/// rtcf::ros)`.
 #pragma once
 
 #include <ros/node_handle.h>
@@ -35,15 +35,17 @@ inline ros::NodeHandle openHandle(const Component& component, const std::string&
 
 }  // namespace detail
 
-/// A handle whose relative names are in the component's namespace. Each call to the master by
-/// way of it takes a second at most; if one gets no answer the hook is refused.
-/// @throws NoMaster if no master answers. Not real-time safe.
+/// A node handle whose relative names are in the component's namespace. A call to the master by
+/// this handle waits for one second at most; if a call gets no answer, the hook fails. Not
+/// real-time safe.
+/// @throws NoMaster if no master answers
+/// @throws std::logic_error outside of a hook, or without a ROS node
 inline ros::NodeHandle nodeHandle(const Component* component) {
     return detail::openHandle(*component, component->context().ns);
 }
 
-/// As nodeHandle(), but relative names are below the component's full name: what `~name` is to
-/// a node.
+/// Like nodeHandle(), but relative names are below the component's full name, as `~name` is for a
+/// node. Not real-time safe.
 inline ros::NodeHandle privateNodeHandle(const Component* component) {
     return detail::openHandle(*component, component->fullName());
 }

@@ -1,7 +1,7 @@
 /// @file
-/// The place where a port's value lives. The output's component writes it in
-/// the real-time thread; inputs read it there by pointer, without a copy. The
-/// graph keeps a slot alive as long as any input refers to it.
+/// The memory of a port's value. The output's component writes it in the real-time thread; inputs
+/// read it by pointer, without a copy. The graph keeps a slot alive as long as an input refers to
+/// it.
 #pragma once
 
 #include <atomic>
@@ -9,21 +9,21 @@
 
 namespace rtcf {
 
-/// When a value was written. Plain data: only the real-time thread touches it
-/// while the loop runs.
+/// Sequence number and time of a value. Plain data: while the loop runs, only the real-time thread
+/// uses it.
 struct SlotHeader {
     std::uint64_t sequence = 0;  ///< writes so far; 0 = never written
-    std::int64_t time_ns = 0;    ///< the loop's time at the last write, ns
+    std::int64_t time_ns = 0;    ///< loop time of the last write, ns
 };
 
-/// A value with its bookkeeping.
+/// A value with its header.
 template <typename T>
 struct Slot final : SlotHeader {
     T value{};
 };
 
-/// A number that one thread writes while others look at it, each value whole.
-/// Costs what a plain number costs.
+/// A number that one thread writes and others read, without torn values. As fast as a plain number.
+/// Real-time safe.
 template <typename T>
 class Shared {
    public:
@@ -40,8 +40,8 @@ class Shared {
     std::atomic<T> value_;
 };
 
-/// The loop's time base as components see it. Written by the executor at the
-/// beginning of each cycle; hooks outside the real-time thread read it too.
+/// The clock of the components. The executor writes it at the beginning of each cycle; hooks
+/// outside the real-time thread may read it.
 struct LoopClock {
     Shared<std::uint64_t> iteration = 0;  ///< cycles since the loop started, from 0
     Shared<std::int64_t> time_ns = 0;     ///< monotonic loop time, ns; simulated under sim time

@@ -1,13 +1,13 @@
 /// @file
-/// Declared state: what a component remembers from one cycle to the next, known by name and type.
-/// It costs what a plain member costs, and is a plain member in the component's memory.
+/// Declared state: the values that a component keeps from one cycle to the next, known to the
+/// executor by name and type. A state is a plain member of the component, and costs as much.
 ///
 ///     rtcf::State<double> integral{this, "integral", 0.0, rtcf::Unit("N m")};
 ///     …
 ///     integral += ki * error * dt();
 ///
-/// Declared state goes over to a component that replaces this one, is shown by `rtcfctl info`,
-/// and goes back to its initial value by `rtcfctl reset`.
+/// The executor hands declared state over to a component that replaces this one. `rtcfctl info`
+/// shows it, `rtcfctl reset` sets it back to its initial value, and snapshots contain it.
 #pragma once
 
 #include <cstddef>
@@ -26,26 +26,26 @@ namespace rtcf {
 
 class Component;
 
-/// What the executor handles of any state.
+/// Name, type and memory of a state of any type.
 struct StateDeclaration {
     std::string name;
-    std::string type;  ///< for people, e.g. "double[3x1]"
+    std::string type;  ///< type for people, e.g. "double[3x1]"
     std::string unit;
     std::string doc;
-    std::uint64_t identity = 0;  ///< of the type; see state_type.hpp
+    std::uint64_t identity = 0;  ///< identity of the type, see state_type.hpp
     std::size_t size = 0;        ///< bytes
-    void* value = nullptr;       ///< in the component
+    void* value = nullptr;       ///< address of the value, in the component
     std::vector<std::byte> initial;
-    /// The value of such bytes as text of one line. Not real-time safe.
+    /// Prints the value at `value` on one line. Not real-time safe.
     std::string (*print)(const void* value) = nullptr;
 };
 
-/// The most bytes of state that one component declares: what a cycle may copy.
+/// Most bytes of state that a component may declare, as one cycle copies them.
 constexpr std::size_t kLargestState = 64 * 1024;
 
 /// A state of an arithmetic type, an enum, a fixed-size Eigen type, a std::array of these, or a
-/// trivially copyable struct that names its fields (state_type.hpp). Written by the component in
-/// update() and in its hooks.
+/// trivially copyable struct that names its fields (state_type.hpp). The component writes it in
+/// update() and in its other hooks.
 template <typename T>
 class State final {
    public:
@@ -67,7 +67,7 @@ class State final {
         declaration.initial.resize(sizeof(T));
         std::memcpy(declaration.initial.data(), static_cast<const void*>(&value_), sizeof(T));
         declaration.print = [](const void* value) {
-            // The bytes may lie anywhere; a T may want its alignment.
+            // The bytes may be unaligned.
             T copy = T();
             std::memcpy(static_cast<void*>(&copy), value, sizeof(T));
             std::string text;
@@ -79,7 +79,7 @@ class State final {
     State(const State&) = delete;
     ~State() = default;
 
-    /// @name As the plain member that it is; real-time safe
+    /// @name Access as to a plain member; real-time safe
     /// @{
     const T& value() const noexcept RTCF_NONBLOCKING { return value_; }
     T& value() noexcept RTCF_NONBLOCKING { return value_; }
@@ -90,7 +90,7 @@ class State final {
     T* operator->() noexcept RTCF_NONBLOCKING { return &value_; }
 
     // NOLINTNEXTLINE(bugprone-unhandled-self-assignment,modernize-use-equals-default): see below
-    State& operator=(const State& other) {  // the value alone: the name stays
+    State& operator=(const State& other) {  // assigns the value only; the name stays
         value_ = other.value_;
         return *this;
     }
@@ -137,15 +137,15 @@ class State final {
     T value_;
 };
 
-/// What a component that is replaced leaves to its successor, by name and type: never the object
-/// itself, as its class may have been built from other source.
+/// A view of the state and outputs of a component that is being replaced, by name and type. It
+/// never gives access to the object, whose class may come from another version of the source.
 class Predecessor {
    public:
-    /// @param component lives as long as this
+    /// @param component must outlive this object
     explicit Predecessor(const Component& component) noexcept : component_(component) {}
 
-    /// The value of a declared state. Real-time safe. @return null if it has none of that name, or
-    /// of another type
+    /// The value of a declared state. Real-time safe.
+    /// @return null if there is no state of this name and type
     template <typename T>
     const T* state(std::string_view name) const noexcept {
         const StateDeclaration* found = findState(name);
@@ -155,8 +155,9 @@ class Predecessor {
         return static_cast<const T*>(found->value);
     }
 
-    /// The value that an output wrote last. Real-time safe if T is the type of a port of your own.
-    /// @return null if it has none of that name, of another type, or wrote none
+    /// The last value of an output. Real-time safe if T is also the type of one of the caller's
+    /// ports.
+    /// @return null if there is no output of this name and type, or it has not written
     template <typename T>
     const T* output(std::string_view name) const noexcept;
 

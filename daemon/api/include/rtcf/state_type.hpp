@@ -1,6 +1,6 @@
 /// @file
-/// What a declared state may be made of: numbers, enums, fixed-size Eigen types, std::array of
-/// these, and trivially copyable structs that name their fields:
+/// Types of declared state: numbers, enums, fixed-size Eigen types, std::array of these, and
+/// trivially copyable structs that name their fields:
 ///
 ///     struct Biquad {
 ///         double x1 = 0.0, x2 = 0.0;
@@ -11,8 +11,9 @@
 ///         }
 ///     };
 ///
-/// Two states of equal identity and size have the same meaning byte for byte, also in libraries
-/// that were built at different times: of a struct the fields' names, types and places count.
+/// Two states of equal identity and size have the same layout, byte for byte, even in libraries
+/// that were built at different times. The identity of a struct contains the names, types and
+/// offsets of its fields.
 #pragma once
 
 #include <fmt/format.h>
@@ -29,10 +30,7 @@
 
 namespace rtcf {
 
-/// How a type becomes a state's type. A specialisation has, all for values of T:
-///  - `static std::uint64_t identity() noexcept`, real-time safe
-///  - `static std::string name()`
-///  - `static void print(const T&, std::string&)`, one line
+/// Makes a type a state type. A specialisation has
 template <typename T, typename Enable = void>
 struct StateType;
 
@@ -51,7 +49,7 @@ constexpr std::uint64_t stateHash(std::uint64_t number, std::uint64_t seed) noex
     return seed;
 }
 
-/// A type's own name without what it stands in, the same from all compilers.
+/// The name of a type without its scope; the same with all compilers.
 template <typename T>
 constexpr std::string_view ownName() noexcept {
     std::string_view text = __PRETTY_FUNCTION__;

@@ -1,6 +1,6 @@
 /// @file
-/// A component alone in a test, without daemon, executor or ROS master: its ports and its clock by
-/// hand. The test program is built from the component's own source file.
+/// Test bench for one component, without daemon, executor or ROS master: the test sets its ports
+/// and its clock. Build the test program from the component's own source file.
 ///
 ///     TEST(Pi, StaysWithinItsLimit) {
 ///         rtcf::test::Bench pi("Pi", {{"kp", 100.0}, {"limit", 2.0}});
@@ -10,8 +10,8 @@
 ///         EXPECT_EQ(*pi.read<double>("effort"), 2.0);
 ///     }
 ///
-/// Not real-time; everything is called by one thread. A wrong name or type is a
-/// std::invalid_argument, a hook that refuses a std::runtime_error with its words.
+/// Not real-time; all calls come from one thread. A wrong name or type throws
+/// std::invalid_argument; a failing hook throws std::runtime_error with the hook's error text.
 #pragma once
 
 #include <cstdint>
@@ -31,8 +31,10 @@ class Bench {
    public:
     using Parameters = std::vector<std::pair<std::string, ParameterValue>>;
 
-    /// Makes a component, sets its parameters and configures it. @param type as registered
-    /// @param period_ns of the loop, ns
+    /// Makes a component, sets its parameters and configures it.
+    /// @param type name of the component type, as registered
+    /// @param parameters pairs (name, value)
+    /// @param period_ns the loop's period, ns
     explicit Bench(const std::string& type, const Parameters& parameters = {},
                    std::int64_t period_ns = 1'000'000)
         : log_(lines_) {
@@ -60,7 +62,7 @@ class Bench {
     Bench(const Bench&) = delete;
     Bench& operator=(const Bench&) = delete;
 
-    /// Sets parameters as a batch, as `rtcfctl set` does.
+    /// Sets a batch of parameters, as `rtcfctl set` does.
     void set(const Parameters& batch) {
         for (const auto& [name, given] : batch) {
             ParameterBase& parameter = named(component_->parameters(), name, "parameter");
@@ -83,7 +85,7 @@ class Bench {
         release();
     }
 
-    /// Gives an input a new value, a queue one more message.
+    /// Writes a new value to an input, or one more message to a queue.
     template <typename T>
     void write(const std::string& name, const T& value) {
         InputBase& input = named(component_->inputs(), name, "input");
@@ -95,7 +97,7 @@ class Bench {
         if (QueueBase* const queue = input.queue()) queue->receive();
     }
 
-    /// Runs cycles, the first after start().
+    /// Runs cycles; calls start() before the first one.
     void cycle(std::uint64_t cycles = 1) {
         if (!started_) {
             require(component_->start(), "start");
@@ -109,13 +111,13 @@ class Bench {
             clock_.stamp_ns = clock_.stamp_ns + clock_.period_ns;
         }
     }
-    /// As at the end of a loop.
+    /// Calls safe(), as at the end of a loop.
     void safe() {
         component_->safe();
         commit();
     }
 
-    /// What an output wrote last. @return null if it has not written yet
+    /// The last value that an output has written; null if it has not written.
     template <typename T>
     const T* read(const std::string& name) const {
         const OutputBase& output = named(component_->outputs(), name, "output");
@@ -124,16 +126,17 @@ class Bench {
                    ? nullptr
                    : &static_cast<const Slot<T>*>(output.slot().get())->value;
     }
-    /// How often an output has been written, non-finite values of Finite outputs not counted.
+    /// Number of values that an output has written, without the non-finite values of Finite
+    /// outputs.
     std::uint64_t writes(const std::string& name) const {
         const OutputBase& output = named(component_->outputs(), name, "output");
         const auto found = staged_writes_.find(&output);
         return found == staged_writes_.end() ? output.slot()->sequence : found->second.seen;
     }
-    /// Values that were not finite on outputs declared Finite.
+    /// Number of non-finite values on outputs declared Finite.
     std::uint64_t nonFinite() const noexcept { return non_finite_; }
 
-    /// A declared state, to look at and to set.
+    /// A declared state, for reading and writing.
     template <typename T>
     T& state(const std::string& name) {
         for (const StateDeclaration& state : component_->states()) {
@@ -144,7 +147,8 @@ class Bench {
         }
         throw std::invalid_argument("no state " + name);
     }
-    /// Takes declared state over from another one, by name and type, as `rtcfctl replace` does.
+    /// Takes over declared state of the same name and type from another bench, as `rtcfctl replace`
+    /// does.
     void takeOver(const Bench& previous) {
         for (const StateDeclaration& state : component_->states()) {
             for (const StateDeclaration& before : previous.component_->states()) {
@@ -156,11 +160,11 @@ class Bench {
         component_->takeOver(Predecessor(*previous.component_));
     }
 
-    /// The loop's clock; time and stamp may be set between cycles.
+    /// The loop's clock. The test may set time and stamp between cycles.
     LoopClock& clock() noexcept { return clock_; }
-    /// Device scopes (RTCF_DEVICE_IO) so far.
+    /// Number of RTCF_DEVICE_IO scopes so far.
     std::uint64_t deviceCalls() const noexcept { return device_.calls; }
-    /// What it has logged, all levels.
+    /// The texts of all log records, of all levels.
     const std::vector<std::string>& log() const noexcept { return lines_; }
     Component& component() noexcept { return *component_; }
 
@@ -181,8 +185,8 @@ class Bench {
     };
 
     struct StagedWrites {
-        std::uint64_t seen = 0;      // by readers
-        std::uint64_t examined = 0;  // all
+        std::uint64_t seen = 0;      // writes that readers have seen
+        std::uint64_t examined = 0;  // writes checked
     };
 
     static const ComponentRecord& find(const std::string& type) {
@@ -223,7 +227,7 @@ class Bench {
         if (passed) return;
         throw std::runtime_error(std::string(hook) + " failed: " + component_->failure());
     }
-    /// Publishes the values of checked outputs.
+    /// Publishes the values of staged outputs.
     void commit() {
         for (OutputBase* output : component_->stagedOutputs()) {
             StagedWrites& writes = staged_writes_[output];

@@ -1,5 +1,6 @@
-# find_package(OROCOS-RTT) of packages that were written for RTCF 2021: OROCOS' variables, with
-# rtcf's headers of the same names behind them. UseOROCOS-RTT.cmake has the macros.
+# find_package(OROCOS-RTT) for packages written for RTCF 2021: sets OROCOS' variables to rtcf's
+# headers of the same names. UseOROCOS-RTT.cmake has the macros.
+
 # Rejects a package of the workspace that hides rtcf.
 include(${CMAKE_CURRENT_LIST_DIR}/../rtcf/rtcf-workspace.cmake)
 find_package(rtcf REQUIRED CONFIG)
@@ -11,7 +12,7 @@ set(OROCOS_TARGET gnulinux)
 set(OROCOS-RTT_INCLUDE_DIRS ${rtcf_INCLUDE_DIRS})
 set(OROCOS-RTT_LIBRARIES ${rtcf_LIBRARIES})
 set(OROCOS-RTT_VERSION 2.9.0)
-# Components that are asked for (rtt-marshalling, rtt-scripting …) have nothing here.
+# rtcf has nothing for OROCOS' components (rtt-marshalling, rtt-scripting …).
 foreach(_oro_component IN LISTS OROCOS-RTT_FIND_COMPONENTS)
   set(OROCOS-RTT_${_oro_component}_FOUND TRUE)
   string(TOUPPER "${_oro_component}" _oro_upper)

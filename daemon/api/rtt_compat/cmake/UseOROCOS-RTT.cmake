@@ -1,12 +1,12 @@
-# OROCOS' macros for packages that were written for RTCF 2021, over rtcf_add_components() and
-# catkin. In new packages write those instead.
+# OROCOS' macros for packages written for RTCF 2021, on top of rtcf_add_components() and catkin. New
+# packages call rtcf_add_components() themselves.
 include_guard(DIRECTORY)
 find_package(rtcf REQUIRED CONFIG)
 
 # orocos_component(<target> <source>... [INSTALL <folder>] [VERSION <version>] [EXPORT <name>])
-# A library of components of the package that is the CMake project; INSTALL, VERSION and EXPORT
-# mean nothing here. Headers and generated code of all that catkin found are in reach, as OROCOS
-# had them by package.xml.
+# Builds a library of components; the rtcf package is the CMake project. INSTALL, VERSION and EXPORT
+# are ignored. The include path contains the headers and generated code of all packages that catkin
+# found, as OROCOS provided by package.xml.
 function(orocos_component target)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "INSTALL;VERSION;EXPORT" "")
   rtcf_add_components(${target} PACKAGE ${PROJECT_NAME} SOURCES ${arg_UNPARSED_ARGUMENTS}
@@ -15,7 +15,7 @@ function(orocos_component target)
 endfunction()
 
 # orocos_library(<target> <source>... [INSTALL <folder>] [VERSION <version>] [EXPORT <name>])
-# A library that several components share.
+# Builds a library that several components share.
 function(orocos_library target)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "INSTALL;VERSION;EXPORT" "")
   add_library(${target} SHARED ${arg_UNPARSED_ARGUMENTS})
@@ -34,8 +34,7 @@ function(_rtcf_oro_dress target)
   endif()
 endfunction()
 
-# orocos_typekit(…), orocos_typegen_headers(…): a port carries a type as it is, so there is nothing
-# to build.
+# orocos_typekit(…), orocos_typegen_headers(…): ports carry any type, so there is nothing to build.
 function(orocos_typekit target)
   message(STATUS "rtcf needs no typekit: orocos_typekit(${target}) does nothing")
 endfunction()
@@ -43,10 +42,11 @@ function(orocos_typegen_headers)
   message(STATUS "rtcf needs no typekits: orocos_typegen_headers() does nothing")
 endfunction()
 
-# What has no place in rtcf is said when CMake runs, not when a component is missing.
+# Plugins, services and programs of OROCOS fail when CMake runs, not when a component is missing at
+# run time.
 function(_rtcf_oro_no_plugins call)
-  message(FATAL_ERROR "${call}: rtcf has no plugins and services of OROCOS; "
-                      "build what components share by orocos_library()")
+  message(FATAL_ERROR "${call}: rtcf does not support plugins and services of OROCOS; "
+                      "build shared code of components with orocos_library()")
 endfunction()
 function(orocos_plugin target)
   _rtcf_oro_no_plugins("orocos_plugin(${target})")
@@ -55,8 +55,8 @@ function(orocos_service target)
   _rtcf_oro_no_plugins("orocos_service(${target})")
 endfunction()
 function(orocos_executable target)
-  message(FATAL_ERROR "orocos_executable(${target}): programs on OROCOS do not run with rtcf; "
-                      "components do, by orocos_component()")
+  message(FATAL_ERROR "orocos_executable(${target}): rtcf does not run programs of OROCOS; "
+                      "build components with orocos_component()")
 endfunction()
 
 # orocos_install_headers([<file>...] [FILES <file>...] [DIRECTORY <folder>...] [INSTALL <folder>])
@@ -71,8 +71,8 @@ function(orocos_install_headers)
   endif()
 endfunction()
 
-# orocos_use_package(<name> …), orocos_find_package(<name> …): what is found that way is either part
-# of rtcf (ocl-logging, rtt_rosclock …) or a catkin package, which find_package(catkin) finds.
+# orocos_use_package(<name> …), orocos_find_package(<name> …): these packages are either part of
+# rtcf (ocl-logging, rtt_rosclock …) or catkin packages, for find_package(catkin).
 macro(orocos_use_package)
 endmacro()
 macro(orocos_find_package)
@@ -81,7 +81,7 @@ macro(orocos_uninstall_target)
 endmacro()
 
 # orocos_generate_package([INCLUDE_DIRS <folder>...] [DEPENDS …] [DEPENDS_TARGETS …])
-# Makes the project a catkin package, unless it calls catkin_package() itself, be it later.
+# Makes the project a catkin package, unless it calls catkin_package() itself, before or after.
 macro(orocos_generate_package)
   if(COMMAND catkin_package)
     cmake_parse_arguments(_rtcf_oro "" "VERSION" "INCLUDE_DIRS;DEPENDS;DEPENDS_TARGETS" ${ARGN})
@@ -96,7 +96,7 @@ macro(_rtcf_oro_catkin_package)
   if(NOT ${PROJECT_NAME}_CATKIN_PACKAGE)
     get_property(_rtcf_oro_dirs DIRECTORY PROPERTY rtcf_oro_include_dirs)
     get_property(_rtcf_oro_typekits DIRECTORY PROPERTY rtcf_oro_typekits)
-    # What depends on this package needs the messages of its typekits.
+    # Packages that depend on this one need the messages of its typekits.
     set(_rtcf_oro_extras)
     if(_rtcf_oro_typekits)
       set(_rtcf_oro_extra ${CMAKE_CURRENT_BINARY_DIR}/${PROJECT_NAME}-messages.cmake)

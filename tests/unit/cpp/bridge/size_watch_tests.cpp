@@ -44,8 +44,8 @@ TEST_F(SizeWatchTest, SaysWhatWasLostSinceItLastDid) {
     lose(*injector, 3);
     look(injector);
     ASSERT_EQ(said_.size(), 2U);
-    EXPECT_EQ(said_[0].find("/x: 2 messages of more than"), 0U) << said_[0];
-    EXPECT_EQ(said_[1].find("/x: 3 messages of more than"), 0U) << said_[1];
+    EXPECT_EQ(said_[0].find("/x: 2 messages larger than"), 0U) << said_[0];
+    EXPECT_EQ(said_[1].find("/x: 3 messages larger than"), 0U) << said_[1];
     EXPECT_EQ(watch_.total(), 5U);
 }
 

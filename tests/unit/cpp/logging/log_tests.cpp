@@ -43,7 +43,7 @@ TEST_F(LogTest, RecordsThatFindItFullAreCountedAndReportedOnce) {
     log.drain();
     ASSERT_EQ(entries.size(), 1025U);
     EXPECT_EQ(entries.back().level, LogLevel::Warn);
-    EXPECT_EQ(entries.back().message.rfind("6 log records were lost", 0), 0U)
+    EXPECT_EQ(entries.back().message.rfind("6 log records were dropped", 0), 0U)
         << entries.back().message;
     entries.clear();
     RTCF_INFO(self, "one more");
@@ -113,7 +113,7 @@ TEST_F(LogTest, AFloodOfOneLineIsLeftOutAndCounted) {
     ASSERT_EQ(entries.size(), 12U);
     EXPECT_EQ(entries[9].message, "flood 9");
     EXPECT_EQ(entries[10].message, "another line");
-    EXPECT_EQ(entries[11].message, "987 more of this line within a second were left out");
+    EXPECT_EQ(entries[11].message, "987 more records of this line within a second were suppressed");
     EXPECT_EQ(entries[11].line, entries[0].line);
     EXPECT_EQ(entries[11].component, entries[0].component);
 }

@@ -136,7 +136,7 @@ TEST_F(LoopTiming, FullBucketStopsTheLoopUnlessItRunsDegraded) {
         EXPECT_TRUE(runs(60));
         EXPECT_EQ(state(), RunnerState::Running);
         ASSERT_TRUE(eventually([this] { return !linesOnOverruns().empty(); }));
-        EXPECT_NE(linesOnOverruns()[0].find("max_overruns ends no loop that runs degraded"),
+        EXPECT_NE(linesOnOverruns()[0].find("max_overruns does not stop a degraded loop"),
                   std::string::npos)
             << linesOnOverruns()[0];
     }

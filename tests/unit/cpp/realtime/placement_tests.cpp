@@ -35,11 +35,11 @@ TEST_F(Placement, ThatIsMendedWhileTheLoopRunsIsNotLackedAnyMore) {
     configure([&](RunnerSettings& settings) { settings.loop.realtime.cpu = shared; });
     load(definition("Ticker", "A"));
     start();
-    EXPECT_TRUE(lacks("has another loop"));
+    EXPECT_TRUE(lacks("also runs another loop"));
     configure([](RunnerSettings& settings) {
         settings.loop.realtime.cpu = executor::processCpus().front();
     });
-    EXPECT_FALSE(lacks("has another loop"));
+    EXPECT_FALSE(lacks("also runs another loop"));
     EXPECT_TRUE(lacks("memory is not locked")) << "as it was at the start";
     EXPECT_TRUE(runs());
 }

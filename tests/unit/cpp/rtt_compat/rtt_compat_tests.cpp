@@ -182,8 +182,8 @@ TEST_F(RttCompat, MessagesThatGrowWithinTheSampleAreWritten) {
 
 TEST_F(RttCompat, ExtensionInAConstructorIsRefused) {
     EXPECT_EQ(refusal([this] { loadOld("TooEarly", "E"); }),
-              "/E (rtcf_unit_test/TooEarly): constructor failed: it threw: RtcfExtension is of no "
-              "use in a constructor: use it from configureHook() on, in a component that "
+              "/E (rtcf_unit_test/TooEarly): constructor failed: it threw: RtcfExtension does not "
+              "work in a constructor: use it from configureHook() on, in a component that "
               "ORO_CREATE_COMPONENT registers");
 }
 

@@ -63,10 +63,9 @@ TEST_F(Change, WhatCannotBePublishedWithoutAllocationIsRefused) {
     const auto order_before = order();
     const auto generation_before = generation();
     EXPECT_EQ(refusal([&] { load(definition("Tracer", "T")); }),
-              "/T.trace cannot be published as /trace: values of rtcf_unit_test/Trace have memory "
-              "of their own, and so have messages of std_msgs/Float64MultiArray, which would be "
-              "allocated in the cycle; keep /trace off the whitelist, or keep the values in a "
-              "std::array");
+              "/T.trace cannot be published as /trace: values of rtcf_unit_test/Trace own memory, "
+              "and so do messages of std_msgs/Float64MultiArray, which would be allocated in the "
+              "cycle; exclude /trace from the whitelist, or store the values in a std::array");
     expectUnchanged(order_before, generation_before);
     ComponentDefinition elsewhere = definition("Tracer", "T");
     elsewhere.remaps = {{"trace", "kept"}};

@@ -194,7 +194,7 @@ TEST_F(Fault, OfALoopBeforeAreNotCounted) {
         return eventually([this] { return iteration() > 400; });
     });
     ASSERT_TRUE(eventually([&] { return told().size() == 2; }));
-    EXPECT_EQ(told()[1].find("since this was told before"), std::string::npos) << told()[1];
+    EXPECT_EQ(told()[1].find("since the last report"), std::string::npos) << told()[1];
 }
 
 TEST_F(Fault, LongExceptionTextIsCut) {

@@ -263,10 +263,11 @@ TEST_F(Image, ThatDoesNotFitIsRefusedWhole) {
                             const std::function<void(RunnerImage&)>& change) {
         expectRefused(changed(change), words);
     };
-    expect("component /P is not in it",
+    expect("component /P is not in the snapshot",
            [](RunnerImage& other) { other.components.erase(other.components.begin()); });
-    expect("there is no component /X", [](RunnerImage& other) { other.components[0].name = "/X"; });
-    expect("a component is there twice",
+    expect("the graph has no component /X",
+           [](RunnerImage& other) { other.components[0].name = "/X"; });
+    expect("a component is in the snapshot twice",
            [](RunnerImage& other) { other.components.push_back(other.components[0]); });
     expect("/P was a Wave and is a Chaos",
            [](RunnerImage& other) { other.components[0].type = "Wave"; });
@@ -276,9 +277,9 @@ TEST_F(Image, ThatDoesNotFitIsRefusedWhole) {
         other.components[0].states[0].type = "int";
         ++other.components[0].states[0].identity;
     });
-    expect("state /P.digest is not in it",
+    expect("state /P.digest is not in the snapshot",
            [](RunnerImage& other) { other.components[0].states[1].name = "other"; });
-    expect("there is no state /P.other",
+    expect("the graph has no state /P.other",
            [](RunnerImage& other) { other.components[0].states[1].name = "other"; });
     expect("state /P.past was",
            [](RunnerImage& other) { other.components[0].states[2].bytes.pop_back(); });
@@ -286,15 +287,15 @@ TEST_F(Image, ThatDoesNotFitIsRefusedWhole) {
            [](RunnerImage& other) { other.components[0].outputs[0].type.name = "float"; });
     expect("output /P.checked is",
            [](RunnerImage& other) { other.components[0].outputs[1].staged.reset(); });
-    expect("the value of /P.x is none",
+    expect("the value of /P.x is not of type",
            [](RunnerImage& other) { other.components[0].outputs[0].value.bytes += 'x'; });
-    expect("the value of /P.listed is none",
+    expect("the value of /P.listed is not of type",
            [](RunnerImage& other) { other.components[0].outputs[3].value.bytes = "\xff"; });
     expect("input /P.a read /Q.x and reads /S.x",
            [](RunnerImage& other) { other.components[0].inputs[0].source = "/Q.x"; });
     expect("input /P.a read nothing",
            [](RunnerImage& other) { other.components[0].inputs[0].source.clear(); });
-    expect("there is no parameter /P.gain",
+    expect("the graph has no parameter /P.gain",
            [](RunnerImage& other) { other.components[0].parameters[0].first = "gain"; });
     expect("above its maximum",
            [](RunnerImage& other) { other.components[0].parameters[0].second = 5.0; });
@@ -321,8 +322,8 @@ TEST_F(Image, OfAnotherBuildFitsByNameAndType) {
     loadVersion(2);
     const std::string text = refusal([&] { restore(image); });
     for (const char* words :
-         {"state /A.fresh is not in it", "state /A.gain was float and is double",
-          "there is no state /A.old_name"})
+         {"state /A.fresh is not in the snapshot", "state /A.gain was float and is double",
+          "the graph has no state /A.old_name"})
         EXPECT_NE(text.find(words), std::string::npos) << text;
     unload("/A");
     loadVersion(1);
@@ -501,10 +502,10 @@ TEST_F(Image, FileThatIsNotAsItWasWrittenIsRefused) {
     };
     EXPECT_EQ(told(file), "");
     for (const std::string& none : {std::string(), std::string("RTCF"), std::string(100, 'x')})
-        EXPECT_NE(told(none).find("that is no snapshot"), std::string::npos);
+        EXPECT_NE(told(none).find("the file is not a snapshot"), std::string::npos);
     std::string newer = file;
     newer[8] = 2;
-    EXPECT_NE(told(newer).find("is of format 2, this rtcf reads format 1"), std::string::npos);
+    EXPECT_NE(told(newer).find("has format 2, this rtcf reads format 1"), std::string::npos);
     for (std::size_t at = 12; at < file.size(); at += 1 + at / 97) {
         std::string damaged = file;
         damaged[at] = static_cast<char>(damaged[at] ^ 0x10);
@@ -518,7 +519,7 @@ TEST_F(Image, SaysWhatDeclaresNoState) {
     load(definition("Controller", "C"));
     const auto notes = onGraphThread([&] { return runner().takeImage().notes; });
     ASSERT_EQ(notes.size(), 1U);
-    EXPECT_NE(notes[0].find("declare no state"), std::string::npos);
+    EXPECT_NE(notes[0].find("components without declared state"), std::string::npos);
     EXPECT_NE(notes[0].find("/C"), std::string::npos);
 }
 

@@ -186,7 +186,7 @@ TEST_F(Lifecycle, StopWhileStartHooksRunIsFinal) {
     runner().requestStop();
     journal().gate_open = true;
     const std::string text = refusal([&] { starting.get(); });
-    EXPECT_NE(text.find("a stop was asked for after the start"), std::string::npos) << text;
+    EXPECT_NE(text.find("a stop was requested after the start"), std::string::npos) << text;
     EXPECT_EQ(state(), RunnerState::Stopped);
     EXPECT_EQ(journal().count("/A update"), 0U);
     EXPECT_EQ(journal().count("/A stop"), 1U);

@@ -147,7 +147,7 @@ TEST_F(Rollback, NoMemoryForAnOptionalComponentsValueTakesItOut) {
         const auto all = events();
         return std::any_of(all.begin(), all.end(), [](const RunnerEvent& event) {
             return event.message.find(
-                       "no copy of a value of safe(): std::bad_alloc; readers keep "
+                       "cannot copy a value of safe(): std::bad_alloc; readers keep "
                        "the value before") != std::string::npos;
         });
     }));

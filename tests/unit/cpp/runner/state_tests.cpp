@@ -52,9 +52,10 @@ TEST_F(DeclaredState, GoesOverToARebuiltComponentInARunningLoop) {
     EXPECT_EQ(state("new_name"), "7.5") << "handed over by takeOver()";
     EXPECT_NE(state("fresh"), "0.25") << "the output's last value, by takeOver()";
     EXPECT_EQ(state("gain"), "2") << "of another type than before";
-    for (const char* note : {"state fresh of /A is new: it begins at 0.25",
-                             "state gain of /A begins at 2: it was float and is double",
-                             "state old_name of /A is no more", "state dropped of /A is no more"})
+    for (const char* note :
+         {"state fresh of /A is new: it begins at 0.25",
+          "state gain of /A begins at 2: it was float and is double",
+          "state old_name of /A no longer exists", "state dropped of /A no longer exists"})
         EXPECT_TRUE(has(notes, note)) << note;
     EXPECT_EQ(notes.size(), 5U) << "and that new_name is new";
 }
@@ -75,8 +76,9 @@ TEST_F(DeclaredState, WithoutAnyBeforeTheAnswerSaysSo) {
                                                    RTCF_UNIT_COMPONENTS "/rtcf_unit_test.so", false,
                                                    [](const std::string&) {});
                        }).notes;
-    EXPECT_EQ(notes, std::vector<std::string>{
-                         "/B begins at its initial state: what it replaces declares none"});
+    EXPECT_EQ(notes,
+              std::vector<std::string>{
+                  "/B begins at its initial state: the replaced component declares no state"});
 }
 
 TEST_F(DeclaredState, IsShownWithItsDeclaration) {
@@ -109,7 +111,7 @@ TEST_F(DeclaredState, IsResetAtABoundaryOfARunningLoop) {
 TEST_F(DeclaredState, ThatIsNotThereCannotBeReset) {
     load(definition("Camera", "B"));
     EXPECT_EQ(refusal([&] { onGraphThread([&] { return runner().reset("/B"); }); }),
-              "/B declares no state (rtcf::State) that could be reset");
+              "/B declares no state (rtcf::State) to reset");
     EXPECT_NE(refusal([&] { onGraphThread([&] { return runner().reset("/C"); }); }), "");
 }
 
@@ -139,7 +141,7 @@ TEST_F(DeclaredState, IsSetExactlyOrNotAtAll) {
     step(1);
     EXPECT_EQ(value("/A", "out"), 42.0);
     start();
-    EXPECT_NE(set("gain", 1.0).find("state is set while it does not"), std::string::npos);
+    EXPECT_NE(set("gain", 1.0).find("stop it to set state"), std::string::npos);
 }
 
 // A graph file that names a rebuilt library replaces too.
@@ -149,7 +151,7 @@ TEST_F(DeclaredState, GoesOverInAnApplyToo) {
     const auto outcome = onGraphThread([&] {
         return runner().apply({{stateful(), version(2)}}, false, [](const std::string&) {});
     });
-    EXPECT_TRUE(has(outcome.notes, "state dropped of /A is no more"));
+    EXPECT_TRUE(has(outcome.notes, "state dropped of /A no longer exists"));
     step(1);
     EXPECT_EQ(value("/A", "out"), 11.0);
 }

@@ -528,8 +528,8 @@ TEST_F(ServerTest, ResetWaitsForTheEndOfACycleInWhichAComponentDoesNotReturn) {
     const Response response = client.ask(reset);
     ASSERT_TRUE(response.has_error());
     EXPECT_EQ(response.error().message(),
-              "the loop of rt_runner reaches no cycle boundary: /G.update() does not return; its "
-              "figures go on");
+              "the loop of rt_runner reaches no cycle boundary: /G.update() does not return; the "
+              "statistics are not reset");
     journal().gate_open = true;
     EXPECT_TRUE(counts_again());
 
@@ -620,7 +620,7 @@ TEST_F(ServerTest, CallFromOutsideFailsWithItsDaemon) {
     client.reset();
     const executor::OutsideAnswer got = asking.get();
     EXPECT_FALSE(got.success);
-    EXPECT_EQ(got.message, "rtcfd has gone away; what was asked for may have been done");
+    EXPECT_EQ(got.message, "rtcfd has disconnected; it may have carried out the request");
 }
 
 TEST_F(ServerTest, CallFromOutsideCanBeGivenUp) {

@@ -35,9 +35,9 @@ TEST_F(FrameTables, ThatHoldLessThanASecondAreTold) {
     load(definition("Camera", "C"));
     ASSERT_EQ(warnings().size(), 1U);
     EXPECT_EQ(warnings()[0],
-              "frames hold the last 16 cycles (0.016 s), not a second: each has 1024.0 KiB of "
-              "values, and all together take 16 MiB at most: lower frame_kb of the runner, or "
-              "watch less");
+              "frames hold the last 16 cycles (0.016 s), not one second: each has 1024.0 KiB of "
+              "values, and the ring is limited to 16 MiB: lower frame_kb of the runner, or "
+              "watch fewer values");
     load(definition("Chatter", "D"));
     EXPECT_EQ(warnings().size(), 1U) << "it is as it was";
     keep(kMega / 16);

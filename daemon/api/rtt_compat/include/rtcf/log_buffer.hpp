@@ -1,6 +1,6 @@
 /// @file
-/// How a text gets into the log from RTCF 2021's macros and from RTT::log(): made in a bounded
-/// buffer on the stack, stored in as many records as it takes.
+/// Path of a text from RTCF 2021's macros and from RTT::log() into the log: it is formatted in a
+/// bounded buffer on the stack, and split into as many records as needed.
 #pragma once
 
 #include <algorithm>
@@ -16,24 +16,25 @@
 
 namespace rtcf::rtt_compat {
 
-/// Longest text of one call, characters; what is longer is cut, and ends in "...".
+/// Longest text of one call, bytes; a longer text is cut and ends in "...".
 constexpr std::size_t kLongestLog = 1000;
 
-/// A text in the making, on the stack.
+/// A stream buffer on the stack for one text.
 class LogBuffer final : public std::streambuf {
    public:
     LogBuffer() noexcept { setp(text_.data(), text_.data() + kLongestLog); }
 
-    /// What is there so far. Real-time safe.
+    /// The text so far. Real-time safe.
     std::string_view text() noexcept {
         const auto size = static_cast<std::size_t>(pptr() - pbase());
         if (cut_) std::memcpy(text_.data() + size, "...", 3);
         return {text_.data(), size + (cut_ ? 3 : 0)};
     }
+    /// Appends a text. Real-time safe.
     void append(std::string_view text) noexcept {
         xsputn(text.data(), static_cast<std::streamsize>(text.size()));
     }
-    /// As std::printf. Real-time safe for numbers and strings.
+    /// Formats like std::printf. Real-time safe for numbers and strings.
     void print(const char* format, std::va_list arguments) noexcept {
         const int size = std::vsnprintf(text_.data(), kLongestLog + 1, format, arguments);
         if (size <= 0) return;
@@ -42,7 +43,7 @@ class LogBuffer final : public std::streambuf {
     }
 
    private:
-    // What finds no room is cut off, without making the stream fail.
+    // Drops text beyond the capacity without making the stream fail.
     int_type overflow(int_type character) override {
         cut_ = true;
         return traits_type::not_eof(character);
@@ -59,7 +60,7 @@ class LogBuffer final : public std::streambuf {
     std::array<char, kLongestLog + 4> text_;
 };
 
-/// A part of a text, as a log record holds it.
+/// Part of a text in one log record.
 struct LogPart {
     static constexpr std::size_t kCapacity = kLogPayload - sizeof(std::uint16_t);
     std::uint16_t size;
@@ -72,11 +73,11 @@ inline void renderLogPart(const LogRecord& record, std::string& text) {
     text.assign(part.bytes.data(), part.size);
 }
 
-/// Hands a text to the log, in as many records as it takes. Real-time safe.
+/// Logs a text in as many records as needed. Real-time safe.
 inline void log(const Component& component, const LogSite& site, std::string_view text) noexcept {
     do {
         LogRecord* record = component.logSink().claim();
-        if (record == nullptr) return;  // counted and reported by the log
+        if (record == nullptr) return;  // the log counts and reports the drop
         const std::string_view part = text.substr(0, LogPart::kCapacity);
         text.remove_prefix(part.size());
         record->site = &site;
@@ -89,9 +90,9 @@ inline void log(const Component& component, const LogSite& site, std::string_vie
     } while (!text.empty());
 }
 
-/// Of the forms without a stream: a text as it is.
+/// Appends a text verbatim. Real-time safe.
 inline void fill(LogBuffer& buffer, std::string_view text) noexcept { buffer.append(text); }
-/// A format with its arguments, as of std::printf.
+/// Formats like std::printf. Real-time safe for numbers and strings.
 // NOLINTNEXTLINE(modernize-avoid-variadic-functions): as the macros of RTCF 2021
 [[gnu::format(printf, 2, 3)]] inline void print(LogBuffer& buffer, const char* format,
                                                 ...) noexcept {

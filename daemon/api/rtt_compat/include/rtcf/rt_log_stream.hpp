@@ -16,7 +16,7 @@ constexpr LogLevel levelOf(ros::console::Level level) {
     return static_cast<LogLevel>(static_cast<int>(level) + 1);
 }
 
-/// Where texts of RtcfExtension's functions come from; one for each level.
+/// Source of the texts from RtcfExtension's functions; one per level.
 inline const LogSite& logSite(LogLevel level) {
     static constexpr auto at = [](LogLevel of) { return LogSite{of, "", 0, "rtLog", "{}"}; };
     static constexpr std::array<LogSite, 5> kSites{at(LogLevel::Debug), at(LogLevel::Info),
@@ -25,11 +25,11 @@ inline const LogSite& logSite(LogLevel level) {
     return kSites.at(static_cast<std::size_t>(level) - 1);
 }
 
-/// A text in the making, logged when the statement ends. Real-time safe as far as its
-/// operands are.
+/// Stream for one text, which is logged at the end of the statement. Real-time safe if the
+/// operators of its operands are.
 class LogStream {
    public:
-    /// @param component null: nothing is logged
+    /// @param component null = no log
     LogStream(const Component* component, LogLevel level) noexcept
         : component_(component != nullptr && component->logs(level) ? component : nullptr),
           level_(level),
@@ -45,7 +45,7 @@ class LogStream {
         if (component_ != nullptr) stream_ << value;
         return *this;
     }
-    // A record is a line: std::endl and std::flush do nothing.
+    // Ignores std::endl and std::flush: each record is a line.
     LogStream& operator<<(std::ostream& (*)(std::ostream&)) noexcept { return *this; }
 
    private:

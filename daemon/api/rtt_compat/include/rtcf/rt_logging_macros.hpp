@@ -1,23 +1,23 @@
 /// @file
-/// RTCF 2021's logging macros, for members of components. All of them may be
-/// used in every hook and are real-time safe as far as their arguments are: a
-/// text is made in a bounded buffer on the stack and stored in the log, from
-/// which it goes to the journal and to ROS.
+/// RTCF 2021's logging macros, for member functions of components. All of them
+/// work in every hook and are real-time safe if formatting their arguments is:
+/// a text is formatted in a bounded buffer on the stack and stored in the log,
+/// which passes it on to the journal and to ROS.
 ///
 ///     RT_INFO("ready");
 ///     RT_WARN_STREAM("force " << force << " N");
 ///     NON_RT_INFO("%d joints", joints);
 #pragma once
 
-#include <ros/console.h>  // as RTCF 2021's header of this name
+#include <ros/console.h>  // as in RTCF 2021's header of this name
 
 #include "rtcf/log_buffer.hpp"
 
-/// The logger above those of all components.
+/// Parent of the loggers of all components.
 #define NAME_PREFIX "ros.rtcf"
 
-/// True in a component's member function while it runs in the loop; false in all hooks but
-/// updateHook() and errorHook().
+/// True in updateHook(), unless the component is in error (TaskContext::error()); false in all
+/// other hooks.
 #define RT_ACTIVE \
     (this->isRunning() && this->getTargetState() == RTT::base::TaskCore::TaskState::Running)
 
@@ -45,7 +45,7 @@
     })
 /// @}
 
-/// @name A text, as it is
+/// @name Log a text verbatim; real-time safe
 /// @{
 #define RT_DEBUG(text) RTCF_COMPAT_TEXT_(::rtcf::LogLevel::Debug, text)
 #define RT_INFO(text) RTCF_COMPAT_TEXT_(::rtcf::LogLevel::Info, text)
@@ -54,7 +54,7 @@
 #define RT_FATAL(text) RTCF_COMPAT_TEXT_(::rtcf::LogLevel::Fatal, text)
 /// @}
 
-/// @name What would be written to a std::ostream
+/// @name Log the text of a std::ostream; real-time safe if the operators are
 /// @{
 #define RT_DEBUG_STREAM(arguments) RTCF_COMPAT_STREAM_(::rtcf::LogLevel::Debug, arguments)
 #define RT_INFO_STREAM(arguments) RTCF_COMPAT_STREAM_(::rtcf::LogLevel::Info, arguments)
@@ -63,8 +63,9 @@
 #define RT_FATAL_STREAM(arguments) RTCF_COMPAT_STREAM_(::rtcf::LogLevel::Fatal, arguments)
 /// @}
 
-/// @name As std::printf, and the stream forms again
-/// RTCF 2021 throws when these are used in the loop; here they are as safe as those above.
+/// @name Log like std::printf, and like the stream macros above
+/// RTCF 2021 throws if a component uses these macros in the loop. Here they are as real-time safe
+/// as those above.
 /// @{
 #define NON_RT_DEBUG(...) RTCF_COMPAT_PRINT_(::rtcf::LogLevel::Debug, __VA_ARGS__)
 #define NON_RT_INFO(...) RTCF_COMPAT_PRINT_(::rtcf::LogLevel::Info, __VA_ARGS__)

@@ -1,6 +1,6 @@
 /// @file
-/// What RTCF 2021 gives a component beside OROCOS: node handles, and the loop's
-/// time. A second base class of components that ORO_CREATE_COMPONENT registers.
+/// RTCF 2021's additions to OROCOS: node handles, and the loop's time. A second base class of
+/// components that ORO_CREATE_COMPONENT registers.
 #pragma once
 
 #include <ros/ros.h>
@@ -28,14 +28,15 @@ class RtcfExtension {
     RtcfExtension& operator=(const RtcfExtension&) = delete;
 
     /// @name For configureHook(), startHook(), stopHook() and cleanupHook(); not real-time safe
-    /// The reference stays good as long as the component. @throws std::logic_error in the
-    /// constructor, rtcf::NoMaster without a ROS master
+    /// The reference is valid as long as the component.
+    /// @throws std::logic_error in the constructor
+    /// @throws rtcf::NoMaster without a ROS master
     /// @{
-    /// Relative names are in the component's namespace.
+    /// A handle whose relative names are in the component's namespace.
     ros::NodeHandle& getNodeHandle() const {
         return handle_.emplace(rtcf::nodeHandle(&component()));
     }
-    /// Relative names are below the component's own name, as `~name` of a node.
+    /// A handle whose relative names are below the component's full name, as `~name` is for a node.
     ros::NodeHandle& getPrivateNodeHandle() const {
         return private_handle_.emplace(rtcf::privateNodeHandle(&component()));
     }
@@ -55,22 +56,22 @@ class RtcfExtension {
     double getFrequency() const { return component().frequency(); }
     /// @}
 
-    /// @name As the RT_ macros, which once were made of these
+    /// @name Like the RT_ macros; real-time safe
     /// @{
     void rtLogDebug(std::string_view text) const { say(rtcf::LogLevel::Debug, text); }
     void rtLogInfo(std::string_view text) const { say(rtcf::LogLevel::Info, text); }
     void rtLogWarn(std::string_view text) const { say(rtcf::LogLevel::Warn, text); }
     void rtLogError(std::string_view text) const { say(rtcf::LogLevel::Error, text); }
     void rtLogFatal(std::string_view text) const { say(rtcf::LogLevel::Fatal, text); }
-    /// `rtLogStream(ros::console::levels::Info) << "force " << force;`
+    /// A stream for one text: `rtLogStream(ros::console::levels::Info) << "force " << force;`
     rtcf::rtt_compat::LogStream rtLogStream(ros::console::Level level) const {
         return {speaker(), rtcf::rtt_compat::levelOf(level)};
     }
     /// @}
 
-    /// For tests that construct a component by themselves: its log goes to rosconsole, under
+    /// For tests that construct a component themselves: sends its log to rosconsole, to the logger
     /// `ros.rtcf.<name>`. Does nothing in a loop, which has a log. Not real-time safe.
-    /// @throws std::logic_error of a class that is no RTT::TaskContext
+    /// @throws std::logic_error if the class is not an RTT::TaskContext
     void configureTestLogger() {
         auto* const task = dynamic_cast<RTT::TaskContext*>(this);
         if (task == nullptr) throw std::logic_error("configureTestLogger() needs a TaskContext");
@@ -80,7 +81,7 @@ class RtcfExtension {
         ROS_WARN("Component logger was set to non real-time safe test mode.");
     }
 
-    /// By ORO_CREATE_COMPONENT, after construction.
+    /// Called by ORO_CREATE_COMPONENT after construction.
     friend void bindRtcfExtension(RtcfExtension& extension, const rtcf::Component& component) {
         extension.component_ = &component;
     }
@@ -89,13 +90,13 @@ class RtcfExtension {
     const rtcf::Component& component() const {
         if (component_ == nullptr) {
             throw std::logic_error(
-                "RtcfExtension is of no use in a constructor: use it from configureHook() on, in a "
-                "component that ORO_CREATE_COMPONENT registers");
+                "RtcfExtension does not work in a constructor: use it from configureHook() on, in "
+                "a component that ORO_CREATE_COMPONENT registers");
         }
         return *component_;
     }
 
-    // Constructors may log too.
+    // The component that logs; constructors may log too.
     const rtcf::Component* speaker() const noexcept {
         if (component_ != nullptr) return component_;
         const rtcf::rtt_compat::HookSlot* const slot = rtcf::rtt_compat::hookSlot();
@@ -110,7 +111,7 @@ class RtcfExtension {
 
     const rtcf::Component* component_ = nullptr;
     std::unique_ptr<rtcf::rtt_compat::TestLogger> test_logger_;
-    // Not before they are asked for: a node handle needs a node.
+    // Made on demand, because a node handle needs a ROS node.
     mutable std::optional<ros::NodeHandle> handle_;
     mutable std::optional<ros::NodeHandle> private_handle_;
 };

@@ -1,5 +1,5 @@
 /// @file
-/// The log of a component that a test constructs by itself, without a loop.
+/// Log of a component that a test constructs without a loop.
 #pragma once
 
 #include <ros/console.h>
@@ -12,11 +12,11 @@
 
 namespace rtcf::rtt_compat {
 
-/// Gives a component without a loop a name, a clock that stands still, and a log that goes to
+/// Context of a component without a loop: a name, a stopped clock, and a log that writes to
 /// rosconsole at once. Owned by the component's RtcfExtension. Not real-time safe.
 class TestLogger final : public LogSink {
    public:
-    /// @param component one without a loop; outlives this
+    /// @param component has no loop; outlives this object
     TestLogger(Component& component, const std::string& name) {
         context_.full_name = "/" + name;
         context_.name = name;
@@ -46,7 +46,7 @@ class TestLogger final : public LogSink {
     }
 
    private:
-    // As ROS_LOG has it, but one for each logger. rosconsole keeps their addresses for good.
+    // Like the location in ROS_LOG, but one per logger. rosconsole keeps the addresses for ever.
     static ros::console::LogLocation locationOf(const std::string& logger,
                                                 ros::console::Level level) {
         ROSCONSOLE_AUTOINIT;
@@ -62,7 +62,7 @@ class TestLogger final : public LogSink {
 
     LoopClock clock_;
     ComponentContext context_;
-    std::mutex mutex_;  // from claim() to commit()
+    std::mutex mutex_;  // locked from claim() to commit()
     LogRecord record_{};
 };
 

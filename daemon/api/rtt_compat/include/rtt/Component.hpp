@@ -1,5 +1,5 @@
 /// @file
-/// How RTCF 2021's components are registered.
+/// Registration of RTCF 2021's components.
 #pragma once
 
 #include <type_traits>
@@ -11,15 +11,15 @@ class RtcfExtension;
 
 namespace rtcf::rtt_compat {
 
-/// Makes a component of OROCOS' kind: its constructor takes its name.
+/// Makes a component whose constructor takes its name, as in OROCOS. Not real-time.
 template <typename T>
 Component* create(const char* name, ComponentContext* context) {
     static_assert(std::is_base_of_v<RTT::TaskContext, T>,
                   "ORO_CREATE_COMPONENT takes a class derived from RTT::TaskContext");
-    // For what the constructor logs.
+    // Lets the constructor log.
     const InHook hook(nullptr);
     auto* const component = detail::construct<T>(context, std::string(name));
-    // Found by its argument: only who includes rtcf_extension.hpp has it.
+    // Found by argument-dependent lookup; declared only in rtcf_extension.hpp.
     if constexpr (std::is_base_of_v<RtcfExtension, T>) bindRtcfExtension(*component, *component);
     return component;
 }
@@ -41,7 +41,7 @@ Component* create(const char* name, ComponentContext* context) {
 
 namespace rtcf::rtt_compat {
 
-/// A class name without its namespaces: a type's name is a ROS base name.
+/// Removes the namespaces of a class name, as a type's name is a ROS base name.
 constexpr const char* baseName(const char* qualified) {
     const char* base = qualified;
     for (const char* at = qualified; *at != '\0'; ++at) {
@@ -52,14 +52,13 @@ constexpr const char* baseName(const char* qualified) {
 
 }  // namespace rtcf::rtt_compat
 
-/// Registers a component class by its name; of a class in a namespace, the last part of it.
+/// Registers a component class by its name, without the namespaces.
 /// @{
 #define ORO_CREATE_COMPONENT(CLASS) RTCF_COMPAT_REGISTER_(CLASS, __COUNTER__)
 #define ORO_LIST_COMPONENT_TYPE(CLASS) RTCF_COMPAT_REGISTER_(CLASS, __COUNTER__)
 /// @}
 
-/// Of a library with several components; there is nothing more to be done. With or without a
-/// semicolon behind it.
+/// Empty: libraries with several components need nothing else. Works with or without a semicolon.
 /// @{
 #define ORO_CREATE_COMPONENT_LIBRARY()
 #define ORO_CREATE_COMPONENT_TYPE()

@@ -1,5 +1,5 @@
 /// @file
-/// By the name that OROCOS has for it.
+/// OROCOS' header of this name.
 #pragma once
 
 #include "rtt/Port.hpp"

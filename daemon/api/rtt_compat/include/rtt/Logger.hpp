@@ -1,7 +1,6 @@
 /// @file
-/// OROCOS' logger by its names. A line goes where the component's other records go, in every hook
-/// and real-time safe as far as its arguments are; from threads without a hook it goes to stderr.
-///
+/// OROCOS' logger. In a hook, a line goes to the component's log; it is real-time safe if
+/// formatting its arguments is. In threads that run no hook, it goes to stderr.
 ///     RTT::log(RTT::Warning) << "force " << force << " N" << RTT::endlog();
 #pragma once
 
@@ -22,13 +21,13 @@ namespace detail {
 struct EndOfLine {};
 
 constexpr rtcf::LogSite logSite(rtcf::LogLevel level) { return {level, "", 0, "RTT::log", "{}"}; }
-/// By LoggerLevel.
+/// Indexed by LoggerLevel.
 inline constexpr std::array<rtcf::LogSite, 8> kLogSites{
     logSite(rtcf::LogLevel::Debug), logSite(rtcf::LogLevel::Fatal), logSite(rtcf::LogLevel::Fatal),
     logSite(rtcf::LogLevel::Error), logSite(rtcf::LogLevel::Warn),  logSite(rtcf::LogLevel::Info),
     logSite(rtcf::LogLevel::Debug), logSite(rtcf::LogLevel::Debug)};
 
-/// One line in the making; logged when it is destroyed.
+/// Stream for one line; the destructor logs it.
 class LogLine {
    public:
     explicit LogLine(LoggerLevel level) noexcept : level_(level), stream_(&buffer_) {}
@@ -52,7 +51,7 @@ class LogLine {
         return *this;
     }
     LogLine& operator<<(EndOfLine) noexcept { return *this; }
-    // A record is a line: what would end one or flush it has nothing to do.
+    // Ignores manipulators such as std::endl: each record is a line.
     LogLine& operator<<(std::ostream& (*)(std::ostream&)) noexcept { return *this; }
 
    private:
@@ -63,7 +62,7 @@ class LogLine {
 
 }  // namespace detail
 
-/// The names that stand in front of levels and of log().
+/// Scope of OROCOS' level names and of log().
 class Logger {
    public:
     using LogLevel = LoggerLevel;
@@ -76,7 +75,7 @@ class Logger {
     static constexpr LoggerLevel Debug = RTT::Debug;
     static constexpr LoggerLevel RealTime = RTT::RealTime;
 
-    /// OROCOS names the module in front of a line; here a line has its component's name.
+    /// Ignored: OROCOS prefixes lines with a module name, rtcf with the component's name.
     struct In {
         explicit In(const std::string&) {}
         ~In() {}
@@ -89,7 +88,7 @@ class Logger {
     static std::ostream& endl(std::ostream& stream) { return stream; }
     static std::ostream& nl(std::ostream& stream) { return stream; }
     static std::ostream& flush(std::ostream& stream) { return stream; }
-    /// Levels are set by rqt_logger_level and `rtcfctl`, for each component.
+    /// Ignored: rqt_logger_level and `rtcfctl` set the levels, per component.
     void setLogLevel(LoggerLevel) noexcept {}
 };
 

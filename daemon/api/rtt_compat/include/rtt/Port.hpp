@@ -1,7 +1,7 @@
 /// @file
-/// OROCOS' ports by their names, as RTCF 2021's components use them: a port has
-/// a name of its own and no component until it is added to one, in the
-/// constructor or in configureHook(). A port that was not added has no peers.
+/// OROCOS' ports, as RTCF 2021's components use them: a port has a name of its own and no component
+/// until it is added to one, in the constructor or in configureHook(). A port that was not added
+/// has no peers.
 #pragma once
 
 #include <optional>
@@ -13,15 +13,15 @@
 
 namespace RTT {
 
-/// What a read found; ordered.
+/// Result of a read; ordered.
 enum FlowStatus { NoData = 0, OldData = 1, NewData = 2 };
 
-/// What came of a write.
+/// Result of a write.
 enum WriteStatus { WriteSuccess = 0, WriteFailure = -1, NotConnected = -2 };
 
 namespace base {
 
-/// What a component knows of a port when it is added.
+/// Base class of all ports.
 class PortInterface {
    public:
     explicit PortInterface(std::string name) : name_(std::move(name)) {}
@@ -30,7 +30,8 @@ class PortInterface {
     PortInterface& operator=(const PortInterface&) = delete;
 
     const std::string& getName() const noexcept { return name_; }
-    /// Before the port is added. @return false afterwards: its name is known by then
+    /// Sets the name. Not real-time safe.
+    /// @return false if the port has already been added
     bool setName(const std::string& name) {
         if (added()) return false;
         name_ = name;
@@ -43,16 +44,17 @@ class PortInterface {
     }
     /// True if the port has a peer, inside the runner or on ROS. Real-time safe.
     virtual bool connected() const noexcept RTCF_NONBLOCKING = 0;
-    /// From here on the component sees no peer: an input reads NoData, an output writes nothing.
-    /// The connection itself is the graph's. Real-time safe.
+    /// Hides the peer from the component: from here on an input reads NoData and an output writes
+    /// nothing. The connection in the graph stays. Real-time safe.
     void disconnect() noexcept RTCF_NONBLOCKING { disconnected_ = true; }
-    /// Forgets an input's value until there is a new one. Real-time safe.
+    /// Clears an input until the next value arrives. Real-time safe.
     virtual void clear() noexcept RTCF_NONBLOCKING = 0;
-    /// True if an input has what read() has not given yet. Real-time safe.
+    /// True if an input has a value that read() has not returned yet. Real-time safe.
     virtual bool hasNewData() const noexcept RTCF_NONBLOCKING { return false; }
 
-    /// Makes it a port of `component`. @throws std::logic_error for a name that is taken or not
-    /// legal, a port that has been added before, and after configureHook()
+    /// Adds the port to `component`. Not real-time safe.
+    /// @throws std::logic_error if the name is taken or not legal, if the port was added before,
+    /// and after configureHook()
     void addTo(::rtcf::Component* component) {
         if (added()) throw std::logic_error("port '" + name_ + "' is added twice");
         declare(component);
@@ -86,8 +88,8 @@ class InputPort final : public base::InputPortInterface {
    public:
     explicit InputPort(const std::string& name = "unnamed") : InputPortInterface(name) {}
 
-    /// Copies the newest value if there is one; one that was read before only with
-    /// `copy_old_data`. Real-time safe for types whose assignment is.
+    /// Copies the newest value, if any; an old value only with `copy_old_data`. Real-time safe if
+    /// the assignment of T is.
     FlowStatus read(T& sample, bool copy_old_data = true) {
         if (!port_ || disconnected()) return NoData;
         const ::rtcf::DataStatus status = port_->read();
@@ -100,11 +102,12 @@ class InputPort final : public base::InputPortInterface {
         if (copy_old_data) sample = port_->value();
         return OldData;
     }
-    /// As read(): an input keeps no more than the newest value.
+    /// Like read(): an input keeps only the newest value.
     FlowStatus readNewest(T& sample, bool copy_old_data = true) {
         return read(sample, copy_old_data);
     }
-    /// Copies the value of the last read(), which tells its type's size; as it is before that.
+    /// Copies the value of the last read(); before the first one, a default-constructed value. Does
+    /// nothing if the port was not added. Real-time safe if the assignment of T is.
     void getDataSample(T& sample) {
         if (port_) sample = port_->value();
     }
@@ -131,36 +134,37 @@ class InputPort final : public base::InputPortInterface {
 template <typename T>
 class OutputPort final : public base::OutputPortInterface {
    public:
-    /// @param keep_last_written_value for source compatibility: it always does
+    /// @param keep_last_written_value ignored: an output always keeps the last value
     explicit OutputPort(const std::string& name = "unnamed", bool keep_last_written_value = true)
         : OutputPortInterface(name) {
         (void)keep_last_written_value;
     }
 
-    /// Real-time safe for types whose assignment is; for messages of variable size once
-    /// setDataSample() has been given the largest one.
+    /// Writes a value. Real-time safe if the assignment of T is; for messages of variable size,
+    /// only up to the size given to setDataSample().
     WriteStatus write(const T& sample) {
         if (!port_ || disconnected()) return NotConnected;
         port_->write(sample);
         return port_->connected() ? WriteSuccess : NotConnected;
     }
-    /// Takes the capacity of `sample`. For constructor and configureHook(), before or after the
-    /// port is added; not real-time safe.
+    /// Reserves memory for values up to the size of `sample`. In the constructor or
+    /// configureHook(), before or after the port is added; not real-time safe.
     WriteStatus setDataSample(const T& sample, bool reset = true) {
         (void)reset;
         sample_ = sample;
         if (port_) port_->reserve(sample);
         return WriteSuccess;
     }
-    /// The value that was written last, or default-constructed. Real-time safe as copying T is.
+    /// The last written value, or a default-constructed one. Real-time safe if copying T is.
     T getLastWrittenValue() { return port_ ? port_->value() : T{}; }
-    /// @return false before the port is added
+    /// Copies the last written value. Real-time safe if the assignment of T is.
+    /// @return false if the port was not added
     bool getLastWrittenValue(T& sample) {
         if (!port_) return false;
         sample = port_->value();
         return true;
     }
-    /// For source compatibility: it always does.
+    /// Ignored: an output always keeps the last value.
     void keepLastWrittenValue(bool) noexcept {}
     void keepNextWrittenValue(bool) noexcept {}
     void clear() noexcept RTCF_NONBLOCKING override {}

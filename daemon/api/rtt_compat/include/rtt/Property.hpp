@@ -1,6 +1,6 @@
 /// @file
-/// OROCOS' properties by their names: a variable of a component that follows a parameter of the
-/// same name, which the loader, `rtcfctl set` and ROS peers set.
+/// OROCOS' properties: a variable of a component that follows a parameter of the same name. The
+/// loader, `rtcfctl set` and ROS peers set the parameter.
 #pragma once
 
 #include <cmath>
@@ -12,26 +12,26 @@
 
 namespace RTT {
 
-/// Where addProperty() and its like return to: descriptions have no place here.
+/// Result of addProperty() and similar functions; descriptions are ignored.
 class Described {
    public:
-    /// For source compatibility. @{
+    /// Does nothing; for source compatibility. @{
     Described& doc(const std::string&) { return *this; }
     Described& arg(const std::string&, const std::string&) { return *this; }
     /// @}
 };
 
-/// Which thread runs an operation, in OROCOS.
+/// The thread that runs an operation, in OROCOS. Ignored.
 enum ExecutionThread { OwnThread, ClientThread };
 
 namespace base {
 
-/// The interface of a component to its properties.
+/// Base class of properties of all types.
 class PropertyBase : public Described {
    public:
     virtual ~PropertyBase() = default;
-    /// Gives the variable the parameter's value, if that has changed. Real-time safe in the cycle;
-    /// texts are left alone there, as to copy one may allocate.
+    /// Copies the parameter's value to the variable if the parameter has changed. Real-time safe in
+    /// the cycle, where it skips texts, as copying one may allocate.
     virtual void bring(bool in_cycle) = 0;
 };
 
@@ -45,20 +45,20 @@ class Property final : public base::PropertyBase {
                   "a property is a bool, an integer, a floating-point number or a std::string: get "
                   "others by getPrivateNodeHandle().getParam() in configureHook()");
 
-    /// @param variable its value is the parameter's default
+    /// @param variable its present value becomes the parameter's default
     Property(::rtcf::Component* owner, std::string name, T& variable)
         : parameter_(owner, std::move(name), variable), variable_(variable), last_(variable) {}
 
     void bring(bool in_cycle) override {
         if (in_cycle && std::is_same_v<T, std::string>) return;
-        // The component may write the variable too: only a change counts.
+        // The component may write the variable too, so copy only a changed parameter.
         if (same(parameter_.value(), last_)) return;
         last_ = parameter_.value();
         variable_ = last_;
     }
 
    private:
-    // Two NaN are one default.
+    // Two NaN count as equal.
     static bool same(const T& a, const T& b) {
         if constexpr (std::is_floating_point_v<T>) {
             if (std::isnan(a) && std::isnan(b)) return true;

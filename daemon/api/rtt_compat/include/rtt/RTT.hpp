@@ -1,5 +1,5 @@
 /// @file
-/// What RTCF 2021's components include of OROCOS.
+/// OROCOS' main header: everything that RTCF 2021's components use.
 #pragma once
 
 #include "rtt/Logger.hpp"

@@ -1,6 +1,6 @@
 /// @file
-/// OROCOS' TaskContext by its name, over rtcf::Component: the hooks, the ports
-/// and the states that RTCF 2021's components use.
+/// OROCOS' TaskContext on top of rtcf::Component: the hooks, ports and states that RTCF 2021's
+/// components use.
 #pragma once
 
 #include <algorithm>
@@ -33,7 +33,7 @@ class TaskCore {
 
 }  // namespace base
 
-/// Ports are added to it; one belongs to each component.
+/// The ports of one component.
 class DataFlowInterface {
    public:
     using Ports = std::vector<base::PortInterface*>;
@@ -42,8 +42,9 @@ class DataFlowInterface {
 
     explicit DataFlowInterface(::rtcf::Component* owner) : owner_(owner) {}
 
-    /// @name In the constructor or in configureHook(); the port's address must not change any more
-    /// @throws std::logic_error as PortInterface::addTo() does
+    /// @name In the constructor or in configureHook(); not real-time safe
+    /// The port's address must not change any more.
+    /// @throws std::logic_error like PortInterface::addTo()
     /// @{
     base::PortInterface& addPort(base::PortInterface& port) {
         port.addTo(owner_);
@@ -54,8 +55,9 @@ class DataFlowInterface {
         port.setName(name);
         return addPort(port);
     }
-    /// As addPort(): a component is updated in every cycle, whatever arrives. `callback` is called
-    /// in front of updateHook() in cycles in which the port has new data, in the real-time thread.
+    /// Like addPort(): the component is updated in every cycle, with or without new data. In cycles
+    /// with new data on the port, `callback` is called before updateHook(), in the real-time
+    /// thread.
     base::PortInterface& addEventPort(base::PortInterface& port, Callback callback = {}) {
         addPort(port);
         if (callback) callbacks_.emplace_back(&port, std::move(callback));
@@ -68,14 +70,14 @@ class DataFlowInterface {
     }
     /// @}
 
-    /// The ports that were added, in that order.
+    /// The ports in the order of addPort().
     const Ports& getPorts() const noexcept { return ports_; }
     PortNames getPortNames() const {
         PortNames names;
         for (const base::PortInterface* port : ports_) names.push_back(port->getName());
         return names;
     }
-    /// Null if there is none of that name.
+    /// The port of this name; null if there is none.
     base::PortInterface* getPort(const std::string& name) const noexcept {
         const auto found =
             std::find_if(ports_.begin(), ports_.end(),
@@ -87,7 +89,7 @@ class DataFlowInterface {
         return dynamic_cast<Port*>(getPort(name));
     }
 
-    /// In the real-time thread, before updateHook().
+    /// Calls the callbacks of ports with new data. In the real-time thread, before updateHook().
     void callBack() {
         for (const auto& [port, callback] : callbacks_) {
             if (port->hasNewData()) callback(port);
@@ -102,7 +104,7 @@ class DataFlowInterface {
 
 class TaskContext;
 
-/// The result of provides(): a component has one service, itself.
+/// Result of provides(). A component has one service: itself.
 class Service : public Described {
    public:
     explicit Service(TaskContext* owner) noexcept : owner_(owner) {}
@@ -118,16 +120,16 @@ class Service : public Described {
     TaskContext* owner_;
 };
 
-/// The base class of RTCF 2021's components.
+/// Base class of RTCF 2021's components.
 class TaskContext : public ::rtcf::Component, public base::TaskCore {
    public:
     using TaskState = base::TaskCore::TaskState;
 
-    /// @param initial_state for source compatibility: configureHook() is always called
+    /// @param initial_state ignored: configureHook() is always called
     explicit TaskContext(std::string name, TaskState initial_state = Stopped)
         : given_name_(std::move(name)), ports_(this), service_(this) {
         (void)initial_state;
-        // Who is being constructed is not known before this.
+        // The component's address is only known from here on.
         if (auto* const slot = ::rtcf::rtt_compat::hookSlot(); slot != nullptr)
             slot->component = this;
     }
@@ -138,10 +140,10 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
     virtual bool configureHook() { return true; }
     virtual bool startHook() { return true; }
     virtual void updateHook() {}
-    virtual void errorHook() {}  ///< instead of updateHook() from error() to recover()
+    virtual void errorHook() {}  ///< called instead of updateHook() between error() and recover()
     virtual void stopHook() {}
     virtual void cleanupHook() {}
-    virtual void exceptionHook() {}  ///< for source compatibility: never called
+    virtual void exceptionHook() {}  ///< never called; for source compatibility
     /// @}
 
     /// @name Real-time safe
@@ -152,7 +154,7 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
     Seconds getPeriod() const noexcept RTCF_NONBLOCKING {
         return static_cast<Seconds>(period()) * 1e-9;
     }
-    /// True between the end of startHook() and the end of stopHook().
+    /// True from the end of startHook() to the end of stopHook().
     bool isRunning() const noexcept RTCF_NONBLOCKING { return getTaskState() >= Running; }
     bool isActive() const noexcept RTCF_NONBLOCKING { return isRunning(); }
     bool isConfigured() const noexcept RTCF_NONBLOCKING { return getTaskState() >= Stopped; }
@@ -160,21 +162,22 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
     TaskState getTaskState() const noexcept RTCF_NONBLOCKING {
         return state_.load(std::memory_order_relaxed);
     }
-    /// Where the hook that runs just now leads to; the same as getTaskState() outside of hooks.
+    /// The state after the hook that runs now; outside of hooks, the same as getTaskState().
     TaskState getTargetState() const noexcept RTCF_NONBLOCKING {
         return target_.load(std::memory_order_relaxed);
     }
-    /// From the next cycle on errorHook() is called.
+    /// Calls errorHook() instead of updateHook() from the next cycle on.
     void error() noexcept RTCF_NONBLOCKING {
         if (getTaskState() == Running) enterState(RunTimeError);
     }
-    /// From the next cycle on updateHook() is called again.
+    /// Calls updateHook() again from the next cycle on.
+    /// @return true if the component is in state Running
     bool recover() noexcept RTCF_NONBLOCKING {
         if (inRunTimeError()) enterState(Running);
         return getTaskState() == Running;
     }
     /// @}
-    /// Ends the loop in order, as any exception out of a hook does.
+    /// Throw, which stops the loop in order.
     /// @{
     [[noreturn]] void exception() const { throw std::runtime_error("exception() was called"); }
     [[noreturn]] void fatal() const { throw std::runtime_error("fatal() was called"); }
@@ -193,9 +196,10 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
         return ports_.getPort(name);
     }
 
-    /// Declares a parameter of a variable's name and value. From then on the variable follows it:
-    /// before each hook, and before updateHook(); a text before the other hooks only.
-    /// @throws std::logic_error for a name that is taken or not legal, and after the constructor:
+    /// Declares a parameter with the variable's value as default. From then on the variable follows
+    /// the parameter: it is updated before each hook, and before updateHook(); a text only before
+    /// the other hooks. Not real-time safe.
+    /// @throws std::logic_error if the name is taken or not legal, and after the constructor, as
     /// the loader sets parameters before configureHook()
     template <typename T>
     Described& addProperty(const std::string& name, T& variable) {
@@ -206,14 +210,14 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
         properties_.push_back(std::make_unique<Property<T>>(this, name, variable));
         return *properties_.back();
     }
-    /// Compiles, and says in the log that nothing can call the operation here.
+    /// Logs a warning that rtcf cannot call operations.
     template <typename... Arguments>
     Described& addOperation(const std::string& name, Arguments&&...) {
         sayNotCallable(name);
         return service_;
     }
     Service* provides() noexcept { return &service_; }
-    /// Names of services are left out: their properties are parameters of the component.
+    /// Ignores the service's name: its properties are parameters of the component.
     Service* provides(const std::string&) noexcept { return &service_; }
 
    private:
@@ -246,7 +250,8 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
         state_.store(next, std::memory_order_relaxed);
     }
 
-    // The state changes when the hook is over; an exception or a refusal leaves it as it was.
+    // The state changes when the hook has succeeded; if it throws or returns false, the state
+    // stays.
     template <typename Hook>
     bool enter(TaskState next, const Hook& hook) {
         const ::rtcf::rtt_compat::InHook here(this);
@@ -280,7 +285,7 @@ class TaskContext : public ::rtcf::Component, public base::TaskCore {
     Service service_;
     std::vector<std::unique_ptr<base::PropertyBase>> properties_;
     bool constructed_ = false;
-    // Written in hooks, read by all of them.
+    // Written in hooks of one thread, read in hooks of others.
     std::atomic<TaskState> state_{PreOperational};
     std::atomic<TaskState> target_{PreOperational};
 };

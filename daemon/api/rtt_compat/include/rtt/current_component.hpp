@@ -1,5 +1,6 @@
 /// @file
-/// Which component of this library a thread runs a hook of, as RTT::log() does not say.
+/// The component of this library whose hook the calling thread runs. RTT::log() needs it, as it has
+/// no argument for the component.
 #pragma once
 
 #include <pthread.h>
@@ -11,16 +12,16 @@
 
 namespace rtcf::rtt_compat {
 
-/// Of one thread that is in a hook.
+/// Entry of one thread that runs a hook.
 struct HookSlot {
-    std::atomic<pthread_t> thread{0};  ///< 0: free
+    std::atomic<pthread_t> thread{0};  ///< 0 = free
     const Component* component = nullptr;
 };
 
-/// More than a loop has threads with hooks in them: the graph thread and the real-time one.
+/// More slots than threads that run hooks: the graph thread and the real-time thread.
 __attribute__((visibility("hidden"))) inline std::array<HookSlot, 4> hook_slots;
 
-/// The slot of this thread; null if it is in no hook. Real-time safe.
+/// The slot of the calling thread; null if it runs no hook. Real-time safe.
 inline HookSlot* hookSlot() noexcept {
     for (HookSlot& slot : hook_slots) {
         if (slot.thread.load(std::memory_order_relaxed) == pthread_self()) return &slot;
@@ -28,11 +29,11 @@ inline HookSlot* hookSlot() noexcept {
     return nullptr;
 }
 
-/// Says that this thread runs a hook, as long as it lives. No lock, and no thread_local, whose
-/// first use in a thread allocates. Real-time safe.
+/// Marks the calling thread as running a hook, for the life of this object. It uses no lock, and no
+/// thread_local, whose first use in a thread allocates. Real-time safe.
 class InHook {
    public:
-    /// @param component null in its constructor, where TaskContext fills it in
+    /// @param component null during construction; the constructor of TaskContext sets it
     explicit InHook(const Component* component) noexcept {
         for (HookSlot& slot : hook_slots) {
             pthread_t free = 0;

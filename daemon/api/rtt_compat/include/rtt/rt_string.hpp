@@ -1,6 +1,6 @@
 /// @file
-/// OROCOS' string of a memory pool of its own. There is no such pool: fill what grows outside of
-/// the loop, and within it copy no more than its capacity.
+/// OROCOS' string with its own memory pool. Here it is a std::string: let it grow only outside of
+/// the loop, and within the loop copy no more than its capacity.
 #pragma once
 
 #include <string>

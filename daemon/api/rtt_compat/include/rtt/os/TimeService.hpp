@@ -1,6 +1,6 @@
 /// @file
-/// OROCOS' clock of the machine, for measuring how long something takes. It is not the loop's: what
-/// a controller computes with is getTime() and getPeriod(), which are right in simulation too.
+/// OROCOS' clock, for measuring durations. It is not the loop's clock: controllers compute with
+/// getTime() and getPeriod(), which are also right in simulation.
 #pragma once
 
 #include <cstdint>
@@ -10,10 +10,10 @@
 
 namespace RTT::os {
 
-/// The one clock. All of it is real-time safe: reading it is no system call.
+/// The machine's clock. All functions are real-time safe: reading it needs no system call.
 class TimeService {
    public:
-    using ticks = std::int64_t;  ///< ns here
+    using ticks = std::int64_t;  ///< ns
     using nsecs = RTT::nsecs;
     using Seconds = RTT::Seconds;
 
@@ -21,7 +21,7 @@ class TimeService {
         static TimeService service;
         return &service;
     }
-    /// CLOCK_MONOTONIC, ns.
+    /// Present time of CLOCK_MONOTONIC, ns.
     ticks getTicks() const noexcept {
         std::timespec now{};
         clock_gettime(CLOCK_MONOTONIC, &now);
@@ -33,7 +33,7 @@ class TimeService {
     Seconds secondsSince(ticks begin) const noexcept {
         return static_cast<Seconds>(ticksSince(begin)) * 1e-9;
     }
-    /// s; OROCOS' own name for getting the time in seconds
+    /// Present time, s.
     Seconds getSeconds() const noexcept { return static_cast<Seconds>(getTicks()) * 1e-9; }
 
     static nsecs ticks2nsecs(ticks count) noexcept { return count; }
