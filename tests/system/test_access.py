@@ -77,7 +77,7 @@ def test_an_operator_runs_loops_but_loads_no_code(levels: Service) -> None:
     for change in (("load", "rtcf_examples", "Mimo", "--name", "X"), ("runner", "add", "other")):
         done = levels.ctl(*change, user="bob", check=False)
         assert done.returncode == 1
-        assert "takes the right to administer" in done.stderr
+        assert "requires the right to administer" in done.stderr
 
 
 def test_a_member_of_an_admin_group_does_everything(levels: Service) -> None:

@@ -78,7 +78,7 @@ def test_what_did_not_load_is_looked_at_again_though_its_file_is_the_same(
         ("kill -KILL $$", "was killed by SIGKILL", False),
         ("kill -BUS $$", "was killed by SIGBUS", False),
         ("echo libneeded.so: cannot open >&2; exit 1", "libneeded.so: cannot open", False),
-        ("echo nonsense", "did not answer in the protocol", False),
+        ("echo nonsense", "wrote no valid description", False),
         ("exec sleep 3600", "did not end within", False),
     ],
 )

@@ -93,7 +93,7 @@ def ask_and_leave(
     daemon: DaemonUnderTest, method: str, request: Any, until: Callable[[], Any] | None = None
 ) -> None:
     """Ctrl-C on a client: once `until` is true, or its call is surely queued."""
-    before = daemon.log().count("its caller left")
+    before = daemon.log().count("its caller disconnected")
     with daemon.client() as client:
         ask = getattr(client._stub, method)
         call = ask.future(request) if hasattr(ask, "future") else ask(request)
@@ -102,7 +102,7 @@ def ask_and_leave(
         if until is not None:
             wait_for(until, "the call to begin")
         call.cancel()
-    wait_for(lambda: daemon.log().count("its caller left") > before, "the caller to be missed")
+    wait_for(lambda: daemon.log().count("its caller disconnected") > before, "the caller to be missed")
 
 
 def test_what_waits_is_withdrawn_when_its_caller_leaves(

@@ -225,7 +225,7 @@ def test_a_reload_fails_when_a_graph_is_refused(stopped_daemon: DaemonUnderTest)
     # Nor does the journal end in another word.
     ends = [line for line in daemon.log().splitlines() if "Reload by" in line]
     assert [line.endswith(": done") for line in ends] == [True, False]
-    assert f"not all of it done: {refused}: " in ends[1]
+    assert f"partly failed: {refused}: " in ends[1]
 
 
 def test_a_reload_that_was_refused_is_told_until_one_is_not(
