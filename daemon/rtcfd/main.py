@@ -211,7 +211,7 @@ class Daemon:
         except Unavailable as silence:
             log.error("not known whether the next rtcfd will take the settings: %s", silence)
         except Refusal as refusal:
-            log.error("the next rtcfd will take the last good settings: %s", refusal)
+            log.error("the next rtcfd will use the last good settings: %s", refusal)
         self._clients.close_door()
         serving = asyncio.create_task(self._end_servers(_GRACE_S))
         await self._runners.leave()

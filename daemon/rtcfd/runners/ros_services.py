@@ -41,7 +41,7 @@ async def serve(runner: RunnerCore, call: wire.ServiceCall) -> wire.ServiceAnswe
         answer.message = bounded(refusal)
         runner.log.warning("refused to a ROS service: %s", answer.message)
     except Exception as error:
-        answer.message = f"internal error of rtcfd ({type(error).__name__}); its log has more"
+        answer.message = f"internal error of rtcfd ({type(error).__name__}): see its log"
         log.exception("internal error")
     return answer
 

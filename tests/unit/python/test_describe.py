@@ -185,9 +185,9 @@ def test_what_a_library_has_started_ends_with_its_process(library: Path, tmp_pat
 @pytest.mark.parametrize(
     ("odd", "said"),
     [
-        (odd_files.pipe, "cannot read it: it is a named pipe, no regular file"),
-        (odd_files.folder, "cannot read it: it is a folder, no regular file"),
-        (odd_files.device, "cannot read it: it is a device, no regular file"),
+        (odd_files.pipe, "cannot read it: it is a named pipe, not a regular file"),
+        (odd_files.folder, "cannot read it: it is a folder, not a regular file"),
+        (odd_files.device, "cannot read it: it is a device, not a regular file"),
     ],
 )
 def test_what_is_no_file_is_not_opened(

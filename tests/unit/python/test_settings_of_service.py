@@ -47,7 +47,7 @@ def test_a_start_with_bad_settings_takes_the_last_good_ones_and_says_so(
     assert status.runners[0].settings.frequency_hz == 250.0
     said = f"{daemon.settings}:2: runner.frequency_hz must be a number"
     assert status.notes[0].startswith(said)
-    assert status.notes[0].endswith("; the last good settings are taken instead")
+    assert status.notes[0].endswith("; the last good settings are used instead")
     assert said in daemon.log()
     # Mended ones are read without a restart.
     daemon.settings.write_text(GOOD.replace("250", "500"))
@@ -70,7 +70,7 @@ def test_a_restart_warns_of_settings_that_the_next_rtcfd_will_not_take(
     daemon.settings.write_text(BAD)
     assert daemon.end(signal.SIGUSR1) == 0
     said = f"{daemon.settings}:2: runner.frequency_hz must be a number"
-    assert f"the next rtcfd will take the last good settings: {said}" in daemon.log()
+    assert f"the next rtcfd will use the last good settings: {said}" in daemon.log()
     # And so it does.
     daemon.start_service()
     with daemon.client() as client:
