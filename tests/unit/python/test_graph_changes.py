@@ -183,7 +183,7 @@ def test_a_change_outlives_its_caller(
     wait_for(lambda: daemon.executor_pid(), "an answer")
     go.touch()
     wait_for(lambda: client.get_order() == ["/Slow"], "the load")
-    wait_for(lambda: "its caller had left" in daemon.log(), "the log")
+    wait_for(lambda: "its caller had disconnected" in daemon.log(), "the log")
     assert list(saved(daemon)) == ["/Slow"]
 
 
@@ -262,7 +262,7 @@ def test_a_component_can_be_taken_out_while_the_executor_is_down(
     )
     with pytest.raises(rtcf.RefusedError, match="no component /c"):
         client.unload(["c"])
-    assert client.unload(["a"]).notes == ["taken out of the saved graph only"]
+    assert client.unload(["a"]).notes == ["removed from the saved graph only"]
     daemon.executor.write_text(works)
     assert client.start().order == ["/b"]
 

@@ -127,7 +127,7 @@ def test_settings_that_cannot_be_read_hold_up_no_restart(
     finally:
         hangs.set()
     assert asked.is_set()
-    assert "not known whether the next rtcfd will take the settings" in caplog.text
+    assert "cannot check the settings for the next rtcfd" in caplog.text
     # The executor was left in order to the next one.
     daemon.start_service()
     assert daemon.executor_pid() == pid
