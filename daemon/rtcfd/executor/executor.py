@@ -66,7 +66,7 @@ class Executor:
         self.expected = False  # rtcfd has requested its end
         self.ended = asyncio.Event()  # set after on_end
         self.verdict = ""  # the cause of its end, or the reason for which rtcfd requested it
-        self.safe = True  # False: it died in one of the hooks that make things safe or stop them
+        self.safe = True  # see Verdict.safe
         self.version = ""  # of rtcf
         self.foreign = ""  # why it accepts only the requests stop and exit; empty = it accepts all
         self._protocol = 0
