@@ -19,10 +19,10 @@ Result = TypeVar("Result")
 
 
 class Aside:
-    """A limited number of threads for one kind of work; `what` names it in errors."""
+    """A limited number of threads for one kind of work; `name` names it in errors."""
 
-    def __init__(self, what: str, threads: int = 2) -> None:
-        self._what = what
+    def __init__(self, name: str, threads: int = 2) -> None:
+        self._name = name
         self._places = asyncio.Semaphore(threads)
 
     async def run(self, work: Callable[[], Result], timeout_s: float) -> Result:
@@ -56,13 +56,13 @@ class Aside:
             async with asyncio.timeout(timeout_s):
                 await self._places.acquire()
                 try:
-                    threading.Thread(target=thread, name=f"rtcfd-{self._what}", daemon=True).start()
+                    threading.Thread(target=thread, name=f"rtcfd-{self._name}", daemon=True).start()
                 except BaseException:
                     self._places.release()
                     raise
                 return await done
         except TimeoutError:
             raise Unavailable(
-                f"no answer from the {self._what} within {timeout_s:g} s",
+                f"no answer from the {self._name} within {timeout_s:g} s",
                 errors_pb2.REASON_MACHINE_SILENT,
             ) from None

@@ -129,23 +129,23 @@ def note(
     before: Mapping[str, graph_pb2.ParameterValue],
     acting: Caller | None,
     how: str,
-    who: str = "",
+    author: str = "",
     takes_back: int = 0,
     quiet: bool = False,
 ) -> None:
     """Note a change of parameters and its author: in the history and, unless `quiet` (for new
     components of a graph), in the log and the events.
 
-    `who` overrides the author; `takes_back` is the number of the change that this one undoes.
+    `author` overrides the caller; `takes_back` is the number of the change that this one undoes.
     """
     settings = list({each.name: each for each in settings}.values())
     if not settings:
         return
-    who = who or _who(acting, how)
+    author = author or _who(acting, how)
     runner.desired.history.note(
         component,
         [(each.name, before.get(each.name), each.value) for each in settings],
-        who,
+        author,
         how,
         takes_back,
     )
@@ -156,14 +156,14 @@ def note(
     if how == UNANSWERED:
         deed = "set (the executor died before its response)"
     runner.happened(
-        control_pb2.Event.KIND_PARAMETERS, f"{component}: {words} {deed}", component, user=who
+        control_pb2.Event.KIND_PARAMETERS, f"{component}: {words} {deed}", component, user=author
     )
     runner.log.logger.info(
         "%s: %s %s by %s",
         component,
         words,
         deed,
-        who if how == "set" or takes_back else f"{who}, {how}",
+        author if how == "set" or takes_back else f"{author}, {how}",
         extra={"runner": runner.name, "peer": None if acting is None else acting.peer},
     )
 

@@ -236,7 +236,7 @@ def test_a_reload_that_was_refused_is_told_until_one_is_not(
     daemon.start_service()
     daemon.settings.write_text(BAD)
     assert rtcfd(daemon, "--reload").returncode == 1
-    said = f"settings not read again: {daemon.settings}:2: runner.frequency_hz must be a number"
+    said = f"settings not reloaded: {daemon.settings}:2: runner.frequency_hz must be a number"
     with daemon.client() as client:
         (note,) = client.get_status().notes
         assert note.startswith(said)
