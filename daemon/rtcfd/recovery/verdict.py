@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from rtcfd.executor.flight_recorder import Note, Thread
 from rtcfd.executor.process import End, describe_signal
 
-# After more than MOST_CRASHES deaths in WINDOW_S the loop is held, whatever its policy; after
+# After more than MOST_CRASHES deaths in WINDOW_S the loop is held under any policy; after
 # MOST_ATTEMPTS no new executor is started.
 WINDOW_S = 60.0
 MOST_CRASHES = 3

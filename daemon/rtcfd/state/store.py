@@ -87,8 +87,8 @@ class Store:
             lock(self._folder)
 
     def mark(self, runner: str) -> Path | None:
-        """Return the path of a runner's mark.  Without this file its loop is not resumed, whatever
-        the state says.
+        """Return the path of a runner's mark.  Without this file its loop is not resumed, even
+        if the state says so.
 
         The file exists while the loop is wanted.  It can be removed even on a full disk, and the
         executor removes it on a direct stop, without rtcfd.
