@@ -68,5 +68,5 @@ class LogThread(logging.Handler):
 
 
 def _report(lost: int) -> logging.LogRecord:
-    text = f"{lost} log records were lost: the journal or terminal is too slow"
+    text = f"{lost} log records were lost: the journal or terminal failed, or was too slow"
     return logging.LogRecord("rtcfd", logging.WARNING, "", 0, text, None, None)

@@ -35,7 +35,7 @@ _CHUNK = 65536
 # Connections accepted in one turn of the event loop: the whole listen backlog, because a gRPC
 # client that finds the backlog full does not wait.
 _AT_ONCE = 4096
-# New connections per user; further ones are closed at once.
+# New connections per user and second; further ones are closed at once.
 _ARRIVALS_PER_S = 20.0
 _MOST_USERS = 4096
 # Connections above the limit that receive an error message; further ones are closed at once.

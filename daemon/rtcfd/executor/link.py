@@ -24,11 +24,10 @@ from rtcfd.executor import frames
 # rtcfd and an executor of neighbouring versions work together: the newer one does not use the new
 # features.  Hello, Stop and Exit never change.
 PROTOCOL = 4
-# The first versions in which an executor
-LIMITS_PROTOCOL = 2  # enforces [limits],
-ACCESS_PROTOCOL = 3  # accepts and reports direct stops, without rtcfd,
-FIGURES_PROTOCOL = 4  # counts in status and statistics from one reset,
-PORTS_PROTOCOL = 4  # sends the values of ports.
+LIMITS_PROTOCOL = 2  # since then, executors enforce [limits]
+ACCESS_PROTOCOL = 3  # since then, executors accept and report direct stops
+FIGURES_PROTOCOL = 4  # since then, one reset begins the counts of status and statistics
+PORTS_PROTOCOL = 4  # since then, executors send the values of ports
 _CREDENTIALS = struct.Struct("3i")  # struct ucred, unix(7)
 
 Progress = Callable[[str], None]

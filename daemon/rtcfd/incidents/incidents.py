@@ -194,7 +194,7 @@ def _tidy(folder: Path, most: int, newest: Path) -> None:
         room -= each.bytes
         if room < 0 and file != newest:
             file.unlink(missing_ok=True)
-            log.info("incident %s removed: all files exceeded incidents_mb", file.stem)
+            log.info("incident %s removed: the incidents exceed incidents_mb", file.stem)
 
 
 def _all(folder: Path) -> list[incidents_pb2.Incident]:

@@ -1,6 +1,6 @@
 """Decorators of the service's methods: unary calls, calls with progress, calls that hold a lease.
 
-Only this module handles the disconnection of a caller.
+Only this module notices that a caller has disconnected.
 """
 
 import asyncio

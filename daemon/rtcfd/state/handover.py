@@ -1,8 +1,8 @@
 """The handover from one rtcfd to the next: a file beside the executors' sockets.
 
 It has the defaults of the runners, and the digests of the applied graphs.  So the next
-rtcfd can distinguish meanwhile changed settings from changes of a runner by clients.  The
-file is removed when no executor is left.
+rtcfd can distinguish changes of the settings in the meantime from changes of a runner by
+clients.  The file is removed when no executor is left.
 """
 
 import contextlib

@@ -154,7 +154,7 @@ class History:
         return min(self._changes, key=lambda name: self._changes[name][0].number)
 
     def _drop_oldest(self, component: str) -> None:
-        """Drop all changes of the oldest number: a part of them must not be undone."""
+        """Drop all changes of the oldest number, because undo must restore all or none of them."""
         number = self._changes[component][0].number
         while component in self._changes and self._changes[component][0].number == number:
             self._drop(component)
