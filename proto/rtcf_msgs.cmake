@@ -1,6 +1,6 @@
-# The ROS messages: C++ headers by the target rtcf_msgs, the Python module
-# rtcf_msgs among the build tree's modules. The package is a project of its
-# own, as catkin changes the output folders of the project it is in.
+# The ROS messages: C++ headers in the target rtcf_msgs, and the Python module
+# rtcf_msgs in the build tree. The package is a separate project, because catkin
+# changes the output folders of its project.
 set(package ${CMAKE_CURRENT_SOURCE_DIR}/rtcf_msgs)
 set(build ${CMAKE_CURRENT_BINARY_DIR}/rtcf_msgs)
 set(stage ${CMAKE_CURRENT_BINARY_DIR}/rtcf_msgs-stage)
@@ -18,7 +18,7 @@ set(stamp ${CMAKE_CURRENT_BINARY_DIR}/rtcf_msgs.stamp)
 add_custom_command(
   OUTPUT ${stamp}
   BYPRODUCTS ${headers}
-  # Lisp has no users here.
+  # No code for Lisp.
   COMMAND
     ${CMAKE_COMMAND} -E env ROS_LANG_DISABLE=genlisp ${CMAKE_COMMAND} -S ${package} -B ${build} -G
     ${CMAKE_GENERATOR} --log-level=WARNING -DCMAKE_INSTALL_PREFIX=${CMAKE_INSTALL_PREFIX}
@@ -41,7 +41,7 @@ add_dependencies(rtcf_msgs rtcf_msgs_build)
 
 install(DIRECTORY ${staged}/include/rtcf_msgs DESTINATION include COMPONENT ros-rtcf)
 install(DIRECTORY ${staged}/share/rtcf_msgs DESTINATION share COMPONENT ros-rtcf)
-# Where catkin puts it depends on the prefix.
+# Installed separately, because catkin's folder for it depends on the prefix.
 install(FILES ${build}/catkin_generated/installspace/rtcf_msgs.pc DESTINATION share/pkgconfig
         COMPONENT ros-rtcf)
 install(

@@ -1,4 +1,4 @@
-"""Where rtcfd's log goes: the journal with its fields, or lines on stderr."""
+"""Writes rtcfd's log: to the journal with fields, or to stderr as lines."""
 
 import logging
 import os
@@ -29,9 +29,9 @@ class JournalHandler(logging.Handler):
         self._journal = journal_socket.JournalSocket(address)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Send one record; waits for a journal that does not read.
+        """Send one record; waits until the journal has room for it.
 
-        Raises OSError, if there is no journal.
+        Raises OSError if there is no journal.
         """
         message = standing_alone(record, self.format(record))
         self._journal.send({"MESSAGE": message, **fields(record)})
@@ -56,8 +56,7 @@ class LineFormatter(logging.Formatter):
 
 
 def standing_alone(record: logging.LogRecord, message: str) -> str:
-    """Return a message that says what runner and component it is about: a line is read without
-    the journal's fields, too."""
+    """Return a message with its runner and component, for readers without the journal's fields."""
     runner = getattr(record, "runner", "")
     component = getattr(record, "component", "")
     if component and not message.startswith(f"{component}:"):
@@ -68,7 +67,7 @@ def standing_alone(record: logging.LogRecord, message: str) -> str:
 
 
 def fields(record: logging.LogRecord) -> dict[str, str]:
-    """Return the journal's fields of a record, besides its message."""
+    """Return the journal's fields of a record, except for its message."""
     priority = next(
         (value for level, value in _JOURNAL_PRIORITIES if record.levelno >= level), _DEBUG_PRIORITY
     )
@@ -92,7 +91,7 @@ def fields(record: logging.LogRecord) -> dict[str, str]:
 
 
 def stderr_is_journal() -> bool:
-    """Tell whether stderr is connected to the journal (systemd.exec(5), $JOURNAL_STREAM)."""
+    """Return whether stderr is connected to the journal (systemd.exec(5), $JOURNAL_STREAM)."""
     device, _, inode = os.environ.get("JOURNAL_STREAM", "").partition(":")
     if not (device.isdigit() and inode.isdigit()):
         return False
@@ -101,7 +100,7 @@ def stderr_is_journal() -> bool:
 
 
 def set_up(verbose: bool) -> None:
-    """Send everything that is logged to where it belongs."""
+    """Install the handler of all log records: the journal if stderr is connected to it."""
     handler: logging.Handler
     if stderr_is_journal():
         handler = JournalHandler()

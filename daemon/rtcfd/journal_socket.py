@@ -1,8 +1,7 @@
-"""The journal's native protocol (systemd.io/JOURNAL_NATIVE_PROTOCOL): a datagram for a record.
+"""The journal's native protocol (systemd.io/JOURNAL_NATIVE_PROTOCOL): one datagram per record.
 
-By Python's own socket, which lets other threads run while it waits: a journal that does not read
-holds up the thread that sends, and nothing else of rtcfd. libsystemd's function, called from
-Python, would hold up all.
+Uses Python's socket, which releases the interpreter lock while it waits: a journal that does not
+read blocks only the thread that sends.  libsystemd's function would block all threads of rtcfd.
 """
 
 import errno
@@ -14,9 +13,9 @@ from collections.abc import Mapping
 
 ADDRESS = "/run/systemd/journal/socket"
 
-# As libsystemd asks for; the kernel gives what net.core.wmem_max allows.
+# The size that libsystemd requests; the kernel grants at most net.core.wmem_max.
 _SEND_BUFFER = 8 << 20
-# What the journal asks of a file, so that it can read it in place.
+# The journal requires these seals of a file, which it reads in place.
 _SEALS = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_WRITE | fcntl.F_SEAL_SEAL
 
 
@@ -25,14 +24,14 @@ class JournalSocket:
 
     def __init__(self, address: str = ADDRESS) -> None:
         self._address = address
-        # Not connected: the journal that is started anew may have a new socket.
+        # Not connected: a restarted journal may have a new socket.
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
 
     def send(self, fields: Mapping[str, str]) -> None:
-        """Send a record, and wait until the journal has room for it.
+        """Send a record; waits until the journal has room for it.
 
-        Raises OSError, if there is no journal.
+        Raises OSError if there is no journal.
         """
         data = encoded(fields)
         try:
@@ -54,12 +53,12 @@ class JournalSocket:
 
 
 def encoded(fields: Mapping[str, str]) -> bytes:
-    """Return a record as the journal reads it."""
+    """Return a record in the journal's format."""
     return b"".join(_field(name, value) for name, value in fields.items())
 
 
 def _field(name: str, value: str) -> bytes:
-    # A file's name need not be text; it stays readable, as on stderr.
+    # A file name may not be valid text; escaped, it stays readable, as on stderr.
     data = value.encode(errors="backslashreplace")
     if b"\n" not in data:
         return b"%s=%s\n" % (name.encode(), data)

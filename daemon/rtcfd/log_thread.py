@@ -1,4 +1,5 @@
-"""Log records handed to a thread: a journal that hangs holds up no event loop, and no watchdog.
+"""Writes log records in a thread, so that a hanging journal blocks neither the event loop nor the
+watchdog.
 
 Owned by the root logger.
 """
@@ -9,12 +10,12 @@ import queue
 import threading
 import time
 
-_MOST_WAITING = 20_000  # records; a hanging journal does not fill the memory
-_LAST_WORDS_S = 2.0  # at the end of rtcfd
+_MOST_WAITING = 20_000  # records in the queue, so that a hanging journal does not fill the memory
+_LAST_WORDS_S = 2.0  # longest wait for the queue at the end of rtcfd
 
 
 class LogThread(logging.Handler):
-    """Passes records on to another handler, in a thread; what finds no room is counted."""
+    """Passes records on to another handler, in a thread; counts records that find no room."""
 
     def __init__(self, handler: logging.Handler, most: int = _MOST_WAITING) -> None:
         super().__init__()
@@ -25,7 +26,7 @@ class LogThread(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Queue one record."""
-        # What it was made of may change before it is written.
+        # Format it now: its arguments may change before it is written.
         kept = copy.copy(record)
         kept.msg, kept.args = record.getMessage(), None
         try:
@@ -34,13 +35,13 @@ class LogThread(logging.Handler):
             self._no_room += 1
 
     def flush(self) -> None:
-        """Wait a while until all is written."""
+        """Wait until all records are written, at most _LAST_WORDS_S."""
         deadline = time.monotonic() + _LAST_WORDS_S
         while self._queue.unfinished_tasks and time.monotonic() < deadline:
             time.sleep(0.005)
 
     def close(self) -> None:
-        """At the end of the process."""
+        """Write the last records, at the end of the process."""
         self.flush()
         super().close()
 
@@ -58,8 +59,8 @@ class LogThread(logging.Handler):
 
     def _written(self, record: logging.LogRecord) -> bool:
         try:
-            # Without its lock: the end of the process would wait for that, and no other thread
-            # writes.
+            # Without the handler's lock: only this thread writes, and the end of the process
+            # would wait for the lock.
             self._handler.emit(record)
         except Exception:  # logging must not end the daemon
             return False
@@ -67,5 +68,5 @@ class LogThread(logging.Handler):
 
 
 def _report(lost: int) -> logging.LogRecord:
-    text = f"{lost} log records were lost: they were not taken as fast as they came"
+    text = f"{lost} log records were lost: the journal or terminal failed, or was too slow"
     return logging.LogRecord("rtcfd", logging.WARNING, "", 0, text, None, None)

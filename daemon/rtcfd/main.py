@@ -1,4 +1,4 @@
-"""The daemon: puts its parts together, runs until a signal, ends in order."""
+"""The daemon: assembles its parts, runs until a signal, ends in order."""
 
 import asyncio
 import contextlib
@@ -44,13 +44,13 @@ from rtcfd.state.store import Store
 log = logging.getLogger("rtcfd")
 
 REFUSED = 1
-_GRACE_S = 60.0  # for calls under way: the end of their executors ends them sooner
-_LAST_WORDS_S = 0.1  # for their answers
-# Of who may not stop loops: how large a message may be, and calls at a time by one connection.
+_GRACE_S = 60.0  # for running calls; normally the end of their executors ends them earlier
+_LAST_WORDS_S = 0.1  # for the responses to them
+# For clients that may not stop loops: the largest message, and concurrent calls per connection.
 _OTHERS_MESSAGE_KB = 1024
 _OTHERS_STREAMS = 16
-_LAST_ANSWERS_S = 1.0  # likewise where all is well: before a restart
-_LAST_LOOK_S = 5.0  # at settings, for a warning only
+_LAST_ANSWERS_S = 1.0  # for clients to read the last responses
+_LAST_LOOK_S = 5.0  # for a check of the settings, which only gives a warning
 
 
 class Daemon:
@@ -65,11 +65,11 @@ class Daemon:
             given.executor,
             given.runtime_dir / "executors",
             given.runtime_dir / "stop",
-            # Who can connect to us can do so too; it is the executor that looks at rights.
+            # All clients of the control socket may connect; the executor checks their rights.
             0o700 if given.foreground else 0o750,
             self._store.mark,
             private=given.foreground,
-            # Of the system's loops, where only their user writes.
+            # System loops: a folder to which only their user can write.
             claims_folder=claims_folder_of_user(given.runtime_dir / "cpus")
             if given.foreground
             else given.runtime_dir / "cpus",
@@ -106,7 +106,7 @@ class Daemon:
             admission,
             self._store,
         )
-        # One for each door: what gRPC itself takes of a client cannot be told it by client.
+        # One server per private socket, because gRPC's own limits cannot differ between clients.
         self._servers = {
             self._doors.trusted: grpc.aio.server(
                 options=_server_options(given.limits.message_kb), interceptors=[admission]
@@ -119,15 +119,17 @@ class Daemon:
                 interceptors=[admission],
             ),
         }
-        self._left_over: list[str] = []  # runners of executors that outlived another rtcfd
-        self._leaving = False  # loops go on after our end
+        self._left_over: list[str] = []  # runners with an executor of an earlier rtcfd
+        self._leaving = False  # the loops go on after our end
         control = Control(self._runners, catalog, self._reloads, shared.events)
         for server in self._servers.values():
             control_pb2_grpc.add_ControlServicer_to_server(control, server)  # type: ignore[no-untyped-call]
 
     async def run(self) -> None:
-        """Serve until SIGTERM or SIGINT stops all loops, or SIGUSR1 leaves them to the next rtcfd;
-        SIGHUP ends what runs from a terminal, else reloads."""
+        """Serve until SIGTERM or SIGINT stops all loops, or SIGUSR1 leaves them to the next rtcfd.
+
+        SIGHUP ends a rtcfd in the foreground, and makes the service reload.
+        """
         end = asyncio.Event()
         loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGINT):
@@ -139,7 +141,7 @@ class Daemon:
             loop.add_signal_handler(signal.SIGUSR1, self._leave, end)
         if self._options.end_with_stdin:
             _when_stdin_ends(end.set)
-        # Before anything is made: the folders of a daemon that answers there are its own.
+        # First of all: if a daemon answers at the socket, the folders belong to it.
         listener = self._endpoint.listen()
         try:
             await self._serve(listener, end)
@@ -149,7 +151,7 @@ class Daemon:
         log.info("ended")
 
     async def _serve(self, listener: socket.socket, end: asyncio.Event) -> None:
-        """Do all that run() does with the control socket."""
+        """Run with the control socket, see run()."""
         self._command.prepare()
         try:
             self._store.prepare()
@@ -177,8 +179,8 @@ class Daemon:
         ending = asyncio.create_task(end.wait())
         await asyncio.wait({starting, ending}, return_when=asyncio.FIRST_COMPLETED)
         if starting.done() and (problem := starting.exception()):
-            # What works is served; what does not shows in the status.
-            log.error("not all of the start was done", exc_info=problem)
+            # Serve the runners that work; the status shows the others.
+            log.error("the start failed in part", exc_info=problem)
             self._ready()
         await ending
         await (self._let_go() if self._leaving else self._stop())
@@ -192,7 +194,7 @@ class Daemon:
         end.set()
 
     async def _stop(self) -> None:
-        """End loops and executors, then what serves clients."""
+        """End loops and executors, then the servers."""
         log.info("stopping all loops")
         self._notify.stopping("stopping all loops")
         serving = asyncio.create_task(self._end_servers(_GRACE_S))
@@ -207,18 +209,18 @@ class Daemon:
         log.info("leaving all loops to the next rtcfd")
         self._notify.stopping("leaving all loops to the next rtcfd")
         try:
-            await Aside("file of settings").run(self._read_options, _LAST_LOOK_S)
+            await Aside("settings file").run(self._read_options, _LAST_LOOK_S)
         except Unavailable as silence:
-            log.error("not known whether the next rtcfd will take the settings: %s", silence)
+            log.error("cannot check the settings for the next rtcfd: %s", silence)
         except Refusal as refusal:
-            log.error("the next rtcfd will take the last good settings: %s", refusal)
+            log.error("the next rtcfd will use the last good settings: %s", refusal)
         self._clients.close_door()
         serving = asyncio.create_task(self._end_servers(_GRACE_S))
         await self._runners.leave()
         done, _ = await asyncio.wait({serving}, timeout=_LAST_ANSWERS_S)
         if done:
             await self._clients.read(_LAST_ANSWERS_S)
-        # Holders see a connection that is lost, and come back.
+        # Holders of leases lose their connection, and reconnect.
         self._clients.close()
         await self._end_servers(None)
 
@@ -234,7 +236,7 @@ class Daemon:
         log.info("ready; runners: %s", self._runners.summary())
 
     def _serve_privately(self) -> None:
-        """Let gRPC listen where only we may connect: the folder is 0700."""
+        """Bind the gRPC servers to sockets in our folder of mode 0700: only we can connect."""
         for door, server in self._servers.items():
             try:
                 bound = server.add_insecure_port(f"unix:{door}")
@@ -242,7 +244,7 @@ class Daemon:
                 bound = 0
             if not bound:
                 raise FailedPrecondition(
-                    f"cannot listen on {door}: is its folder ours to write?",
+                    f"cannot listen on {door}: check that rtcfd may write to its folder",
                     errors_pb2.REASON_DAEMON_FAILED,
                 )
 
@@ -258,13 +260,13 @@ class Daemon:
     def _clean_up(self) -> None:
         self._notify.close()
         self._endpoint.remove()
-        # What is not empty or not there stays as it is.
+        # Folders that are not empty stay.
         self._command.remove_folders()
         if self._options.own_runtime_dir:
             with contextlib.suppress(OSError):
                 self._options.runtime_dir.rmdir()
         if self._options.end_with_stdin:
-            # Who made it for us may have died.
+            # The process that created it for us may have died.
             with contextlib.suppress(OSError):
                 self._options.socket.parent.rmdir()
 
@@ -289,7 +291,7 @@ def _server_options(message_kb: int) -> list[tuple[str, int]]:
 
 async def _run(given: options.Options, read_options: Callable[[], options.Options]) -> None:
     if sys.version_info < (3, 12):
-        # The default one starts a thread for each child.
+        # The default watcher starts a thread per child.
         watcher = asyncio.PidfdChildWatcher()
         watcher.attach_loop(asyncio.get_running_loop())
         asyncio.set_child_watcher(watcher)
@@ -297,7 +299,7 @@ async def _run(given: options.Options, read_options: Callable[[], options.Option
 
 
 def _reload(socket: Path) -> int:
-    """Make the rtcfd that runs read its settings again; what came of it is printed."""
+    """Make the running rtcfd reload its settings, and print the result."""
     try:
         with grpc.insecure_channel(f"unix:{socket}") as channel:
             daemon = control_pb2_grpc.ControlStub(channel)  # type: ignore[no-untyped-call]
@@ -316,8 +318,8 @@ def _reload(socket: Path) -> int:
 
 
 def _check(arguments: Sequence[str] | None, build_tree: Path | None) -> int:
-    """Say whether settings and graphs are valid."""
-    log.addHandler(logging.NullHandler())  # what is wrong is printed
+    """Check settings and graphs, and print the errors."""
+    log.addHandler(logging.NullHandler())  # the errors are printed, not logged
     given = options.parse(arguments, build_tree)
     _, problems = BootGraphs(given.graphs_dir, {}, given.opinion).read()
     for problem in problems:
@@ -328,10 +330,10 @@ def _check(arguments: Sequence[str] | None, build_tree: Path | None) -> int:
 
 
 def end(status: int) -> NoReturn:
-    """End the process, once main() has returned.
+    """End the process, after main() has returned.
 
-    Not by way of the interpreter's end: a gRPC server that was made and never served waits there
-    for its thread, which runs no more by then, for ever.
+    Not by the interpreter's shutdown: a gRPC server that was created but never served waits there
+    for ever for its thread, which no longer runs.
     """
     logging.shutdown()
     for stream in (sys.stdout, sys.stderr):
@@ -356,6 +358,6 @@ def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None)
         print(f"rtcfd: {refusal}", file=sys.stderr)
         return REFUSED
     except Exception:
-        traceback.print_exc()  # and to the end by end(), as ever
+        traceback.print_exc()  # the caller then ends the process by end(), as always
         return REFUSED
     return 0

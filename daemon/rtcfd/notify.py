@@ -1,6 +1,6 @@
-"""What systemd is told: READY, STATUS, STOPPING, and the watchdog's pings.
+"""Notifies systemd: READY, STATUS, STOPPING, and the watchdog's pings.
 
-Does nothing where rtcfd was not started by systemd (no NOTIFY_SOCKET).
+Does nothing if systemd has not started rtcfd (no NOTIFY_SOCKET).
 """
 
 import asyncio
@@ -12,12 +12,14 @@ from collections.abc import Callable
 from rtcfd.common.tasks import looked_at
 
 _EXTEND_EVERY_S = 10
-_ASKING_TIMEOUT_S = 10.0  # while all that runs is being ended
+_ASKING_TIMEOUT_S = 10.0  # of systemctl, which is slow while the machine shuts down
 
 
 async def machine_goes_down() -> bool:
-    """Tell whether we are to end because the machine is, by systemd's word: what ran then is to
-    run again after the boot; what an administrator ends is not."""
+    """Return whether the machine is shutting down, according to systemd.
+
+    Loops that run then resume after the next boot.  Loops that an administrator ends do not.
+    """
     if not os.environ.get("NOTIFY_SOCKET"):
         return False
     try:
@@ -40,12 +42,12 @@ def _sender() -> Callable[[str], object]:
     address = os.environ.get("NOTIFY_SOCKET", "")
     if not address:
         return lambda _: None
-    # The kernel's name of an abstract socket begins with a zero.
+    # The name of an abstract socket begins with a zero byte.
     to = "\0" + address[1:] if address.startswith("@") else address
     to_systemd = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
 
     def send(text: str) -> None:
-        # Nobody listens any more: that is no reason to end.
+        # Go on if systemd does not listen any more.
         with contextlib.suppress(OSError):
             to_systemd.sendto(text.encode(), to)
 
@@ -53,7 +55,7 @@ def _sender() -> Callable[[str], object]:
 
 
 class Notify:
-    """The service manager's ear."""
+    """The notifications to the service manager."""
 
     def __init__(self) -> None:
         self._send = _sender()
@@ -61,11 +63,11 @@ class Notify:
         self._starting: asyncio.Task[None] | None = None
 
     def starting(self) -> None:
-        """Ask for more time again and again until all is started, however long that takes."""
+        """Extend the start timeout repeatedly, until ready() is called."""
         self._starting = looked_at(asyncio.create_task(self._extend()), "asking systemd for time")
 
     def ready(self, status: str) -> None:
-        """Say that clients are served, and begin to feed the watchdog."""
+        """Report that rtcfd serves clients, and begin to feed the watchdog."""
         if self._starting is not None:
             self._starting.cancel()
         self._send(f"READY=1\nSTATUS={status}")
@@ -77,27 +79,27 @@ class Notify:
             )
 
     def status(self, status: str) -> None:
-        """Say what is going on, in a line."""
+        """Report the status in one line."""
         self._send(f"STATUS={status}")
 
     def stopping(self, status: str) -> None:
-        """Say that the end has begun."""
+        """Report that the shutdown has begun."""
         self._send(f"STOPPING=1\nSTATUS={status}")
 
     def close(self) -> None:
-        """Feed the watchdog no more."""
+        """Stop all repeated notifications."""
         for task in (self._watchdog, self._starting):
             if task is not None:
                 task.cancel()
 
     async def _extend(self) -> None:
         while True:
-            # From now on, see sd_notify(3): an event loop that hangs asks for no more.
+            # Counted from now, see sd_notify(3): a hanging event loop requests no more time.
             self._send(f"EXTEND_TIMEOUT_USEC={2 * _EXTEND_EVERY_S * 1_000_000}")
             await asyncio.sleep(_EXTEND_EVERY_S)
 
     async def _feed(self, every_s: float) -> None:
-        # From the event loop itself: the watchdog is to see that this one runs.
+        # From the event loop, because the watchdog checks that the event loop runs.
         while True:
             self._send("WATCHDOG=1")
             await asyncio.sleep(every_s)

@@ -1,4 +1,4 @@
-"""What changes in rtcfd itself while it runs: its settings, its graphs.d, its own files.
+"""Reloads settings and graphs.d while rtcfd runs, and notices an upgrade of rtcfd.
 
 Owned by the daemon.
 """
@@ -33,12 +33,12 @@ log = logging.getLogger(__name__)
 _USERS_TIMEOUT_S = 5.0
 _FILES_TIMEOUT_S = 60.0
 _COPY_TIMEOUT_S = 2.0
-# Read at the start only.
+# Settings that take effect only at the start.
 _FIXED = ("socket", "runtime_dir", "state_dir", "graphs_dir", "executor")
 
 
 class Reloads:
-    """Keeps the parts of the daemon as the settings say."""
+    """Applies the settings and graphs.d to the parts of the daemon."""
 
     def __init__(
         self,
@@ -63,18 +63,19 @@ class Reloads:
         self._users = Aside("user database")
         self._aside = Aside("settings and graphs")
         self._copy = Aside("state folder")
-        self._left: Handover | None = None  # by the rtcfd before this one
+        self._left: Handover | None = None  # from the previous rtcfd
         self._graphs = BootGraphs(given.graphs_dir, {}, self._opinion)
-        self._late: list[Given] = []  # for runners that are adopted first
+        self._late: list[Given] = []  # changed graphs of runners whose executors are adopted first
         self._graph_problems: list[str] = []
-        self._refused = ""  # why the last reload changed nothing
+        self._refused = ""  # the error of the last reload; empty = it succeeded
         self._files = (Path(__file__), given.executor)
         self._identities = [_identity(file) for file in self._files]
 
     def boot(self, states: list[Desired], running: Iterable[str]) -> list[Desired]:
-        """Return the states with the runners of graphs.d as their files say.
+        """Return the states, in which runners of graphs.d have the graphs of their files.
 
-        Those whose executors run are taken as they are; catch_up() follows."""
+        The states of runners whose executors run stay; catch_up() changes them later.
+        """
         adopted = set(running)
         if adopted and (left := handover.read(self._command_folder)):
             self._left = left
@@ -91,12 +92,14 @@ class Reloads:
                     self._late.append(given)
                 continue
             become(found.setdefault(given.runner, Desired(given.runner)), given.graph)
-            log.info("runner %s is as %s says", given.runner, given.file)
+            log.info("runner %s set up from %s", given.runner, given.file)
         return list(found.values())
 
     async def catch_up(self) -> None:
-        """Once executors are adopted: apply what has changed in settings and graphs.d since the
-        rtcfd before this one read them."""
+        """Apply changes of settings and graphs.d since the previous rtcfd read them.
+
+        To be called after the adoption of executors.
+        """
         lines = await self._follow_defaults(self._given.defaults)
         lines += await self._apply(self._late)
         self._late = []
@@ -105,18 +108,18 @@ class Reloads:
             log.info("changed while rtcfd was away: %s", line)
 
     async def rules(self) -> wire.AccessRules:
-        """Return who may do what, for executors."""
+        """Return the access rules for executors."""
         access = self._admission.access
         try:
             return await self._users.run(
                 lambda: access.for_executors(self._given.socket), _USERS_TIMEOUT_S
             )
         except (Refusal, OSError) as problem:
-            log.error("executors take `stop` from root and us alone: %s", problem)
+            log.error("executors accept direct stops only from root and rtcfd's user: %s", problem)
             return wire.AccessRules()
 
     def notes(self) -> list[str]:
-        """Return what is to be said about rtcfd itself."""
+        """Return notes on rtcfd itself, a line each."""
         lines = [each for each in (self._given.settings.problem, self._refused) if each]
         lines += [f"not applied: {problem}" for problem in self._graph_problems]
         lines += self._store.problems
@@ -130,12 +133,15 @@ class Reloads:
 
     @property
     def refused(self) -> list[str]:
-        """What of graphs.d is not applied, a line each."""
+        """The errors of graphs.d, a line each."""
         return list(self._graph_problems)
 
     async def reload(self) -> list[str]:
-        """Read settings and graphs.d again; refused as a whole if the settings are not valid.
-        One at a time; a caller that leaves holds up nothing."""
+        """Reload settings and graphs.d; return a line for each change.
+
+        Raises Refusal, without any change, if the settings are not valid.  One reload at a time;
+        it goes on if its caller disconnects.
+        """
         return await self._runners.operations.take_turn("a reload", self._reload, None)
 
     async def _reload(self) -> list[str]:
@@ -143,14 +149,14 @@ class Reloads:
         try:
             lines = await self._read_again()
         except Refusal as refusal:
-            self._refused = f"settings not read again: {refusal}"
+            self._refused = f"settings not reloaded: {refusal}"
             raise
         self._refused = ""
         return lines
 
     async def _read_again(self) -> list[str]:
         new = await self._aside.run(self._read_options, _FILES_TIMEOUT_S)
-        with contextlib.suppress(Unavailable):  # a disk that hangs holds up nothing else
+        with contextlib.suppress(Unavailable):  # a hanging disk must not delay the rest
             await self._copy.run(new.settings.keep, _COPY_TIMEOUT_S)
         lines = [
             f"{name} changes with the next restart of rtcfd"
@@ -169,7 +175,7 @@ class Reloads:
         self._shared.limits = new.limits
         self._shared.rules = await self.rules()
         self._given = new
-        # Users and groups may be others than before, whatever the settings say.
+        # Also with unchanged settings, because the user database may have changed.
         for runner in self._runners.all():
             await runner.follow_limits()
         lines += await self._follow_defaults(new.defaults)
@@ -179,11 +185,11 @@ class Reloads:
         self._leave_note()
         log.log(
             logging.ERROR if self._graph_problems else logging.INFO,
-            "settings and graphs read again: %s",
+            "settings and graphs reloaded: %s",
             "; ".join(lines) or "nothing has changed",
         )
         self._shared.events.add(
-            control_pb2.Event.KIND_DAEMON, "; ".join(["settings read again", *lines])
+            control_pb2.Event.KIND_DAEMON, "; ".join(["settings reloaded", *lines])
         )
         return lines
 
@@ -214,7 +220,7 @@ class Reloads:
             except Refusal as refusal:
                 problem = f"{given.file}: {refusal}"
                 self._graph_problems.append(problem)
-                self._graphs.forget(given.file)  # tried again by the next reload
+                self._graphs.forget(given.file)  # so that the next reload tries again
                 log.error("%s", problem)
                 lines.append(problem)
         return lines
@@ -225,7 +231,7 @@ _WORDS = {"folders": "component folders", "access": "access rights", "limits": "
 
 
 def _identity(file: Path) -> tuple[int, int] | None:
-    """Return what is another when a package manager has replaced a file."""
+    """Return values that differ after a package manager has replaced a file."""
     try:
         found = os.stat(file)
     except OSError:

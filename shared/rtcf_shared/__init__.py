@@ -1,1 +1,1 @@
-"""What the daemon and its clients share: words, graph files, folders of components."""
+"""The code shared by the daemon and its clients: names, graph files, component folders."""

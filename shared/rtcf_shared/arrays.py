@@ -1,4 +1,4 @@
-"""NumPy's arrays as lists."""
+"""Converts NumPy arrays to lists."""
 
 from typing import TYPE_CHECKING, Any, cast
 
@@ -7,8 +7,8 @@ if TYPE_CHECKING:
 
 
 def as_list(array: "NDArray[Any]") -> list[Any]:
-    """Return the elements of the first dimension, as Python's own numbers and lists of them.
+    """Return an array as a list of Python numbers, or of nested lists.
 
-    NumPy's own type of this depends on its release and on what it knows of the dimensions.
+    The cast is needed because the type annotation of tolist() differs between NumPy releases.
     """
     return cast("list[Any]", array.tolist())

@@ -1,4 +1,4 @@
-"""Files that a caller names: whatever stands there, no more of it is read than can be used."""
+"""Reads files that a user names, up to a limit: they may be devices or endless pipes."""
 
 import errno
 import os
@@ -6,11 +6,11 @@ import sys
 from pathlib import Path
 from typing import BinaryIO
 
-MOST_BYTES = 16 * 1024 * 1024  # of a message to rtcfd
+MOST_BYTES = 16 * 1024 * 1024  # the limit of a message to rtcfd
 
 
 def read(path: str | Path) -> bytes:
-    """Return what a file, device or pipe gives, "-" being standard input.
+    """Return the content of a file, device or pipe; "-" is standard input.
 
     Raises OSError, also for more than MOST_BYTES.
     """

@@ -1,23 +1,22 @@
-"""Files that are replaced at once, and outlive a power cut."""
+"""Replaces files atomically, so that they survive a power cut."""
 
 import contextlib
 import errno
 import os
 import stat
 
-# What is opened here is no file of a disk, whatever it leads to.
+# Files in these folders are written to, never replaced.
 _NO_FILES = ("/dev/", "/proc/")
 
 
 def write_named(file: str | os.PathLike[str], data: bytes) -> None:
-    """Make `data` what somebody finds in the file that he named; raises OSError.  Blocks.
+    """Write `data` to a file that a user names; raises OSError.  Blocks.
 
-    A file is replaced, of a link the one that it leads to, and stays whose it is and as open as
-    it is (not in a folder that is everybody's).  A device or a pipe is never replaced: it is
-    written to.
+    A regular file, or the target of a link, is replaced.  It keeps its owner and mode, except in
+    a folder to which everybody can write (sticky, as /tmp).  A device or a pipe is written to.
     """
     try:
-        # By the kernel: it follows no stranger's link in a folder that is everybody's.
+        # Resolved by the kernel, which follows no link of another user in a sticky folder.
         place = os.open(file, os.O_PATH | os.O_CLOEXEC)
     except FileNotFoundError:
         if os.path.islink(file):
@@ -28,7 +27,7 @@ def write_named(file: str | os.PathLike[str], data: bytes) -> None:
         found = os.fstat(place)
         path = f"/proc/self/fd/{place}"
         if not stat.S_ISREG(found.st_mode) or os.path.abspath(file).startswith(_NO_FILES):
-            with open(path, "ab") as out:  # where it stands, if it leads to a file
+            with open(path, "ab") as out:  # appends, if it leads to a regular file
                 out.write(data)
             return
         real = os.readlink(path)
@@ -46,16 +45,17 @@ def replace(
     like: os.stat_result | None = None,
     mode: int = 0o666,
 ) -> None:
-    """Make `data` what a file holds, or leave it as it is; raises OSError.  Blocks.
+    """Replace the content of a file atomically; on an error, it is unchanged; raises OSError.
+    Blocks.
 
-    After a power cut it may still hold what it held, until sync_folder(); without
-    `sync` it may hold nothing.  `like`: whose mode it gets, and its owner where that is allowed;
-    else it gets `mode`, but for what the umask takes away.
+    Until sync_folder(), the file may have its old content after a power cut; without `sync`, it
+    may be empty.  The new file gets the mode of `like`, and its owner if that is permitted;
+    without `like`, `mode` minus the umask.
     """
     folder, name = os.path.split(file)
     new = os.path.join(folder, f".{name}.new")
     try:
-        # What is there, of a power cut or of somebody, is not opened: it may be a named pipe.
+        # Do not open an existing file of this name: it may be a named pipe.
         with contextlib.suppress(FileNotFoundError):
             os.unlink(new)
         with open(new, "xb", opener=lambda path, flags: os.open(path, flags, mode)) as out:
@@ -78,8 +78,8 @@ def replace(
 
 
 def sync_folder(folder: str | os.PathLike[str]) -> None:
-    """Bring what was renamed and removed in a folder to disk; raises OSError.  Blocks."""
-    # Without this a rename may be undone by a power cut (fsync(2), NOTES).
+    """Write the renamed and removed names of a folder to disk; raises OSError.  Blocks."""
+    # Without this, a power cut may undo a rename (fsync(2), NOTES).
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(descriptor)

@@ -1,5 +1,5 @@
-"""The base of what goes wrong for people, in one line."""
+"""The base class of all errors with a message of one line."""
 
 
 class RtcfError(Exception):
-    """A call failed, or a text is not valid; the message is one line for people."""
+    """A call failed, or a text is not valid; the message is one line."""

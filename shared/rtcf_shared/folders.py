@@ -1,7 +1,7 @@
-"""Where component libraries are: the folders that rtcfd and local tools search.
+"""The folders of component libraries that rtcfd and local tools search.
 
-A package is a folder of libraries, `<folder>/<package>/*.so`; of two types
-with one name in a package the first found counts.
+A package is a folder of libraries, `<folder>/<package>/*.so`.  If two libraries of a
+package provide a type, the first one wins.
 """
 
 import os
@@ -9,16 +9,16 @@ import sysconfig
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-# Of a prefix.  Its lib/rtcf is that of the programs of the ROS package rtcf: another one in a
-# workspace would hide them.
+# In <prefix>/lib.  Not lib/rtcf, which has the programs of the ROS package rtcf: a folder of that
+# name in a workspace would hide them.
 PREFIX_FOLDER = "rtcf-components"
 
 
 def component_folders(extra: Sequence[Path], build_tree: Path | None) -> list[Path]:
-    """Return the folders that hold packages, the first ones win.
+    """Return the folders of packages, in the order of the search.
 
-    Those named come first, then workspaces as catkin overlays them, then the
-    build tree of rtcf itself, then the system.
+    `extra` comes first, then the workspaces in the order of catkin's overlays, then the
+    build tree of rtcf, then the system.
     """
     folders = list(extra)
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep):
@@ -34,13 +34,14 @@ def component_folders(extra: Sequence[Path], build_tree: Path | None) -> list[Pa
 
 
 def compiled_folder() -> Path:
-    """Return where `rtcfctl load FILE.py` puts libraries; a user's private daemons look there."""
+    """Return the folder for libraries compiled by `rtcfctl load FILE.py`, which private daemons
+    of the same user search."""
     cache = os.environ.get("XDG_CACHE_HOME", "")
     return (Path(cache) if cache.startswith("/") else Path.home() / ".cache") / "rtcf-components"
 
 
 def packages(folders: Sequence[Path]) -> dict[str, list[Path]]:
-    """Return the libraries of each package, in the order in which they count."""
+    """Return the libraries of each package, in the order of the search."""
     found: dict[str, list[Path]] = {}
     for folder in folders:
         for package in _sub_folders(folder):

@@ -1,7 +1,7 @@
-"""Reads graph files: YAML to Graph, each refusal with file and line.
+"""Reads graph files: YAML to Graph; each error has file and line.
 
-docs/graph-files.md describes the format.  Scalars are typed as YAML 1.2 does
-(see rtcf.spec), so that a graph file and the command line agree.
+docs/graph-files.md describes the format.  Scalars have the types of YAML 1.2 (see
+spec.py), so that a graph file and the command line agree.
 """
 
 from collections.abc import Collection
@@ -23,20 +23,20 @@ _WORDS = {bool: "true or false", int: "an integer", float: "a number", str: "tex
 
 
 class GraphFileError(RtcfError):
-    """A graph file is not valid; the text names file, line and how to mend it."""
+    """A graph file is not valid; the text has the file, the line and the remedy."""
 
 
 @dataclass
 class Graph:
-    """The graph of one runner, and the settings that go with it."""
+    """The graph of one runner, and its settings."""
 
-    runner: str = ""  # empty: the file names none
+    runner: str = ""  # empty = the file names none
     settings: runner_pb2.RunnerSettings = field(default_factory=runner_pb2.RunnerSettings)
     components: list[graph_pb2.ComponentSpec] = field(default_factory=list)
 
 
 def read_graphs(text: str, file: str) -> list[Graph]:
-    """Return the graphs of a file's text; `file` is for messages.  Raises GraphFileError."""
+    """Return the graphs in the text of a file; `file` is for errors.  Raises GraphFileError."""
     import yaml  # slow to import
 
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -48,12 +48,12 @@ def read_graphs(text: str, file: str) -> list[Graph]:
         problem = getattr(error, "problem", None) or error
         raise GraphFileError(f"{place}: {' '.join(str(problem).split())}") from None
     if root is None:
-        raise GraphFileError(f"{file}: there is no graph in it")
+        raise GraphFileError(f"{file}: it has no graph")
     return _Reader(file).document(root)
 
 
 class _Reader:
-    """Walks the nodes of one file; `where` names a node in messages."""
+    """Walks the nodes of one file; `where` names a node in errors."""
 
     def __init__(self, file: str) -> None:
         self._file = file
@@ -84,7 +84,7 @@ class _Reader:
             spec = self._component(each)
             name = f"{spec.ns.strip('/')}/{spec.name or spec.type}".lstrip("/")
             if name in lines:
-                raise self._error(each, f"component /{name} is in line {lines[name]} already")
+                raise self._error(each, f"component /{name} is already in line {lines[name]}")
             lines[name] = each.start_mark.line + 1
             graph.components.append(spec)
         return graph
@@ -177,7 +177,7 @@ class _Reader:
             if key.id != "scalar":
                 raise self._error(key, f"a key of {where} must be a single word")
             if key.value in result:
-                raise self._error(key, f'key "{key.value}" is there twice')
+                raise self._error(key, f'key "{key.value}" occurs twice')
             result[key.value] = (key, value)
         return result
 

@@ -1,4 +1,4 @@
-"""Writes graph files: what graph_reader.py reads, and what is loaded as a Graph."""
+"""Writes graph files for graph_reader.py, and converts loaded components to their specs."""
 
 import math
 import re
@@ -11,7 +11,7 @@ from rtcf_shared.enums import word
 from rtcf_shared.graph_reader import Graph
 from rtcf_shared.spec import parse_value
 
-# YAML 1.1 takes these for ends of lines, which are folded.
+# YAML 1.1 reads these as line breaks, and folds them.
 _OTHER_BREAKS = re.compile("[\x85\u2028\u2029]")
 
 
@@ -20,7 +20,7 @@ def write_graphs(graphs: Iterable[Graph]) -> str:
     import yaml  # slow to import
 
     class Dumper(yaml.SafeDumper):  # type: ignore[misc]
-        """Quotes text that would be read as something else."""
+        """Quotes text that would otherwise be read as another type."""
 
     def text(dumper: Any, value: str) -> Any:
         style = None
@@ -41,10 +41,10 @@ def write_graphs(graphs: Iterable[Graph]) -> str:
 
 
 def live_spec(info: graph_pb2.ComponentInfo) -> graph_pb2.ComponentSpec:
-    """Return what would load a component as it is now.
+    """Return the spec that would load a component with its current values.
 
-    That is its spec with the values its parameters have now, as far as they
-    were given when it was loaded or differ from the defaults.
+    It has the parameters that were given when the component was loaded, and those that
+    differ from their defaults.
     """
     spec = graph_pb2.ComponentSpec()
     spec.CopyFrom(info.spec)
@@ -61,7 +61,7 @@ def live_spec(info: graph_pb2.ComponentInfo) -> graph_pb2.ComponentSpec:
 
 
 def same_value(one: graph_pb2.ParameterValue, other: graph_pb2.ParameterValue) -> bool:
-    """Tell whether two values are the same; 1 and 1.0 are."""
+    """Return whether two values are equal; 1 and 1.0 are, True and 1 are not."""
     left, right = (getattr(value, value.WhichOneof("kind") or "string_value")
                    for value in (one, other))  # fmt: skip
     if isinstance(left, float) and isinstance(right, float) and math.isnan(left):
@@ -71,11 +71,11 @@ def same_value(one: graph_pb2.ParameterValue, other: graph_pb2.ParameterValue) -
 
 
 def _is_text(value: str) -> bool:
-    """Tell whether a value without quotes is a string, and that one."""
+    """Return whether a value without quotes would be read as this string."""
     try:
         return parse_value(value).string_value == value
     except ValueError:
-        return False  # it looks like something that is not valid
+        return False  # without quotes it would not be valid
 
 
 def _graph(graph: Graph) -> dict[str, Any]:

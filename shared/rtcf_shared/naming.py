@@ -1,4 +1,4 @@
-"""Names in messages: those there are, and the one that was probably meant."""
+"""Lists of names, and suggestions for misspelt names, for messages."""
 
 import difflib
 import itertools
@@ -9,7 +9,7 @@ _MOST = 2000
 
 
 def suggestion(name: str, known: Iterable[str], most: int = 2) -> str:
-    """Return '; did you mean "x"?' with at most so many, or nothing where no name is close."""
+    """Return '; did you mean "x"?' with at most `most` names; empty if no name is close."""
     close = _close(name, known, most)
     if not close:
         return ""
@@ -17,7 +17,7 @@ def suggestion(name: str, known: Iterable[str], most: int = 2) -> str:
 
 
 def closest(name: str, known: Iterable[str]) -> str:
-    """Return the name that was probably meant, or nothing where none is close."""
+    """Return the closest name; empty if none is close."""
     return next(iter(_close(name, known, 1)), "")
 
 
@@ -28,6 +28,6 @@ def listing(names: Iterable[str]) -> str:
 
 def _close(name: str, known: Iterable[str], most: int) -> list[str]:
     if len(name) > _LONGEST:
-        return []  # what is compared costs by its length
+        return []  # the cost of a comparison grows with the length
     known = itertools.islice(known, _MOST)
     return difflib.get_close_matches(name, list(known), n=most, cutoff=0.6)

@@ -1,7 +1,7 @@
-"""Settings of a runner that are numbers: range, unit and default of each, written down once.
+"""The numeric settings of a runner, each with its range, unit and default.
 
-rtcfd checks by this table, rtcfctl and rt_runner take their help and their limits from it, and a
-test compares rtcfd.toml, the manual pages and the comments of runner.proto with it.
+rtcfd checks values with this table, rtcfctl and rt_runner use it for their help and limits, and a
+test compares it with rtcfd.toml, the manual pages and the comments in runner.proto.
 """
 
 import math
@@ -16,14 +16,14 @@ class Quantity:
     low: float
     high: float
     default: float
-    unit: str = ""  # "" = a plain number
+    unit: str = ""  # empty = none
 
     def range(self) -> str:
-        """Return the range for people: "0.1 to 20000 Hz"."""
+        """Return the range as text: "0.1 to 20000 Hz"."""
         return f"{_figure(self.low)} to {_figure(self.high)}{self.unit and f' {self.unit}'}"
 
     def holds(self, value: float) -> bool:
-        """Tell whether a value is in the range; NaN is in none."""
+        """Return whether a value is in the range; NaN is in none."""
         return math.isfinite(value) and self.low <= value <= self.high
 
 
@@ -32,14 +32,14 @@ _COUNT = 2**31 - 1  # XML-RPC has no larger integers
 # Named as in RunnerSettings.
 RUNNER = {
     "frequency_hz": Quantity(0.1, 50000.0, 1000.0, "Hz"),
-    "priority": Quantity(1, 98, 80),  # 99 is the kernel's own watchdog and migration threads'
-    "spin_us": Quantity(0, 1_000_000, 0, "µs"),  # and at most half a period
+    "priority": Quantity(1, 98, 80),  # 99 is for the kernel's watchdog and migration threads
+    "spin_us": Quantity(0, 1_000_000, 0, "µs"),  # also at most half a period
     "max_overruns": Quantity(0, _COUNT, 0),
     "warmup_cycles": Quantity(0, _COUNT, 10),
     "stall_timeout_ms": Quantity(0, 3_600_000, 2000, "ms"),
     "orphan_timeout_s": Quantity(0.0, 86400.0, 60.0, "s"),
     "max_clock_jump_s": Quantity(0.0, 86400.0, 10.0, "s"),
-    "log_limit": Quantity(0, 1_000_000, 100),  # of one line, a second; 0 = any number
+    "log_limit": Quantity(0, 1_000_000, 100),  # records per source line and second; 0 = unlimited
     "heap_kb": Quantity(0, 1024 * 1024, 8192, "KiB"),
     "stack_kb": Quantity(16, 64 * 1024, 256, "KiB"),
     "frame_kb": Quantity(0, 1024, 64, "KiB"),  # 0 = only watched values
@@ -70,9 +70,9 @@ _TEXT = re.compile(
 
 
 def parse(text: str, unit: str) -> float:
-    """Return the number in `unit` that a text with or without a unit stands for.
+    """Return the value of a text, with or without a unit, in `unit`.
 
-    "30us", "0.03 ms" and "30" are the same where the unit is µs.  Raises ValueError.
+    If `unit` is µs, "30us", "0.03 ms" and "30" have the same value.  Raises ValueError.
     """
     found = _TEXT.fullmatch(text)
     known: dict[str, float] = next((units for units in _UNITS if unit in units), {})
@@ -80,10 +80,10 @@ def parse(text: str, unit: str) -> float:
         return float(found[1])
     if not found or found[2] not in known:
         allowed = f" with one of {', '.join(known)}" if known else ""
-        raise ValueError(f"{text}: a number{allowed}, please")
+        raise ValueError(f"{text}: give a number{allowed}")
     value = float(found[1]) * known[found[2]] / known[unit]
     if not math.isfinite(value):
-        return value  # in no range
+        return value  # the caller's range check fails
     # 30us is 30 µs, not 29.999999999999996.
     return round(value) if math.isclose(value, round(value), rel_tol=1e-12) else value
 

@@ -1,6 +1,6 @@
-"""The fields of a ROS message and of the messages in it, by the text of its definition.
+"""Parses the definition of a ROS message: its fields, and those of the messages in it.
 
-What ROS 1 writes there is told in http://wiki.ros.org/msg.
+http://wiki.ros.org/msg describes the format.
 """
 
 import re
@@ -12,16 +12,16 @@ _FIELD = re.compile(r"^([\w/]+)(\[(\d*)\])?\s+(\w+)\s*$")
 
 @dataclass(frozen=True)
 class Field:
-    """A field, or an array of such."""
+    """A field of a message, possibly an array."""
 
     name: str
-    kind: str  # a number, "string", or a message's name with its package
+    kind: str  # a number type, "string", or a message type with its package
     is_array: bool = False
-    length: int | None = None  # of an array; None: any
+    length: int | None = None  # of an array; None = variable
 
 
 class Definition:
-    """All messages of a definition; the one that it is of has the name ""."""
+    """All message types of a definition; the defined message itself has the name ""."""
 
     def __init__(self, text: str) -> None:
         first, *others = re.split(r"^=+$", text, flags=re.MULTILINE)
@@ -35,7 +35,7 @@ class Definition:
         for line in self._texts[message].splitlines():
             match = _FIELD.match(line.partition("#")[0].strip())
             if match is None:
-                continue  # a constant, or nothing
+                continue  # a constant, a comment or an empty line
             kind, array, length, name = match.groups()
             full = self._resolve(kind, message.rpartition("/")[0])
             yield Field(name, full, array is not None, int(length) if length else None)

@@ -1,8 +1,8 @@
-"""Building components and parameters from the words of a command line.
+"""Builds components and parameters from the words of a command line.
 
-Values are read as YAML 1.2 scalars: true and false, integers (also 0x and 0o),
-floating-point numbers (also 1e-3, .inf, .nan), and strings; quotes make a
-string of anything.
+Values are YAML 1.2 scalars: true and false, integers (also 0x and 0o),
+floating-point numbers (also 1e-3, .inf, .nan), and strings.  A quoted value is
+always a string.
 """
 
 import re
@@ -22,13 +22,13 @@ _BOOLS = {
     "false": False, "False": False, "FALSE": False,
 }  # fmt: skip
 _INT_RANGE = range(-(2**63), 2**63)
-_LONGEST_INT = 100  # characters, with zeros in front
+_LONGEST_INT = 100  # characters, including leading zeros
 
 
-def several(what: str, given: Iterable[Item]) -> Iterable[Item]:
-    """Return what is given as several; raises TypeError of a text, whose letters would be taken."""
+def several(name: str, given: Iterable[Item]) -> Iterable[Item]:
+    """Return `given`; raises TypeError if it is a string, whose letters would be the items."""
     if isinstance(given, str | bytes):
-        raise TypeError(f"{what} are several, in a list: [{given!r}], not {given!r}")
+        raise TypeError(f"{name} must be a list: [{given!r}], not {given!r}")
     return given
 
 
@@ -50,8 +50,8 @@ def component(
     """Return a component to load.
 
     `remaps` are "from:=to", `parameters` are "name:=value", `breaks` are input
-    ports; the other arguments are fields of ComponentSpec.  Raises ValueError, and TypeError
-    where a text stands for several.
+    ports; the other arguments are fields of ComponentSpec.  Raises ValueError, or TypeError for a
+    string in the place of a list.
     """
     return graph_pb2.ComponentSpec(
         name=name,
@@ -84,12 +84,12 @@ def parse_parameter(text: str) -> graph_pb2.ParameterSetting:
 
 
 def parse_value(text: str) -> graph_pb2.ParameterValue:
-    """Return a value, typed as YAML 1.2 would; raises ValueError."""
+    """Return a value with its type by YAML 1.2; raises ValueError."""
     text = text.strip()
     if text in _BOOLS:
         return graph_pb2.ParameterValue(bool_value=_BOOLS[text])
     if _INT.fullmatch(text) or _HEX_OR_OCTAL.fullmatch(text):
-        # Python itself reads no more than thousands of digits.
+        # Python rejects integers of thousands of digits with another message.
         if len(text) > _LONGEST_INT:
             raise ValueError(f"{text[:20]}… does not fit into 64 bits")
         number = int(text) if _INT.fullmatch(text) else int(text, 0)

@@ -1,4 +1,4 @@
-"""What ports and state hold, which travels as text, as numbers, lists and objects."""
+"""Converts the values of ports and state from text to numbers, lists and objects."""
 
 import math
 import re
@@ -6,16 +6,16 @@ from typing import Any
 
 import yaml
 
-_MOST_DIGITS = 300  # with which a number is finite
+_MOST_DIGITS = 300  # of an integer that is finite as a double
 _INTEGER = re.compile(r"[-+]?[0-9]+")
 _FLOAT = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 _WORDS: dict[str, Any] = {"true": True, "false": False}
-# A matrix, or a vector: rows between semicolons.
+# A matrix or a vector: rows separated by semicolons.
 _MATRIX = re.compile(r"\[([^][{}\"]*;[^][{}\"]*)\]")
 
 
 class _Loader(yaml.BaseLoader):  # type: ignore[misc]
-    """Takes for a number what is one, also where YAML 1.1 knows a word, a date or a time of day."""
+    """Reads numbers as such, even where YAML 1.1 sees a word, a date or a time of day."""
 
     def construct_scalar(self, node: Any) -> Any:
         text = super().construct_scalar(node)
@@ -23,7 +23,7 @@ class _Loader(yaml.BaseLoader):  # type: ignore[misc]
 
 
 def parse(text: str) -> Any:
-    """Return the value that a text stands for; the text itself if it was cut."""
+    """Return the value of a text; the text itself if it is not valid, as a truncated one."""
     try:
         return yaml.load(_MATRIX.sub(_rows, text), _Loader)
     except yaml.YAMLError:
@@ -38,8 +38,8 @@ def _rows(found: re.Match[str]) -> str:
 
 
 def _scalar(text: str) -> Any:
-    # JSON has no words for what is not finite, and no reader takes thousands of digits: it stays
-    # a text.
+    # Infinity, NaN and integers of thousands of digits stay text, because JSON cannot represent
+    # them.
     if _INTEGER.fullmatch(text) and len(text) <= _MOST_DIGITS:
         return int(text)
     if _FLOAT.fullmatch(text) and math.isfinite(number := float(text)):

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all: what ends halfway leaves what was there before."""
+"""Writes files completely or not at all: an interrupted write leaves the old file."""
 
 import errno
 import os
@@ -9,10 +9,10 @@ from pathlib import Path
 
 @contextmanager
 def whole_file(path: Path, *, force: bool = False) -> Iterator[Path]:
-    """Give the path to write to, in the folder of `path`; the file has that name from the end on.
+    """Yield the path to write to, in the folder of `path`; at the end, the file gets that name.
 
-    A device or a pipe is written to as it is.  Raises FileExistsError for a file that is there,
-    unless `force`, also if it came meanwhile; and OSError.
+    A device or a pipe is written to directly.  Raises FileExistsError if the file exists, unless
+    `force`, even if it was created meanwhile; raises OSError.
     """
     target = path.resolve()
     if target.exists() and not target.is_file():
@@ -36,7 +36,7 @@ def _name(part: Path, target: Path, force: bool) -> None:
         except FileExistsError:
             raise
         except OSError as error:
-            # A file system without such links, as of a USB stick.
+            # A file system without hard links, as on a USB stick.
             if error.errno not in (errno.EPERM, errno.EOPNOTSUPP) or target.exists():
                 raise
     part.replace(target)

@@ -150,7 +150,7 @@ def test_a_holder_gets_the_log_records_of_its_component_and_of_no_other(
 def test_a_load_that_is_refused_leaves_nothing_behind(client: rtcf.Client, daemon: Daemon) -> None:
     client.load(counter("there"))
     refusal = lease(client, counter("there")).refusal()
-    assert "/there is there already" in str(refusal)
+    assert "/there exists already" in str(refusal)
     refusal = lease(client, rtcf.component("rtcf_test", "FailingConfigure", name="bad")).refusal()
     assert "configure" in str(refusal)
     refusal = lease(client, rtcf.component("rtcf_examples", "Mino", name="x")).refusal()

@@ -156,5 +156,5 @@ def test_who_watches_a_runner_is_told_when_it_is_removed(client: rtcf.Client) ->
     client.add_runner("arm")
     with client.watch_logs("arm") as stream:
         client.remove_runner("arm")
-        with pytest.raises(rtcf.RefusedError, match="runner arm is not there any more"):
+        with pytest.raises(rtcf.RefusedError, match="runner arm no longer exists"):
             list(stream)

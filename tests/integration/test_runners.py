@@ -137,7 +137,8 @@ def test_a_bare_stop_names_the_loops_that_run_on(daemon: Daemon, client: rtcf.Cl
         client.start(runner)
     done = daemon.ctl("stop")
     assert (done.returncode, done.stdout) == (0, "stopped\n")
-    assert done.stderr == "rtcfctl: note: runs on: second; `rtcfctl stop --all` ends all loops\n"
+    note = "still running: second; `rtcfctl stop --all` stops all loops"
+    assert done.stderr == f"rtcfctl: note: {note}\n"
     client.start()
     # Who names a runner means that one.
     done = daemon.ctl("-r", "second", "stop")

@@ -170,7 +170,7 @@ def test_a_change_that_waits_for_its_executor_says_so(daemon: Daemon) -> None:
             text=True,
         )
         assert setting.stderr is not None
-        assert "status` tells what is waited for" in setting.stderr.readline()
+        assert "still waiting after" in setting.stderr.readline()
     _, rest = setting.communicate()
     assert setting.returncode == 0, rest
 

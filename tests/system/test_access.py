@@ -77,7 +77,7 @@ def test_an_operator_runs_loops_but_loads_no_code(levels: Service) -> None:
     for change in (("load", "rtcf_examples", "Mimo", "--name", "X"), ("runner", "add", "other")):
         done = levels.ctl(*change, user="bob", check=False)
         assert done.returncode == 1
-        assert "takes the right to administer" in done.stderr
+        assert "requires the right to administer" in done.stderr
 
 
 def test_a_member_of_an_admin_group_does_everything(levels: Service) -> None:
@@ -142,8 +142,8 @@ def untrusted(service: Service, make: str) -> str:
         ("{ln} -Wl,-rpath,/srv/root -L/srv/root -lhelps",
          "which links against /srv/root/libhelps.so: /srv/root/libhelps.so belongs to user alice"),
         ("{ln} -Wl,-rpath,/srv/root -L/srv/root -lchain", "/srv/open can be written by everybody"),
-        ("mkfifo $t", "no regular file"),
-        ("mkdir $t", "no regular file"),
+        ("mkfifo $t", "not a regular file"),
+        ("mkdir $t", "not a regular file"),
     ],
 )  # fmt: skip
 def test_code_that_others_can_write_is_refused(service: Service, make: str, said: str) -> None:

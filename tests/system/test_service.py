@@ -83,7 +83,7 @@ def test_a_service_with_bad_settings_supervises_with_the_last_good_ones(service:
     assert service.machine.run("rtcfd", "--check-config", check=False).returncode == 1
     service.systemctl("restart", "rtcfd.service")
     service.wait_until_said("frequency of 0 Hz is out of range")
-    assert "the last good settings are taken instead" in service.ctl("status").stdout
+    assert "the last good settings are used instead" in service.ctl("status").stdout
     assert (service.status()["pid"], service.status()["state"]) == (executor, "running")
     service.configure("")
     service.systemctl("reload", "rtcfd.service")

@@ -1,1 +1,1 @@
-"""Who connects, who they are, and what they may do."""
+"""The control socket, the identity of its clients, and their rights."""

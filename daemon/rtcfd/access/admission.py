@@ -1,6 +1,6 @@
-"""Between the gRPC server and the service: who calls, whether they may, and a line on each change.
+"""Identifies the caller of each gRPC call, checks its right, and logs each change.
 
-An interceptor, so that no method of the service can be reached around it.
+An interceptor of the gRPC server, so that no method of the service can bypass it.
 Owned by the daemon.
 """
 
@@ -27,12 +27,12 @@ from rtcfd.common.status_codes import abort, bounded
 
 log = logging.getLogger("rtcfd.access")
 
-# Refused calls that are logged, each second; a client that tries all day fills no disk.
+# Log lines about rejected calls, per second: a client that retries all day must not fill the disk.
 _REFUSALS_PER_S = 20
 
 
 class _Malformed:
-    """What arrived was no message of the expected type, or was refused before it was read."""
+    """Stands for a request that is too large to be parsed, or could not be parsed."""
 
     def __init__(self, problem: Refusal) -> None:
         self.problem = problem
@@ -43,15 +43,15 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
 
     def __init__(self, access: Access) -> None:
         self.access = access
-        self.clients: Clients | None = None  # set by who owns both
+        self.clients: Clients | None = None  # set by the daemon, which owns both
         self._budget = Budget(_REFUSALS_PER_S)
 
     def level(self, peer: Peer) -> Level:
-        """Return what a peer may do."""
+        """Return the right of a peer."""
         return self.access.level(peer)
 
     async def intercept_service(self, continuation: Any, details: Any) -> Any:
-        """Return the handler of a call, behind the gate."""
+        """Return the handler of a call, wrapped in the checks."""
         handler = await continuation(details)
         if handler is None:
             return None
@@ -95,7 +95,7 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
 
     @contextlib.asynccontextmanager
     async def _admitted(self, method: str, request: Any, context: Any) -> AsyncIterator[Peer]:
-        """Return who calls, for as long as that lasts; refuse who may not."""
+        """Yield the caller for the duration of its call; abort the call if it is not allowed."""
         assert self.clients is not None
         with contextlib.ExitStack() as stack:
             client: Client | None = None
@@ -113,7 +113,7 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
             yield client.peer
 
     async def _check_again(self, method: str, request: Any, context: Any, peer: Peer) -> None:
-        """Show nothing more to a watcher whose right was taken away since."""
+        """Abort a stream whose caller has lost its right since it began."""
         try:
             self.access.check(peer, method)
         except Refusal as refusal:
@@ -122,7 +122,7 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
     async def _formed(
         self, method: str, requests: AsyncIterator[Any], peer: Peer
     ) -> AsyncIterator[Any]:
-        """Look at each message of a stream, which may last longer than a right does."""
+        """Check each message of a request stream: the caller may lose its right meanwhile."""
         async for request in requests:
             self.access.check(peer, method)
             _require_formed(method, request)
@@ -138,24 +138,24 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
 
     @contextlib.contextmanager
     def _noted(self, method: str, request: Any, context: Any, peer: Peer) -> Iterator[list[str]]:
-        """Log the result of a change; its refused parts go into the list."""
+        """Log the result of a change.  The caller adds the rejected parts to the yielded list."""
         but: list[str] = []
         if needed(method) <= Level.OBSERVE:
             yield but
             return
         runner = _runner(request)
-        what = f"{method} by {peer}"
+        call = f"{method} by {peer}"
         try:
             yield but
         except BaseException:
-            reason = context.details() or "its caller left"
-            self._log(logging.WARNING, f"{what}: not done: {reason}", peer, request)
+            reason = context.details() or "its caller disconnected"
+            self._log(logging.WARNING, f"{call}: failed: {reason}", peer, request)
             raise
         if but:
-            text = f"{what}: not all of it done: {bounded('; '.join(but))}"
+            text = f"{call}: partly failed: {bounded('; '.join(but))}"
             self._log(logging.WARNING, text, peer, request)
             return
-        log.info("%s: done", what, extra={"runner": runner, "peer": peer})
+        log.info("%s: done", call, extra={"runner": runner, "peer": peer})
 
     def _log(self, level: int, text: str, peer: Peer, request: Any) -> None:
         if not self._budget.take():
@@ -166,13 +166,14 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
 
 
 def _refused(response: Any) -> list[str]:
-    """Return the refused parts of a change by its answer, a line each."""
+    """Return the rejected parts of a change from its response, a line each."""
     result = getattr(response, "result", None)
     return [str(line) for line in getattr(result, "refused", ())]
 
 
 def _asked_ns(context: Any) -> int:
-    """Return when the caller says that it asked: a rtcfd that was stopped comes to it later."""
+    """Return the caller's time of the request, CLOCK_MONOTONIC in ns: rtcfd itself may have been
+    suspended since then."""
     now = time.monotonic_ns()
     for key, value in context.invocation_metadata() or ():
         if key == ASKED_KEY and isinstance(value, str) and value.isdigit() and len(value) < 20:
@@ -193,8 +194,10 @@ def _require_formed(method: str, request: Any) -> None:
 
 
 def _forgiving(method: str, deserialize: Callable[[bytes], Any]) -> Callable[[bytes], Any]:
-    """Make a deserializer that hands on what is malformed, instead of a traceback in the log,
-    and does not begin with what is too large for the call."""
+    """Make a deserializer that returns _Malformed for a request that is too large or malformed.
+
+    An exception would leave a traceback in the log.
+    """
     largest = calls.of(method).largest
 
     def forgiving(data: bytes) -> Any:

@@ -1,6 +1,6 @@
-"""Who makes the call that is being served, for what is done in its name.
+"""The caller on whose behalf the current task works.
 
-Set by admission.py for the task of each call, and of what that begins.
+admission.py sets it for the task of each call; tasks that this one creates inherit it.
 """
 
 import time
@@ -17,11 +17,11 @@ ASKED_KEY = "rtcf-asked-ns"
 
 @dataclass(frozen=True)
 class Caller:
-    """A peer, what it may do, and since when it waits for its answer."""
+    """A peer, its right, and the time of its request."""
 
     peer: Peer
     level: Level
-    tuning: Tuning | None = None  # which parameters it may set; None: all, if any
+    tuning: Tuning | None = None  # the parameter rules that bind it; None: no rule does
     asked_ns: int = field(default_factory=time.monotonic_ns)
 
 
@@ -29,22 +29,22 @@ _caller: ContextVar[Caller | None] = ContextVar("caller", default=None)
 
 
 def enter(caller: Caller) -> None:
-    """From here on this task serves a call of this caller."""
+    """Note that this task, from here on, serves a call of this caller."""
     _caller.set(caller)
 
 
 def current() -> Caller | None:
-    """Return who makes the call that is being served; None: rtcfd itself acts."""
+    """Return the caller of the current call; None: rtcfd acts on its own."""
     return _caller.get()
 
 
 def asked_ns() -> int:
-    """Return when the call that is being served was asked for, on CLOCK_MONOTONIC."""
+    """Return the time of the current request, CLOCK_MONOTONIC in ns."""
     caller = _caller.get()
     return time.monotonic_ns() if caller is None else caller.asked_ns
 
 
 def name() -> str:
-    """Return who acts, for people."""
+    """Return the caller's user name, or "rtcfd" if rtcfd acts on its own."""
     caller = _caller.get()
     return "rtcfd" if caller is None else caller.peer.user

@@ -1,6 +1,6 @@
-"""Every call of rtcf.v1.Control: which right it takes, and how large its messages may be.
+"""The calls of rtcf.v1.Control, each with its required right and its largest request.
 
-A call that is not in the table takes an administrator; a test sees to it that
+A call that is missing here requires the right to administer; a test checks that
 none is missing.
 """
 
@@ -11,36 +11,36 @@ from rtcf.v1 import runner_pb2
 
 
 class Level(enum.IntEnum):
-    """Rights, each with those before it; as `Right` of the protocol."""
+    """Rights; each includes those before it.  The numbers are those of `Right` in the protocol."""
 
     NONE = 1
     OBSERVE = 2  # see everything, change nothing
     TUNE = 3  # set parameters
-    OPERATE = 4  # run what is there: loops, loop breaks
-    ADMIN = 5  # decide what is there: load code, make runners, settings
+    OPERATE = 4  # run the loaded graph: start and stop loops, set loop breaks and values
+    ADMIN = 5  # change the graph and the machine: load code, add runners, change settings
 
     @property
     def word(self) -> str:
-        """Return it as the settings write it."""
+        """The name of this right in the settings."""
         return self.name.lower()
 
     @property
     def right(self) -> "runner_pb2.Right":
-        """Return it as the protocol writes it."""
+        """The enumerator of this right in the protocol."""
         return self.value  # type: ignore[return-value]
 
 
 WORDS = {level.word: level for level in Level}
 
-# Bytes of one request message.
+# Largest request messages, in bytes.
 _NAMES = 16 * 1024  # a handful of names
 _LISTS = 1024 * 1024  # names of many components
-_ANY = 16 * 1024 * 1024  # a graph, a recording: what gRPC takes
+_ANY = 16 * 1024 * 1024  # a graph or a recording: the limit of rtcfd's gRPC servers
 
 
 @dataclass(frozen=True)
 class Call:
-    """One call."""
+    """The requirements of one call."""
 
     right: Level
     largest: int = _NAMES
@@ -95,5 +95,5 @@ CALLS = {
 
 
 def of(method: str) -> Call:
-    """Return what a method takes."""
+    """Return the requirements of a method."""
     return CALLS.get(method, UNKNOWN)

@@ -1,12 +1,11 @@
-"""What clients connect to: takes them, learns who they are, and relays to the gRPC server.
+"""Accepts clients on the control socket, identifies them, and relays them to the gRPC servers.
 
-grpcio neither shows a peer's credentials nor adopts a listening socket. So it
-serves private sockets, and each client is relayed there from a socket with a
-name of its own, which grpcio does show.  Owned by the daemon.
+grpcio neither shows a peer's credentials nor adopts a listening socket.  So the
+gRPC servers listen on private sockets.  Each client is relayed there from a socket
+with a unique name, which grpcio does show.  Owned by the daemon.
 
-Everything here is bounded by user: connections, bytes a second, the time until
-a first call and between calls; and some connections are kept for those who may
-stop loops.
+Limits apply to each user: connections, bytes per second, the time until the first
+call and between calls.  Some connections are reserved for clients that may stop loops.
 """
 
 import asyncio
@@ -33,21 +32,21 @@ from rtcfd.common.refusals import Refusal, ResourceExhausted
 log = logging.getLogger(__name__)
 
 _CHUNK = 65536
-# Accepted before the event loop looks after something else: as many as may wait, as one for whom
-# there is no place in that queue is not waited for by gRPC.
+# Connections accepted in one turn of the event loop: the whole listen backlog, because a gRPC
+# client that finds the backlog full does not wait.
 _AT_ONCE = 4096
-# New connections of a user; above that they are hung up on before anything else is asked.
+# New connections per user and second; further ones are closed at once.
 _ARRIVALS_PER_S = 20.0
 _MOST_USERS = 4096
-# Connections above the limit that get a word of refusal; more are hung up on.
+# Connections above the limit that receive an error message; further ones are closed at once.
 _MOST_REFUSED = 64
 _MOST_REFUSED_OF_A_USER = 8
-_FIRST_CALL_S = 20.0  # from the connection on
-_IDLE_S = 900.0  # without a call; gRPC's clients connect again by themselves
-_LOOK_S = 5.0
-_LINGER_S = 5.0  # for who was hung up on to hang up too
-_OUT_OF_DESCRIPTORS_S = 0.1
-_SHOWN_PREFIX = "unix-abstract:"  # of an abstract name, as grpcio shows it
+_FIRST_CALL_S = 20.0  # longest time from the connection to the first call
+_IDLE_S = 900.0  # longest time between calls; gRPC clients reconnect by themselves
+_LOOK_S = 5.0  # interval of the search for overdue clients, and of warnings
+_LINGER_S = 5.0  # grace period for dropped clients
+_OUT_OF_DESCRIPTORS_S = 0.1  # pause before the next attempt to accept
+_SHOWN_PREFIX = "unix-abstract:"  # how grpcio marks an abstract socket name
 
 
 @dataclass(frozen=True)
@@ -55,7 +54,7 @@ class Doors:
     """The private sockets of the gRPC servers."""
 
     trusted: Path
-    others: Path  # takes small messages and few streams only
+    others: Path  # accepts only small messages and few streams
 
 
 @dataclass(eq=False)
@@ -68,18 +67,18 @@ class Client:
     usage: Usage
     peer: Peer | None = None  # None: its names are not known yet
     level: Level = Level.NONE
-    refused: bool = False  # one too many: it is told so until there is room
-    calls: int = 0  # under way
+    refused: bool = False  # above the limit: its calls fail until there is room
+    calls: int = 0  # running
     last_call: float = 0.0  # 0 = none yet
     name: str = field(default_factory=lambda: f"rtcfd-client-{secrets.token_hex(16)}")
 
     @property
     def trusted(self) -> bool:
-        """Tell whether the reserve is for this one."""
+        """Whether this client may use the reserved connections."""
         return self.level >= TRUSTED
 
     def overdue(self, now: float) -> str:
-        """Return why it is to be ended; empty = it is not."""
+        """Return the reason to disconnect this client; empty = there is none."""
         if self.calls:
             return ""
         if not self.last_call:
@@ -88,9 +87,9 @@ class Client:
 
 
 class Clients:
-    """Those who are connected.  `limits` may be changed while it serves.
+    """The connected clients.  `limits` may be changed at any time.
 
-    `level_of` says what a peer may do by the rules of now.
+    `level_of` returns the right of a peer under the current rules.
     """
 
     def __init__(self, doors: Doors, limits: Limits, level_of: Callable[[Peer], Level]) -> None:
@@ -110,39 +109,39 @@ class Clients:
         return await self._directory.name_of(uid)
 
     async def serve(self, listener: socket.socket) -> None:
-        """Begin to take clients from a listening socket."""
+        """Begin to accept clients from a listening socket."""
         listener.setblocking(False)
         self._listener = listener
         asyncio.get_running_loop().add_reader(listener, self._accept)
 
     def close_door(self) -> None:
-        """Take no more clients: with systemd's socket they wait for the next rtcfd."""
+        """Stop accepting clients.  At systemd's socket, new clients wait for the next rtcfd."""
         if self._listener is not None:
             asyncio.get_running_loop().remove_reader(self._listener)
             self._listener.close()
             self._listener = None
 
     async def read(self, timeout_s: float) -> None:
-        """Wait until all clients have read what they were answered, of servers that have ended."""
+        """Wait until all clients have read the last responses of the ended gRPC servers."""
         if self._relays:
             await asyncio.wait(self._relays, timeout=timeout_s)
 
     def close(self) -> None:
-        """Take no more clients, and let go those that are there."""
+        """Stop accepting clients, and disconnect the present ones."""
         self.close_door()
         for relay in self._relays:
             relay.cancel()
 
     @contextmanager
     def calling(self, shown: str, method: str) -> Iterator[Client]:
-        """Count a call as long as it lasts; return who makes it, from what grpcio shows.
+        """Count a call while it lasts; yield its client, found by the name that grpcio shows.
 
-        Refuses one client, or one call, too many.
+        Raises ResourceExhausted if the client or the call is above a limit.
         """
         client = self._clients.get(shown.removeprefix(_SHOWN_PREFIX))
         if client is None or client.peer is None:
             raise Refusal(
-                "this call did not come by the control socket", errors_pb2.REASON_INTERNAL
+                "this call did not arrive by the control socket", errors_pb2.REASON_INTERNAL
             )
         client.level = self._level_of(client.peer)
         client.last_call = time.monotonic()
@@ -153,9 +152,8 @@ class Clients:
                 f"rtcfd serves {self.limits.clients} clients already: end some, or raise clients "
                 "under [limits] in its settings"
                 if client.trusted
-                else f"rtcfd serves as many clients as user {client.peer.user} may have, or as "
-                "there is room for: end some, or raise clients or clients_per_user under [limits] "
-                "in its settings",
+                else f"rtcfd has no free place for a client of user {client.peer.user}: end some, "
+                "or raise clients or clients_per_user under [limits] in its settings",
                 errors_pb2.REASON_TOO_MANY_CLIENTS,
                 user=client.peer.user,
             )
@@ -168,7 +166,7 @@ class Clients:
                 client.last_call = time.monotonic()
 
     def _accept(self) -> None:
-        """Take those that wait; who is one too many costs next to nothing."""
+        """Accept all waiting connections.  Those above the limits cost next to nothing."""
         for _ in range(_AT_ONCE):
             if self._listener is None:
                 return
@@ -177,8 +175,8 @@ class Clients:
             except (BlockingIOError, ConnectionError):
                 return
             except OSError as error:
-                # Out of descriptors: looking again at once would do nothing else.
-                self._warn("no more clients for now: %s", error.strerror)
+                # Out of file descriptors: retrying at once would occupy the event loop.
+                self._warn("cannot accept clients for now: %s", error.strerror)
                 self._pause(self._listener)
                 return
             connection.setblocking(False)
@@ -214,7 +212,7 @@ class Clients:
             if len(refused) >= _MOST_REFUSED or of_user >= _MOST_REFUSED_OF_A_USER:
                 connection.close()
                 return
-            self._warn("too many clients: some of uid %d are refused", found.uid)
+            self._warn("too many clients: rejecting some of uid %d", found.uid)
         self._clients[client.name] = client
         client.usage.connections += 1
         task = asyncio.get_running_loop().create_task(self._serve(client))
@@ -230,7 +228,7 @@ class Clients:
         return found
 
     def _full(self, client: Client) -> bool:
-        """Tell whether there is no room for one more such client."""
+        """Return whether the limits leave no room for this client."""
         served = [
             each for each in self._clients.values() if not each.refused and each is not client
         ]
@@ -253,7 +251,7 @@ class Clients:
                     client.refused = self._full(client)
             await self._relay(client)
         except OSError as error:
-            self._warn("a client is lost: %s", error.strerror or error)
+            self._warn("a client's connection failed: %s", error.strerror or error)
         finally:
             client.connection.close()
             del self._clients[client.name]
@@ -263,12 +261,13 @@ class Clients:
 
     async def _relay(self, client: Client) -> None:
         door = self._doors.trusted if client.trusted else self._doors.others
-        # Bare sockets: closing them is the end, whatever has not been read on the other side.
+        # Sockets, not asyncio streams: closing one takes effect at once, even if the other side
+        # has unread data.
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as inner:
             inner.setblocking(False)
             inner.bind("\0" + client.name)
             await asyncio.get_running_loop().sock_connect(inner, str(door))
-            # When one side ends so does the other: gRPC never closes only half.
+            # When one side closes, close the other too: gRPC never closes a single direction.
             there = asyncio.create_task(_pump(client.connection, inner, client))
             back = asyncio.create_task(_pump(inner, client.connection))
             ways = {there, back}
@@ -277,10 +276,11 @@ class Clients:
                     await asyncio.wait(ways, timeout=_LOOK_S, return_when=asyncio.FIRST_COMPLETED)
                 )[0]:
                     if reason := client.overdue(time.monotonic()):
-                        log.debug("a client of %s is hung up on: %s", client.peer, reason)
+                        log.debug("disconnecting a client of %s: %s", client.peer, reason)
                         break
                 if there.done() and not there.result():
-                    # gRPC has hung up on who still talks: what it had answered comes first.
+                    # gRPC has closed the connection of a client that still sends: relay gRPC's
+                    # last responses first.
                     await asyncio.wait({back}, timeout=_LINGER_S)
             finally:
                 hung_up = back.done()
@@ -291,7 +291,7 @@ class Clients:
                 await _linger(client.connection)
 
     def _warn(self, text: str, *arguments: object) -> None:
-        """Say what may happen a thousand times a second, once in a while."""
+        """Log a warning, at most one per _LOOK_S: its cause may occur 1000 times a second."""
         now = time.monotonic()
         if now - self._warned > _LOOK_S:
             self._warned = now
@@ -299,20 +299,25 @@ class Clients:
 
 
 async def _linger(connection: socket.socket) -> None:
-    """Let a client read to the end: with its first word that fails, gRPC throws away what it has
-    not read yet."""
+    """Wait for the client to close, so that it can read the last response.
+
+    Closing at once could make the client's next write fail, and a gRPC client discards
+    all unread data then.
+    """
     loop = asyncio.get_running_loop()
     with contextlib.suppress(OSError, TimeoutError):
         connection.shutdown(socket.SHUT_WR)
         async with asyncio.timeout(_LINGER_S):
             while await loop.sock_recv(connection, _CHUNK):
-                # Who talks on and on gets no turn of all others.
+                # A client that sends without pause must not starve the others.
                 await asyncio.sleep(0)
 
 
 async def _pump(source: socket.socket, sink: socket.socket, client: Client | None = None) -> bool:
-    """Hand on what comes; of a `client` that may only look, so much a second.  Tell whether it
-    was all taken."""
+    """Copy from `source` to `sink` until the source closes; return False if the sink failed.
+
+    The rate is limited for a `client` that is not trusted.
+    """
     loop = asyncio.get_running_loop()
     with contextlib.suppress(OSError):
         while data := await loop.sock_recv(source, _CHUNK):

@@ -1,4 +1,4 @@
-"""The control socket's file: taking it, or getting it from systemd, and giving it back."""
+"""The control socket: binds it or takes it over from systemd, and removes its file."""
 
 import os
 import socket
@@ -17,17 +17,20 @@ _FIRST_PASSED = 3  # sd_listen_fds(3)
 
 
 class Endpoint:
-    """A listening unix socket, ours from listen() to remove()."""
+    """A listening unix socket, owned by this process from listen() to remove()."""
 
     def __init__(self, path: Path, private: bool = False) -> None:
-        """`private`: for our user alone."""
+        """`private`: only this process's user may connect."""
         self.path = path
         self._umask = _PRIVATE_UMASK if private else _UMASK
-        self._identity: tuple[int, int] | None = None  # device and inode; None: not ours to remove
+        self._identity: tuple[int, int] | None = None  # device, inode; None: nothing to remove
 
     def listen(self) -> socket.socket:
-        """Return the socket that systemd passed, or a new one: a stale file is removed, a live
-        one refused."""
+        """Return the socket passed by systemd, or a new one.
+
+        Replaces a stale socket file.  Raises FailedPrecondition if a daemon answers at the
+        path, or if the socket cannot be created there.
+        """
         passed = _passed()
         if passed is not None:
             self.path = Path(passed.getsockname())
@@ -48,7 +51,8 @@ class Endpoint:
         except OSError as error:
             listener.close()
             raise FailedPrecondition(
-                f"cannot listen on {self.path}: {error.strerror}; is its folder ours to write?",
+                f"cannot listen on {self.path}: {error.strerror}; check that rtcfd may write to "
+                "its folder",
                 errors_pb2.REASON_DAEMON_FAILED,
             ) from None
         finally:
@@ -92,20 +96,20 @@ class Endpoint:
 
 
 def _passed() -> socket.socket | None:
-    """Return the listening socket of rtcfd.socket, if systemd started us by it or with it."""
+    """Return the listening socket of rtcfd.socket; None: systemd passed none."""
     if os.environ.get("LISTEN_PID") != str(os.getpid()):
         return None
     count = os.environ.get("LISTEN_FDS", "")
     if count != "1":
         raise FailedPrecondition(
-            f"systemd passed {count or 'no'} sockets: rtcfd takes one",
+            f"systemd passed {count or 'no'} sockets: rtcfd expects one",
             errors_pb2.REASON_DAEMON_FAILED,
         )
     listener = socket.socket(fileno=_FIRST_PASSED)
     listening = listener.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
     if listener.family != socket.AF_UNIX or listener.type != socket.SOCK_STREAM or not listening:
         raise FailedPrecondition(
-            "the socket that systemd passed is no listening unix stream socket: "
+            "the socket that systemd passed is not a listening unix stream socket: "
             "see ListenStream= in rtcfd.socket",
             errors_pb2.REASON_DAEMON_FAILED,
         )

@@ -1,7 +1,7 @@
-"""How long what is in a request may be: looked at before anything else is done with it.
+"""Limits on the length of texts in a request, checked before all other work.
 
-Names go into look-ups, suggestions, log records and refusals, each of which
-costs by their length.
+Names go into look-ups, suggestions, log records and errors.  The cost of each grows
+with their length.
 """
 
 from typing import Any
@@ -10,28 +10,28 @@ from rtcf.v1 import errors_pb2
 
 from rtcfd.common.refusals import InvalidArgument
 
-LONGEST_NAME = 255  # ROS's own
+# In characters.
+LONGEST_NAME = 255  # the limit of ROS
 LONGEST_TEXT = 4096  # remaps, expressions, URIs
-LONGEST_VALUE = 64 * 1024  # of a parameter that is a string
+LONGEST_VALUE = 64 * 1024  # string parameters
 _NAMES = frozenset(
     {
         "runner", "component", "components", "package", "type", "name", "ns", "port", "run_id",
         "token", "holder",
     }
 )  # fmt: skip
-# Values are what somebody wants to have, not names of something.
 _VALUES = "rtcf.v1.ParameterValue"
 _BULK = frozenset({"rtcf.v1.RecordedMessage"})
 
 
 def check(message: Any) -> None:
-    """Refuse a message with a text in it that is too long."""
+    """Raise InvalidArgument if a text in a message, at any depth, is too long."""
     full_name = message.DESCRIPTOR.full_name
     if full_name in _BULK:
         return
     for field, value in message.ListFields():
         if field.message_type is not None:
-            # A single message has no length.
+            # `value` is one message or a list of messages.
             for each in [value] if hasattr(value, "DESCRIPTOR") else value:
                 check(each)
         elif field.cpp_type == field.CPPTYPE_STRING and field.type == field.TYPE_STRING:

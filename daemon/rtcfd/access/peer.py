@@ -1,4 +1,4 @@
-"""Who is at the other end of a connection, by the kernel's word and the user database's names."""
+"""The peer of a connection: its credentials from the kernel, its names from the user database."""
 
 import grp
 import os
@@ -13,15 +13,15 @@ from rtcfd.common.refusals import Refusal
 
 _CREDENTIALS = struct.Struct("3i")  # struct ucred, unix(7)
 _SO_PEERGROUPS = 59  # asm-generic/socket.h; unknown to Python's socket
-_LARGEST_OPTION = 1024  # bytes, of Python's getsockopt: 256 groups
-_KEPT_S = 60.0  # names that were looked up
+_LARGEST_OPTION = 1024  # bytes, the limit of Python's getsockopt: 256 groups
+_KEPT_S = 60.0  # how long names stay in the cache
 _MOST_KEPT = 4096
-_TIMEOUT_S = 5.0  # for the user database
+_TIMEOUT_S = 5.0  # of a look-up in the user database
 
 
 @dataclass(frozen=True)
 class Credentials:
-    """What the kernel says of a process that connected, with the rights it had then."""
+    """A connected process, as the kernel recorded it when it connected."""
 
     pid: int
     uid: int
@@ -30,12 +30,12 @@ class Credentials:
 
 @dataclass(frozen=True)
 class Peer:
-    """A process that connected, with the names of its user and groups."""
+    """A connected process, with the names of its user and groups."""
 
     pid: int
     uid: int
-    user: str  # #uid where there is none
-    groups: frozenset[str]  # by name; #gid where there is none
+    user: str  # #uid if it has no name
+    groups: frozenset[str]  # names; #gid for a group without one
     known: bool = True  # False: the user database did not answer
 
     def __str__(self) -> str:
@@ -43,25 +43,25 @@ class Peer:
 
 
 def user_of(connection: socket.socket) -> int:
-    """Return the user of the peer of a connected unix socket; raises OSError.  Never blocks."""
+    """Return the uid of the peer of a connected unix socket; raises OSError.  Never blocks."""
     found = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
     return int(_CREDENTIALS.unpack(found)[1])
 
 
 def credentials(connection: socket.socket) -> Credentials:
-    """Return those of the peer of a connected unix socket; raises OSError.  Never blocks."""
+    """Return the peer's credentials of a connected unix socket; raises OSError.  Never blocks."""
     found = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
     pid, uid, gid = _CREDENTIALS.unpack(found)
     try:
         listed = connection.getsockopt(socket.SOL_SOCKET, _SO_PEERGROUPS, _LARGEST_OPTION)
     except OSError:
-        # Of more than 256 groups the first counts: rights come from few.
+        # With more than 256 groups, only the primary group counts.
         listed = b""
     return Credentials(pid, uid, frozenset({gid, *struct.unpack(f"{len(listed) // 4}I", listed)}))
 
 
 class Directory:
-    """Names of users and groups, looked up aside and kept for a while.
+    """The names of users and groups, looked up in worker threads and cached.
 
     Owned by Clients.
     """
@@ -69,22 +69,22 @@ class Directory:
     def __init__(self) -> None:
         self._aside = Aside("user database")
         self._kept: dict[tuple[int, frozenset[int]], tuple[float, str, frozenset[str]]] = {}
-        # A hanging database must not keep out who may always come in.
+        # A hanging user database must not lock out root and our own user.
         self._sure = {0: "root", os.geteuid(): user_name(os.geteuid())}
 
     def sure(self, uid: int) -> bool:
-        """Tell whether this is root or our own user."""
+        """Return whether this is root or our own user."""
         return uid in self._sure
 
     def known(self, found: Credentials) -> Peer | None:
-        """Return a peer whose names are at hand."""
+        """Return a peer if its names are cached, else None."""
         if found.uid in self._sure:
             return Peer(found.pid, found.uid, self._sure[found.uid], frozenset())
         until, user, groups = self._kept.get((found.uid, found.gids), (0.0, "", frozenset()))
         return Peer(found.pid, found.uid, user, groups) if until > time.monotonic() else None
 
     async def peer(self, found: Credentials) -> Peer:
-        """Return a peer with its names; one that is not `known` if they cannot be found out."""
+        """Return a peer with its names; not `known` if the user database does not answer."""
         try:
             user, groups = await self._aside.run(lambda: _names(found), _TIMEOUT_S)
         except (Refusal, OSError):
@@ -95,7 +95,7 @@ class Directory:
         return Peer(found.pid, found.uid, user, groups)
 
     async def name_of(self, uid: int) -> str:
-        """Return a user's name for people, or #uid if that takes too long."""
+        """Return a user's name, or #uid if the user database does not answer."""
         try:
             if uid in self._sure:
                 return self._sure[uid]
@@ -105,7 +105,7 @@ class Directory:
 
 
 def user_name(uid: int) -> str:
-    """Return a user's name, or #uid where there is none.  May block."""
+    """Return a user's name, or #uid if it has none.  May block."""
     try:
         return pwd.getpwuid(uid).pw_name
     except KeyError:

@@ -1,6 +1,6 @@
-"""What a client may do, by its user and groups.
+"""The rights of clients, by user and group.
 
-Owned by the daemon; asked by admission.py before each call.
+Owned by the daemon; admission.py checks them before each call.
 """
 
 import grp
@@ -27,27 +27,28 @@ log = logging.getLogger(__name__)
 
 
 def needed(method: str) -> Level:
-    """Return what a method of rtcf.v1.Control takes."""
+    """Return the right that a method of rtcf.v1.Control requires."""
     return calls.of(method).right
 
 
 @dataclass(frozen=True)
 class Access:
-    """The rules: a user's own rule goes before those of groups, of these the highest counts."""
+    """The rules.  A user's own rule overrides those of groups; of several groups, the highest
+    right counts."""
 
-    default: Level = Level.ADMIN  # of whoever may connect and is not named
+    default: Level = Level.ADMIN  # for clients without a rule
     users: Mapping[str, Level] = field(default_factory=dict)
     groups: Mapping[str, Level] = field(default_factory=dict)
     parameters: tuple[Rule, ...] = ()
 
     def tuning(self, peer: Peer) -> Tuning | None:
-        """Return which parameters a peer may set; None: all, if it may set any."""
+        """Return the parameter rules that bind a peer; None: its right alone decides."""
         rules = tuple(rule for rule in self.parameters if rule.of(peer))
         return Tuning(peer.user, rules) if bound(self.level(peer), rules) else None
 
     def level(self, peer: Peer) -> Level:
-        """Return what a peer may do."""
-        # Root can become anybody, and our own user owns the executors.
+        """Return the right of a peer."""
+        # Root can become any user, and our own user owns the executors.
         if peer.uid in (0, os.geteuid()):
             return Level.ADMIN
         if not peer.known and (self.users or self.groups):
@@ -58,22 +59,22 @@ class Access:
         return max(ruled, default=self.default)
 
     def check(self, peer: Peer, method: str) -> None:
-        """Refuse a call that a peer may not make."""
+        """Raise PermissionDenied if a peer may not make a call."""
         has, wants = self.level(peer), needed(method)
         if has >= wants:
             return
         if wants == Level.TUNE and has == Level.OBSERVE and self.tuning(peer) is not None:
-            return  # which parameters is looked at where they are known
+            return  # the handler of the call checks each parameter
         if not peer.known:
             raise PermissionDenied(
-                f"{method} takes the right to {_deed(wants)}, and who user {peer.user} is cannot "
-                "be found out: the user database does not answer",
+                f"{method} requires the right to {_deed(wants)}, and the name and groups of user "
+                f"{peer.user} are unknown: the user database does not answer",
                 errors_pb2.REASON_RIGHT_MISSING,
                 right=wants.word,
                 user=peer.user,
             )
         raise PermissionDenied(
-            f"{method} takes the right to {_deed(wants)}, and user {peer.user} has "
+            f"{method} requires the right to {_deed(wants)}, and user {peer.user} has "
             f"{'none' if has == Level.NONE else f'only the right to {_deed(has)}'}: an "
             f'administrator grants it by {wants.word} = ["{peer.user}"] under [access] in '
             "rtcfd's settings and `systemctl reload rtcfd`",
@@ -83,21 +84,21 @@ class Access:
         )
 
     def for_executors(self, door: Path) -> wire.AccessRules:
-        """Return the rules by numbers, with who can connect to the socket `door` at all.
+        """Return the rules with uids and gids, and the permissions of the control socket `door`.
 
-        May block: asks the user database.  Names that it does not have are left out.
+        May block: asks the user database.  Rules with unknown names are left out.
         """
         found = wire.AccessRules(others=self.default.right)
         for name, level in self.users.items():
             try:
                 found.users.add(id=pwd.getpwnam(name).pw_uid, right=level.right)
             except KeyError:
-                log.warning("[access] names user %s, whom there is not", name)
+                log.warning("[access] names the unknown user %s", name)
         for name, level in self.groups.items():
             try:
                 found.groups.add(id=grp.getgrnam(name).gr_gid, right=level.right)
             except KeyError:
-                log.warning("[access] names group %s, which there is not", name)
+                log.warning("[access] names the unknown group %s", name)
         try:
             there = door.stat()
         except OSError:
@@ -111,7 +112,7 @@ class Access:
 def rules(
     named: Mapping[Level, Collection[str]], default: Level, parameters: tuple[Rule, ...] = ()
 ) -> Access:
-    """Return the rules that a settings file gives; names that begin with @ are groups."""
+    """Build the rules of a settings file; names that begin with @ are groups."""
     users: dict[str, Level] = {}
     groups: dict[str, Level] = {}
     for level in sorted(named):

@@ -1,7 +1,7 @@
-"""Who may set which parameters, and how fast: the [[access.parameters]] of the settings.
+"""Rules on parameters and their rate of change: [[access.parameters]] of the settings.
 
-Rules grant them to users who may otherwise only look, and bound those who may
-tune; who may operate is bound by none.
+A rule lets users with the right to observe set some parameters, and restricts users
+with the right to tune to them.  Users with the right to operate are not restricted.
 """
 
 import re
@@ -13,26 +13,26 @@ from rtcfd.access.calls import Level
 from rtcfd.access.peer import Peer
 from rtcfd.common.refusals import FailedPrecondition, PermissionDenied
 
-# A value that has not been changed for long may not leap either.
+# The allowed step grows with the time since the last change, up to this time.
 LONGEST_PAUSE_S = 10.0
-_FIRST_PAUSE_S = 1.0  # before the first change
+_FIRST_PAUSE_S = 1.0  # assumed before the first change
 
 
 @dataclass(frozen=True)
 class Rule:
-    """Some users, and what they may set."""
+    """A set of users, and the parameters that they may set."""
 
     who: frozenset[str]  # users, and groups with @
-    runner: str = ".*"  # an expression that matches the whole name
-    names: tuple[str, ...] = (".*",)  # likewise, of COMPONENT.PARAMETER
-    most_per_s: float | None = None  # change of a number, in its unit
+    runner: str = ".*"  # regular expression that matches the whole name
+    names: tuple[str, ...] = (".*",)  # likewise, for COMPONENT.PARAMETER
+    most_per_s: float | None = None  # largest change of a number per second, in its unit
 
     def of(self, peer: Peer) -> bool:
-        """Tell whether it is about this user."""
+        """Return whether the rule names this user or one of its groups."""
         return peer.user in self.who or not self.who.isdisjoint(f"@{each}" for each in peer.groups)
 
     def allows(self, runner: str, name: str) -> bool:
-        """Tell whether it is about this parameter: `name` is COMPONENT.PARAMETER."""
+        """Return whether the rule covers a parameter; `name` is COMPONENT.PARAMETER."""
         if not re.fullmatch(self.runner, runner):
             return False
         return any(re.fullmatch(pattern, name) for pattern in self.names)
@@ -40,20 +40,20 @@ class Rule:
 
 @dataclass(frozen=True)
 class Tuning:
-    """What one user may set."""
+    """The rules that bind one user."""
 
     user: str
     rules: tuple[Rule, ...]
 
     def rule(self, runner: str, name: str) -> Rule:
-        """Return the rule for a parameter, or refuse."""
+        """Return the rule for a parameter; raises PermissionDenied if there is none."""
         for rule in self.rules:
             if rule.allows(runner, name):
                 return rule
         allowed = ", ".join(sorted({each for rule in self.rules for each in rule.names}))
         raise PermissionDenied(
-            f"user {self.user} may not set {name} of runner {runner}, but what matches {allowed}: "
-            "see [[access.parameters]] in rtcfd's settings",
+            f"user {self.user} may not set {name} of runner {runner}, only parameters that match "
+            f"{allowed}: see [[access.parameters]] in rtcfd's settings",
             errors_pb2.REASON_PARAMETER_FORBIDDEN,
             parameter=name,
             user=self.user,
@@ -63,14 +63,18 @@ class Tuning:
 def require_pace(
     rule: Rule, name: str, old: object, new: object, last: float | None, now: float
 ) -> None:
-    """Refuse a change of a number that is faster than the rule allows; times in seconds."""
+    """Raise FailedPrecondition if a number changes faster than the rule allows.
+
+    `last` is the time of the last change (None: there was none), `now` the current time,
+    both in seconds on one clock.
+    """
     if rule.most_per_s is None or not isinstance(old, int | float) or isinstance(old, bool):
         return
     if not isinstance(new, int | float):
-        return  # of another type: its component refuses it
+        return  # the component rejects a value of another type
     pause_s = _FIRST_PAUSE_S if last is None else min(now - last, LONGEST_PAUSE_S)
     most = rule.most_per_s * pause_s
-    # Written so that NaN is too fast.
+    # "not <=" instead of ">": NaN must fail.
     if not abs(new - old) <= most:
         raise FailedPrecondition(
             f"{name} may change by {rule.most_per_s:g} a second: from {old:g} to between "
@@ -81,5 +85,5 @@ def require_pace(
 
 
 def bound(level: Level, rules: tuple[Rule, ...]) -> bool:
-    """Tell whether rules bind a user with this right."""
+    """Return whether rules bind a user with this right."""
     return bool(rules) and level < Level.OPERATE

@@ -1,7 +1,7 @@
-"""What one user takes of rtcfd: connections, calls under way, calls a second.
+"""The use that one user makes of rtcfd: connections, running calls, calls per second.
 
-Owned by Clients.  Those who may stop loops are not held back: a flood by one
-who may only look must never be the reason why a loop goes on.
+Owned by Clients.  Users that may stop loops are not limited: a flood of calls by
+another user must never delay a stop.
 """
 
 import asyncio
@@ -15,31 +15,31 @@ from rtcfd.access.calls import Level
 from rtcfd.access.peer import Peer
 from rtcfd.common.refusals import ResourceExhausted
 
-# From this right on nothing is held back, and connections are kept in reserve.
+# Users with this right or more are not limited, and some connections are reserved for them.
 TRUSTED = Level.OPERATE
 _CALLS_AT_A_TIME = 64
 _WATCHES_AT_A_TIME = 8
 _CALLS_PER_S = 100.0
 _BYTES_PER_S = 1024 * 1024.0
-_SAVED_S = 0.5  # of the above, for bursts
+_SAVED_S = 0.5  # seconds of unused rate that a burst may use
 
 
 class Pace:
-    """So many a second: says how long to wait before the next."""
+    """A rate limit that delays instead of rejecting."""
 
     def __init__(self, per_s: float) -> None:
         self._per_s = per_s
         self._due = time.monotonic()
 
     def take(self, amount: float = 1.0) -> float:
-        """Take some; return for how many seconds to wait before."""
+        """Account for `amount`; return how many seconds to wait before using it."""
         now = time.monotonic()
         self._due = max(self._due, now - _SAVED_S) + amount / self._per_s
         return max(self._due - now, 0.0)
 
 
 class Usage:
-    """Of one user."""
+    """The use of one user."""
 
     def __init__(self) -> None:
         self.connections = 0
@@ -50,22 +50,23 @@ class Usage:
 
     @property
     def idle(self) -> bool:
-        """Tell whether there is nothing of this user."""
+        """Whether the user has neither connections nor running calls."""
         return not (self.connections or self._calls)
 
     @contextmanager
     def calling(self, method: str, peer: Peer, level: Level) -> Iterator[None]:
-        """Count a call that is under way; refuse one too many of those who may only look."""
+        """Count a running call; raises ResourceExhausted above the limits of users who are not
+        trusted."""
         watches = method.startswith("Watch")
         if level < TRUSTED:
-            for number, most, what in (
-                (self._calls, _CALLS_AT_A_TIME, "calls"),
-                (self._watches if watches else 0, _WATCHES_AT_A_TIME, "streams of figures"),
+            for number, most, kind in (
+                (self._calls, _CALLS_AT_A_TIME, "running calls"),
+                (self._watches if watches else 0, _WATCHES_AT_A_TIME, "open streams"),
             ):
                 if number >= most:
                     raise ResourceExhausted(
-                        f"user {peer.user} has {number} {what} under way, the most at a time of "
-                        f"who may only {level.word}: end some",
+                        f"user {peer.user} has {number} {kind}, the limit of a user that may only "
+                        f"{level.word}: end some",
                         errors_pb2.REASON_TOO_MANY_CALLS,
                         user=peer.user,
                     )
@@ -78,6 +79,6 @@ class Usage:
             self._watches -= watches
 
     async def turn(self, level: Level) -> None:
-        """Wait until the next call may be done."""
+        """Wait until the rate limit allows the next call."""
         if level < TRUSTED and (wait_s := self._pace.take()):
             await asyncio.sleep(wait_s)

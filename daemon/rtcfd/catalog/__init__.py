@@ -1,1 +1,1 @@
-"""Which component types there are, and in which library."""
+"""The catalog of component types and their libraries."""

@@ -1,9 +1,9 @@
-"""The catalog: which library offers a component type.
+"""The catalog: finds the library of a component type.
 
 A package is a folder of libraries, `<folder>/<package>/*.so`, in one of the
-folders of the search path; of two types with one name the first found wins.
-A library that does not load hides its package in later folders: other code than
-the first folder's is never taken unasked.
+folders of the search path.  If two libraries provide a type, the first one wins.
+A library that does not load hides its package in later folders: rtcfd never
+silently replaces the first folder's code by other code.
 """
 
 import asyncio
@@ -26,13 +26,13 @@ _FOLDERS_TIMEOUT_S = 10.0
 
 @dataclass(frozen=True)
 class Folder:
-    """A folder of packages; in one that the settings name, its owner's libraries are trusted."""
+    """A folder of packages.  If the settings name it, libraries of its owner are trusted."""
 
     path: Path
     named: bool = False
 
     def owner(self) -> int | None:
-        """Return whose libraries are trusted besides root's and our own."""
+        """Return the uid whose libraries are trusted besides root's and our own, if any."""
         if not self.named:
             return None
         try:
@@ -43,33 +43,33 @@ class Folder:
 
 @dataclass(frozen=True)
 class Found:
-    """A library that offers a type."""
+    """A library that provides a type."""
 
     path: str
     owner: int | None
-    others: tuple[str, ...] = ()  # libraries that offer it too, and are not taken
-    parameters: tuple[graph_pb2.ParameterInfo, ...] = ()  # as the type declares them
+    others: tuple[str, ...] = ()  # further libraries with the type, which are not used
+    parameters: tuple[graph_pb2.ParameterInfo, ...] = ()  # declared by the type
 
     def note(self, spec: graph_pb2.ComponentSpec) -> str:
-        """Say that the type is in several places; empty = it is not."""
+        """Return a note if several libraries provide the type, else an empty string."""
         if not self.others:
             return ""
         return (
-            f"{spec.package}/{spec.type} is in several places: {self.path} is taken, "
+            f"several libraries provide {spec.package}/{spec.type}: rtcfd uses {self.path}, "
             f"not {', '.join(self.others)}"
         )
 
     def load(self, spec: graph_pb2.ComponentSpec) -> wire.Load:
-        """Return the request to load a component from it."""
+        """Return the request to load a component from this library."""
         return wire.Load(component=spec, library=self.path, owner=self.owner)
 
 
 @dataclass
 class _Contents:
-    """What the libraries of a package offer."""
+    """The types in the libraries of a package."""
 
     types: dict[str, graph_pb2.ComponentType] = field(default_factory=dict)
-    others: dict[str, list[str]] = field(default_factory=dict)  # libraries with a type again
+    others: dict[str, list[str]] = field(default_factory=dict)  # by type, its further libraries
     hidden: dict[str, Path] = field(default_factory=dict)  # by type, its library in a later folder
     broken: Path | None = None  # the first library that does not load
     problems: list[str] = field(default_factory=list)
@@ -81,15 +81,15 @@ class Catalog:
     def __init__(self, folders: Sequence[Folder], describer: Describer) -> None:
         self.folders = list(folders)
         self._describer = describer
-        # They may be on a server that does not answer.
+        # The folders may be on a server that does not answer.
         self._aside = Aside("folders of components")
 
     def look_again(self) -> None:
-        """Forget what is known of libraries that did not load."""
+        """Forget the cached failures of libraries."""
         self._describer.forget_failures()
 
     async def find(self, package: str, type_name: str) -> Found:
-        """Return the library that offers a type, or refuse and say why."""
+        """Return the library of a type; raises NotFound or FailedPrecondition."""
         check_base_name("package", package)
         check_base_name("type", type_name)
         known = await self._packages()
@@ -112,15 +112,15 @@ class Catalog:
             )
         if contents.problems:
             later = contents.hidden.get(type_name)
-            what = (
+            text = (
                 f'no type "{type_name}" in package "{package}" (types: {listing(contents.types)}), '
-                "and not all of it loads"
+                "and some of its libraries do not load"
                 if later is None
-                else f"{package}/{type_name}: {contents.broken} does not load, and {later} of a "
-                f"later folder is not taken in its place: mend {contents.broken}, or remove it"
+                else f"{package}/{type_name}: {contents.broken} does not load, and {later} in a "
+                f"later folder does not replace it: repair or remove {contents.broken}"
             )
             raise FailedPrecondition(
-                f"{what}: {'; '.join(contents.problems)}",
+                f"{text}: {'; '.join(contents.problems)}",
                 errors_pb2.REASON_LIBRARY_REFUSED,
                 package=package,
                 type=type_name,
@@ -135,7 +135,7 @@ class Catalog:
         )
 
     async def types(self, package: str = "") -> tuple[list[graph_pb2.ComponentType], list[str]]:
-        """Return the types of one package or of all, by name, and what does not load."""
+        """Return the types of one package or of all, sorted by name, and the load errors."""
         known = await self._packages()
         if package:
             check_base_name("package", package)
@@ -182,7 +182,7 @@ class Catalog:
         return await self._aside.run(lambda: packages(folders), _FOLDERS_TIMEOUT_S)
 
     def _owner(self, library: Path) -> int | None:
-        """Return whose libraries are trusted in the folder that holds a package's library."""
+        """Return the owner() of the folder with a library's package."""
         for folder in self.folders:
             if folder.path == library.parents[1]:
                 return folder.owner()
@@ -197,7 +197,7 @@ class Catalog:
 
 
 async def loads(catalog: Catalog, specs: Iterable[graph_pb2.ComponentSpec]) -> list[wire.Load]:
-    """Return components with their libraries; each type is looked for once."""
+    """Return the requests to load components; each type is looked up once."""
     libraries: dict[tuple[str, str], Found] = {}
     result = []
     for spec in specs:
@@ -209,6 +209,6 @@ async def loads(catalog: Catalog, specs: Iterable[graph_pb2.ComponentSpec]) -> l
 
 
 def _one_problem(library: Path, problem: str) -> str:
-    """Name the library, unless the dynamic loader's text begins with it already."""
+    """Put the library's path before a problem, unless the dynamic loader's text has it already."""
     text = " ".join(problem.split())
     return text if str(library) in text else f"{library}: {text}"

@@ -1,7 +1,7 @@
 """Describes component libraries, each in a throw-away process.
 
-So that foreign code, which runs as soon as a library is loaded, runs neither
-in rtcfd nor in a loop's process: a crash there is a refusal.
+Loading a library runs foreign code.  In a process of its own, that code can crash
+neither rtcfd nor a loop: the crash becomes an error.
 """
 
 import asyncio
@@ -29,17 +29,17 @@ _MAX_STDERR_LINE = 300
 _LONGEST_ANSWER = 4 * 1024 * 1024
 _LONGEST_COMPLAINT = 64 * 1024
 _CHUNK = 64 * 1024
-_OOM_SCORE = "500"  # proc(5): where memory runs out, what nobody has loaded goes before a loop
+_OOM_SCORE = "500"  # proc(5): if memory runs out, the kernel kills this process before a loop
 
-_File = tuple[str, int | None]  # path, and whose libraries are trusted
-_Identity = tuple[int, ...]  # inode, time of change, size; and whose it is and who may write it
-# Signals by which a library ends its process itself.  SIGKILL and SIGBUS come of short memory, too.
+_File = tuple[str, int | None]  # path, and the uid whose libraries are trusted
+_Identity = tuple[int, ...]  # inode, modification time, size, mode, owner, group
+# Signals of a crash that the library itself causes.  SIGKILL and SIGBUS may mean a lack of memory.
 _CRASHES = (signal.SIGSEGV, signal.SIGILL, signal.SIGFPE, signal.SIGABRT, signal.SIGTRAP,
             signal.SIGSYS)  # fmt: skip
 
 
 class _Failed(Exception):
-    """There is no description; `own`: for what the library itself did, whatever is around it."""
+    """Describing failed; `own`: because of the library itself, not of its environment."""
 
     def __init__(self, problem: str, own: bool = False) -> None:
         super().__init__(problem)
@@ -48,16 +48,19 @@ class _Failed(Exception):
 
 @dataclass
 class _Known:
-    """What is kept of one file as it is."""
+    """A cached description of one version of a file."""
 
     identity: _Identity
     description: wire.LibraryDescription
-    lasting: bool  # for as long as the file stays as it is
+    lasting: bool  # valid until the file changes
     since: float = field(default_factory=time.monotonic)
 
     def valid(self, identity: _Identity) -> bool:
-        """Tell whether it need not be looked at again: what does not load may do so later, when
-        what it links against is there; what crashes will not."""
+        """Return whether the description still holds.
+
+        A library that does not load may load later, when its dependencies are installed.
+        One that crashes will crash again.
+        """
         if identity != self.identity:
             return False
         return self.lasting or time.monotonic() - self.since < FAILURE_KEPT_S
@@ -65,7 +68,7 @@ class _Known:
 
 @dataclass
 class Describer:
-    """Answers what a library offers, from a cache while the file stays as it is."""
+    """Describes libraries, and caches each description until the file changes."""
 
     binary: Path
 
@@ -77,11 +80,11 @@ class Describer:
 
     @property
     def kept(self) -> list[str]:
-        """The libraries whose description is kept, one of each."""
+        """The paths of the libraries in the cache."""
         return [path for path, _ in self._known]
 
     def forget_failures(self) -> None:
-        """Look again at what did not load, whatever the cause."""
+        """Remove all failures from the cache."""
         failed = [file for file, known in self._known.items() if known.description.problem]
         for file in failed:
             del self._known[file]
@@ -89,13 +92,13 @@ class Describer:
     async def describe(
         self, library: Path, package: str, owner: int | None = None
     ) -> wire.LibraryDescription:
-        """Return the description; `problem` in it says why there is none.
+        """Return the description; if there is none, its field `problem` has the reason.
 
-        `owner` is a user whose libraries are trusted besides root's and our own.
+        `owner` is a uid whose libraries are trusted besides root's and our own.
         """
         try:
             found = await self._aside.run(library.stat, TIMEOUT_S)
-            # Else the process that loads it waits for the other end of a pipe.
+            # Loading a FIFO would wait for its other end.
             regular_files.require_regular(library, found)
         except OSError as error:
             return _problem(f"cannot read it: {error.strerror}")
@@ -109,7 +112,7 @@ class Describer:
         known = self._known.get(file)
         if known is not None and known.valid(identity):
             return known.description
-        # Whoever asks for the same meanwhile waits for the same answer; who leaves ends nothing.
+        # Concurrent calls for one file share one process; a cancelled call does not end it.
         key = (file, identity)
         running = self._running.get(key)
         if running is None:
@@ -173,7 +176,7 @@ class Describer:
         try:
             description: wire.LibraryDescription = wire.LibraryDescription.FromString(output)
         except DecodeError:
-            raise _Failed("the process that loaded it did not answer in the protocol") from None
+            raise _Failed("the process that loaded it wrote no valid description") from None
         if status and not description.problem:
             raise _Failed(
                 f"the process that loaded it {describe_exit(status)}{_last_line(complaint)}"
@@ -184,10 +187,10 @@ class Describer:
 async def _until_end(
     process: asyncio.subprocess.Process, pipe: asyncio.StreamReader | None, longest: int
 ) -> bytes:
-    """Return what a process writes to a pipe; end one that writes more than `longest` bytes."""
+    """Return a process's output from a pipe; kill it if it writes more than `longest` bytes."""
     assert pipe is not None
     data = b""
-    # To the end also of what is too long: asyncio waits for a process with its pipes.
+    # Read even too long output to its end: asyncio's wait() for the process needs closed pipes.
     while more := await pipe.read(_CHUNK):
         if len(data) <= longest:
             data += more
@@ -197,7 +200,7 @@ async def _until_end(
 
 
 def _end(process: asyncio.subprocess.Process) -> None:
-    """Kill it, and whatever the library has started: its session is its own."""
+    """Kill a process and its children, which are in its own session."""
     with contextlib.suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
 

@@ -1,1 +1,1 @@
-"""What all rooms stand on: refusals and their codes, names, limits, budgets, settings."""
+"""The base of all packages: errors and their codes, names, limits, budgets, settings."""

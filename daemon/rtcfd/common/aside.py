@@ -1,8 +1,8 @@
-"""What may block, done beside the event loop: the user database, folders that may be remote, files.
+"""Runs blocking work in threads: the user database, folders that may be remote, files.
 
-In daemon threads: one that hangs for ever holds up neither the event loop nor
-the end of rtcfd.  Each kind of work has its own, so that a hanging one takes no
-other's place.
+The threads are daemon threads: one that hangs for ever delays neither the event loop
+nor the end of rtcfd.  Each kind of work has its own, so that one that hangs does not
+block the others.
 """
 
 import asyncio
@@ -19,16 +19,16 @@ Result = TypeVar("Result")
 
 
 class Aside:
-    """At most so many threads for one kind of work; `what` names it in refusals."""
+    """A limited number of threads for one kind of work; `name` names it in errors."""
 
-    def __init__(self, what: str, threads: int = 2) -> None:
-        self._what = what
+    def __init__(self, name: str, threads: int = 2) -> None:
+        self._name = name
         self._places = asyncio.Semaphore(threads)
 
     async def run(self, work: Callable[[], Result], timeout_s: float) -> Result:
-        """Return what `work` returns, or raise what it raises; Unavailable after `timeout_s`.
+        """Return the result of `work`, or raise its exception; Unavailable after `timeout_s`.
 
-        Work that is given up on keeps its thread until it returns.
+        Work that has timed out keeps its thread until it returns.
         """
         loop = asyncio.get_running_loop()
         done: asyncio.Future[Result] = loop.create_future()
@@ -48,7 +48,7 @@ class Aside:
                 result = work()
             except BaseException as error:
                 problem = error
-            # Closed: rtcfd has ended meanwhile.
+            # RuntimeError: the event loop is closed, rtcfd has ended.
             with contextlib.suppress(RuntimeError):
                 loop.call_soon_threadsafe(finish, result, problem)
 
@@ -56,13 +56,13 @@ class Aside:
             async with asyncio.timeout(timeout_s):
                 await self._places.acquire()
                 try:
-                    threading.Thread(target=thread, name=f"rtcfd-{self._what}", daemon=True).start()
+                    threading.Thread(target=thread, name=f"rtcfd-{self._name}", daemon=True).start()
                 except BaseException:
                     self._places.release()
                     raise
                 return await done
         except TimeoutError:
             raise Unavailable(
-                f"the {self._what} does not answer within {timeout_s:g} s",
+                f"no answer from the {self._name} within {timeout_s:g} s",
                 errors_pb2.REASON_MACHINE_SILENT,
             ) from None

@@ -1,8 +1,8 @@
-"""A budget of log lines: so many a second, saved up for some seconds; the rest is counted."""
+"""A budget of log lines per second.  Lines above it are counted as lost."""
 
 import time
 
-_SAVED_S = 5.0
+_SAVED_S = 5.0  # seconds of unused budget that a burst may use
 
 
 class Budget:
@@ -15,7 +15,7 @@ class Budget:
         self._at = time.monotonic()
 
     def take(self) -> bool:
-        """Tell whether there is room for one more; if not it counts as lost."""
+        """Return whether one more line fits into the budget; if not, it counts as lost."""
         now = time.monotonic()
         self._tokens = min(self._tokens + (now - self._at) * self.per_s, self.per_s * _SAVED_S)
         self._at = now
@@ -26,6 +26,6 @@ class Budget:
         return True
 
     def take_lost(self) -> int:
-        """Return how many were lost since the last call."""
+        """Return the number of lines lost since the last call."""
         lost, self._lost = self._lost, 0
         return lost

@@ -1,7 +1,7 @@
-"""Checks values against the declarations of parameters, where no executor has the component.
+"""Checks values against declared parameters, while no executor has the component.
 
-As ParameterBase::check() of the component API does; errors of prepare() appear when the component
-is loaded.
+Applies the rules of ParameterBase::check() in the component API.  Errors of prepare() appear
+when the component is loaded.
 """
 
 import math
@@ -26,9 +26,9 @@ def check(
     setting: graph_pb2.ParameterSetting,
     declared: Mapping[str, graph_pb2.ParameterInfo],
 ) -> None:
-    """Refuse a value that a component would refuse; an int for a double becomes one in place.
+    """Raise NotFound or InvalidArgument for a value that the component would reject.
 
-    Raises NotFound or InvalidArgument.
+    Converts an int for a double in place.
     """
     found = declared.get(setting.name)
     if found is None:
@@ -52,7 +52,7 @@ def check(
 
 
 def _problem(value: graph_pb2.ParameterValue, declared: graph_pb2.ParameterInfo) -> str:
-    """Return the error of a value; empty: none."""
+    """Return the error of a value; empty = it is valid."""
     kind, wanted = value.WhichOneof("kind"), declared.default_value.WhichOneof("kind")
     if kind != wanted:
         given = "nothing" if kind is None else _KINDS[kind]

@@ -1,4 +1,4 @@
-"""What has happened, in order and with numbers.  Owned by the daemon."""
+"""The numbered log of events.  Owned by the daemon."""
 
 import time
 
@@ -25,7 +25,7 @@ class EventLog(NumberedLog[control_pb2.Event]):
         user: str = "",
         holder: str = "",
     ) -> None:
-        """Note what has just happened; see Event."""
+        """Append an event that has just happened; see Event in control.proto."""
         line = " ".join(message.split())
         self.append(
             control_pb2.Event(

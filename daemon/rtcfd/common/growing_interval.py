@@ -1,14 +1,14 @@
-"""Spaces repeated messages out in growing intervals.
+"""Logs a repeated message at growing intervals.
 
-On rtcfd's one thread.
+Used on rtcfd's one thread.
 """
 
 import time
 
 
 class GrowingInterval:
-    """Of one thing to be said: at once, after `first_s`, then at intervals that double up to
-    `longest_s`; anew when there was nothing to say for two of the first."""
+    """The times of one message: at once, after `first_s`, then at intervals that double up to
+    `longest_s`.  Begins anew if due() was not called for a little more than 2 * `first_s`."""
 
     def __init__(self, first_s: float, longest_s: float) -> None:
         self._first_s = first_s
@@ -19,8 +19,7 @@ class GrowingInterval:
         self._left_out = 0
 
     def due(self) -> int | None:
-        """Tell whether it is to be said now: how often it was not since the last time; None: it
-        is not."""
+        """Return None if the message must wait, else how many were suppressed since the last."""
         now = time.monotonic()
         if not self._interval_s or now - self._asked_at > 2 * self._first_s + 1.0:
             self._interval_s, self._left_out = self._first_s, 0

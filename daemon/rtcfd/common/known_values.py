@@ -1,7 +1,7 @@
-"""Enumerators that are none.
+"""Rejects unknown enumerators.
 
-proto3 keeps any number in the place of an enumerator, and a reader's last branch takes it.  So
-requests are checked once, on arrival.
+proto3 accepts any number as an enumerator, and a reader would treat it like the enumerator of
+its last branch.  So each request is checked once, on arrival.
 """
 
 from functools import cache
@@ -17,7 +17,7 @@ from rtcfd.common.refusals import InvalidArgument
 
 
 def check(message: Message) -> None:
-    """Refuse a message with an enumerator that is not known, at any depth."""
+    """Raise InvalidArgument for a message with an unknown enumerator, at any depth."""
     for field in _to_look_at(message.DESCRIPTOR):
         value: Any = getattr(message, field.name)
         repeated = field.label == FieldDescriptor.LABEL_REPEATED
@@ -32,10 +32,10 @@ def check(message: Message) -> None:
 
 
 def check_value(enum_type: EnumDescriptor, name: str, value: object) -> None:
-    """Refuse a value that is no enumerator; `name` is its setting."""
+    """Raise InvalidArgument for a value that is no enumerator of the setting `name`."""
     if value not in enum_type.values_by_number:
         raise InvalidArgument(
-            f"{name} {value} is not known: choose of {listing(choices(enum_type))}",
+            f"{name} {value} is not known: choose one of {listing(choices(enum_type))}",
             errors_pb2.REASON_VALUE_INVALID,
             setting=name,
         )
@@ -43,7 +43,7 @@ def check_value(enum_type: EnumDescriptor, name: str, value: object) -> None:
 
 @cache
 def _to_look_at(message: Descriptor) -> tuple[FieldDescriptor, ...]:
-    """Return the fields that are enumerators, or may hold some."""
+    """Return the fields that are enums or contain some."""
     return tuple(
         field
         for field in message.fields
@@ -52,7 +52,7 @@ def _to_look_at(message: Descriptor) -> tuple[FieldDescriptor, ...]:
 
 
 def _holds(message: Descriptor | None, above: frozenset[str]) -> bool:
-    """Tell whether there are enumerators in messages of a type."""
+    """Return whether messages of a type contain enums."""
     if message is None or message.full_name in above:
         return False
     within = above | {message.full_name}

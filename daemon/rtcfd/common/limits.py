@@ -1,4 +1,4 @@
-"""How much clients and components may ask for; each is refused with a line that names it."""
+"""Limits on clients and components.  An error above a limit names it."""
 
 from dataclasses import dataclass, fields
 
@@ -9,28 +9,28 @@ from rtcfd.common.refusals import ResourceExhausted
 
 @dataclass(frozen=True)
 class Limits:
-    """The [limits] of the settings."""
+    """The section [limits] of the settings."""
 
-    clients: int = 256  # connections at a time
-    clients_per_user: int = 32  # of one user that may only look or tune
+    clients: int = 256  # connections
+    clients_per_user: int = 32  # connections of a user with the right to observe or tune only
     runners: int = 32
-    components: int = 5000  # of one runner
-    taps: int = 1000  # outputs of one runner that are published; kept by its executor
-    message_kb: int = 16384  # one request, KiB
-    log_records_per_s: int = 2000  # of one runner, averaged over some seconds
-    incidents_mb: int = 1000  # files of incidents, MB; 0 = none of faults and crashes
+    components: int = 5000  # per runner
+    taps: int = 1000  # published outputs per runner; the executor enforces it
+    message_kb: int = 16384  # size of a request, KiB
+    log_records_per_s: int = 2000  # per runner, averaged over some seconds
+    incidents_mb: int = 1000  # all incident files, MB; 0 = faults and crashes leave none
 
     @property
     def reserve(self) -> int:
-        """Connections that are kept for those who may stop loops."""
+        """The number of connections reserved for clients that may stop loops."""
         return max(self.clients // 8, 1)
 
     def check_runners(self, number: int) -> None:
-        """Refuse a number of runners."""
+        """Raise ResourceExhausted for too many runners."""
         self._check("runners", number, self.runners)
 
     def check_components(self, number: int) -> None:
-        """Refuse a number of components of one runner."""
+        """Raise ResourceExhausted for too many components in one runner."""
         self._check("components", number, self.components)
 
     @staticmethod
@@ -44,7 +44,7 @@ class Limits:
             )
 
 
-# What the settings may say: least and most.
+# The smallest and the largest value that the settings may contain.
 RANGES = {
     "clients": (1, 4096),
     "clients_per_user": (1, 4096),

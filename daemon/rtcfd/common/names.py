@@ -15,7 +15,7 @@ _BASE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
 
 
 def check_base_name(kind: str, name: str) -> str:
-    """Return `name` if it is a ROS base name; `kind` ("runner", …) is for the message."""
+    """Return `name` if it is a ROS base name; `kind` ("runner", …) is for the error message."""
     if not _BASE_NAME.fullmatch(name):
         raise InvalidArgument(
             f'{kind} name "{name}" is not valid: use letters, digits and _, and begin with a '
@@ -33,24 +33,24 @@ def check_base_name(kind: str, name: str) -> str:
 
 
 def absolute(name: str) -> str:
-    """Resolve a component's name as requests give it: relative ones are taken in "/"."""
+    """Return the absolute name of a component in a request: a relative one is in "/"."""
     return name if name.startswith("/") else "/" + name
 
 
 def full_name(spec: graph_pb2.ComponentSpec) -> str:
-    """Return namespace and name of a component as the executor makes them."""
+    """Return the absolute name that the executor gives a component."""
     parts = [part for part in spec.ns.split("/") if part]
     return "/" + "/".join([*parts, spec.name or spec.type])
 
 
 def check_graph(specs: Sequence[graph_pb2.ComponentSpec]) -> None:
-    """Refuse a graph with two components of one name."""
+    """Raise InvalidArgument for a graph with two components of one name."""
     seen: set[str] = set()
     for spec in specs:
         name = full_name(spec)
         if name in seen:
             raise InvalidArgument(
-                f"component {name} is there twice in the graph",
+                f"component {name} occurs twice in the graph",
                 errors_pb2.REASON_COMPONENT_TWICE,
                 component=name,
             )

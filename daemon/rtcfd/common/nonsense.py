@@ -1,4 +1,4 @@
-"""What reading a document may raise that is well-formed at best, and holds something else."""
+"""Exceptions raised by parsing unexpected content."""
 
 from google.protobuf import json_format
 

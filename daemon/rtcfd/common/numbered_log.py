@@ -1,7 +1,7 @@
-"""Things that came one after the other, with numbers: for those who watch, however slow they are.
+"""A log of numbered entries for any number of watchers of any speed.
 
-On rtcfd's one thread.  Watchers have a place in it each and nothing else, so that one costs
-nothing; who is left behind is told how many were not kept.
+Used on rtcfd's one thread.  A watcher holds only the number of its last entry, so it costs no
+memory here.  If entries are deleted before a slow watcher reads them, it learns their number.
 """
 
 import asyncio
@@ -16,36 +16,38 @@ Entry = TypeVar("Entry")
 
 
 class NumberedLog(Generic[Entry]):
-    """The last entries; the first one ever has number 1."""
+    """The last `kept` entries; the first entry ever has number 1."""
 
     def __init__(self, kept: int = KEPT) -> None:
         self.log_id = secrets.token_hex(8)
-        self.last = 0  # number of the newest
-        self.ended = False  # none will come
+        self.last = 0  # number of the newest entry
+        self.ended = False  # no more entries follow
         self._entries: deque[Entry] = deque(maxlen=kept)
-        self._news: asyncio.Event | None = None  # where somebody waits
+        self._news: asyncio.Event | None = None  # set at the next entry; None: nobody waits
 
     def append(self, entry: Entry) -> None:
-        """Take the next entry."""
+        """Append an entry, and wake the watchers."""
         self.last += 1
         self._entries.append(entry)
         self._tell()
 
     def end(self) -> None:
-        """Take none any more; who waits for one waits no longer."""
+        """End the log, and wake the watchers."""
         self.ended = True
         self._tell()
 
     def after(self, number: int, most: int) -> tuple[list[Entry], int]:
-        """Return the entries behind a number, the oldest first, and how many of them were lost:
-        the first one's number is behind those."""
-        first = self.last - len(self._entries) + 1  # the oldest that is kept
+        """Return up to `most` entries after a number, the oldest first, and how many are lost.
+
+        The first returned entry has the number `number + lost + 1`.
+        """
+        first = self.last - len(self._entries) + 1  # number of the oldest kept entry
         lost = max(first - 1 - number, 0)
         begin = number + lost + 1 - first
         return list(islice(self._entries, begin, begin + most)), lost
 
     async def beyond(self, number: int) -> None:
-        """Wait for an entry behind a number, or the end."""
+        """Wait for an entry after a number, or for the end."""
         while self.last <= number and not self.ended:
             if self._news is None:
                 self._news = asyncio.Event()

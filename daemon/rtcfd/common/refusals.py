@@ -1,17 +1,17 @@
-"""The exceptions of rtcfd: a refusal, in one line, with its kind and its reason.
+"""The exceptions of rtcfd: errors of one line, each with a kind and a reason code.
 
-A refusal has changed nothing.  status_codes.py makes gRPC's statuses of them;
-executor/link.py makes them of the executor's errors.
+A request that raises one has changed nothing.  status_codes.py converts them to gRPC
+statuses; executor/link.py creates them from the executor's errors.
 """
 
 from rtcf.v1 import errors_pb2
 
 
 class Refusal(Exception):
-    """A request is refused; the text says what, where and how to mend it.
+    """A request failed.  The text gives the cause, the names, and the remedy.
 
-    `reason` says it for programs (see errors.proto), with what it is `about`: names by
-    the keys of ErrorInfo.metadata.  What is empty says nothing.
+    For programs, `reason` gives the code (see errors.proto), and `about` the names, by the
+    keys of ErrorInfo.metadata.  Empty names are left out.
     """
 
     def __init__(self, text: object, reason: "errors_pb2.Reason", **about: str) -> None:
@@ -29,15 +29,15 @@ class NotFound(Refusal):
 
 
 class AlreadyExists(Refusal):
-    """A runner or component of that name is there already."""
+    """A runner or component of that name exists already."""
 
 
 class FailedPrecondition(Refusal):
-    """The graph, a library, a hook or the machine refuses."""
+    """The state of the graph, a library, a hook or the machine does not allow it."""
 
 
 class NoMaster(FailedPrecondition):
-    """A hook needs a ROS master, and none answers."""
+    """A hook needs a ROS master, but none answers."""
 
 
 class Unavailable(Refusal):
@@ -45,11 +45,11 @@ class Unavailable(Refusal):
 
 
 class Silent(Unavailable):
-    """An executor that is there, and whose loop may be running, does not answer."""
+    """The executor runs, and perhaps its loop, but it does not answer."""
 
 
 class PermissionDenied(Refusal):
-    """The caller may not do that."""
+    """The caller lacks the right."""
 
 
 class ResourceExhausted(Refusal):

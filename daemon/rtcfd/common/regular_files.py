@@ -1,11 +1,11 @@
-"""Reading, and adding to, files in whose place there may be something else.
+"""Reads and appends to regular files, and rejects everything else.
 
-Whoever opens a named pipe waits for its other end, for ever; a device may do
-anything when it is opened.  What is no regular file is an OSError here, whose
-`strerror` says what it is instead.
+Opening a named pipe blocks until its other end is open; opening a device may have any
+effect.  So for anything but a regular file, these functions raise an OSError whose
+`strerror` names the kind of file.
 
-FileNotFoundError is for a name that is not there: a link that leads nowhere is
-another error, as somebody meant a file by it.
+FileNotFoundError means that the name does not exist.  A dangling symbolic link is
+another OSError, because somebody meant a file by it.
 """
 
 import errno
@@ -24,26 +24,26 @@ _KINDS: tuple[tuple[Callable[[int], bool], str], ...] = (
 
 
 def read_bytes(file: Path) -> bytes:
-    """Return what a file holds; raises OSError."""
+    """Return the content of a file; raises OSError."""
     with open(_opened(file, os.O_RDONLY), "rb") as content:
         return content.read()
 
 
 def read_text(file: Path, encoding: str = "utf-8", errors: str = "strict") -> str:
-    """Return the text that a file holds; raises OSError, UnicodeDecodeError."""
+    """Return the text of a file; raises OSError, UnicodeDecodeError."""
     with open(_opened(file, os.O_RDONLY), encoding=encoding, errors=errors) as content:
         return content.read()
 
 
 def append(file: Path, data: bytes) -> None:
-    """Write to the end of a file, which is made if it is not there; raises OSError."""
+    """Append to a file, which is created if needed; raises OSError."""
     with open(_opened(file, os.O_WRONLY | os.O_APPEND | os.O_CREAT), "ab") as out:
         out.write(data)
 
 
 def require_present(path: Path) -> None:
-    """Raise FileNotFoundError if there is no such name, another OSError if a link on the way to
-    it leads nowhere."""
+    """Raise FileNotFoundError if a name does not exist, another OSError if the name, or a folder
+    on its path, is a dangling symbolic link."""
     try:
         path.stat()
     except FileNotFoundError:
@@ -57,10 +57,10 @@ def require_present(path: Path) -> None:
 
 
 def require_regular(file: Path, found: os.stat_result) -> None:
-    """Raise OSError if what was found at a path is no regular file."""
+    """Raise OSError if `found`, the status of `file`, is not that of a regular file."""
     if not stat.S_ISREG(found.st_mode):
         kind = next((word for is_one, word in _KINDS if is_one(found.st_mode)), "something else")
-        raise OSError(errno.EINVAL, f"it is {kind}, no regular file", str(file))
+        raise OSError(errno.EINVAL, f"it is {kind}, not a regular file", str(file))
 
 
 def _opened(file: Path, flags: int) -> int:
@@ -70,7 +70,7 @@ def _opened(file: Path, flags: int) -> int:
     except FileNotFoundError:
         if not flags & os.O_CREAT:
             raise
-    # Without waiting: it may have become something else meanwhile.
+    # O_NONBLOCK: a pipe may have replaced the file meanwhile.
     descriptor = os.open(file, flags | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
     try:
         require_regular(file, os.fstat(descriptor))

@@ -1,4 +1,4 @@
-"""A value that somebody has written as text, as a serialised ROS message."""
+"""Converts a value from YAML text to a serialised ROS message."""
 
 import re
 import struct
@@ -18,8 +18,8 @@ _NANOSECONDS = 1_000_000_000
 
 
 class _Loader(yaml.BaseLoader):  # type: ignore[misc]
-    """Takes all scalars for texts: what they are the message's definition says.  And nothing
-    twice, as a short text can be a very long value then."""
+    """Reads all scalars as strings, because the message's definition gives their types.  Rejects
+    aliases, with which a short text can expand to a huge value."""
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         if self.check_event(yaml.AliasEvent):
@@ -28,23 +28,26 @@ class _Loader(yaml.BaseLoader):  # type: ignore[misc]
 
 
 def encode(definition: str, text: str) -> bytes:
-    """Return the message; what is not named in it is zero.  Raises ValueError: one line."""
+    """Return the serialised message; fields without a value are zero.
+
+    Raises ValueError with a message of one line.
+    """
     try:
         value = yaml.load(text, _Loader)
     except (yaml.YAMLError, RecursionError) as error:
         problem = getattr(error, "problem", None) or str(error)
-        raise ValueError(f"no YAML: {' '.join(problem.split())}") from None
+        raise ValueError(f"invalid YAML: {' '.join(problem.split())}") from None
     return _Writer(Definition(definition)).message("", "" if value is None else value, "")
 
 
 class _Writer:
-    """One way through a definition."""
+    """Serialises a value by a message definition."""
 
     def __init__(self, types: Definition) -> None:
         self._types = types
 
     def message(self, name: str, value: Any, path: str) -> bytes:
-        """Return a message of a name, of "" the first one."""
+        """Return a message of the type `name`; "" is the type of the whole message."""
         fields = list(self._types.fields(name))
         named = self._by_name(fields, value, path)
         return b"".join(
@@ -62,13 +65,13 @@ class _Writer:
                         f"(fields: {listing(names)})"
                     )
             return value
-        # As std_msgs wrap one thing, and arrays with a layout.
+        # The types of std_msgs with the only field `data`, and its arrays with a layout.
         if "data" in names:
             return {"data": _flat(value) if "layout" in names else value}
         if isinstance(value, list) and len(value) == len(fields):
             return dict(zip(names, value, strict=True))
         raise ValueError(
-            f"{_at(path)}{_told(value)} is no message: name its fields, as in "
+            f"{_at(path)}{_told(value)} is not a message: name its fields, as in "
             f"{{{', '.join(f'{each}: …' for each in names)}}}"
         )
 
@@ -78,7 +81,7 @@ class _Writer:
         if value is None:
             value = [None] * (field.length or 0)
         if not isinstance(value, list):
-            raise ValueError(f"{_at(path)}{_told(value)} is no list, as in [1, 2]")
+            raise ValueError(f"{_at(path)}{_told(value)} is not a list, as in [1, 2]")
         if field.length is not None and len(value) != field.length:
             raise ValueError(f"{_at(path)}{len(value)} values, {field.length} are needed")
         count = b"" if field.length is not None else struct.pack("<I", len(value))
@@ -92,7 +95,7 @@ class _Writer:
         if kind in _TIMES and isinstance(value, dict):
             return self._time(kind, value, path)
         if isinstance(value, dict | list):
-            raise ValueError(f"{_at(path)}{_told(value)} is no {kind}")
+            raise ValueError(f"{_at(path)}{_told(value)} is not a valid {kind}")
         if kind == "string":
             data = ("" if value is None else str(value)).encode()
             return struct.pack("<I", len(data)) + data
@@ -100,7 +103,7 @@ class _Writer:
         try:
             return _packed(kind, text)
         except (KeyError, ValueError, OverflowError, struct.error):
-            raise ValueError(f"{_at(path)}{_told(value)} is no {kind}") from None
+            raise ValueError(f"{_at(path)}{_told(value)} is not a valid {kind}") from None
 
     def _time(self, kind: str, value: dict[str, Any], path: str) -> bytes:
         form = _TIMES[kind][0]
@@ -138,6 +141,6 @@ def _at(path: str) -> str:
 
 def _told(value: Any) -> str:
     if isinstance(value, dict | list):
-        return "a list" if isinstance(value, list) else "what has fields"
+        return "a list" if isinstance(value, list) else "a mapping"
     text = " ".join(str(value).split())
     return f'"{text}"' if len(text) <= _MOST_TOLD else f'"{text[:_MOST_TOLD]}…"'

@@ -1,7 +1,7 @@
-"""Settings of runners: their defaults, and what is allowed.
+"""Settings of runners: defaults, merging, checks.
 
-Regular expressions are left to the executor, which compiles them with the
-engine that will use them: executor/opinion.py asks one.
+Regular expressions are checked by an executor, because it compiles them with the
+engine that uses them: see executor/opinion.py.
 """
 
 import math
@@ -20,12 +20,12 @@ from rtcfd.common.refusals import InvalidArgument
 Settings = TypeVar("Settings", runner_pb2.RunnerSettings, runner_pb2.RosSettings)
 
 _DOUBLE = FieldDescriptor.CPPTYPE_DOUBLE
-# Of the units in names of settings.
+# By unit, the suffix of a setting's name.
 _SUFFIXES = {"Hz": "hz", "µs": "us", "ms": "ms", "s": "s", "KiB": "kb"}
-LAST_CPU = -1  # one of those with the fewest loops, the last ones first
-_LEVELS_PER_OCTAVE = 2  # of SCHED_FIFO: 53 at 0.1 Hz, 91 at 50 kHz
+LAST_CPU = -1  # of the CPUs with the fewest loops, an isolated one, else the highest number
+_LEVELS_PER_OCTAVE = 2  # priorities of SCHED_FIFO: 53 at 0.1 Hz, 91 at 50 kHz
 ORPHAN_TIMEOUT_S = quantities.RUNNER["orphan_timeout_s"].default
-# A private rtcfd takes its executors with it, however it ends.
+# The executors of a private rtcfd end soon after it, even if it crashes.
 PRIVATE_ORPHAN_TIMEOUT_S = 2.0
 _DEFAULT_MASTER = "http://localhost:11311"
 
@@ -35,8 +35,7 @@ def defaults(
     orphan_timeout_s: float = ORPHAN_TIMEOUT_S,
     peers: "runner_pb2.Right" = runner_pb2.RIGHT_OBSERVE,
 ) -> runner_pb2.RunnerSettings:
-    """Return settings, complete but for the priority; ROS_MASTER_URI of our environment is part
-    of them."""
+    """Return all settings except for the priority; ROS_MASTER_URI is from our environment."""
     result = runner_pb2.RunnerSettings(
         cpu=LAST_CPU,
         realtime=realtime,
@@ -74,12 +73,12 @@ def defaults(
 
 
 def completed(settings: runner_pb2.RunnerSettings) -> runner_pb2.RunnerSettings:
-    """Return settings with the priority that goes with their frequency, if it is not among them.
+    """Return settings with a priority, which follows from the frequency if it is not set.
 
     The faster of two loops on one CPU has the higher priority: no other order of fixed priorities
     meets deadlines that this one misses (rate-monotonic: C. L. Liu and J. W. Layland, "Scheduling
     Algorithms for Multiprogramming in a Hard-Real-Time Environment", Journal of the ACM 20, 1973).
-    It depends on the loop alone, so that what others do changes nothing under it.
+    The priority depends on this loop alone, so that it stays when other loops change.
     """
     if settings.HasField("priority"):
         return settings
@@ -95,7 +94,7 @@ def completed(settings: runner_pb2.RunnerSettings) -> runner_pb2.RunnerSettings:
 def merged(
     base: runner_pb2.RunnerSettings, change: runner_pb2.RunnerSettings
 ) -> runner_pb2.RunnerSettings:
-    """Return `base` with what `change` sets; what is UNSPECIFIED there counts as unset."""
+    """Return `base` with the settings of `change`; UNSPECIFIED counts as unset there."""
     effective = runner_pb2.RunnerSettings()
     effective.CopyFrom(change)
     for field in ("realtime", "overrun", "on_boot", "on_crash", "sim_time"):
@@ -110,7 +109,7 @@ def merged(
 
 
 def changed(base: Settings, other: Settings) -> Settings:
-    """Return the settings of `other` that are set and not as in `base`."""
+    """Return the settings that `other` sets and that differ from `base`."""
     result = type(other)()
     for field, value in other.ListFields():
         if field.message_type is not None:
@@ -123,7 +122,7 @@ def changed(base: Settings, other: Settings) -> Settings:
 
 
 def differences(base: Settings, other: Settings, prefix: str = "") -> list[str]:
-    """Return a line for each setting of `other` that is set and not as in `base`."""
+    """Return a line for each setting that `other` sets and that differs from `base`."""
     lines: list[str] = []
     for field, value in changed(base, other).ListFields():
         old = getattr(base, field.name)
@@ -135,7 +134,7 @@ def differences(base: Settings, other: Settings, prefix: str = "") -> list[str]:
 
 
 def _same(one: Any, other: Any) -> bool:
-    # An executor counts in ns; what it tells may be rounded.
+    # An executor counts in ns, so its values may be rounded.
     if isinstance(one, float):
         return math.isclose(one, other, rel_tol=1e-9, abs_tol=1e-9)
     return bool(one == other)
@@ -150,14 +149,14 @@ def _text(field: Any, value: Any) -> str:
 
 
 def check(settings: runner_pb2.RunnerSettings) -> None:
-    """Refuse settings that are set and not allowed."""
+    """Raise InvalidArgument if a setting has a value that is not allowed."""
     _check_ranges(settings, quantities.RUNNER)
     _check_ranges(settings.ros, quantities.ROS)
     if settings.HasField("cpu") and settings.cpu != LAST_CPU:
         allowed = os.sched_getaffinity(0)
         if settings.cpu not in allowed:
             raise InvalidArgument(
-                f"CPU {settings.cpu} is not one rtcfd may use: choose of "
+                f"rtcfd may not use CPU {settings.cpu}: choose one of "
                 f"{_ranges(allowed)}, or -1 for the last of them",
                 errors_pb2.REASON_VALUE_INVALID,
                 setting="cpu",

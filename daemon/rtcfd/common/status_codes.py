@@ -1,4 +1,4 @@
-"""The one place where refusals become gRPC statuses: a line for people, a reason for programs."""
+"""Converts errors to gRPC statuses: a line for people, a reason code for programs."""
 
 import logging
 from typing import Any, NoReturn
@@ -26,15 +26,18 @@ DOMAIN = "rtcf"
 DETAILS_KEY = "grpc-status-details-bin"
 INFO_TYPE = "type.googleapis.com/google.rpc.ErrorInfo"
 
-# A refusal travels as metadata, of which a client that is not ours takes 8 KiB: the line twice,
-# for gRPC and in the details, where three bytes become four, and what it is about.
-_LONGEST = 2600  # bytes, as they are encoded
+# An error travels as metadata, of which other gRPC clients accept at most 8 KiB: the line twice
+# (as gRPC's message, and in the details, where base64 makes four bytes of three), and the names.
+_LONGEST = 2600  # bytes of the encoded line
 _LONGEST_NAME = 100  # bytes
 _MOST_NAMES = 8
 
 
 def bounded(text: object) -> str:
-    """Return one line that fits: of what is too long, begin and end, which says what to do."""
+    """Return one line that fits into the metadata.
+
+    A longer text keeps its beginning and its end, which has the remedy.
+    """
     line = " ".join(str(text).split())
     longest = _LONGEST
     while len(quote(line)) > _LONGEST:
@@ -44,12 +47,12 @@ def bounded(text: object) -> str:
 
 
 def details(refusal: Refusal) -> bytes:
-    """Return what stands in `grpc-status-details-bin`; at most 4 KiB."""
+    """Return the content of `grpc-status-details-bin`, at most 4 KiB."""
     info = errors_pb2.ErrorInfo(
         reason=errors_pb2.Reason.Name(refusal.reason).removeprefix("REASON_"), domain=DOMAIN
     )
     for key, value in list(refusal.about.items())[:_MOST_NAMES]:
-        # Half a name would be another one: what is too long is left to the line.
+        # A truncated name would be another name, so a long one is only in the line.
         if len(value.encode(errors="replace")) <= _LONGEST_NAME:
             info.metadata[key] = value
     status = errors_pb2.ErrorStatus(code=status_code(refusal).value[0], message=bounded(refusal))
@@ -59,7 +62,7 @@ def details(refusal: Refusal) -> bytes:
 
 
 def status_code(refusal: Refusal) -> grpc.StatusCode:
-    """Return gRPC's code of a refusal."""
+    """Return the gRPC status code of an error."""
     return next(
         (found for kind in type(refusal).__mro__ if (found := STATUS_CODES.get(kind))),
         grpc.StatusCode.FAILED_PRECONDITION,
@@ -67,13 +70,13 @@ def status_code(refusal: Refusal) -> grpc.StatusCode:
 
 
 async def abort(context: Any, error: Exception, request: Any = None) -> NoReturn:
-    """End a call with what an error says, and what the `request` it answers names."""
+    """End a call with an error, to which the names in the call's `request` are added."""
     if isinstance(error, Refusal):
         refusal = error
     else:
         log.error("internal error", exc_info=error)
         refusal = refusals.Internal(
-            f"internal error of rtcfd ({type(error).__name__}: {error}); its log has more",
+            f"internal error of rtcfd ({type(error).__name__}: {error}): see its log",
             errors_pb2.REASON_INTERNAL,
         )
     for key in ("runner", "component"):

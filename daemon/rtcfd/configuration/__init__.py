@@ -1,1 +1,1 @@
-"""The command line and the settings file, and what they make of rtcfd."""
+"""The command line and the settings file of rtcfd."""

@@ -1,7 +1,7 @@
-"""The settings of the service, and a copy of those that were good last.
+"""The settings of the service, and a copy of the last good settings.
 
-A file that cannot be read must not keep rtcfd from supervising loops that run:
-at a start, the copy in the state folder is taken in its place.
+A bad settings file must not keep rtcfd from supervising running loops: at its start,
+rtcfd uses the copy in the state folder instead.
 """
 
 import contextlib
@@ -23,7 +23,7 @@ _NONE = "# Nothing was set.\n"
 
 @dataclass(frozen=True)
 class Settings:
-    """What was read, and what was wrong with the file if the copy was taken."""
+    """The settings, and the error in the file if they are from the copy."""
 
     found: settings_file.Config = field(default_factory=settings_file.Config)
     problem: str = ""
@@ -36,9 +36,10 @@ class Settings:
         last_good: bool,
         opinion: settings_file.Opinion = lambda _: "",
     ) -> "Settings":
-        """Read a file, if one is given; `folder` is that of the copy.
+        """Read `file`, unless it is None; the copy is in `folder`.
 
-        Raises Refusal, with `last_good` only if there is no good copy either.
+        `opinion` is for settings_file.read.  Raises Refusal for a bad file; with `last_good`,
+        only if there is no good copy either.
         """
         copy = folder / _NAME if folder else None
         if file is None:
@@ -49,11 +50,11 @@ class Settings:
             if not last_good or copy is None or not _is_there(copy):
                 raise
             return Settings(
-                settings_file.read(copy), f"{refusal}; the last good settings are taken instead"
+                settings_file.read(copy), f"{refusal}; the last good settings are used instead"
             )
 
     def keep(self) -> None:
-        """Make a copy of settings that were good."""
+        """Write the copy, if these settings are good."""
         if self._copy is None or self.problem:
             return
         data = (self.found.text or _NONE).encode()
@@ -64,12 +65,15 @@ class Settings:
             durable.replace(self._copy, data)
             durable.sync_folder(self._copy.parent)
         except OSError as error:
-            log.warning("no copy of the settings at %s: %s", self._copy, error.strerror)
+            log.warning("cannot copy the settings to %s: %s", self._copy, error.strerror)
 
 
 def _is_there(copy: Path) -> bool:
-    """Tell whether there is a copy; an empty one is what a file system left of it, and would
-    grant everybody everything."""
+    """Return whether there is a copy.
+
+    An empty one does not count: a file system may leave it after a crash, and without rules
+    every client would have all rights.
+    """
     try:
         return copy.stat().st_size > 0
     except OSError:

@@ -1,5 +1,5 @@
-"""The command line of rtcfd, and what it makes of it, the configuration file and
-the environment, in this order of precedence."""
+"""The options of rtcfd: from the command line, the configuration file and the environment,
+in this order of precedence."""
 
 import argparse
 import os
@@ -28,11 +28,11 @@ _REALTIME = {
 
 @dataclass(frozen=True)
 class Options:
-    """All that the daemon needs to know."""
+    """All options of the daemon."""
 
     socket: Path
     runtime_dir: Path
-    own_runtime_dir: bool  # made for this run: removed at its end
+    own_runtime_dir: bool  # created for this run, and removed at its end
     state_dir: Path | None
     executor: Path
     graphs_dir: Path | None
@@ -44,10 +44,10 @@ class Options:
     end_with_stdin: bool
     foreground: bool
     verbose: bool
-    settings: Settings  # as they were read
+    settings: Settings  # from the configuration file
 
     def opinion(self, settings: runner_pb2.RunnerSettings) -> str:
-        """Return why an executor would refuse settings that a runner chooses, or nothing."""
+        """Return why an executor would reject the settings of a runner; empty = it accepts them."""
         return opinion.of_settings(self.executor, runner_settings.merged(self.defaults, settings))
 
 
@@ -56,7 +56,7 @@ def parse(
 ) -> Options:
     """Return the options; raises Refusal for a bad file, exits with 2 on bad usage.
 
-    With `last_good`, the service takes the last good settings in the place of bad ones.
+    With `last_good`, the service uses the last good settings instead of bad ones.
     """
     args = _parser(build_tree).parse_args(arguments)
     kept = None
@@ -103,7 +103,7 @@ def parse(
                 runner_settings.PRIVATE_ORPHAN_TIMEOUT_S
                 if args.foreground
                 else runner_settings.ORPHAN_TIMEOUT_S,
-                # Privately, its ROS is as much its user's as its socket.
+                # A private rtcfd belongs to one user, and so do the ROS peers of its loops.
                 runner_pb2.RIGHT_ADMIN if args.foreground else runner_pb2.RIGHT_OBSERVE,
             ),
             file.runner,
@@ -124,19 +124,20 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
         description="Supervises real-time control loops and serves rtcfctl and other clients.",
         epilog=textwrap.dedent(
             """\
-            Without --foreground it is the systemd service: files under /run/rtcfd and
-            /var/lib/rtcfd, real time required, settings from /etc/rtcfd/rtcfd.toml.
-            With it, it is private: preferred real time, no state kept unless --state-dir
-            is given, no settings read unless --config is given, and its loops stop soon
-            after it however it ends (orphan_timeout_s = 2 instead of 60).
+            Without --foreground, rtcfd is the systemd service: it keeps its files in
+            /run/rtcfd and /var/lib/rtcfd, requires real-time rights, and reads its
+            settings from /etc/rtcfd/rtcfd.toml.
+            With --foreground, rtcfd is private: it prefers real-time rights, keeps state
+            only with --state-dir, and reads settings only with --config.  Its loops stop
+            soon after it, even if it crashes (orphan_timeout_s = 2 instead of 60).
 
-            Components are looked for in <folder>/<package>/*.so, in this order:
+            rtcfd searches for components in <folder>/<package>/*.so, in this order:
               each --path, then each `path` of the configuration file, then
             """
         )
         + folders
-        + "\n(<prefix>/lib/rtcf-components of each prefix in CMAKE_PREFIX_PATH is among them;\n"
-        "with --foreground, at last what `rtcfctl load FILE.py` has compiled for you.)",
+        + "\n(They include <prefix>/lib/rtcf-components of each prefix in CMAKE_PREFIX_PATH.\n"
+        "With --foreground, libraries compiled by `rtcfctl load FILE.py` come last.)",
     )
     parser.add_argument("--version", action="version", version=f"rtcfd {VERSION}")
     parser.add_argument(
@@ -146,33 +147,34 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
         "--socket",
         type=Path,
         metavar="PATH",
-        help=f"control socket (default: $RTCF_SOCKET, else {paths.SOCKET})",
+        help=f"listen on this control socket (default: $RTCF_SOCKET, else {paths.SOCKET})",
     )
     parser.add_argument(
         "--runtime-dir",
         type=Path,
         metavar="DIR",
-        help="for the executors' sockets (default: /run/rtcfd; "
+        help="put the executors' sockets into this folder (default: /run/rtcfd; "
         "with --foreground: the control socket's path and .d, removed at the end)",
     )
     parser.add_argument(
         "--state-dir",
         type=Path,
         metavar="DIR",
-        help="for what is to outlive rtcfd (default: $STATE_DIRECTORY, else /var/lib/rtcfd; "
-        "with --foreground: none)",
+        help="keep persistent state in this folder (default: $STATE_DIRECTORY, else "
+        "/var/lib/rtcfd; with --foreground: none)",
     )
     parser.add_argument(
         "--graphs-dir",
         type=Path,
         metavar="DIR",
-        help=f"graphs to apply at the start (default: {paths.GRAPHS_DIR}; with --foreground: none)",
+        help="apply the graphs in this folder at the start "
+        f"(default: {paths.GRAPHS_DIR}; with --foreground: none)",
     )
     parser.add_argument(
         "--config",
         type=Path,
         metavar="FILE",
-        help=f"settings (default: {settings_file.DEFAULT_FILE} if it exists; "
+        help=f"read settings from this file (default: {settings_file.DEFAULT_FILE} if it exists; "
         "with --foreground: none)",
     )
     parser.add_argument(
@@ -181,18 +183,18 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
         metavar="DIR",
         action="append",
         default=[],
-        help="folder to look for component packages in, before all others (repeatable)",
+        help="search this folder for component packages, before all others (repeatable)",
     )
     parser.add_argument(
         "--executor",
         type=Path,
         metavar="FILE",
-        help=f"executor binary (default: {paths.executor(build_tree)})",
+        help=f"run this executor binary (default: {paths.executor(build_tree)})",
     )
     parser.add_argument(
         "--realtime",
         choices=sorted(_REALTIME),
-        help="whether a loop may run without real-time rights "
+        help="reject loops without real-time rights, or only warn "
         "(default: required; with --foreground: preferred)",
     )
     parser.add_argument(
@@ -204,25 +206,25 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
     parser.add_argument(
         "--end-with-stdin",
         action="store_true",
-        help="end in order when standard input ends: with the process at its other end; "
-        "then remove the control socket's folder too, if nothing else is in it",
+        help="shut down in order when standard input closes, as at the end of the process that "
+        "writes to it; then also remove the control socket's folder if it is empty",
     )
     parser.add_argument(
         "--reload",
         action="store_true",
-        help="make the rtcfd that runs read its settings and graphs again, and exit",
+        help="make the running rtcfd reload its settings and graphs, and exit",
     )
     parser.add_argument(
         "--check-config",
         action="store_true",
-        help="only say whether settings and graphs are valid: exit status 0 or 1",
+        help="check settings and graphs, and exit with status 0 (valid) or 1",
     )
     parser.add_argument("--verbose", action="store_true", help="log debugging messages too")
     return parser
 
 
 def reload_wanted(arguments: Sequence[str] | None) -> Path | None:
-    """Return the socket of the rtcfd that is to reload, if the command line says so."""
+    """Return the socket of the rtcfd to reload; None without --reload."""
     args = _parser(None).parse_args(arguments)
     if not args.reload:
         return None
@@ -238,7 +240,7 @@ def _file(args: argparse.Namespace) -> Path | None:
         except FileNotFoundError:
             return None
         except OSError:
-            pass  # there is one, and reading it says what is wrong
+            pass  # the file exists, and reading it raises the error
     return chosen
 
 
@@ -249,13 +251,12 @@ def _socket(args: argparse.Namespace, file: settings_file.Config) -> Path:
 
 
 def check_wanted(arguments: Sequence[str] | None) -> bool:
-    """Tell whether settings are only to be checked."""
+    """Return whether the command line has --check-config."""
     return bool(_parser(None).parse_args(arguments).check_config)
 
 
 def _folders(named: Sequence[Path], build_tree: Path | None) -> list[Folder]:
-    """Return where packages are; libraries in folders that are named may be of the folder's
-    owner."""
+    """Return the search path.  In named folders, libraries of the folder's owner are trusted."""
     chosen = {Path(os.path.abspath(folder)) for folder in named}
     return [Folder(path, path in chosen) for path in component_folders(named, build_tree)]
 

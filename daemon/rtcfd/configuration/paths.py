@@ -1,4 +1,7 @@
-"""Where things are by default: sockets, folders, the executor.  Components: rtcf.folders."""
+"""Default paths of sockets, folders and the executor.
+
+rtcf_shared.folders has those of components.
+"""
 
 from pathlib import Path
 

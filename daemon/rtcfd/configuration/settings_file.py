@@ -2,13 +2,13 @@
 
     [daemon]            socket, path, realtime, state_dir, runtime_dir, graphs_dir, executor
     [access]            default, and the users and @groups of each level
-    [[access.parameters]]  who may set what, how fast: who, runner, names, most_per_s
+    [[access.parameters]]  rules on parameters: who, runner, names, most_per_s
     [limits]            named as in common/limits.py
     [runner]            defaults of runners, named as in RunnerSettings
     [runner.ros]        likewise, named as in RosSettings
 
-Every key is optional.  What is not known, of the wrong type or out of range is
-refused by name and line.
+Every key is optional.  An unknown key, a value of the wrong type or out of range is an
+error with its name and line.
 """
 
 import math
@@ -34,7 +34,7 @@ from rtcfd.configuration.toml_lines import lines_of_keys
 DEFAULT_FILE = Path("/etc/rtcfd/rtcfd.toml")
 
 _PATHS = ("socket", "state_dir", "runtime_dir", "graphs_dir", "executor")
-# As adduser(8) allows them, and systemd: with @ before a group.
+# The names that adduser(8) and systemd allow; groups begin with @.
 _PRINCIPAL = re.compile(r"@?[A-Za-z_][A-Za-z0-9_.-]*\$?")
 _INTEGERS = range(-(2**63), 2**63)
 _ENDLESS = re.compile(r"\d[\d_]{4300}")  # sys.int_info.default_max_str_digits
@@ -43,7 +43,7 @@ _TYPE_WORDS = {bool: "true or false", int: "an integer", float: "a number", str:
 
 @dataclass
 class Config:
-    """What a configuration file says; None or empty where it says nothing."""
+    """The content of a configuration file; None or empty where it has no value."""
 
     socket: Path | None = None
     state_dir: Path | None = None
@@ -58,22 +58,22 @@ class Config:
     text: str = field(default="", repr=False)  # of the file
 
 
-# Why an executor would refuse what a file says; empty: it would not.
+# Returns why an executor would reject the settings of a file; empty = it accepts them.
 Opinion = Callable[[Config], str]
 
 
 class _Wrong(InvalidArgument):
-    """Something is wrong with a key."""
+    """An error in the value of a key."""
 
-    def __init__(self, key: str, what: str) -> None:
-        super().__init__(what, errors_pb2.REASON_SETTINGS_FILE_INVALID)
+    def __init__(self, key: str, text: str) -> None:
+        super().__init__(text, errors_pb2.REASON_SETTINGS_FILE_INVALID)
         self.key = key
 
 
 def read(file: Path, opinion: Opinion = lambda _: "") -> Config:
-    """Read a configuration file; a Refusal names the file, the line and what is wrong there.
+    """Read a configuration file; raises Refusal with the file, the line and the error.
 
-    `opinion` is the executor's, of the settings of runners.
+    `opinion` asks an executor whether it accepts the settings of runners.
     """
     try:
         # Some editors write a byte order mark.
@@ -90,7 +90,7 @@ def read(file: Path, opinion: Opinion = lambda _: "") -> Config:
     except tomllib.TOMLDecodeError as error:
         raise InvalidArgument(f"{file}: {error}", errors_pb2.REASON_SETTINGS_FILE_INVALID) from None
     except ValueError:
-        # Python itself reads no integer of thousands of digits.
+        # Python rejects integers of thousands of digits.
         digits = _ENDLESS.search(text)
         place = f":{text.count(chr(10), 0, digits.start()) + 1}" if digits else ""
         raise InvalidArgument(
@@ -108,11 +108,11 @@ def read(file: Path, opinion: Opinion = lambda _: "") -> Config:
         _read_limits(_table(document, "limits"), config)
         _read_message(_table(document, "runner"), "runner", config.runner)
         _check_runner(config.runner)
-        if config.runner.ListFields() and (complaint := opinion(config)):
-            raise _Wrong(_key(complaint), complaint)
+        if config.runner.ListFields() and (error := opinion(config)):
+            raise _Wrong(_key(error), error)
     except _Wrong as wrong:
         lines = lines_of_keys(text)
-        # Of what is missing, or stands in braces, that in which it is.
+        # A missing key, or one of an inline table, has the line of its table.
         line = lines.get(wrong.key) or lines.get(wrong.key.rpartition(".")[0])
         where = f"{file}:{line}" if line else str(file)
         raise InvalidArgument(
@@ -131,8 +131,10 @@ def _too_deep(file: Path) -> InvalidArgument:
 
 
 def _check_numbers(value: Any, key: str) -> None:
-    """Refuse, wherever they stand, numbers that no setting can have: Python's have no bounds, and
-    what is infinite passes as more than any."""
+    """Reject numbers that no setting can have, anywhere in the document.
+
+    Python's integers are unbounded, and infinity would satisfy every lower bound.
+    """
     if isinstance(value, dict):
         for name, each in value.items():
             _check_numbers(each, f"{key}.{name}" if key else name)
@@ -172,9 +174,9 @@ def _read_access(table: dict[str, Any], config: Config) -> None:
             raise _Wrong(key, f"{key} must be a list of users and @groups, not {names!r}")
         for name in names:
             if not isinstance(name, str) or not _PRINCIPAL.fullmatch(name):
-                raise _Wrong(key, f"{key}: {name!r} is no user's name, nor @ and a group's")
+                raise _Wrong(key, f"{key}: {name!r} is neither a user nor a @group")
             if name in seen:
-                raise _Wrong(key, f"{key}: {name} is in {seen[name]} already")
+                raise _Wrong(key, f"{key}: {name} is already in {seen[name]}")
             seen[name] = key
         named[rights.WORDS[word]] = names
     rules = table.get("parameters", [])
@@ -193,7 +195,7 @@ def _parameter_rules(tables: list[dict[str, Any]]) -> Iterator[Rule]:
 
 
 def _parameter_rule(table: dict[str, Any]) -> Rule:
-    """Return who may set what, how fast."""
+    """Return the rule of one table."""
     key = "access.parameters"
     _check_keys(f"{key}.", table, ("who", "runner", "names", "most_per_s"))
     who, names, runner = table.get("who"), table.get("names", [".*"]), table.get("runner", ".*")
@@ -208,7 +210,8 @@ def _parameter_rule(table: dict[str, Any]) -> Rule:
             re.compile(pattern)
         except (re.error, TypeError) as error:
             raise _Wrong(
-                f"{key}.{field_name}", f"{key}: {pattern!r} is no expression: {error}"
+                f"{key}.{field_name}",
+                f"{key}: {pattern!r} is not a regular expression: {error}",
             ) from None
     pace = table.get("most_per_s")
     if pace is not None and (type(pace) not in (int, float) or not pace > 0):
@@ -256,7 +259,7 @@ def _set_scalar(message: Any, key: str, name: str, value: Any, expected: type) -
 
 
 def _check_runner(runner: runner_pb2.RunnerSettings) -> None:
-    """Refuse values by the key that has them."""
+    """Check each value by itself, so that an error has its key."""
     for descriptor, value in runner.ListFields():
         key = f"runner.{descriptor.name}"
         if descriptor.message_type is None:
@@ -269,9 +272,9 @@ def _check_runner(runner: runner_pb2.RunnerSettings) -> None:
             )
 
 
-def _key(complaint: str) -> str:
-    """Return the key that an executor complains of."""
-    first = re.match(r"\w*", complaint)
+def _key(error: str) -> str:
+    """Return the key that an executor's error begins with."""
+    first = re.match(r"\w*", error)
     known = runner_pb2.RosSettings.DESCRIPTOR.fields_by_name
     return f"runner.ros.{first[0]}" if first and first[0] in known else "runner"
 

@@ -1,4 +1,4 @@
-"""In which line of a TOML file a key stands: for messages, as tomllib does not tell."""
+"""Finds the lines of the keys of a TOML file, for error messages; tomllib does not return them."""
 
 import re
 from collections import Counter
@@ -9,8 +9,11 @@ _KEY = re.compile(r"\s*([A-Za-z0-9_.\"'-]+(?:\s*\.\s*[A-Za-z0-9_\"'-]+)*)\s*=")
 
 
 def lines_of_keys(text: str) -> dict[str, int]:
-    """Return the line, from 1, of each table and key; keys in full: "runner.ros.queue", and of
-    the tables of a list "access.parameters[0].who"."""
+    """Return the line, from 1, of each table and key.
+
+    Keys are complete, as "runner.ros.queue", and with an index in tables of a list, as
+    "access.parameters[0].who".
+    """
     found: dict[str, int] = {}
     entries: Counter[str] = Counter()
     table = ""

@@ -1,1 +1,1 @@
-"""One executor process: its start and end, its socket, what it says unasked."""
+"""One executor process: its start and end, its socket, its notifications."""

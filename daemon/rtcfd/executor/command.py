@@ -1,4 +1,4 @@
-"""How an executor is called: its binary, its socket, its environment."""
+"""The command line of an executor: its binary, its sockets, its environment."""
 
 import contextlib
 import hashlib
@@ -13,8 +13,8 @@ from rtcf.v1 import errors_pb2
 
 from rtcfd.common.refusals import FailedPrecondition
 
-# What belongs to rtcfd alone: an executor that answered systemd in its name
-# would lie about the daemon.
+# Variables for rtcfd alone: an executor that used them would report to systemd in the
+# daemon's name.
 _OWN_VARIABLES = ("NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID", "LISTEN_FDS", "LISTEN_PID",
                   "LISTEN_FDNAMES")  # fmt: skip
 
@@ -24,19 +24,19 @@ MAX_SOCKET_PATH = 107
 
 @dataclass(frozen=True)
 class ExecutorCommand:
-    """Where the executor binary is, and the folders of the executors' sockets."""
+    """The executor binary, and the folders of the executors' sockets."""
 
     binary: Path
     folder: Path
-    # Of the sockets by which loops are stopped without rtcfd, and who may enter besides us.
+    # The folder of the sockets for direct stops, without rtcfd, and its mode.
     stop_folder: Path | None = None
     stop_mode: int = 0o700
     mark: Callable[[str], Path | None] = lambda runner: None  # see Store.mark
-    private: bool = False  # not the system's daemon
+    private: bool = False  # not the system daemon
     claims_folder: Path | None = None  # where loops claim their CPUs
 
     def prepare(self) -> None:
-        """Make the folders and check the binary."""
+        """Create the folders and check the binary."""
         if not os.access(self.binary, os.X_OK):
             raise FailedPrecondition(
                 f"no executor at {self.binary}: install it, or name one with --executor",
@@ -45,8 +45,10 @@ class ExecutorCommand:
         self.close_folders()
 
     def close_folders(self) -> None:
-        """Let others than our user enter the folder of direct stops alone.  systemd opens all of
-        them with each command of the unit that it runs."""
+        """Restrict the folders: other users may enter only the folder of direct stops.
+
+        systemd resets the modes of all of them with each command of the unit that it runs.
+        """
         _make(self.folder, 0o700)
         if self.stop_folder is not None:
             _make(self.stop_folder, self.stop_mode)
@@ -54,9 +56,9 @@ class ExecutorCommand:
             _make(self.claims_folder, 0o700)
 
     def remove_folders(self) -> None:
-        """Remove our folders, if nothing is left in them."""
+        """Remove our folders if they are empty."""
         for folder in (self.folder, self.stop_folder, self.claims_folder):
-            # That of the claims may be of several daemons.
+            # Several daemons may share the folder of claims, which is elsewhere then.
             if folder is not None and folder.parent == self.folder.parent:
                 with contextlib.suppress(OSError):
                     folder.rmdir()
@@ -84,24 +86,27 @@ class ExecutorCommand:
         return line
 
     def daemon_name(self) -> str:
-        """Return what tells this daemon from others of the machine; empty: it is the system's."""
+        """Return a name that no other daemon of this machine has; empty for the system daemon."""
         if not self.private:
             return ""
-        # The same after a restart, and no other daemon's: two cannot share a folder.
+        # Made from the folder: the same after a restart, and two daemons cannot share a folder.
         folder = hashlib.sha256(os.fsencode(self.folder.absolute())).hexdigest()
         return f"u{os.geteuid()}_{folder[:6]}"
 
     @staticmethod
     def environment() -> dict[str, str]:
-        """Return ours (ROS_MASTER_URI, ROS_IP, ROS_HOSTNAME …) without what is rtcfd's alone."""
+        """Return our environment (ROS_MASTER_URI, ROS_IP …) without the variables for rtcfd."""
         return {name: value for name, value in os.environ.items() if name not in _OWN_VARIABLES}
 
 
 def claims_folder_of_user(fallback: Path) -> Path:
-    """Return where the loops of all private daemons of our user claim CPUs; `fallback`: of a
-    daemon that is alone with it, where somebody else has the name."""
+    """Return the folder in which the loops of all private daemons of our user claim CPUs.
+
+    Returns `fallback`, which the daemon uses alone, if the shared folder cannot be created or
+    belongs to another user.
+    """
     runtime = os.environ.get("XDG_RUNTIME_DIR")
-    if runtime and _is_ours(Path(runtime)):  # su keeps the variable
+    if runtime and _is_ours(Path(runtime)):  # su keeps the variable of the first user
         return Path(runtime) / "rtcf-cpus"
     folder = Path(tempfile.gettempdir()) / f"rtcf-cpus-{os.geteuid()}"
     try:

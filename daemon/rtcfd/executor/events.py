@@ -1,4 +1,4 @@
-"""Log records and events of an executor, into rtcfd's log.
+"""Writes an executor's log records and events to rtcfd's log, and passes them on.
 
 Owned by the Runner; called by its Link on rtcfd's one thread.
 """
@@ -16,7 +16,7 @@ from rtcfd.common.growing_interval import GrowingInterval
 from rtcfd.common.limits import Limits
 
 log = logging.getLogger("rtcf-executor")
-# What a component logs is chosen where it is logged, by its logger's level.
+# The executor filters the records, by the level of each component's logger.
 log.setLevel(logging.DEBUG)
 
 _LEVELS: dict[int, int] = {
@@ -28,7 +28,7 @@ _LEVELS: dict[int, int] = {
 }
 _EVENT_LEVELS: dict[int, int] = {
     wire.Event.KIND_LOOP_ENDED: logging.ERROR,
-    # As loud as a refusal would be: who starts rtcfd in a terminal is to see it.
+    # An error, so that the terminal of a rtcfd in the foreground shows it.
     wire.Event.KIND_DEGRADED: logging.ERROR,
     wire.Event.KIND_ROS: logging.INFO,
     wire.Event.KIND_COMPONENT_FAILED: logging.WARNING,
@@ -37,7 +37,7 @@ _EVENT_LEVELS: dict[int, int] = {
 }
 
 
-# As those who watch are told of them.
+# The kinds of these events in the client protocol.
 _KINDS: dict[int, "control_pb2.Event.Kind"] = {
     wire.Event.KIND_LOOP_ENDED: control_pb2.Event.KIND_LOOP_FAULT,
     wire.Event.KIND_DEGRADED: control_pb2.Event.KIND_DEGRADED,
@@ -47,53 +47,53 @@ _KINDS: dict[int, "control_pb2.Event.Kind"] = {
     wire.Event.KIND_CLOCK: control_pb2.Event.KIND_CLOCK,
 }
 
-# Between lines of the journal on late cycles, of which an executor tells each 10 s.
+# Intervals of journal lines about late cycles, which an executor reports every 10 s.
 _LATE_S = 10.0
 _LATE_LONGEST_S = 3600.0
-_REPORT_S = 1.0  # from the first record that is dropped to the line that says how many were
+_REPORT_S = 1.0  # from the first dropped record to the line with their number
 
 
 class Audience(Protocol):
-    """Who else hears of it: the Runner."""
+    """Receives the notifications: the Runner."""
 
     def loop_ended(self, component: str, reason: str) -> None:
-        """The loop has ended by itself."""
+        """The loop has ended because of a fault."""
 
     def late(self, message: str) -> None:
         """Cycles ended late."""
 
     def told(self, kind: "control_pb2.Event.Kind", event: wire.Event) -> None:
-        """Something has happened, which has been seen to."""
+        """An event has occurred; called after the specific method, if there is one."""
 
     def component_failed(self, component: str, reason: str) -> None:
         """A component has failed; the loop goes on."""
 
     def take_log(self, record: wire.LogRecord) -> None:
-        """A record has come."""
+        """A component has logged a record."""
 
     def called(self, call: wire.ServiceCall) -> None:
-        """Somebody calls a service of the executor's ROS node."""
+        """A ROS node calls a service of the executor's ROS node."""
 
     def stopped_directly(self, stop: wire.DirectStop) -> None:
-        """Somebody has stopped the loop at its executor; told of again with each connection."""
+        """A user has stopped the loop at its executor; repeated after each connection."""
 
     def parameters_changed(self, changed: wire.ParametersChanged) -> None:
-        """A peer on ROS has changed parameters of a component."""
+        """A ROS node has changed parameters of a component."""
 
 
 class Events:
-    """The unasked frames of one runner's executor."""
+    """The notifications of one runner's executor."""
 
     def __init__(self, runner: str, audience: Audience, limits: Callable[[], Limits]) -> None:
         self._runner = runner
         self._audience = audience
         self._limits = limits
         self._budget = Budget(limits().log_records_per_s)
-        self._report: asyncio.TimerHandle | None = None  # of what was lost
-        self._late = GrowingInterval(_LATE_S, _LATE_LONGEST_S)  # between lines on late cycles
+        self._report: asyncio.TimerHandle | None = None  # on dropped records
+        self._late = GrowingInterval(_LATE_S, _LATE_LONGEST_S)  # of lines about late cycles
 
     def take(self, response: wire.Response) -> None:
-        """Take one unasked frame."""
+        """Handle one notification."""
         kind = response.WhichOneof("kind")
         if kind == "log":
             self._log(response.log)
@@ -133,7 +133,7 @@ class Events:
                 "iteration": record.iteration,
             },
         )
-        # The time of the call, not of its arrival here.
+        # The time at which the component logged it, not of its arrival here.
         entry.created = record.time_ns / 1e9
         entry.msecs = record.time_ns // 1_000_000 % 1000
         log.handle(entry)
@@ -150,11 +150,10 @@ class Events:
 
     def _event(self, event: wire.Event) -> None:
         text = str(event.message)
-        # A loop that is late for good, as on a kernel that is not for real time, is not to fill
-        # the journal.
+        # A loop that is always late, as on a kernel without real time, must not fill the journal.
         left_out = self._late.due() if event.kind == wire.Event.KIND_OVERRUNS else 0
         if left_out:
-            text += f" ({left_out} reports like this were left out since the last one here)"
+            text += f" ({left_out} similar reports were suppressed since the last one)"
         if left_out is not None:
             log.log(
                 _EVENT_LEVELS.get(event.kind, logging.WARNING),
@@ -177,5 +176,5 @@ class Events:
 
 
 def logger_of(runner: str) -> "logging.LoggerAdapter[logging.Logger]":
-    """Return the logger for what rtcfd itself says about a runner."""
+    """Return the logger for rtcfd's own messages about a runner."""
     return logging.LoggerAdapter(logging.getLogger("rtcfd"), {"runner": runner})

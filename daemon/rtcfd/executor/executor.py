@@ -1,7 +1,7 @@
 """One executor process and the link to it.
 
-Owned by its Runner from launch, or from its adoption, to its end.  It never
-restarts: a new start is a new object.
+Owned by its Runner from its launch or adoption to its end.  An executor never
+restarts: each start creates a new object.
 """
 
 import asyncio
@@ -43,16 +43,16 @@ log = logging.getLogger(__name__)
 CONNECT_TIMEOUT_S = 10.0
 QUERY_TIMEOUT_S = 5.0
 STOP_TIMEOUT_S = 10.0  # for the loop to end and the stop hooks to return
-EXIT_TIMEOUT_S = 5.0  # from the exit frame, and then from SIGTERM, to the end
+EXIT_TIMEOUT_S = 5.0  # from the exit message, and then from SIGTERM, to the end
 _RETRY_S = 0.01
-_RENEW_S = 3.0  # for an executor to make a socket that was removed, or to end
+_RENEW_S = 3.0  # longest time in which an executor recreates a removed socket, or ends
 _RENEW_LOOK_S = 0.1
 
 OnEnd = Callable[["Executor", End], None]
 
 
 class Executor:
-    """A running executor.  `on_end` is called once, with how it ended."""
+    """A running executor.  Calls `on_end` once, with the way in which it ended."""
 
     def __init__(
         self,
@@ -63,12 +63,12 @@ class Executor:
         on_end: OnEnd,
     ) -> None:
         self.pid = process.pid
-        self.expected = False  # its end was asked for
+        self.expected = False  # rtcfd has requested its end
         self.ended = asyncio.Event()  # set after on_end
-        self.verdict = ""  # on its end, or why it was asked for
-        self.safe = True  # it did not die in a hook that makes things safe or stops them
+        self.verdict = ""  # the cause of its end, or the reason for which rtcfd requested it
+        self.safe = True  # see Verdict.safe
         self.version = ""  # of rtcf
-        self.foreign = ""  # why nothing but stop and its end can be asked of it
+        self.foreign = ""  # why it accepts only the requests stop and exit; empty = it accepts all
         self._protocol = 0
         self._runner = runner
         self._peer = f"executor of {runner} (pid {process.pid})"
@@ -78,7 +78,7 @@ class Executor:
         self._on_end = on_end
         self._link: Link | None = None
         self._recorder: FlightRecorder | None = None
-        self.frames: int | None = None  # descriptor of what incidents/frame_file.py reads
+        self.frames: int | None = None  # descriptor of the frames, for incidents/frame_file.py
         self._watching: asyncio.Task[None] | None = None
 
     @classmethod
@@ -87,10 +87,10 @@ class Executor:
     ) -> "Executor":
         """Start the process and connect; a failure leaves no process behind."""
         try:
-            # An own session: Ctrl-C at rtcfd's terminal reaches rtcfd alone, which
-            # then stops the loops in order.  Signals as rtcfd has them: without
-            # SIGPIPE, so that a loop does not die of the reader of our stderr.
-            # Not asyncio's, which kills what it started when it is closed.
+            # An own session: Ctrl-C at rtcfd's terminal reaches only rtcfd, which
+            # then stops the loops in order.  restore_signals=False keeps SIGPIPE
+            # ignored, so that a loop survives the reader of our stderr.  Not
+            # asyncio's subprocess, which is killed when the event loop closes.
             started = subprocess.Popen(
                 command.arguments(runner),
                 stdin=subprocess.DEVNULL,
@@ -109,7 +109,7 @@ class Executor:
             await executor._attach()
             if executor.foreign:
                 raise FailedPrecondition(
-                    f"{executor.foreign}: install both of one version, then restart rtcfd",
+                    f"{executor.foreign}: install both in one version, then restart rtcfd",
                     errors_pb2.REASON_EXECUTOR_FOREIGN,
                 )
         except BaseException:
@@ -125,10 +125,10 @@ class Executor:
     async def adopt(
         cls, runner: str, command: ExecutorCommand, on_unasked: Unasked, on_end: OnEnd
     ) -> "Executor | None":
-        """Take over an executor that an earlier rtcfd left at its socket.
+        """Take over an executor that an earlier rtcfd left running.
 
-        None if there is none: a dead socket is removed.  One whose protocol is
-        not ours is `foreign`: its loop goes on, and can be stopped.
+        Returns None if there is none, and removes a dead socket.  An executor with an
+        incompatible protocol is `foreign`: its loop goes on, and can be stopped.
         """
         socket = command.socket(runner)
         link = await _link_to(runner, socket, on_unasked)
@@ -156,7 +156,7 @@ class Executor:
             executor._close_memory()
             if isinstance(problem, Unavailable):
                 raise Silent(
-                    f"{problem}; its loop may be running: it is asked again and again, "
+                    f"{problem}; its loop may be running: rtcfd keeps asking it, "
                     f"`kill {executor.pid}` ends it",
                     errors_pb2.REASON_EXECUTOR_SILENT,
                 ) from None
@@ -166,12 +166,15 @@ class Executor:
 
     @property
     def connected(self) -> bool:
-        """Tell whether the link stands."""
+        """Whether the link is open."""
         return self._link is not None and not self._link.ended.is_set()
 
     @property
     def frozen(self) -> str:
-        """Return a message with the remedy if a signal or a debugger has stopped it; else empty."""
+        """Why the process stands still, with the remedy: a signal or a debugger has stopped it.
+
+        Empty if it does not.
+        """
         if not self._process.frozen:
             return ""
         return (
@@ -180,11 +183,11 @@ class Executor:
         )
 
     def note(self) -> Note | None:
-        """Return what the flight recorder says; None if there is none."""
+        """Return the current content of the flight recorder; None if there is none."""
         return None if self._recorder is None else self._recorder.read()
 
     def trace(self) -> Trace | None:
-        """Return where it crashed, if that is known."""
+        """Return the stack trace of its crash, if it is known."""
         return None if self._recorder is None else self._recorder.trace()
 
     async def request(
@@ -202,14 +205,14 @@ class Executor:
         return await self._link.request(request, timeout_s, on_progress, on_answer)
 
     async def watch_ports(self, request: ports_pb2.WatchPortsRequest, on_ports: OnPorts) -> None:
-        """Hand on the values of ports until cancelled; see Link.watch_ports."""
+        """Pass the values of ports on until cancelled; see Link.watch_ports."""
         if self._link is None:
             raise Unavailable(f"{self._peer} is not connected", errors_pb2.REASON_EXECUTOR_DOWN)
         if self.foreign:
             raise FailedPrecondition(self.foreign, errors_pb2.REASON_EXECUTOR_FOREIGN)
         if self._protocol < PORTS_PROTOCOL:
             raise FailedPrecondition(
-                f"{self._peer} is of rtcf {self.version}, which tells no values of ports: `rtcfctl "
+                f"{self._peer} is of rtcf {self.version}, which sends no values of ports: `rtcfctl "
                 f"runner restart {self._runner}` stops the loop and starts one that does",
                 errors_pb2.REASON_EXECUTOR_FOREIGN,
             )
@@ -217,21 +220,25 @@ class Executor:
 
     @property
     def resets_all_at_once(self) -> bool:
-        """Its status counts from where its statistics do; else we see to that."""
+        """Whether a reset of its statistics also resets the counters of its status.
+
+        If not, rtcfd subtracts the earlier counts.
+        """
         return self._protocol >= FIGURES_PROTOCOL
 
     async def limit(self, limits: Limits) -> None:
-        """Tell it what its graph may have; one that does not know of limits goes without."""
+        """Send the limits of its graph.  An old executor without this request has no limits."""
         if self._protocol >= LIMITS_PROTOCOL and not self.foreign:
             await self.request(wire.Request(limits=wire.Limits(taps=limits.taps)), None)
 
     async def grant(self, rules: wire.AccessRules) -> None:
-        """Tell it who may stop its loop past us, and whose ROS master it may follow."""
+        """Send the access rules: which users may stop its loop directly, and whose ROS master it
+        may follow."""
         if self._protocol >= ACCESS_PROTOCOL and not self.foreign:
             await self.request(wire.Request(access=rules))
 
     async def leave(self) -> None:
-        """Let go of it without ending it: the next rtcfd finds it."""
+        """Disconnect without ending it: the next rtcfd adopts it."""
         if self._watching is not None:
             self._watching.cancel()
             await asyncio.gather(self._watching, return_exceptions=True)
@@ -241,7 +248,7 @@ class Executor:
         self._process.release()
 
     async def shut_down(self) -> None:
-        """Stop the loop in order, then end the process, by force if it must be."""
+        """Stop the loop in order, then end the process, by signals if necessary."""
         self.expected = True
         try:
             if frozen := self.frozen:
@@ -249,32 +256,32 @@ class Executor:
             await self.request(wire.Request(stop=wire.Stop()), STOP_TIMEOUT_S)
             await self.request(wire.Request(exit=wire.Exit()), EXIT_TIMEOUT_S)
         except Refusal as refusal:
-            log.warning("%s: no orderly end: %s", self._peer, refusal)
+            log.warning("%s: cannot end it in order: %s", self._peer, refusal)
             self._process.signal(signal.SIGTERM)
-            # One that was frozen finds the other when it wakes up, and ends in order.
+            # A frozen process receives the pending SIGTERM when it continues.
             self._process.signal(signal.SIGCONT)
         await _end(self._process, self._peer)
         if self._watching is not None:
             await self._watching
 
     async def _attach(self) -> None:
-        """Connect and say hello, within the deadline."""
+        """Connect and exchange hello messages, within CONNECT_TIMEOUT_S."""
         loop = asyncio.get_running_loop()
         deadline = loop.time() + CONNECT_TIMEOUT_S
         while True:
             if self._process.end is not None:
                 raise FailedPrecondition(
-                    f"{self._peer} {self._process.end} before it served; "
-                    "its reason is in rtcfd's log",
+                    f"{self._peer} {self._process.end} before it listened at its socket; "
+                    "rtcfd's log has its reason",
                     errors_pb2.REASON_EXECUTOR_FAILED,
                 )
             try:
                 link = await Link.connect(self._peer, self._socket, self._on_unasked)
                 break
-            except OSError as error:  # out of descriptors, too: its loop runs meanwhile
+            except OSError as error:  # also if rtcfd is out of file descriptors: retry
                 if loop.time() > deadline:
                     raise Unavailable(
-                        f"{self._peer} does not serve {self._socket} "
+                        f"{self._peer} does not listen at {self._socket} "
                         f"{CONNECT_TIMEOUT_S:g} s after its start ({error.strerror or error})",
                         errors_pb2.REASON_EXECUTOR_SILENT,
                     ) from None
@@ -286,18 +293,18 @@ class Executor:
             raise
 
     async def _greet(self, link: Link, timeout_s: float) -> None:
-        """Say hello, and open what the answer names."""
+        """Exchange hello messages, and open the shared memory that the answer names."""
         if not _belongs(link.peer_pid, self.pid):
             raise Unavailable(
                 f"{self._socket} is served by process {link.peer_pid}, which is not the executor "
-                f"of {self._runner} (pid {self.pid}): end that",
+                f"of {self._runner} (pid {self.pid}): end process {link.peer_pid}",
                 errors_pb2.REASON_EXECUTOR_SILENT,
             )
         hello = await link.hello(timeout_s)
         if hello.runner != self._runner:
             raise Unavailable(
-                f'{self._socket} is served by the executor of runner "{hello.runner}", and is to '
-                f'be that of "{self._runner}": end it (pid {link.peer_pid})',
+                f'{self._socket} is served by the executor of runner "{hello.runner}" instead of '
+                f'"{self._runner}": end it (pid {link.peer_pid})',
                 errors_pb2.REASON_EXECUTOR_SILENT,
             )
         self.version = hello.version or "?"
@@ -317,19 +324,19 @@ class Executor:
                 path = f"/proc/{link.peer_pid}/fd/{hello.frames_fd}"
                 self.frames = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
             except OSError as error:
-                log.warning("%s: its last cycles cannot be read: %s", self._peer, error)
+                log.warning("%s: cannot read its frames: %s", self._peer, error)
         self._link = link
         if hello.HasField("direct_stop"):
             link.direct_stops = hello.direct_stop.count
             self._on_unasked(wire.Response(direct_stop=hello.direct_stop))
 
     def _begin_to_watch(self) -> None:
-        # In nobody's name: its end is no deed of whose call started it.
+        # Own context: do not attribute its end to the client whose call started it.
         watching = asyncio.create_task(self._watch(), context=contextvars.Context())
         self._watching = looked_at(watching, f"the watch over {self._peer}")
 
     async def _watch(self) -> None:
-        """See the process end; a link lost before that is made anew."""
+        """Wait for the end of the process; reconnect if the link breaks before."""
         ending = asyncio.create_task(self._process.wait())
         while self._link is not None:
             lost = asyncio.create_task(self._link.ended.wait())
@@ -340,7 +347,9 @@ class Executor:
                 await asyncio.wait({ending}, timeout=1.0)
             if ending.done() or self.expected:
                 break
-            log.error("%s; connecting again", self._link.problem or f"{self._peer} hung up")
+            log.error(
+                "%s; reconnecting", self._link.problem or f"{self._peer} closed the connection"
+            )
             try:
                 await self._attach()
             except Refusal as refusal:
@@ -356,7 +365,7 @@ class Executor:
         self.ended.set()
 
     def _close_memory(self) -> None:
-        """Let go of what it shares with us."""
+        """Close the memory that it shares with us."""
         if self._recorder is not None:
             self._recorder.close()
             self._recorder = None
@@ -365,13 +374,13 @@ class Executor:
             self.frames = None
 
     def _remove_sockets(self) -> None:
-        """Of an executor that has ended: by force, it has left them."""
+        """Remove the sockets of an ended executor: one that was killed leaves them."""
         for socket in self._sockets:
             socket.unlink(missing_ok=True)
 
 
 def _belongs(pid: int, to: int) -> bool:
-    """Tell whether a process is the one that was started, or of the session that it began."""
+    """Return whether process `pid` is process `to`, or in the session that it leads."""
     try:
         return pid == to or os.getsid(pid) == to
     except OSError:
@@ -379,7 +388,7 @@ def _belongs(pid: int, to: int) -> bool:
 
 
 async def _end(process: Process, peer: str) -> None:
-    """Wait until a process that was asked to end has done so; insist."""
+    """Wait for a process that was asked to end; send SIGTERM, then SIGKILL, if it does not."""
     for harder in (signal.SIGTERM, signal.SIGKILL):
         try:
             await asyncio.wait_for(process.wait(), EXIT_TIMEOUT_S)
@@ -391,10 +400,10 @@ async def _end(process: Process, peer: str) -> None:
 
 
 async def _link_to(runner: str, socket: Path, on_unasked: Unasked) -> Link | None:
-    """Connect to an executor that was left at a socket; None if there is none any more.
+    """Connect to an executor of an earlier rtcfd; None if there is none any more.
 
-    One whose socket was removed makes it anew within a second, and one that ends takes a while:
-    both are waited for.  Raises Silent for one that does neither.
+    An executor recreates a removed socket within a second; one that is ending takes a while.
+    Waits for either, and raises Silent if neither happens.
     """
     deadline = time.monotonic() + _RENEW_S
     while True:
@@ -409,8 +418,8 @@ async def _link_to(runner: str, socket: Path, on_unasked: Unasked) -> Link | Non
             return None
         if time.monotonic() > deadline:
             raise Silent(
-                f"an executor of runner {runner} is there (pid {pid}), and its socket {socket} is "
-                "not; its loop may be running: it is looked for again and again, "
+                f"the executor of runner {runner} (pid {pid}) exists, but its socket {socket} does "
+                "not; its loop may be running: rtcfd keeps looking for it, "
                 f"`kill {pid}` ends it in order",
                 errors_pb2.REASON_EXECUTOR_SILENT,
             )
@@ -422,6 +431,6 @@ def _remove_dead(socket: Path) -> None:
         socket.unlink(missing_ok=True)
     except OSError as error:
         raise FailedPrecondition(
-            f"{socket} is in the way and is no socket of an executor: remove it ({error.strerror})",
+            f"{socket} is in the way and is not an executor's socket: remove it ({error.strerror})",
             errors_pb2.REASON_EXECUTOR_FAILED,
         ) from None

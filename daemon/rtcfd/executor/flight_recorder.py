@@ -1,7 +1,7 @@
-"""Reads an executor's flight recorder: what its threads were doing when it died.
+"""Reads an executor's flight recorder: the activity of its threads when it died.
 
-A shared memory of the executor (layout in executor.proto) that this rtcfd
-opens at hello and holds; it outlives the process.  Owned by the Executor.
+The recorder is shared memory of the executor (layout in executor.proto).  rtcfd opens
+it at hello and holds it, so that it outlives the process.  Owned by the Executor.
 """
 
 import mmap
@@ -35,23 +35,23 @@ class Thread(IntEnum):
 
 @dataclass(frozen=True)
 class Note:
-    """What the recorder says."""
+    """The content of the recorder at one time."""
 
     iteration: int = 0
-    running: bool = False  # the loop
-    updating: str = ""  # full name of the component in the real-time thread
+    running: bool = False  # whether the loop runs
+    updating: str = ""  # full name of the component whose hook the real-time thread runs
     hooking: str = ""  # full name of the component whose hook the graph thread runs
-    hook: str = ""
-    signal: int = 0  # of a crash that was noted; 0 = none
-    thread: int = Thread.NONE  # that crashed
-    stalled: bool = False  # the crash was made because a cycle did not end
-    address: int = 0  # of the fault
-    cycle_hook: str = "update"  # the real-time thread's in the component `updating`
+    hook: str = ""  # hook of `hooking`
+    signal: int = 0  # signal of a crash; 0 = none
+    thread: int = Thread.NONE  # the crashed thread
+    stalled: bool = False  # the executor crashed itself because a cycle did not end
+    address: int = 0  # address of the fault
+    cycle_hook: str = "update"  # hook of `updating`
 
 
 @dataclass(frozen=True)
 class Trace:
-    """Where a crash was: addresses of code, innermost first, and the process's mappings then."""
+    """The stack of a crash: code addresses, innermost first, and the memory map of the process."""
 
     frames: tuple[int, ...]
     maps: str  # as /proc/PID/maps
@@ -66,7 +66,7 @@ class FlightRecorder:
 
     def __init__(self, pid: int, descriptor: int) -> None:
         """Open a recorder by its number in the executor; raises OSError or ValueError."""
-        # Kept open: the notes of a crash come behind the mapped page.
+        # Kept open: the trace of a crash is written behind the mapped page.
         self._file = os.open(f"/proc/{pid}/fd/{descriptor}", os.O_RDONLY | os.O_CLOEXEC)
         try:
             self._memory = mmap.mmap(self._file, 0, prot=mmap.PROT_READ)
@@ -76,10 +76,10 @@ class FlightRecorder:
         magic, version, *_ = _HEADER.unpack_from(self._memory)
         if (magic, version) != (_MAGIC, _VERSION):
             self.close()
-            raise ValueError(f"it is no flight recorder of version {_VERSION}")
+            raise ValueError(f"it is not a flight recorder of version {_VERSION}")
 
     def read(self) -> Note:
-        """Return what it says now."""
+        """Return the current content."""
         (_, _, iteration, updating, hooking, hook, signal, thread, reason, address, running,
          slots, cycle_hook, _) = _HEADER.unpack_from(self._memory)  # fmt: skip
         return Note(
@@ -96,7 +96,7 @@ class FlightRecorder:
         )
 
     def trace(self) -> Trace | None:
-        """Return where the process crashed; None: it did not, or nothing is known."""
+        """Return the stack of a crash; None: there was none, or it is not known."""
         slots = _HEADER.unpack_from(self._memory)[11]
         begin = _NAMES + slots * _NAME_BYTES
         data = os.pread(self._file, _TRACE.size, begin)
@@ -109,7 +109,7 @@ class FlightRecorder:
         return Trace(tuple(frames[:count]), os.fsdecode(maps))
 
     def close(self) -> None:
-        """Let go of it."""
+        """Unmap and close it."""
         self._memory.close()
         os.close(self._file)
 

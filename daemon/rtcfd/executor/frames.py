@@ -1,4 +1,5 @@
-"""Frames of the executor protocol: a 4-byte little-endian length and a message."""
+"""Reads and writes messages on an executor's socket: a 4-byte little-endian length, then the
+serialized message."""
 
 import asyncio
 
@@ -7,13 +8,13 @@ _LENGTH_BYTES = 4
 
 
 class FrameError(Exception):
-    """The peer does not keep to the protocol."""
+    """A message violates the protocol."""
 
 
 def pack(message: bytes) -> bytes:
-    """Return the frame of a serialized message."""
+    """Return a serialized message with its length before it."""
     if len(message) > MAX_FRAME:
-        raise FrameError(f"a message of {len(message)} bytes is above the {MAX_FRAME} of a frame")
+        raise FrameError(f"a message of {len(message)} bytes is above the limit of {MAX_FRAME}")
     return len(message).to_bytes(_LENGTH_BYTES, "little") + message
 
 
@@ -22,7 +23,7 @@ async def read(reader: asyncio.StreamReader) -> bytes | None:
     try:
         size = int.from_bytes(await reader.readexactly(_LENGTH_BYTES), "little")
         if size > MAX_FRAME:
-            raise FrameError(f"a frame of {size} bytes is above the limit of {MAX_FRAME}")
+            raise FrameError(f"a message of {size} bytes is above the limit of {MAX_FRAME}")
         return await reader.readexactly(size)
     except (asyncio.IncompleteReadError, ConnectionError):
         return None

@@ -1,7 +1,7 @@
-"""The connection to one executor: requests out, responses and unasked frames in.
+"""The connection to one executor: sends requests, receives responses and notifications.
 
-Owned by the Executor.  Requests may overlap; each response finds its request
-by id.  A link that ends fails all requests that wait for it.
+Owned by the Executor.  Requests may overlap; a response has the id of its request.
+When the link ends, all pending requests fail.
 """
 
 import asyncio
@@ -20,14 +20,14 @@ from rtcfd.common import refusals
 from rtcfd.common.tasks import looked_at
 from rtcfd.executor import frames
 
-# The protocol that this rtcfd speaks.  A number is added for what a peer cannot do without
-# knowing of it, so that rtcfd and an executor of neighbouring numbers work together: the newer
-# asks the older for nothing that it does not know.  Hello, Stop and Exit stay as they are for good.
+# The protocol version of this rtcfd.  It increases with features that need support by the peer.
+# rtcfd and an executor of neighbouring versions work together: the newer one does not use the new
+# features.  Hello, Stop and Exit never change.
 PROTOCOL = 4
-LIMITS_PROTOCOL = 2  # from it on executors keep [limits]
-ACCESS_PROTOCOL = 3  # from it on they are stopped past rtcfd by who may, and tell
-FIGURES_PROTOCOL = 4  # from it on status and statistics count from one reset
-PORTS_PROTOCOL = 4  # from it on values of ports can be watched
+LIMITS_PROTOCOL = 2  # since then, executors enforce [limits]
+ACCESS_PROTOCOL = 3  # since then, executors accept and report direct stops
+FIGURES_PROTOCOL = 4  # since then, one reset begins the counts of status and statistics
+PORTS_PROTOCOL = 4  # since then, executors send the values of ports
 _CREDENTIALS = struct.Struct("3i")  # struct ucred, unix(7)
 
 Progress = Callable[[str], None]
@@ -35,7 +35,7 @@ Unasked = Callable[[wire.Response], None]
 OnAnswer = Callable[[wire.Response], None]
 OnPorts = Callable[[ports_pb2.WatchPortsResponse], None]
 
-# By code; and the reason of one that an executor which knows of none gives.
+# By code: the exception, and the reason for an executor that sends none.
 _REFUSALS: dict[int, tuple[type[refusals.Refusal], errors_pb2.Reason]] = {
     wire.Error.CODE_INVALID_ARGUMENT: (refusals.InvalidArgument, errors_pb2.REASON_VALUE_INVALID),
     wire.Error.CODE_NOT_FOUND: (refusals.NotFound, errors_pb2.REASON_COMPONENT_NOT_FOUND),
@@ -54,7 +54,7 @@ _REFUSALS: dict[int, tuple[type[refusals.Refusal], errors_pb2.Reason]] = {
 
 
 class _Pending:
-    """A request on its way."""
+    """A request that waits for its response."""
 
     def __init__(
         self,
@@ -83,21 +83,24 @@ class Link:
         self._on_unasked = on_unasked
         self._next_id = 1
         self._pending: dict[int, _Pending] = {}
-        self.direct_stops = 0  # that we know of: what was asked before any is refused
-        self.problem = ""  # why the peer was cut off; empty = it closed
+        # The number of direct stops that we know of.  It goes into each request, and the executor
+        # rejects a request to start that was sent before a later one.
+        self.direct_stops = 0
+        self.problem = ""  # why we closed the connection; empty = the peer closed it
         self.ended = asyncio.Event()
         credentials = writer.get_extra_info("socket").getsockopt(
             socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size
         )
-        # Of the process that listens, by the kernel's word.
+        # From the kernel; those of the process that listens.
         self.peer_pid, self.peer_uid, _ = _CREDENTIALS.unpack(credentials)
-        # In nobody's name: what an executor says is not said by whose call connected to it.
+        # Own context: do not attribute executor messages to the connecting client.
         reading = asyncio.create_task(self._read(reader), context=contextvars.Context())
         self._reading = looked_at(reading, f"the link to {peer}")
 
     @classmethod
     async def connect(cls, peer: str, path: Path, on_unasked: Unasked) -> "Link":
-        """Connect to the executor's socket; raises OSError, or a refusal of a foreign one."""
+        """Connect to the executor's socket; raises OSError, or Unavailable if it belongs to
+        another user."""
         reader, writer = await asyncio.open_unix_connection(path)
         link = cls(peer, reader, writer, on_unasked)
         if link.peer_uid not in (os.geteuid(), 0):
@@ -109,7 +112,7 @@ class Link:
         return link
 
     async def hello(self, timeout_s: float) -> wire.HelloResult:
-        """Open the conversation; both then say which protocol and version they are."""
+        """Exchange hello messages, which have the protocol and the version of both sides."""
         request = wire.Request(hello=wire.Hello(protocol=PROTOCOL))
         return (await self.request(request, timeout_s)).hello
 
@@ -120,27 +123,24 @@ class Link:
         on_progress: Progress | None = None,
         on_answer: OnAnswer | None = None,
     ) -> wire.Response:
-        """Send a request (its id is set here) and return the response that ends it.
+        """Send a request, set its id, and return the response that completes it.
 
-        `on_answer` is called with it when it arrives, unless it is a refusal: before any frame
-        that comes after it is looked at.
+        `on_answer` is called with the response when it arrives, unless it is an error, and
+        before any later message is handled.
 
-        Raises the executor's refusal, or Unavailable when the link ends or
-        `timeout_s` of wall-clock time passes (None: for callers with an own limit).
+        Raises the executor's error, or Unavailable when the link ends or `timeout_s` of
+        wall-clock time passes (None: the caller has a limit of its own).
         """
         return await self._request(request, timeout_s, _Pending(on_progress, on_answer))
 
     async def watch_ports(self, request: ports_pb2.WatchPortsRequest, on_ports: OnPorts) -> None:
-        """Have the executor tell the values of ports until this is cancelled.
-
-        Raises as request() does.
-        """
+        """Receive the values of ports until cancelled; raises the errors of request()."""
         opening = wire.Request(watch_ports=request)
         try:
             await self._request(opening, None, _Pending(on_ports=on_ports))
         finally:
             if opening.id and not self.ended.is_set():
-                # Its answer is nobody's.
+                # Nobody waits for its response.
                 closing = wire.Request(end_watch=wire.EndWatch(watch=opening.id))
                 self._writer.write(frames.pack(self._numbered(closing).SerializeToString()))
 
@@ -181,7 +181,7 @@ class Link:
         return response
 
     async def close(self) -> None:
-        """End the connection; requests that wait fail."""
+        """Close the connection; pending requests fail."""
         self._writer.close()
         self._reading.cancel()
         await asyncio.gather(self._reading, return_exceptions=True)
@@ -192,7 +192,7 @@ class Link:
             while (message := await frames.read(reader)) is not None:
                 self._dispatch(wire.Response.FromString(message))
         except (frames.FrameError, DecodeError) as error:
-            self.problem = f"{self.peer} does not keep to the protocol: {error}"
+            self.problem = f"{self.peer} violates the protocol: {error}"
         finally:
             self._writer.close()
             self._fail_pending()
@@ -205,7 +205,7 @@ class Link:
             return
         pending = self._pending.get(response.id)
         if pending is None:
-            return  # its caller gave up
+            return  # its caller has stopped waiting
         if response.WhichOneof("kind") == "progress":
             if pending.on_progress is not None:
                 pending.on_progress(response.progress)

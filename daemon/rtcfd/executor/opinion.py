@@ -1,7 +1,7 @@
-"""What an executor would say of settings: asked in a process of its own, which runs no loop.
+"""Checks settings by an executor, in a process of its own that runs no loop.
 
-Expressions over names, and what else only the executor knows, are judged by
-the code that will take them.
+So regular expressions, and other values that only the executor understands, are
+checked by the code that will use them.
 """
 
 import signal
@@ -15,12 +15,12 @@ from rtcfd.executor.command import ExecutorCommand
 _TIMEOUT_S = 10.0
 _REFUSED = 1
 _BEGIN = "rtcf-executor: "
-_MAX_LENGTH = 1500  # of a line, with an expression as long as they may be
+_MAX_LENGTH = 1500  # characters of the error, which may quote the longest allowed expression
 
 
 def of_settings(binary: Path, settings: runner_pb2.RunnerSettings) -> str:
-    """Return why they would be refused, in a line; nothing if they would not be, or if there is
-    no executor to ask.  Blocks."""
+    """Return why an executor would reject the settings, in one line; empty = it accepts them, or
+    there is no executor to ask.  Blocks."""
     try:
         asked = subprocess.run(
             [binary, "--check-settings"],
@@ -34,8 +34,8 @@ def of_settings(binary: Path, settings: runner_pb2.RunnerSettings) -> str:
     except (OSError, subprocess.TimeoutExpired):
         return ""
     if asked.returncode < 0:
-        return f"an executor dies of it ({signal.Signals(-asked.returncode).name})"
+        return f"an executor crashes with it ({signal.Signals(-asked.returncode).name})"
     if asked.returncode != _REFUSED:
-        return ""  # one of another version, or none at all
+        return ""  # an executor of another version, or no executor
     said = asked.stderr.decode(errors="replace").partition(_BEGIN)[2]
-    return " ".join(said.split())[:_MAX_LENGTH]  # there may be any text in an expression
+    return " ".join(said.split())[:_MAX_LENGTH]  # an expression may have any characters

@@ -1,7 +1,7 @@
 """The process of an executor: our own child, or one that an earlier rtcfd left running.
 
-Owned by the Executor.  Of a child the kernel tells how it ended; of another
-process only that it did.  Nothing here ends a process that is merely forgotten:
+Owned by the Executor.  The kernel reports the exit status of a child, but only the
+end of another process.  The end of these objects does not end the process, because
 executors outlive the rtcfd that started them.
 """
 
@@ -15,13 +15,13 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class End:
-    """How a process ended: `status` as in `returncode`, None if nobody can know."""
+    """The end of a process; `status` is as in `returncode`, None if it cannot be known."""
 
     status: int | None = None
 
     def __str__(self) -> str:
         if self.status is None:
-            return "ended (no child of this rtcfd: its exit status is unknown)"
+            return "ended (with unknown exit status, as it is not a child of this rtcfd)"
         return describe_exit(self.status)
 
 
@@ -29,7 +29,7 @@ class Process:
     """A process, watched through a pidfd."""
 
     def __init__(self, pid: int) -> None:
-        """Raises OSError, if there is none (any more)."""
+        """Raises OSError if the process does not exist (any more)."""
         self.pid = pid
         self._descriptor = os.pidfd_open(pid)
         self._ended = asyncio.Event()
@@ -40,12 +40,12 @@ class Process:
 
     @property
     def end(self) -> End | None:
-        """How it ended; None while it runs."""
+        """The end of the process; None while it runs."""
         return self._end
 
     @property
     def frozen(self) -> bool:
-        """Tell whether a signal or a debugger has stopped it: it does nothing."""
+        """Whether a signal or a debugger has stopped it."""
         if self._end is not None:
             return False
         try:
@@ -60,13 +60,13 @@ class Process:
         return self._end or End()
 
     def signal(self, number: signal.Signals) -> None:
-        """Send a signal; nothing happens if it has ended."""
+        """Send a signal; does nothing if the process has ended."""
         if self._end is None:
-            # By descriptor: never to another process that has got the number since.
+            # By descriptor: another process may have the same pid by now.
             signal.pidfd_send_signal(self._descriptor, number)
 
     def release(self) -> None:
-        """Watch it no more."""
+        """Stop watching the process."""
         if self._end is None:
             self._loop.remove_reader(self._descriptor)
             os.close(self._descriptor)
@@ -89,14 +89,14 @@ class Child(Process):
 
 
 def describe_exit(status: int) -> str:
-    """Return how a process ended, from its `returncode`."""
+    """Return a phrase on how a process ended, from its `returncode`."""
     if status >= 0:
         return f"ended with exit status {status}"
     return f"was killed by {describe_signal(-status)}"
 
 
 def describe_signal(number: int) -> str:
-    """Return the name of a signal and what it means."""
+    """Return the name of a signal and its meaning."""
     try:
         return f"{signal.Signals(number).name} ({signal.strsignal(number)})"
     except ValueError:

@@ -1,7 +1,7 @@
 """Finds the source lines of a crash, by addr2line in a process of its own.
 
-Neither the dying process nor rtcfd reads debug information: that of a component is as foreign as
-its code.  Pure but for the files and the process.
+A component's debug information is as untrusted as its code, so neither the crashing process nor
+rtcfd reads it.  Stateless.
 """
 
 import asyncio
@@ -39,7 +39,7 @@ class _Mapping:
 
 @dataclass(frozen=True)
 class _Frame:
-    """A place in the code: `file` is where it can be read, as `name` is said."""
+    """A place in the code: `file` is the path to read, `name` is for messages."""
 
     file: str
     name: str
@@ -48,18 +48,21 @@ class _Frame:
 
 @dataclass(frozen=True)
 class Found:
-    """Frames of a crash, a line each, innermost first: function and source line, as far as known;
-    `place`: the first of a component, or else of all."""
+    """The stack frames of a crash, innermost first: function and source line, as far as known.
+
+    `place` is the first frame in a component, else the first of all.
+    """
 
     place: str = ""
     lines: tuple[str, ...] = ()
 
 
 async def find(trace: Trace, libraries: Iterable[str], program: str, folders: Aside) -> Found:
-    """Find the lines of a crash; raises Unavailable if a disk does not answer, TimeoutError.
+    """Find the source lines of a crash; raises Unavailable if a disk does not answer.
 
-    `libraries` are the files that components were loaded from, unless they have changed since;
-    `program` is the executor: its own frames at the outer end are left out; `folders` reads them.
+    `libraries` are the library files of the components, without those that have changed since.
+    `program` is the executor, whose own frames at the outer end are left out.  `folders` runs
+    the reads.
     """
     known = set(libraries)
     frames = _placed(trace, known)
@@ -83,7 +86,7 @@ def _placed(trace: Trace, libraries: set[str]) -> list[_Frame]:
     mappings = _mappings(trace.maps)
     frames = []
     for depth, address in enumerate(trace.frames):
-        # A return address is that of the line after the call.
+        # A return address belongs to the instruction after the call.
         at = address - (depth > 0)
         found = next((each for each in mappings if each.begin <= at < each.end), None)
         if found is None:
@@ -113,14 +116,14 @@ def _where(frame: _Frame) -> str:
 
 
 async def _lines(tool: str, file: str, frames: list[_Frame], folders: Aside) -> list[str]:
-    """Return addr2line's answer for some places in one file; empty where it knows none."""
+    """Return addr2line's answers for places in one file; empty where it finds nothing."""
     try:
         addresses = await folders.run(
             lambda: [_linked(Path(file), each.offset) for each in frames], _READ_TIMEOUT_S
         )
     except (OSError, ValueError, struct.error):
         return []
-    # The line that was reached and those it was inlined into.
+    # With -i: the function at the address, then those into which it is inlined.
     command = [tool, "-C", "-f", "-i", "-p", "-s", "-e", file, *map(hex, addresses)]
     output = await _run(command)
     found = (each for each in output.splitlines() if not each.startswith(" (inlined by) "))
@@ -163,14 +166,14 @@ async def _run(command: list[str]) -> str:
 
 
 def _linked(file: Path, offset: int) -> int:
-    """Return the linked address of an offset in an ELF file of 64 bits.
+    """Return the linked address of an offset in a 64-bit ELF file.
 
     Raises OSError, ValueError, struct.error.
     """
     with file.open("rb") as content:
         head = content.read(64)
         if head[:6] != b"\x7fELF\x02\x01":
-            raise ValueError(f"{file} is no ELF file of 64 bits")
+            raise ValueError(f"{file} is not a 64-bit ELF file")
         (headers,) = struct.unpack_from("<Q", head, 32)
         size, count = struct.unpack_from("<HH", head, 54)
         content.seek(headers)
@@ -179,4 +182,4 @@ def _linked(file: Path, offset: int) -> int:
         kind, _, at, address, _, length = struct.unpack_from("<IIQQQQ", table, i * size)
         if kind == _LOADED and at <= offset < at + length:
             return int(offset - at + address)
-    raise ValueError(f"nothing of {file} is loaded from {offset:#x}")
+    raise ValueError(f"no loaded segment of {file} contains {offset:#x}")

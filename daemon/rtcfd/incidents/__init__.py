@@ -1,1 +1,1 @@
-"""What ran just before a fault or a death, kept as files."""
+"""Incident files: the last cycles before a fault or a crash."""

@@ -1,4 +1,4 @@
-"""The build id of a library: which build of it ran."""
+"""Reads the build id of a library, which identifies the build."""
 
 import struct
 from pathlib import Path
@@ -8,27 +8,29 @@ _BUILD_ID = 3  # NT_GNU_BUILD_ID
 
 
 def of(file: Path) -> str:
-    """Return it in hexadecimal, or nothing if there is none.  Raises OSError; ValueError of what
-    is no ELF file of 64 bits."""
+    """Return the build id in hexadecimal, empty if there is none.
+
+    Raises OSError, or ValueError if the file is not a 64-bit ELF file.
+    """
     data = file.read_bytes()
     try:
         return _found(data)
     except struct.error:
-        raise ValueError(f"{file} is cut off") from None
+        raise ValueError(f"{file} is truncated") from None
 
 
 def _found(data: bytes) -> str:
     if data[:6] != b"\x7fELF\x02\x01":
-        raise ValueError("no ELF file of 64 bits")
+        raise ValueError("not a 64-bit ELF file")
     (headers,) = struct.unpack_from("<Q", data, 32)
     size, count = struct.unpack_from("<HH", data, 54)
     for i in range(count):
         kind, _, at, _, _, length = struct.unpack_from("<IIQQQQ", data, headers + i * size)
         end = at + length
         while kind == _NOTES and at + 12 <= end:
-            name, content, what = struct.unpack_from("<III", data, at)
+            name, content, note = struct.unpack_from("<III", data, at)
             begin = at + 12 + _aligned(name)
-            if what == _BUILD_ID and data[at + 12 : at + 16] == b"GNU\0":
+            if note == _BUILD_ID and data[at + 12 : at + 16] == b"GNU\0":
                 return data[begin : begin + content].hex()
             at = begin + _aligned(content)
     return ""

@@ -1,6 +1,6 @@
-"""Copies the memory of an executor's frames while its loop goes on writing them.
+"""Copies the memory of an executor's frames while its loop continues to write them.
 
-Without NumPy, and in little memory: it runs in a thread of rtcfd.
+Runs in a thread of rtcfd, so it uses little memory, and no NumPy.
 """
 
 import os
@@ -11,16 +11,16 @@ _PIECE = 1024 * 1024
 
 
 def copied(descriptor: int) -> int:
-    """Return a copy, in a memory of its own; its holes stay holes.
+    """Return the descriptor of a copy in memory; holes stay holes.
 
-    Whatever was written anew meanwhile is marked as absent, as a part of it may be of another
-    frame.
+    Frames that were overwritten during the copy are marked as absent, because they may have
+    parts of two cycles.
     """
     size = os.fstat(descriptor).st_size
     copy = os.memfd_create("rtcf-incident")
     try:
         os.ftruncate(copy, size)
-        # An offset of its own: the descriptor shares its with others.
+        # Opened again, for a file offset of its own: duplicates of the descriptor share one.
         own = os.open(f"/proc/self/fd/{descriptor}", os.O_RDONLY | os.O_CLOEXEC)
         try:
             _copy(own, copy, size)
@@ -46,12 +46,15 @@ def _copy(own: int, copy: int, size: int) -> None:
 
 
 def _leave_out_torn(own: int, copy: int) -> None:
-    """A frame's mark, and a ring's entry, change before anything else of it does."""
+    """Mark overwritten frames and rings in the copy as absent.
+
+    The executor changes the mark of a frame, and the entry of a ring, before the rest of it.
+    """
     for index in range(layout.ENTRIES):
         at = layout.entry_at(index)
         then = os.pread(copy, layout.ENTRY.size, at)
         if len(then) != layout.ENTRY.size:
-            return  # these are no frames
+            return  # this is not a memory of frames
         if then != os.pread(own, layout.ENTRY.size, at):
             os.pwrite(copy, bytes(layout.ENTRY.size), at)
             continue

@@ -1,8 +1,8 @@
-"""Reads the frames of an executor, which may be dead: the last second of its loop.
+"""Reads the frames of an executor, alive or dead: the last second of its loop.
 
-A shared memory (layout in executor.proto) that rtcfd opens at hello and holds.  A frame
-that was being written when the process died is left out.  Needs NumPy, and runs in a
-process of its own: rtcfd itself only holds the descriptor.
+They are in shared memory (layout in executor.proto) that rtcfd opens at hello and holds.
+A frame that was being written when the process died is left out.  Needs NumPy, and runs
+in a process of its own: rtcfd itself only holds the descriptor.
 """
 
 import itertools
@@ -21,10 +21,10 @@ from rtcfd.incidents import frame_layout
 
 @dataclass(frozen=True)
 class Ring:
-    """Whole frames of one graph, one after the other."""
+    """The complete frames of one graph, in order."""
 
     layout: wire.FrameLayout
-    words: "NDArray[np.uint64]"  # a row each
+    words: "NDArray[np.uint64]"  # one row per frame
 
     def __len__(self) -> int:
         return len(self.words)
@@ -41,22 +41,22 @@ class Ring:
 
     @property
     def latencies_ns(self) -> "NDArray[np.int64]":
-        """Wake-up after each deadline."""
+        """The wake-up latency of each cycle, after its deadline."""
         return self._signed(3)
 
     @property
     def durations_ns(self) -> "NDArray[np.int64]":
-        """Calculation in each cycle."""
+        """The calculation duration of each cycle."""
         return self._signed(4)
 
     @property
     def last_of_loop(self) -> "NDArray[np.bool_]":
-        """Whether components made safe in that cycle."""
+        """Whether a cycle ends its loop: the components' safe() has run in it."""
         flags: NDArray[np.bool_] = self.words[:, 5] != 0
         return flags
 
     def schema(self) -> ports_pb2.PortSchema:
-        """Return what the columns are, as a stream would tell; see PortColumn."""
+        """Return the schema of the columns, as in a stream; see PortColumn."""
         columns = []
         for value in self.layout.values:
             column = ports_pb2.PortColumn(
@@ -79,18 +79,19 @@ class Ring:
         return ports_pb2.PortSchema(columns=columns, notes=self.notes())
 
     def notes(self) -> list[str]:
-        """Return what is left out, a line each."""
+        """Return a line for each value that is left out."""
         return [
             *self.layout.notes,
             *(
-                f"{value.component}.{value.name} is left out: its message is computed from it"
+                f"{value.component}.{value.name} is left out: its message is not a copy of the "
+                "value, but computed"
                 for value in self.layout.values
                 if self._computed(value)
             ),
         ]
 
     def batches(self) -> "list[ports_pb2.PortBatch]":
-        """Return all cycles, as a stream would tell: each batch without a gap."""
+        """Return all cycles in batches, as in a stream: a batch has no gap."""
         cycles, last = self.cycles, self.last_of_loop
         gaps = (np.diff(cycles) != 1) | last[:-1]
         ends: list[int] = as_list(np.flatnonzero(gaps) + 1)
@@ -132,10 +133,13 @@ class Ring:
 
 
 def read(descriptor: int) -> list[Ring]:
-    """Return the rings, from the oldest on; raises OSError, and ValueError of what is no frames."""
+    """Return the rings, the oldest first.
+
+    Raises OSError, or ValueError if this is not a memory of frames.
+    """
     with mmap.mmap(descriptor, 0, prot=mmap.PROT_READ) as memory:
         if frame_layout.HEAD.unpack_from(memory) != (frame_layout.MAGIC, frame_layout.VERSION):
-            raise ValueError(f"these are no frames of version {frame_layout.VERSION}")
+            raise ValueError(f"not a memory of frames of version {frame_layout.VERSION}")
         entries = [
             frame_layout.ENTRY.unpack_from(memory, frame_layout.entry_at(index))
             for index in range(frame_layout.ENTRIES)
@@ -150,7 +154,8 @@ def _ring(
     flat = np.frombuffer(memory[offset : offset + 8 * frames * stride], "<u8")
     words = flat.reshape(frames, stride)
     marks = words[:, 0]
-    # Of the frame that belongs there; what is odd was being written.
+    # A complete frame has the number that belongs to its place; an odd mark means that it was
+    # being written.
     numbers = marks // 2 - 1
     whole = (marks % 2 == 0) & (marks != 0) & (numbers % frames == np.arange(frames))
     kept = words[whole]

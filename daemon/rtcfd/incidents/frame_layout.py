@@ -1,4 +1,4 @@
-"""Where things lie in the memory of an executor's frames; laid down in executor.proto."""
+"""The layout of the memory of an executor's frames, as defined in executor.proto."""
 
 import struct
 
@@ -12,5 +12,5 @@ HEAD_WORDS = 6  # of a frame: mark, iteration, stamp, latency, duration, last of
 
 
 def entry_at(index: int) -> int:
-    """Return where an entry of the directory begins."""
+    """Return the offset of an entry of the directory."""
     return HEAD.size + index * ENTRY.size

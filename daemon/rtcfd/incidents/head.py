@@ -1,6 +1,6 @@
-"""What an incident's file says of itself at its begin: its first metadata, without reading on.
+"""Reads the first metadata record of an incident file, which describes the incident.
 
-Pure but for the file; no NumPy.
+Reads only the beginning of the file, and needs no NumPy.
 """
 
 import struct
@@ -9,12 +9,12 @@ from pathlib import Path
 _MAGIC = b"\x89MCAP0\r\n"
 _METADATA = 0x0C
 _RECORD = struct.Struct("<BQ")
-_LONGEST = 64 * 1024  # bytes that are looked at
+_LONGEST = 64 * 1024  # bytes read from the file
 NAME = "incident"
 
 
 def read(file: Path) -> dict[str, str]:
-    """Return the pairs; nothing of a file that is no incident.  Raises OSError."""
+    """Return the keys and values; empty if the file is not an incident.  Raises OSError."""
     with file.open("rb") as content:
         data = content.read(_LONGEST)
     try:
@@ -47,5 +47,5 @@ def _text(data: bytes, at: int) -> tuple[str, int]:
     (length,) = struct.unpack_from("<I", data, at)
     at += 4
     if at + length > len(data):
-        raise ValueError("cut off")
+        raise ValueError("truncated")
     return data[at : at + length].decode(), at + length

@@ -1,7 +1,7 @@
 """The incidents: files with the last cycles before a fault, a crash or a stall.
 
-Owned by the daemon, which they never hold up: frames are copied by a thread, and the file is
-written by a process of its own, which has NumPy.  The oldest files go when there are too many.
+Owned by the daemon, which they never delay: a thread copies the frames, and a process of its own,
+with NumPy, writes the file.  If the files exceed the limit, the oldest ones are removed.
 """
 
 import asyncio
@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 _SUFFIX = ".mcap"
 _NAME = re.compile(r"[A-Za-z0-9_.-]+\Z")
-_PACE_S = 10.0  # between two of one runner that nobody asked for
+_PACE_S = 10.0  # shortest time between two automatic incidents of one runner
 _WRITE_TIMEOUT_S = 120.0
 _PIECE = 1024 * 1024
 _MODULES = Path(rtcfd.__file__).parents[1]
@@ -41,21 +41,22 @@ _WRITER = (
 
 
 class Incidents:
-    """The files in one folder; None = none are kept."""
+    """The incident files in a folder; None = none are kept."""
 
     def __init__(self, folder: Path | None, limits: Callable[[], Limits]) -> None:
         self._folder = folder
         self._limits = limits
         self._threads = ThreadPoolExecutor(1, "rtcfd-incidents")
-        # Of their own: lists and reads do not wait for a file that is being written.
+        # Own threads: a list or a read must not wait for a file that is being written.
         self._readers = ThreadPoolExecutor(2, "rtcfd-incident-list")
-        # Of its own: frames are written anew while they wait for the file of another incident.
+        # Own thread: the loop would overwrite the frames while they wait for another file.
         self._copier = ThreadPoolExecutor(1, "rtcfd-frames")
-        self._kept: dict[str, float] = {}  # when, by runner
+        self._kept: dict[str, float] = {}  # by runner, the time of its last automatic incident
         self._writing = asyncio.Lock()
 
     def wanted(self, runner: str) -> bool:
-        """Tell whether to keep one that nobody asked for: a loop may fail again and again."""
+        """Return whether to keep an automatic incident: at most one per runner in _PACE_S, because
+        a loop may fail again and again."""
         if self._folder is None or not self._limits().incidents_mb:
             return False
         now = time.monotonic()
@@ -65,7 +66,7 @@ class Incidents:
         return True
 
     async def keep(self, descriptor: int, facts: dict[str, Any]) -> incidents_pb2.Incident:
-        """Write a file of frames, whose descriptor is closed, and of what is known besides."""
+        """Write a file with the frames of `descriptor`, which is closed, and with the facts."""
         try:
             folder = self._place()
             frozen = await self._aside(copying.copied, descriptor, threads=self._copier)
@@ -85,14 +86,14 @@ class Incidents:
         return await self._look(_incident, file)  # type: ignore[no-any-return]
 
     async def all(self, runner: str = "") -> list[incidents_pb2.Incident]:
-        """Return what there is, from the oldest on."""
+        """Return all incidents, the oldest first."""
         if self._folder is None:
             return []
         found = await self._look(_all, self._folder)
         return [each for each in found if not runner or each.runner == runner]
 
     async def get(self, name: str) -> incidents_pb2.Incident:
-        """Return one by its name, or the newest."""
+        """Return an incident by its name; an empty name is the newest."""
         found = await self.all()
         for each in reversed(found):
             if name in ("", each.name):
@@ -100,11 +101,11 @@ class Incidents:
         raise _unknown(name, found)
 
     async def read(self, incident: incidents_pb2.Incident, at: int) -> bytes:
-        """Return a piece of the file; nothing at its end."""
+        """Return a piece of the file from byte `at` on; empty at its end."""
         return await self._look(_piece, Path(incident.file), at)  # type: ignore[no-any-return]
 
     async def remove(self, names: Sequence[str]) -> list[incidents_pb2.Incident]:
-        """Remove files, all of them or none."""
+        """Remove files; none of them if there is no incident of one of the names."""
         found = await self.all()
         known = {str(each.name): each for each in found}
         for name in names:
@@ -118,7 +119,7 @@ class Incidents:
     def _place(self) -> Path:
         if self._folder is None:
             raise FailedPrecondition(
-                "this rtcfd keeps nothing, no incidents either: start it with --state-dir",
+                "this rtcfd keeps no incidents: start it with --state-dir",
                 errors_pb2.REASON_DAEMON_FAILED,
             )
         return self._folder
@@ -142,7 +143,9 @@ class Incidents:
 def _unknown(name: str, found: Sequence[incidents_pb2.Incident]) -> NotFound:
     there = ", ".join(each.name for each in found[-4:]) or "none"
     return NotFound(
-        f"there is no incident {name}; there is {there}" if name else "there are no incidents",
+        f"there is no incident {name}; the newest are {there}"
+        if name
+        else "there are no incidents",
         errors_pb2.REASON_INCIDENT_NOT_FOUND,
     )
 
@@ -175,33 +178,33 @@ def _write(frozen: int, file: Path, facts: dict[str, Any]) -> None:
         )
         if done.returncode != 0:
             said = done.stderr.decode(errors="replace").strip().splitlines()
-            raise OSError(0, said[-1] if said else f"its writer ended with {done.returncode}")
+            raise OSError(0, said[-1] if said else f"the writer ended with {done.returncode}")
         part.rename(file)
     except subprocess.TimeoutExpired:
-        raise OSError(0, f"not written in {_WRITE_TIMEOUT_S:g} s") from None
+        raise OSError(0, f"the writer did not end within {_WRITE_TIMEOUT_S:g} s") from None
     finally:
         part.unlink(missing_ok=True)
 
 
 def _tidy(folder: Path, most: int, newest: Path) -> None:
-    """Remove the oldest ones until there is room; the newest stays."""
+    """Remove the oldest incidents until the rest has at most `most` bytes; the newest stays."""
     room = most
     for each in reversed(_all(folder)):
         file = Path(each.file)
         room -= each.bytes
         if room < 0 and file != newest:
             file.unlink(missing_ok=True)
-            log.info("incident %s removed: those kept are more than incidents_mb", file.stem)
+            log.info("incident %s removed: the incidents exceed incidents_mb", file.stem)
 
 
 def _all(folder: Path) -> list[incidents_pb2.Incident]:
-    """Return all of them in the order of their sequence, even if the clock has jumped."""
+    """Return all incidents in the order of their sequence, even if the clock has jumped."""
     found = []
     for each in folder.glob("*" + _SUFFIX):
-        with contextlib.suppress(OSError):  # removed since, or not ours to read
+        with contextlib.suppress(OSError):  # it was just removed, or we may not read it
             if _NAME.match(each.stem):
                 found.append(_incident(each))
-    # Those of an older rtcfd have no number, and are older.
+    # The incidents of an older rtcfd have no number (0), so they come first.
     return sorted(found, key=lambda each: (each.sequence, each.time_ns, each.name))
 
 

@@ -1,7 +1,7 @@
-"""Writes the file of an incident; a process of its own, see incidents.py.
+"""Writes the file of an incident, in a process of its own; see incidents.py.
 
-Arguments: the descriptor of a copy of the frames, and the file.  Standard input: what is known
-besides, as JSON.
+Arguments: the descriptor of a copy of the frames, and the file.  Standard input: the facts, as
+JSON.
 """
 
 import json
@@ -15,11 +15,11 @@ from rtcfd.incidents import build_id, head
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Write; what goes wrong is a line on standard error, and the exit status 1."""
+    """Write the file; an error is one line on standard error, and exit status 1."""
     try:
         import numpy  # noqa: F401
     except ImportError:
-        print("an incident needs python3-numpy: install it", file=sys.stderr)
+        print("incidents need python3-numpy: install it", file=sys.stderr)
         return 1
     try:
         facts = json.load(sys.stdin)
@@ -74,7 +74,7 @@ def _write(descriptor: int, file: Path, facts: dict[str, Any]) -> None:
 
 
 def _libraries(of: dict[str, Any]) -> dict[str, str]:
-    """Return file and build id of each component's library, as far as it is still that file."""
+    """Return path and build id of each component's library, if the file has not changed since."""
     told = {}
     for component, (path, *identity) in of.items():
         try:

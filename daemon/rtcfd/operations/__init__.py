@@ -1,1 +1,1 @@
-"""What is done to one runner, one thing at a time."""
+"""Operations on one runner, one at a time."""

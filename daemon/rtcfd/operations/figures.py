@@ -1,8 +1,8 @@
-"""From when on a loop's figures count, and whether its cycles keep ending late.
+"""Corrects the counters of a loop's status, and detects loops whose cycles keep ending late.
 
-Owned by a RunnerCore.  All are told from one moment, the start of the loop or
-the last reset.  An executor of protocol 3 counts only its statistics from there,
-and the overruns of its status from its own start: here these are left out.
+Owned by a RunnerCore.  All counters begin at one time: the start of the loop, or the
+last reset.  An executor of protocol 3 resets only its statistics, and its status counts
+overruns from its own start; this class subtracts the earlier ones.
 """
 
 import time
@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 from rtcf.v1 import runner_pb2
 
-# An executor tells of late cycles at most each 10 s, as long as there are any.
+# An executor reports late cycles at most every 10 s, as long as there are any.
 _FRESH_S = 15.0
-_MUCH = 0.01  # of the cycles
+_MUCH = 0.01  # share of late cycles from which on the status mentions them
 
 
 @dataclass
@@ -23,7 +23,7 @@ class _Told:
 
 
 class Figures:
-    """What is left out of the status, and what was told last of late cycles."""
+    """The counts to subtract from the status, and the last report of late cycles."""
 
     def __init__(self) -> None:
         self.overruns = 0
@@ -32,19 +32,19 @@ class Figures:
         self._late = ""
 
     def begin(self) -> None:
-        """Tell what the executor does; forget what it has said of late cycles."""
+        """Subtract nothing, and forget the last report of late cycles."""
         self.overruns = self.missed = 0
         self._last, self._late = None, ""
 
     def leave_out(
         self, status: runner_pb2.RunnerStatus, counted: runner_pb2.RunnerStatistics
     ) -> None:
-        """Count from where the statistics do."""
+        """Make the status count from the same time as the statistics."""
         self.overruns = max(status.overruns - counted.overruns, 0)
         self.missed = max(status.missed - counted.missed, 0)
 
     def told_of_late_cycles(self, status: runner_pb2.RunnerStatus, message: str) -> None:
-        """Note that cycles ended late, with cause and component."""
+        """Note a report of late cycles; `message` has their cause and component."""
         before, now = self._last, time.monotonic()
         self._last = _Told(now, status.iteration, status.overruns)
         self._late = ""
@@ -55,7 +55,7 @@ class Figures:
             self._late = f"{min(share, 1.0):.0%} of its cycles: {message}"
 
     def put_into(self, status: runner_pb2.RunnerStatus) -> None:
-        """Make the counters of a status those since the moment; say what is late."""
+        """Correct the counters of a status, and set its text on late cycles."""
         status.overruns = max(status.overruns - self.overruns, 0)
         status.missed = max(status.missed - self.missed, 0)
         fresh = self._last is not None and time.monotonic() - self._last.at <= _FRESH_S

@@ -1,4 +1,4 @@
-"""Changes of a runner's graph: the executor adopts, then rtcfd notes and saves.
+"""Changes of a runner's graph: the executor adopts a change, then rtcfd notes and saves it.
 
 Functions on a RunnerCore; each is one transaction of its executor.
 """
@@ -40,13 +40,13 @@ async def load(
         result = (await runner.ask(request, progress)).change
         runner.left_out.pop(result.component, None)
         runner.desired.put(result.component, spec)
-        runner.happened(_Event.KIND_GRAPH, f"{result.component} loaded ({what})", result.component)
+        runner.happened(_Event.KIND_GRAPH, f"{result.component} loaded ({code})", result.component)
         parameters.note(runner, result.component, spec.parameters, {}, acting, "load")
         return await _saved(runner, result)
 
-    what = f"{spec.package}/{spec.type}"
-    result = await runner.change(f"the load of {what}", work)
-    runner.log.info("%s loaded (%s)", result.component, what)
+    code = f"{spec.package}/{spec.type}"
+    result = await runner.change(f"the load of {code}", work)
+    runner.log.info("%s loaded (%s)", result.component, code)
     if note:
         runner.log.warning(note)
         result.notes.append(note)
@@ -56,14 +56,14 @@ async def load(
 async def load_when_master(
     runner: RunnerCore, spec: graph_pb2.ComponentSpec, progress: Progress
 ) -> control_pb2.ChangeResult:
-    """Load a component; wait for a ROS master if its hooks need one and there is none."""
+    """Load a component; if its hooks need a ROS master and there is none, wait for one."""
     return await when_master(lambda: load(runner, spec, progress), progress)
 
 
 async def when_master(
     attempt: Callable[[], Awaitable[control_pb2.ChangeResult]], progress: Progress
 ) -> control_pb2.ChangeResult:
-    """Try a load again for as long as its hooks need a ROS master and there is none."""
+    """Repeat a load while its hooks need a ROS master and there is none."""
     said = ""
     while True:
         try:
@@ -72,7 +72,7 @@ async def when_master(
             if str(refusal) != said:
                 said = str(refusal)
                 progress(f"waiting for a ROS master: {said}")
-        # Between turns, so that other changes go on.
+        # Outside of the turn, so that other changes can take theirs.
         await asyncio.sleep(_MASTER_POLL_S)
 
 
@@ -81,12 +81,12 @@ async def unload(
 ) -> control_pb2.ChangeResult:
     """Unload components.
 
-    Those that were left out, or belong to an executor that is down, are only
-    forgotten: so a component that breaks its executor can be taken out.
+    If a component is left out, or its executor is down, only the saved graph changes.
+    So a component that crashes its executor can be removed.
     """
     if not names:
         raise InvalidArgument(
-            "no component named to unload", errors_pb2.REASON_NAME_MISSING, field="components"
+            "name the components to unload", errors_pb2.REASON_NAME_MISSING, field="components"
         )
     full_names = [absolute(name) for name in names]
 
@@ -97,25 +97,28 @@ async def unload(
             result = (await runner.ask(request, progress)).change
         else:
             _check_known(runner, full_names)
-            result = control_pb2.ChangeResult(notes=["taken out of the saved graph only"])
+            result = control_pb2.ChangeResult(notes=["removed from the saved graph only"])
         for name in full_names:
             runner.left_out.pop(name, None)
         runner.desired.drop(full_names)
         one = full_names[0] if len(full_names) == 1 else ""
-        runner.happened(_Event.KIND_GRAPH, f"{what} unloaded", one)
+        runner.happened(_Event.KIND_GRAPH, f"{listed} unloaded", one)
         return await _saved(runner, result)
 
-    what = ", ".join(full_names)
-    result = await runner.change(f"the unload of {what}", work)
-    runner.log.info("%s unloaded", what)
+    listed = ", ".join(full_names)
+    result = await runner.change(f"the unload of {listed}", work)
+    runner.log.info("%s unloaded", listed)
     return result
 
 
 async def replace(
     runner: RunnerCore, request: control_pb2.ReplaceRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
-    """Put a new component in the place of an old one; parameters stay unless they are named; with
-    `given_before` those that were tuned since."""
+    """Replace a component by a new one.
+
+    Parameters that the request does not name keep their values; with `given_before`, only those
+    do that were tuned since (see tuned.py).
+    """
     old, given = absolute(request.component), request.replacement
     before = runner.desired.components.get(old)
     package = given.package or (before.package if before else "")
@@ -152,7 +155,7 @@ async def replace(
         runner.desired.drop([old])
         runner.desired.put(result.component, spec)
         runner.happened(
-            _Event.KIND_GRAPH, f"{old} replaced by {result.component} ({what})", result.component
+            _Event.KIND_GRAPH, f"{old} replaced by {result.component} ({code})", result.component
         )
         if kept is None:
             parameters.note(runner, result.component, set_now, values, acting, "replace")
@@ -161,22 +164,22 @@ async def replace(
             kept.tell(result)
         return await _saved(runner, result)
 
-    what = f"{package}/{type_name}"
-    result = await runner.change(f"the replacement of {old} by {what}", work)
-    runner.log.info("%s replaced by %s (%s)", old, result.component, what)
+    code = f"{package}/{type_name}"
+    result = await runner.change(f"the replacement of {old} by {code}", work)
+    runner.log.info("%s replaced by %s (%s)", old, result.component, code)
     return result
 
 
 async def release(
     runner: RunnerCore, names: list[str], progress: Progress
 ) -> control_pb2.ChangeResult:
-    """Load components anew that are left out of the loop, or that a fault has marked there."""
+    """Load components again that are left out of the loop, or are marked as faulted in it."""
     if not names:
         raise InvalidArgument(
-            "no component named to release", errors_pb2.REASON_NAME_MISSING, field="components"
+            "name the components to release", errors_pb2.REASON_NAME_MISSING, field="components"
         )
     full_names = [absolute(name) for name in names]
-    what = ", ".join(full_names)
+    listed = ", ".join(full_names)
 
     async def work() -> control_pb2.ChangeResult:
         _check_known(runner, full_names)
@@ -199,16 +202,16 @@ async def release(
             runner.left_out.pop(name, None)
             runner.desired.quarantined.pop(name, None)
         one = full_names[0] if len(full_names) == 1 else ""
-        runner.happened(_Event.KIND_GRAPH, f"{what} released", one)
+        runner.happened(_Event.KIND_GRAPH, f"{listed} released", one)
         return await _saved(runner, result)
 
-    result = await runner.change(f"the release of {what}", work)
-    runner.log.info("%s released", what)
+    result = await runner.change(f"the release of {listed}", work)
+    runner.log.info("%s released", listed)
     return result
 
 
 async def _require_faulted(runner: RunnerCore, names: list[str]) -> None:
-    """Refuse to release a sound component of the loop."""
+    """Raise NotFound if a component of the loop is not faulted."""
     listed = await runner.ask(wire.Request(list_components=wire.ListComponents()))
     faulted = {
         str(each.full_name)
@@ -227,7 +230,7 @@ async def _require_faulted(runner: RunnerCore, names: list[str]) -> None:
 async def apply(
     runner: RunnerCore, request: control_pb2.ApplyRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
-    """Make the graph, and the settings that are given, what a request says."""
+    """Change the graph, and the given settings, to those of a request."""
     check_graph(request.components)
     runner_settings.check(request.settings)
     runner.limits.check_components(len(request.components))
@@ -245,7 +248,8 @@ async def apply(
         for load in apply.components:
             load.anew = request.rebuilt and full_name(load.component) in rebuilt
         if not request.dry_run and (changes or not request.runner):
-            # So that a graph that is refused changes no settings, for however short a time.
+            # A dry run first, so that a rejected graph does not change the settings, not even for
+            # a moment.
             would = (await runner.ask(wire.Request(apply=apply), progress)).change
             if not request.runner:
                 _require_no_unload(runner, would)
@@ -270,8 +274,8 @@ async def apply(
         stale = sorted({full_name(each) for each in request.components} & rebuilt.keys())
         if stale and not request.rebuilt:
             result.notes.append(
-                f"another library than {', '.join(stale)} was loaded from is there now: "
-                "--rebuilt takes it"
+                f"the library of {', '.join(stale)} has changed since it was loaded: "
+                "--rebuilt loads the new one"
             )
         if request.dry_run:
             return result
@@ -283,19 +287,19 @@ async def apply(
         runner.desired.choose(request.settings)
         count, differed = len(request.components), len(result.differences)
         runner.happened(
-            _Event.KIND_GRAPH, f"graph of {count} components applied: {differed} differed"
+            _Event.KIND_GRAPH, f"graph of {count} components applied: {differed} differences"
         )
         return await _saved(runner, result)
 
     result = await runner.change("the application of a graph", work)
     if not request.dry_run:
-        runner.log.info("graph of %d components applied: %d differed",
+        runner.log.info("graph of %d components applied: %d differences",
                         len(request.components), len(result.differences))  # fmt: skip
     return result
 
 
 def _require_no_unload(runner: RunnerCore, would: control_pb2.ChangeResult) -> None:
-    """Refuse a change that takes components out of a runner that it does not name."""
+    """Raise InvalidArgument if a change removes components from a runner that it does not name."""
     kind = control_pb2.Difference.KIND_UNLOAD
     leaving = [each.component for each in would.differences if each.kind == kind]
     if leaving:
@@ -309,7 +313,7 @@ def _require_no_unload(runner: RunnerCore, would: control_pb2.ChangeResult) -> N
 
 
 def left_out(runner: RunnerCore) -> list[graph_pb2.ComponentInfo]:
-    """Return what belongs to the graph but is not loaded, with the reason."""
+    """Return the components of the graph that are not loaded, with the reason."""
     return [
         graph_pb2.ComponentInfo(
             full_name=name,
@@ -329,20 +333,20 @@ async def set_breaks(
     async def work() -> control_pb2.ChangeResult:
         result = (await runner.ask(wire.Request(set_breaks=request), progress)).change
         runner.desired.set_breaks(request.ports, request.broken)
-        runner.happened(_Event.KIND_GRAPH, what)
+        runner.happened(_Event.KIND_GRAPH, text)
         return await _saved(runner, result)
 
     ports = ", ".join(f"{absolute(port.component)}.{port.port}" for port in request.ports)
-    what = f"{ports}: loop break {'set' if request.broken else 'removed'}"
+    text = f"{ports}: loop break {'set' if request.broken else 'removed'}"
     result = await runner.change("a change of loop breaks", work)
-    runner.log.info("%s", what)
+    runner.log.info("%s", text)
     return result
 
 
 def _note_parameters(
     runner: RunnerCore, specs: Iterable[graph_pb2.ComponentSpec], acting: Caller | None
 ) -> None:
-    """Note parameters that a graph has changed."""
+    """Note the parameters that a graph has changed."""
     for spec in specs:
         name = full_name(spec)
         before = runner.desired.components.get(name)
@@ -352,14 +356,14 @@ def _note_parameters(
             for each in spec.parameters
             if each.name not in known or not same_value(known[each.name], each.value)
         ]
-        quiet = before is None  # it is loaded, with a thousand others maybe
+        quiet = before is None  # a new component, perhaps one of a thousand
         parameters.note(runner, name, changed, known, acting, "apply", quiet=quiet)
 
 
 async def reset_state(
     runner: RunnerCore, request: control_pb2.ResetStateRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
-    """Take the state of one component back to its initial values."""
+    """Reset the state of one component to its initial values."""
     name = absolute(request.component)
 
     async def work() -> control_pb2.ChangeResult:
@@ -375,7 +379,7 @@ async def reset_state(
 async def set_state(
     runner: RunnerCore, request: control_pb2.SetStateRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
-    """Set values of the state of one component, of a loop that does not run."""
+    """Set state values of one component while the loop does not run."""
     name = absolute(request.component)
 
     async def work() -> control_pb2.ChangeResult:

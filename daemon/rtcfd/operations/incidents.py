@@ -1,4 +1,4 @@
-"""Keeping the last cycles of a runner: what is known of it goes into the file, too.
+"""Writes incidents of a runner: its last cycles, with the facts about it.
 
 Functions on a RunnerCore.
 """
@@ -24,24 +24,24 @@ _LONGEST_REASON = 500  # characters
 def keep(
     runner: RunnerCore, executor: Executor, reason: str, component: str = "", iteration: int = 0
 ) -> None:
-    """Keep an incident that nobody asked for, in the background."""
+    """Write an automatic incident, in the background."""
     if executor.frames is None or not runner.shared.incidents.wanted(runner.name):
         return
     facts = _facts(runner, executor, reason, component, iteration)
-    # Our own: the executor's is closed soon.
+    # A duplicate: the executor's descriptor is closed soon.
     descriptor = os.dup(executor.frames)
-    # Not the runner's: its removal does not wait for a file.
+    # Not an operation of the runner, so that its removal does not wait for the file.
     runner.shared.keeping.in_background(
         f"an incident of {runner.name}", _keep(runner, descriptor, facts)
     )
 
 
 async def take(runner: RunnerCore, reason: str) -> incidents_pb2.Incident:
-    """Keep one now."""
+    """Write an incident now, on request."""
     executor = runner.alive()
     if executor.frames is None:
         raise FailedPrecondition(
-            f"the executor of {runner.name} is of rtcf {executor.version}, which keeps no cycles: "
+            f"the executor of {runner.name} is of rtcf {executor.version}, which keeps no frames: "
             f"`rtcfctl runner restart {runner.name}` stops the loop and starts one that does",
             errors_pb2.REASON_EXECUTOR_FOREIGN,
         )
@@ -49,7 +49,7 @@ async def take(runner: RunnerCore, reason: str) -> incidents_pb2.Incident:
     reason = reason or f"taken by {acting.peer.user if acting else 'rtcfd'}"
     facts = _facts(runner, executor, reason, "", 0)
     descriptor = os.dup(executor.frames)
-    # To its end, also if the caller leaves: threads have what is open then.
+    # Runs to its end even if the caller disconnects: threads use the open files.
     return await runner.shared.keeping.begin(
         f"an incident of {runner.name}", lambda: _keep(runner, descriptor, facts)
     )

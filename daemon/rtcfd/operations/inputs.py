@@ -1,4 +1,4 @@
-"""Values for inputs that nobody else feeds, written by hand.  Functions on a RunnerCore."""
+"""Writes values to inputs without a writer.  Functions on a RunnerCore."""
 
 import asyncio
 
@@ -16,7 +16,7 @@ from rtcfd.operations.runner_core import RunnerCore
 async def write(
     runner: RunnerCore, request: control_pb2.WritePortRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
-    """Give an input a value at the next cycle boundary; it is not kept."""
+    """Write a value to an input at the next cycle boundary; it is not saved."""
     name = absolute(request.component)
     port = {"component": name, "port": request.port}
 
@@ -24,7 +24,7 @@ async def write(
         asked = await runner.ask(wire.Request(describe_input=wire.DescribeInput(**port)))
         found = asked.input_type
         try:
-            # Aside, as its reader is slow.
+            # In a thread, because the YAML parser is slow.
             message = await asyncio.to_thread(ros_value.encode, found.ros_definition, request.value)
         except ValueError as error:
             raise InvalidArgument(

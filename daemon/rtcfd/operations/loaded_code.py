@@ -1,7 +1,7 @@
-"""Which file each component's code was loaded from, and whether it is another one now.
+"""The library of each component, and whether its file has changed since it was loaded.
 
-Owned by a RunnerCore, for the executor that it has.  An executor keeps a copy
-of its own, so a library that is rebuilt changes nothing until it is loaded again.
+Owned by a RunnerCore, for its current executor.  An executor runs a private copy of a
+library, so a rebuilt library takes effect only when it is loaded again.
 """
 
 import contextlib
@@ -21,24 +21,26 @@ from rtcfd.common.nonsense import NONSENSE
 from rtcfd.common.refusals import Unavailable
 
 _Kinds = control_pb2.Difference
-_Identity = tuple[int, int, int]  # inode, time of change, size
-_TIMEOUT_S = 2.0  # for folders to answer, which may be remote
+_Identity = tuple[int, int, int]  # inode, modification time, size
+_TIMEOUT_S = 2.0  # for a folder, which may be remote
 
 
 class LoadedCode:
-    """The files, by component.  Of a file in a folder that does not answer nothing is known."""
+    """The library files, by component.  A file is unknown if its folder does not answer."""
 
     def __init__(self, folders: Aside) -> None:
         self._folders = folders
         self._files: dict[str, tuple[str, _Identity]] = {}
 
     def clear(self) -> None:
-        """Forget all: the executor is new."""
+        """Forget all files, for a new executor."""
         self._files = {}
 
     async def before(self, request: wire.Request) -> dict[str, _Identity]:
-        """Look at the libraries of a change that is about to be asked for; one without any does
-        not wait."""
+        """Return the identities of a change's libraries, before it is requested.
+
+        Returns at once if the change has no libraries.
+        """
         found = await self._look(set(_libraries(request)))
         return {path: identity for path, identity in found.items() if identity is not None}
 
@@ -48,7 +50,7 @@ class LoadedCode:
         change: control_pb2.ChangeResult,
         seen: dict[str, _Identity],
     ) -> None:
-        """Note what a change has loaded; `seen` is what before() gave."""
+        """Note the libraries that a change has loaded; `seen` is the result of before()."""
         kind = request.WhichOneof("kind")
         if kind == "load":
             self._note(change.component, request.load.library, seen)
@@ -74,12 +76,12 @@ class LoadedCode:
             self._files.pop(name, None)
 
     def files(self) -> dict[str, tuple[str, int, int, int]]:
-        """Return the file of each component, as it was when it was loaded: path, inode, time of
-        change, size."""
+        """Return the library of each component when it was loaded: path, inode, modification
+        time, size."""
         return {name: (path, *identity) for name, (path, identity) in self._files.items()}
 
     async def changed(self) -> dict[str, str]:
-        """Return the components whose library is another file now, and its path."""
+        """Return the components whose library has changed, each with the library's path."""
         files = dict(self._files)
         now = await self._look({path for path, _ in files.values()})
         return {
@@ -87,7 +89,7 @@ class LoadedCode:
         }
 
     async def _look(self, paths: set[str]) -> dict[str, _Identity | None]:
-        """Look at files, beside the event loop; return what is known."""
+        """Return the identities of files, read in a thread; empty if a folder does not answer."""
         if not paths:
             return {}
         try:
@@ -98,12 +100,12 @@ class LoadedCode:
             return {}
 
     def store(self, file: Path) -> None:
-        """Leave it to the next rtcfd, that adopts the executor."""
-        with contextlib.suppress(OSError):  # then that one does not know
+        """Save the files for the next rtcfd, which adopts the executor."""
+        with contextlib.suppress(OSError):  # the next rtcfd then does not know them
             durable.replace(file, json.dumps(self._files).encode(), sync=False, mode=0o600)
 
     def restore(self, file: Path) -> None:
-        """Take what the rtcfd before this one left."""
+        """Load the files that the previous rtcfd saved."""
         self._files = {}
         with contextlib.suppress(OSError, *NONSENSE):
             found = json.loads(regular_files.read_bytes(file))

@@ -1,8 +1,8 @@
-"""What makes a runner's loop run, and ends it.  `stop` is final.
+"""Starts and stops a runner's loop.  `stop` is final.
 
-Functions on a RunnerCore.  What was asked for before a stop was accepted starts
-no cycle after it: what is queued is withdrawn, what has begun finds out before
-it asks the executor, and stops what it started if the stop came in between.
+Functions on a RunnerCore.  No request from before a stop runs a cycle after it.  The
+stop withdraws queued operations.  A running operation checks for a stop before it asks
+the executor, and stops the loop again if the stop came in between.
 """
 
 import asyncio
@@ -21,17 +21,17 @@ _FROZEN_S = 1.0
 
 
 def asked_now(runner: RunnerCore) -> int:
-    """Return the number of stops at which what is asked for by the call of now was asked for."""
+    """Return the stop count at the time of the current call's request."""
     if caller.asked_ns() <= runner.loop.stopped_at_ns:
-        return -1  # before somebody stopped the loop at its executor, as we did not answer
+        return -1  # before a direct stop at the executor, as rtcfd did not answer
     return runner.loop.stops
 
 
 def require_no_stop(runner: RunnerCore, asked: int) -> None:
-    """Refuse what would run cycles and was asked for at the stop of number `asked`."""
+    """Raise FailedPrecondition if the loop was stopped after the stop count was `asked`."""
     if runner.loop.stops != asked:
         raise FailedPrecondition(
-            f"runner {runner.name}: its loop was stopped after this was asked for: ask again",
+            f"runner {runner.name}: its loop was stopped after this request: repeat the request",
             errors_pb2.REASON_LOOP_STOPPED,
         )
 
@@ -39,7 +39,7 @@ def require_no_stop(runner: RunnerCore, asked: int) -> None:
 async def start_in_turn(
     runner: RunnerCore, asked: int, progress: Progress | None = None
 ) -> control_pb2.ChangeResult:
-    """Start the loop, in a turn; `asked`: the number of stops when that was asked for."""
+    """Start the loop, in a turn; `asked` is the stop count at the time of the request."""
     require_no_stop(runner, asked)
     if not runner.loop.running:
         await runner.begin_figures(reset=True)
@@ -55,21 +55,24 @@ async def start_in_turn(
 
 
 async def stop(runner: RunnerCore, progress: Progress) -> control_pb2.ChangeResult:
-    """End the loop at the next boundary.  Never queues; a dead loop is a stopped loop."""
+    """Stop the loop at the next cycle boundary.  Never queues.
+
+    A loop whose executor is dead counts as stopped.
+    """
     runner.loop.stop()
     runner.operations.withdraw(
-        "the loop was stopped after it was asked for",
+        "the loop was stopped after the request",
         errors_pb2.REASON_LOOP_STOPPED,
         only_cycles=True,
     )
 
     async def work() -> control_pb2.ChangeResult:
         runner.require_ours()
-        # Beside each other: neither a slow disk nor a slow executor holds up the other.
+        # Concurrently: neither a slow disk nor a slow executor must delay the other.
         saving = asyncio.create_task(runner.save())
         try:
             if not runner.up:
-                await runner.settle()  # it may be adopted just now
+                await runner.settle()  # its executor may be being adopted
                 runner.require_ours()
             if runner.up:
                 result = await _stop_at(runner, runner.alive(), progress)
@@ -86,7 +89,7 @@ async def stop(runner: RunnerCore, progress: Progress) -> control_pb2.ChangeResu
 
 
 async def stop_quietly(runner: RunnerCore) -> None:
-    """Stop the loop for somebody who is gone; what goes wrong is logged."""
+    """Stop the loop after the loss of a client; log an error."""
     try:
         await stop(runner, lambda _: None)
     except Refusal as refusal:
@@ -96,10 +99,13 @@ async def stop_quietly(runner: RunnerCore) -> None:
 async def _stop_at(
     runner: RunnerCore, executor: Executor, progress: Progress
 ) -> control_pb2.ChangeResult:
-    """Have an executor stop its loop.  Its death ends the loop too, unless it kept something from
-    becoming safe."""
+    """Make an executor stop its loop.
+
+    The executor's death ends the loop too, unless it may have kept a component from making its
+    device safe.
+    """
     try:
-        # One that is frozen takes it when it goes on.
+        # A frozen executor handles the request when it continues.
         patience_s = _FROZEN_S if executor.frozen else STOP_TIMEOUT_S
         return await _ask_to_stop(runner, progress, patience_s)
     except Unavailable as refusal:

@@ -1,9 +1,9 @@
-"""What is done to one thing (a runner, or all of them), as operations of one kind.
+"""Operations on one subject (a runner, or all of them), one after the other.
 
-Queued: it can be withdrawn, and is when its caller leaves or runs out of time.
-Begun: it runs to its end in a task that rtcfd owns, whatever becomes of its
-caller, and what came of it is noted: by its own work, and in the log if nobody
-waits any more.  On rtcfd's one thread.
+A queued operation can be withdrawn, and is when its caller disconnects or its timeout
+passes.  A running operation runs to its end in a task that rtcfd owns, even without its
+caller.  Its own work notes the result; if no caller waits any more, the log has it too.
+On rtcfd's one thread.
 """
 
 import asyncio
@@ -25,11 +25,11 @@ Log = logging.Logger | logging.LoggerAdapter[logging.Logger]
 
 @dataclass(eq=False)
 class _Operation(Generic[Result]):
-    what: str
+    name: str
     work: Callable[[], Awaitable[Result]]
     done: "asyncio.Future[Result]"
     runs_cycles: bool = False
-    # Of its caller, in whose name it is done when its turn comes.
+    # The context of the caller, to which the work is attributed when its turn comes.
     context: contextvars.Context = field(default_factory=contextvars.copy_context)
 
 
@@ -40,20 +40,23 @@ class Operations:
         self._subject = subject
         self._log = log
         self._queue: deque[_Operation[Any]] = deque()
-        self._current: _Operation[Any] | None = None  # whose turn it is
+        self._current: _Operation[Any] | None = None  # has the turn
         self._since = 0.0
         self._tasks: set[asyncio.Task[None]] = set()
 
     async def take_turn(
         self,
-        what: str,
+        name: str,
         work: Callable[[], Awaitable[Result]],
         timeout_s: float | None,
         runs_cycles: bool = False,
     ) -> Result:
-        """Do `work` when it is its turn: one at a time, in the order they came.  `timeout_s`
-        counts from now, on the wall clock (None: no limit)."""
-        operation = self._new(what, work, runs_cycles)
+        """Run `work` in its turn: one at a time, in the order of the calls.
+
+        `name` is for messages.  `timeout_s` counts from now, on the wall clock (None: no limit).
+        Raises Unavailable after it.
+        """
+        operation = self._new(name, work, runs_cycles)
         self._queue.append(operation)
         self._next()
         try:
@@ -67,18 +70,19 @@ class Operations:
         how = f"after {timeout_s:g} s ({self.busy() or 'waiting'})"
         if self._withdraw(operation):
             raise Unavailable(
-                f"{self._subject}: {what} has not begun {how}, and will not: see `rtcfctl status`",
+                f"{self._subject}: {name} was withdrawn, as it had not begun {how}: "
+                "see `rtcfctl status`",
                 errors_pb2.REASON_BUSY,
             )
         self._report_late(operation)
         raise Unavailable(
-            f"{self._subject}: {what} is not done {how}; it goes on: see `rtcfctl status`",
+            f"{self._subject}: {name} is still running {how}: see `rtcfctl status`",
             errors_pb2.REASON_BUSY,
         )
 
-    async def begin(self, what: str, work: Callable[[], Awaitable[Result]]) -> Result:
-        """Do `work` at once, beside others."""
-        operation = self._new(what, work)
+    async def begin(self, name: str, work: Callable[[], Awaitable[Result]]) -> Result:
+        """Run `work` at once, beside others."""
+        operation = self._new(name, work)
         self._spawn(self._do(operation))
         try:
             await asyncio.wait({operation.done})
@@ -87,46 +91,46 @@ class Operations:
             raise
         return operation.done.result()
 
-    def in_background(self, what: str, work: Coroutine[Any, Any, object]) -> "asyncio.Task[None]":
-        """Do at once what nobody waits for; what goes wrong is logged."""
+    def in_background(self, name: str, work: Coroutine[Any, Any, object]) -> "asyncio.Task[None]":
+        """Run `work` at once, without a waiting caller; log its errors."""
 
         async def run() -> None:
             try:
                 await work
             except Refusal as refusal:
-                self._log.error("%s: %s", what, refusal)
+                self._log.error("%s: %s", name, refusal)
             except Exception:
-                self._log.exception("%s failed", what)
+                self._log.exception("%s failed", name)
 
         return self._spawn(run())
 
     def withdraw(self, cause: str, reason: errors_pb2.Reason, only_cycles: bool = False) -> None:
-        """Refuse what has not begun: all, or what would run cycles of a loop."""
+        """Withdraw the queued operations: all, or only those that would run cycles of a loop."""
         for operation in list(self._queue):
             if operation.runs_cycles or not only_cycles:
                 self._queue.remove(operation)
                 operation.done.set_exception(
                     FailedPrecondition(
-                        f"{self._subject}: {operation.what} is withdrawn: {cause}", reason
+                        f"{self._subject}: {operation.name} is withdrawn: {cause}", reason
                     )
                 )
 
     def busy(self, longer_than_s: float = 0.0) -> str:
-        """Return what is going on for how long, or nothing."""
+        """Return the current operation and its duration, or an empty string."""
         taken_s = time.monotonic() - self._since
         if self._current is None or taken_s <= longer_than_s:
             return ""
-        return f"busy with {self._current.what} for {taken_s:.0f} s"
+        return f"busy with {self._current.name} for {taken_s:.0f} s"
 
     async def drain(self) -> None:
-        """Wait until nothing is left, and nothing follows from what was."""
+        """Wait until all operations have ended, including those that they begin."""
         while self._tasks:
             await asyncio.wait(self._tasks)
 
     def _new(
-        self, what: str, work: Callable[[], Awaitable[Result]], runs_cycles: bool = False
+        self, name: str, work: Callable[[], Awaitable[Result]], runs_cycles: bool = False
     ) -> _Operation[Result]:
-        return _Operation(what, work, asyncio.get_running_loop().create_future(), runs_cycles)
+        return _Operation(name, work, asyncio.get_running_loop().create_future(), runs_cycles)
 
     def _next(self) -> None:
         if self._current is None and self._queue:
@@ -138,7 +142,7 @@ class Operations:
             result = await operation.work()
         except Exception as error:
             operation.done.set_exception(error)
-        except BaseException:  # rtcfd is ending by force
+        except BaseException:  # cancelled: rtcfd ends
             operation.done.cancel()
             raise
         else:
@@ -169,12 +173,14 @@ class Operations:
                 return
             error = done.exception()
             if error is None:
-                self._log.info("%s is done; its caller had left", operation.what)
+                self._log.info("%s is done; its caller had disconnected", operation.name)
             elif isinstance(error, Refusal):
-                self._log.warning("%s failed after its caller had left: %s", operation.what, error)
+                self._log.warning(
+                    "%s failed after its caller had disconnected: %s", operation.name, error
+                )
             else:
                 self._log.error(
-                    "%s failed after its caller had left", operation.what, exc_info=error
+                    "%s failed after its caller had disconnected", operation.name, exc_info=error
                 )
 
         operation.done.add_done_callback(report)

@@ -1,4 +1,4 @@
-"""Changes of parameters: by clients, by ROS peers, and taken back; with who made them.
+"""Changes of parameters, by clients and ROS peers; their history; undo.
 
 Functions on a RunnerCore; each is one transaction of its executor.
 """
@@ -21,9 +21,9 @@ from rtcfd.executor.link import Progress
 from rtcfd.operations.runner_core import Asked, RunnerCore
 from rtcfd.state.history import UNANSWERED, Change
 
-_LONGEST_WORD = 60  # of a value in a line
-_MOST_CHANGES = 500  # in one answer
-_MOST_BYTES = 2 * 1024 * 1024  # likewise; clients that are not ours take 4 MiB
+_LONGEST_WORD = 60  # characters of a value in a message
+_MOST_CHANGES = 500  # in one response
+_MOST_BYTES = 2 * 1024 * 1024  # in one response; other gRPC clients accept 4 MiB
 
 Settings = Iterable[graph_pb2.ParameterSetting]
 
@@ -33,7 +33,7 @@ async def set_parameters(
 ) -> control_pb2.ChangeResult:
     """Change parameters of one component."""
     name = absolute(request.component)
-    # Not looked up when it is its turn, which may come by another's call.
+    # Looked up here: the turn may begin in the context of another call.
     acting = caller.current()
 
     async def work() -> control_pb2.ChangeResult:
@@ -45,7 +45,7 @@ async def set_parameters(
 async def undo(
     runner: RunnerCore, request: control_pb2.UndoParametersRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
-    """Take back what was changed last of one component; again, what was changed before that."""
+    """Undo the last change of one component; repeated, the change before that."""
     name = absolute(request.component)
     acting = caller.current()
 
@@ -53,8 +53,8 @@ async def undo(
         last = runner.desired.history.to_take_back(name)
         if not last:
             raise FailedPrecondition(
-                f"no change of parameters of {name} in runner {runner.name} is known that is not "
-                f"taken back: `rtcfctl -r {runner.name} history {name}` lists what is known",
+                f"no change of parameters of {name} in runner {runner.name} is left to undo: "
+                f"`rtcfctl -r {runner.name} history {name}` lists all changes",
                 errors_pb2.REASON_NOTHING_TO_UNDO,
                 component=name,
             )
@@ -71,7 +71,7 @@ async def undo(
 def history(
     runner: RunnerCore, request: control_pb2.GetHistoryRequest
 ) -> control_pb2.GetHistoryResponse:
-    """Return who set what when, oldest first: the newest of what is known."""
+    """Return the newest changes that match a request, in order, oldest first."""
     component = absolute(request.component) if request.component else ""
     found = runner.desired.history.of(component, request.parameter)
     most = min(request.most or _MOST_CHANGES, _MOST_CHANGES)
@@ -79,7 +79,7 @@ def history(
     room = _MOST_BYTES
     for each in reversed(found[-most:]):
         change = told(each)
-        room -= change.ByteSize() + 8  # a tag and a length besides
+        room -= change.ByteSize() + 8  # 8: the tag and the length of the field
         if room < 0 and changes:
             break
         changes.append(change)
@@ -87,7 +87,7 @@ def history(
 
 
 def told(change: Change) -> control_pb2.ParameterChange:
-    """Return a change as clients know it."""
+    """Return a change as the client protocol has it."""
     return control_pb2.ParameterChange(
         component=change.component,
         parameter=change.parameter,
@@ -100,10 +100,10 @@ def told(change: Change) -> control_pb2.ParameterChange:
 
 
 async def follow_ros(runner: RunnerCore, changed: Mapping[str, set[str]]) -> None:
-    """Note parameters, by component, that ROS peers have changed."""
+    """Note parameters that ROS peers have changed; `changed` has their names, by component."""
     for component, names in changed.items():
-        # Not what was told: more may have happened since.
-        with contextlib.suppress(NotFound):  # gone since, and its parameters with it
+        # Ask for the current values: they may have changed again.
+        with contextlib.suppress(NotFound):  # the component was unloaded meanwhile
             found = await live_component(runner, component)
             known = _last_values(runner, found.full_name, found.parameters)
             settings = [
@@ -116,7 +116,7 @@ async def follow_ros(runner: RunnerCore, changed: Mapping[str, set[str]]) -> Non
 
 
 def note_unanswered(runner: RunnerCore) -> None:
-    """Note the `set` under way when an executor died: it may be the cause."""
+    """Note the `set` that was running when an executor died: it may be the cause."""
     asked, runner.asked_parameters = runner.asked_parameters, []
     for each in asked:
         note(runner, each.component, each.settings, each.before, each.acting, UNANSWERED)
@@ -129,38 +129,41 @@ def note(
     before: Mapping[str, graph_pb2.ParameterValue],
     acting: Caller | None,
     how: str,
-    who: str = "",
+    author: str = "",
     takes_back: int = 0,
     quiet: bool = False,
 ) -> None:
-    """Note parameters that were changed, with who did it: in the history and, unless they came
-    with a whole graph (`quiet`), in the log."""
+    """Note a change of parameters and its author: in the history and, unless `quiet` (for new
+    components of a graph), in the log and the events.
+
+    `author` overrides the caller; `takes_back` is the number of the change that this one undoes.
+    """
     settings = list({each.name: each for each in settings}.values())
     if not settings:
         return
-    who = who or _who(acting, how)
+    author = author or _who(acting, how)
     runner.desired.history.note(
         component,
         [(each.name, before.get(each.name), each.value) for each in settings],
-        who,
+        author,
         how,
         takes_back,
     )
     if quiet:
         return
     words = ", ".join(f"{each.name} = {word(each.value)}" for each in settings)
-    what = "taken back" if takes_back else "set"
+    deed = "restored" if takes_back else "set"
     if how == UNANSWERED:
-        what = "set (the executor died before its answer)"
+        deed = "set (the executor died before its response)"
     runner.happened(
-        control_pb2.Event.KIND_PARAMETERS, f"{component}: {words} {what}", component, user=who
+        control_pb2.Event.KIND_PARAMETERS, f"{component}: {words} {deed}", component, user=author
     )
     runner.log.logger.info(
         "%s: %s %s by %s",
         component,
         words,
-        what,
-        who if how == "set" or takes_back else f"{who}, {how}",
+        deed,
+        author if how == "set" or takes_back else f"{author}, {how}",
         extra={"runner": runner.name, "peer": None if acting is None else acting.peer},
     )
 
@@ -199,14 +202,14 @@ async def _ask(runner: RunnerCore, asked: Asked, progress: Progress) -> control_
 async def _check_left_out(
     runner: RunnerCore, name: str, settings: list[graph_pb2.ParameterSetting]
 ) -> control_pb2.ChangeResult:
-    """Check parameters that a component begins with when it is loaded again."""
+    """Check parameters for a component that is left out: it gets them when it is loaded again."""
     declared = {each.name: each for each in await _declared(runner, name)}
     for each in settings:
         declared_values.check(name, each, declared)
     result = control_pb2.ChangeResult(component=name)
     result.notes.append(
         f"{name} is left out of the loop: `rtcfctl -r {runner.name} release {name}` loads it with "
-        "this"
+        "these values"
     )
     return result
 
@@ -214,12 +217,15 @@ async def _check_left_out(
 def _taken_back(
     runner: RunnerCore, change: Change, now: Mapping[str, graph_pb2.ParameterValue]
 ) -> graph_pb2.ParameterSetting:
-    """Return what takes a change back; refuse where that would take back something else."""
+    """Return the setting that undoes a change.
+
+    Raises FailedPrecondition if there is no earlier value, or if the parameter has changed since.
+    """
     name = f"{change.component}.{change.parameter}"
     if change.before is None:
         raise FailedPrecondition(
-            f"{name} came with the component ({change.how} by {change.who}): there is no value "
-            f"before to go back to; `rtcfctl -r {runner.name} set` sets another",
+            f"{name} came with the component ({change.how} by {change.who}): there is no earlier "
+            f"value to restore; `rtcfctl -r {runner.name} set` sets another value",
             errors_pb2.REASON_NOTHING_TO_UNDO,
             component=change.component,
             parameter=change.parameter,
@@ -227,8 +233,8 @@ def _taken_back(
     found = now.get(change.parameter)
     if found is None or not same_value(found, change.value):
         raise FailedPrecondition(
-            f"{name} is {'no more' if found is None else word(found)}, not "
-            f"{word(change.value)} as {change.who} changed it to: it was changed otherwise since; "
+            f"{name} is {'gone' if found is None else word(found)}, not "
+            f"{word(change.value)} as {change.who} set it: it was changed otherwise since; "
             f"`rtcfctl -r {runner.name} set` sets another value",
             errors_pb2.REASON_NOTHING_TO_UNDO,
             component=change.component,
@@ -244,14 +250,15 @@ def _require_tuning(
     values: Mapping[str, graph_pb2.ParameterValue],
     acting: Caller,
 ) -> None:
-    """Refuse what somebody may not set, or not that fast."""
+    """Raise PermissionDenied or FailedPrecondition if the rules that bind the caller forbid a
+    change, or one that fast."""
     assert acting.tuning is not None
     now = time.monotonic()
     tuned = {}
     for each in changes:
         name = f"{component}.{each.name}"
         rule = acting.tuning.rule(runner.name, name)
-        if each.name in values:  # else its component refuses it
+        if each.name in values:  # else the component rejects it
             last = runner.tuned.get(name)
             require_pace(rule, name, _plain(values[each.name]), _plain(each.value), last, now)
             tuned[name] = now
@@ -262,20 +269,20 @@ def _require_tuning(
 
 
 async def live_component(runner: RunnerCore, name: str) -> graph_pb2.ComponentInfo:
-    """Return one component as its executor has it."""
+    """Return one component, as it is in the executor."""
     query = wire.Request(get_component=control_pb2.GetComponentRequest(component=name))
     found: graph_pb2.ComponentInfo = (await runner.ask(query)).component
     return found
 
 
 async def live_components(runner: RunnerCore) -> dict[str, graph_pb2.ComponentInfo]:
-    """Return all components as the executor has them, by full name."""
+    """Return all components, as they are in the executor, by full name."""
     listed = await runner.ask(wire.Request(list_components=wire.ListComponents()))
     return {str(each.full_name): each for each in listed.components.components}
 
 
 async def _declared(runner: RunnerCore, name: str) -> list[graph_pb2.ParameterInfo]:
-    """Return the parameters of a component that is left out, as its type declares them."""
+    """Return the parameters that the type of a left-out component declares."""
     spec = runner.desired.components[name]
     return list((await runner.catalog.find(spec.package, spec.type)).parameters)
 
@@ -290,7 +297,7 @@ async def _values(runner: RunnerCore, name: str) -> dict[str, graph_pb2.Paramete
 def _last_values(
     runner: RunnerCore, name: str, declared: Iterable[graph_pb2.ParameterInfo]
 ) -> dict[str, graph_pb2.ParameterValue]:
-    """Return the values that a component's parameters had as far as rtcfd was told."""
+    """Return the last known values of a component's parameters."""
     values = {each.name: each.default_value for each in declared}
     spec = runner.desired.components.get(name)
     if spec is not None:
@@ -310,5 +317,5 @@ def _plain(value: graph_pb2.ParameterValue) -> object:
 
 
 def word(value: graph_pb2.ParameterValue) -> str:
-    """Return a value as a word of a line."""
+    """Return a value as text for a message."""
     return f"{_plain(value)}"[:_LONGEST_WORD]

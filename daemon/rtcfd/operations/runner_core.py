@@ -1,7 +1,7 @@
-"""What every operation on a runner stands on: its executor, its desired state, its loop.
+"""The base of all operations on a runner: its executor, its desired state, its loop.
 
-Base of Runner, on rtcfd's one thread.  The executor is taken, asked and let go
-here and nowhere else.
+Base class of Runner, on rtcfd's one thread.  Only this module launches, adopts, asks
+and leaves the executor.
 """
 
 import asyncio
@@ -36,7 +36,7 @@ from rtcfd.state.desired import Desired
 from rtcfd.state.disk import Disk
 from rtcfd.state.saver import Saver
 
-CHANGE_TIMEOUT_S = 60.0  # for one change, waiting for those before it included
+CHANGE_TIMEOUT_S = 60.0  # for one change, including the wait for those before it
 _LAST_WORDS_S = 2.0  # from the loss of a link to the end of its executor
 
 Result = TypeVar("Result")
@@ -48,30 +48,29 @@ async def _number(uid: int) -> str:
 
 @dataclass
 class Surroundings:
-    """What all runners share; a reload of rtcfd changes it."""
+    """The objects that all runners share; a reload of rtcfd changes some."""
 
     command: ExecutorCommand
     catalog: Catalog
     disk: Disk
     defaults: runner_pb2.RunnerSettings  # complete
-    on_change: Callable[[], None]  # what summary() says may have changed
-    # Answers what ROS peers ask of a runner.
+    on_change: Callable[[], None]  # called when summary() may have changed
+    # Answers the calls of ROS services of a runner.
     serve_ros: Callable[["RunnerCore", wire.ServiceCall], Awaitable[wire.ServiceAnswer]]
     events: EventLog = field(default_factory=EventLog)
     limits: Limits = field(default_factory=Limits)
     incidents: Incidents = field(default_factory=lambda: Incidents(None, Limits))
-    keeping: Operations = field(  # incidents under way
+    keeping: Operations = field(  # incidents being written
         default_factory=lambda: Operations("incidents", logging.getLogger("rtcfd.incidents"))
     )
     rules: wire.AccessRules = field(default_factory=wire.AccessRules)  # for executors
-    name_of: Callable[[int], Awaitable[str]] = _number  # of a user, for people
-    # In threads of its own.
+    name_of: Callable[[int], Awaitable[str]] = _number  # returns the name of a uid
     folders: Aside = field(default_factory=lambda: Aside("folders of components"))
 
 
 @dataclass(eq=False)
 class Asked:
-    """Parameters that an executor was asked to set, and has not answered for yet."""
+    """A request to set parameters that the executor has not answered yet."""
 
     component: str  # full name
     settings: list[graph_pb2.ParameterSetting]
@@ -80,7 +79,7 @@ class Asked:
 
 
 class RunnerCore(ABC):
-    """A runner below what clients see of it."""
+    """A runner without its client-facing part."""
 
     def __init__(self, desired: Desired, surroundings: Surroundings) -> None:
         self.name = desired.runner
@@ -89,43 +88,43 @@ class RunnerCore(ABC):
         self.loop = LoopState(desired)
         self.operations = Operations(f"runner {self.name}", self.log)
         self.shared = surroundings
-        self.trouble = "its executor is not started"  # why there is none
-        self.tuned: dict[str, float] = {}  # when parameters were set whose pace is bound
+        self.trouble = "its executor is not started"  # why there is no executor
+        self.tuned: dict[str, float] = {}  # by rate-limited parameter, the time it was last set
         self.asked_parameters: list[Asked] = []
         self.closing = False
-        self.leaving = False  # it ends for this rtcfd only
+        self.leaving = False  # rtcfd ends, but the loop goes on
         self.saver = Saver(desired, surroundings.disk, self.log)
         self.code = LoadedCode(surroundings.folders)
         self.figures = Figures()
-        self.incident = ""  # the name of the newest
+        self.incident = ""  # the name of the newest incident
         self._code_file = surroundings.command.folder / f"{self.name}.libraries"
         self._executor: Executor | None = None
         self._changing_executor = asyncio.Lock()
         self._settled = asyncio.Event()  # not set while an executor is being started
-        self._told = (self.state, "")  # state and holder, as those who watch know them
+        self._told = (self.state, "")  # state and holder in the last events
 
-    # -- what a runner adds ---------------------------------------------------
+    # -- implemented by Runner ------------------------------------------------
 
     @abstractmethod
     def take_unasked(self, response: wire.Response) -> None:
-        """Take what an executor says unasked."""
+        """Handle a notification from the executor."""
 
     @abstractmethod
     def executor_ended(self, executor: Executor, end: End, ours: bool) -> None:
-        """See the end of an executor that nobody asked for."""
+        """Handle the unexpected end of an executor; `ours` if it was the current one."""
 
     @abstractmethod
     def adopted(self) -> None:
-        """See that the executor of an earlier rtcfd was taken over."""
+        """Note that the executor of an earlier rtcfd was adopted."""
 
     def tell(self) -> None:
-        """After any change: tell who wants to know."""
+        """Notify systemd and event watchers; to be called after each change."""
         self.shared.on_change()
         holder = self.desired.hold.holder if self.desired.hold else ""
         before, self._told = self._told, (self.state, holder)
         if holder != before[1]:
-            what = f"held by {holder}" if holder else f"given back by {before[1]}"
-            self.happened(control_pb2.Event.KIND_RUNNER_SETTINGS, what)
+            text = f"held by {holder}" if holder else f"given back by {before[1]}"
+            self.happened(control_pb2.Event.KIND_RUNNER_SETTINGS, text)
         if self.state != before[0]:
             why = self.loop.fault or self.loop.held or (self.trouble if not self.up else "")
             text = word(runner_pb2.RunnerState.DESCRIPTOR, self.state) + (why and f": {why}")
@@ -139,7 +138,7 @@ class RunnerCore(ABC):
         iteration: int = 0,
         user: str = "",
     ) -> None:
-        """Tell those who watch events; `user` is who did it, if not the caller of now."""
+        """Add an event; `user` is its author, by default the current caller."""
         acting = caller.current()
         self.shared.events.add(
             kind,
@@ -152,16 +151,16 @@ class RunnerCore(ABC):
             holder=self.desired.hold.holder if self.desired.hold else "",
         )
 
-    # -- what is known ----------------------------------------------------------
+    # -- state ------------------------------------------------------------------
 
     @property
     def up(self) -> bool:
-        """Tell whether there is an executor."""
+        """Whether there is an executor."""
         return self._executor is not None
 
     @property
     def state(self) -> "runner_pb2.RunnerState":
-        """What is known without asking the executor: not whether it is stuck, or stepping."""
+        """The state as far as known without asking the executor: never STUCK or STEPPING."""
         if not self.up:
             return runner_pb2.RUNNER_STATE_DOWN
         if self.loop.running:
@@ -172,12 +171,12 @@ class RunnerCore(ABC):
 
     @property
     def executor(self) -> Executor | None:
-        """The executor, if there is one: to look at."""
+        """The executor, if there is one; callers must only read it."""
         return self._executor
 
     @property
     def left_out(self) -> dict[str, str]:
-        """Components that are desired and not loaded, and why."""
+        """The components that are desired but not loaded, each with the reason."""
         return self.desired.left_out
 
     @left_out.setter
@@ -186,17 +185,17 @@ class RunnerCore(ABC):
 
     @property
     def limits(self) -> Limits:
-        """What may be asked for."""
+        """The limits on this runner."""
         return self.shared.limits
 
     @property
     def catalog(self) -> Catalog:
-        """Where libraries are found."""
+        """The catalog of component types."""
         return self.shared.catalog
 
     @property
     def defaults(self) -> runner_pb2.RunnerSettings:
-        """What settings are unless chosen."""
+        """The settings that apply unless set for this runner."""
         return self.shared.defaults
 
     def settings(self) -> runner_pb2.RunnerSettings:
@@ -206,8 +205,11 @@ class RunnerCore(ABC):
     # -- the executor -------------------------------------------------------------
 
     async def take_executor(self, only_left_over: bool = False) -> bool | None:
-        """Adopt the executor that is there (then True), or launch one (False), unless
-        `only_left_over` (None).  One that is being ended is waited for."""
+        """Adopt a left-over executor (returns True), or launch a new one (returns False).
+
+        With `only_left_over`, launches none (returns None).  Waits for an executor that is
+        being ended.
+        """
         self._settled.clear()
         self.trouble = "its executor is starting"
         command = self.shared.command
@@ -243,7 +245,7 @@ class RunnerCore(ABC):
         return adopted
 
     async def end_executor(self, trouble: str) -> None:
-        """Stop its loop in order and end it, whatever it is busy with; `trouble` says why."""
+        """Stop the loop in order and end the executor, even a busy one; `trouble` is the reason."""
         executor, self._executor = self._executor, None
         if executor is not None:
             self.trouble = executor.verdict = trouble
@@ -252,26 +254,26 @@ class RunnerCore(ABC):
         self.loop.gone()
 
     async def leave_executor(self) -> None:
-        """Let go of it: its loop goes on until the next rtcfd adopts it."""
+        """Disconnect from the executor: its loop goes on, and the next rtcfd adopts it."""
         executor, self._executor = self._executor, None
         if executor is not None:
             self.code.store(self._code_file)
             await executor.leave()
 
     async def settle(self) -> None:
-        """Wait while an executor is being started, for as long as that may take."""
+        """Wait while an executor is being started, at most for its start timeout."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(CONNECT_TIMEOUT_S + 1.0):
                 await self._settled.wait()
 
     async def limit(self) -> None:
-        """Tell the executor what its graph may have, and who may do what at it."""
+        """Send the limits and the access rules to the executor."""
         if self._executor is not None:
             await self._executor.limit(self.limits)
             await self._executor.grant(self.shared.rules)
 
     async def query(self, request: wire.Request) -> wire.Response:
-        """Ask the executor what changes nothing in the graph."""
+        """Send a query, which does not change the graph, to the executor."""
         await self.settle()
         return await self.ask(request, timeout_s=QUERY_TIMEOUT_S)
 
@@ -282,7 +284,7 @@ class RunnerCore(ABC):
         on_answer: OnAnswer | None = None,
         timeout_s: float | None = None,
     ) -> wire.Response:
-        """Ask the executor; of a change the caller's limit is change()'s."""
+        """Send a request to the executor; for changes, the timeout of change() applies."""
         seen = await self.code.before(request)
         executor = self.alive()
         async with self._last_words(executor):
@@ -291,7 +293,7 @@ class RunnerCore(ABC):
         return response
 
     async def watch_ports(self, request: ports_pb2.WatchPortsRequest, on_ports: OnPorts) -> None:
-        """Hand on the values of ports until cancelled, or until the executor ends."""
+        """Pass the values of ports on until cancelled, or until the executor ends."""
         await self.settle()
         executor = self.alive()
         async with self._last_words(executor):
@@ -299,13 +301,13 @@ class RunnerCore(ABC):
 
     @contextlib.asynccontextmanager
     async def _last_words(self, executor: Executor) -> AsyncIterator[None]:
-        """Say what is known of an executor's end, where that has cut something off."""
+        """Replace the error of a lost link by the cause of the executor's end, if it has ended."""
         try:
             yield
         except Unavailable:
             if executor.connected:
                 raise
-            # It may have died of this: then its end says more than the lost link.
+            # The request may have killed it: then the cause of its end is more helpful.
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(_LAST_WORDS_S):
                     await executor.ended.wait()
@@ -316,7 +318,7 @@ class RunnerCore(ABC):
             ) from None
 
     async def begin_figures(self, reset: bool) -> None:
-        """Count from here on (`reset`), or from where the executor's statistics do."""
+        """Count from now on (`reset`), or from the begin of the executor's statistics."""
         if reset:
             await self.ask(wire.Request(reset_statistics=wire.ResetStatistics()))
         self.figures.begin()
@@ -327,7 +329,7 @@ class RunnerCore(ABC):
         self.figures.leave_out(status, counted.statistics)
 
     def alive(self) -> Executor:
-        """Return the executor, or refuse."""
+        """Return the executor; raises Unavailable if there is none."""
         if self._executor is None:
             raise Unavailable(
                 f"runner {self.name} is down: {self.trouble}", errors_pb2.REASON_EXECUTOR_DOWN
@@ -335,7 +337,7 @@ class RunnerCore(ABC):
         return self._executor
 
     def require_ours(self) -> None:
-        """Refuse when executor and disk were left to the next rtcfd: its loop may run."""
+        """Raise Unavailable if executor and state are left to the next rtcfd: the loop may run."""
         if self.leaving and not self.up:
             raise Unavailable("rtcfd is being restarted", errors_pb2.REASON_DAEMON_ENDING)
 
@@ -351,7 +353,7 @@ class RunnerCore(ABC):
         return executor
 
     def _ended(self, executor: Executor, end: End) -> None:
-        """An executor of ours is dead."""
+        """Handle the end of an executor."""
         ours = executor is self._executor
         if ours:
             self._executor = None
@@ -365,12 +367,12 @@ class RunnerCore(ABC):
 
     async def change(
         self,
-        what: str,
+        name: str,
         work: Callable[[], Awaitable[Result]],
         timeout_s: float | None = CHANGE_TIMEOUT_S,
         runs_cycles: bool = False,
     ) -> Result:
-        """Do one change in its turn."""
+        """Run one change in its turn; see Operations.take_turn()."""
 
         async def told() -> Result:
             self.require_ours()
@@ -379,7 +381,7 @@ class RunnerCore(ABC):
             finally:
                 self.tell()
 
-        return await self.operations.take_turn(what, told, timeout_s, runs_cycles)
+        return await self.operations.take_turn(name, told, timeout_s, runs_cycles)
 
     async def save(self) -> list[str]:
         """Save the desired state; see Saver.save()."""

@@ -1,7 +1,7 @@
-"""Snapshots of a runner: taken and restored by its executor, handed on here unread.
+"""Snapshots of a runner: the executor takes and restores them, rtcfd passes them on unparsed.
 
-Functions on a RunnerCore.  What a snapshot changes of parameters is noted as if
-it had been set.
+Functions on a RunnerCore.  Parameters that a snapshot changes are noted as if they had
+been set.
 """
 
 from rtcf.executor.v1 import executor_pb2 as wire
@@ -29,7 +29,7 @@ async def take(runner: RunnerCore) -> control_pb2.TakeSnapshotResponse:
 async def restore(
     runner: RunnerCore, snapshot: bytes, progress: Progress
 ) -> control_pb2.ChangeResult:
-    """Restore a snapshot at a cycle boundary; a loop that does not run is paused."""
+    """Restore a snapshot at a cycle boundary; a loop that does not run is paused then."""
     asked = asked_now(runner)
     acting = caller.current()
 

@@ -1,7 +1,7 @@
-"""Parameters that were tuned since a file gave them their values.
+"""Parameters that were tuned after a graph file was applied.
 
-When the file is applied again, they stay where they fit. A parameter counts as tuned if its value
-is neither the one that was given nor the default.
+When the file is applied again, tuned values that still fit stay.  A parameter counts as tuned if
+its value is neither the given value nor the default.
 """
 
 from collections.abc import Iterable, Mapping
@@ -21,20 +21,20 @@ from rtcfd.operations.runner_core import RunnerCore
 
 @dataclass
 class Tuned:
-    """What became of one component's parameters."""
+    """The tuned parameters of one component that stay, and those that change."""
 
     kept: list[graph_pb2.ParameterSetting] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     before: dict[str, graph_pb2.ParameterValue] = field(default_factory=dict)
-    # By a value given now, or by one that does not fit; not by another default.
+    # Changed by a value given now, or because a value does not fit; not by a new default.
     changed: list[graph_pb2.ParameterSetting] = field(default_factory=list)
 
     def note(self, runner: RunnerCore, component: str, acting: Caller | None, how: str) -> None:
-        """Note changes in the history: a value that stays is its setter's."""
+        """Note the changes in the history; a value that stays keeps its author there."""
         parameters.note(runner, component, self.changed, self.before, acting, how)
 
     def tell(self, result: control_pb2.ChangeResult) -> None:
-        """Add it to the result of a change of this component."""
+        """Add kept values and notes to the result of a change of this component."""
         result.kept.extend(self.kept)
         result.notes.extend(self.notes)
 
@@ -44,7 +44,7 @@ async def keep_all(
     specs: Iterable[graph_pb2.ComponentSpec],
     given_before: Iterable[graph_pb2.ComponentSpec],
 ) -> dict[str, Tuned]:
-    """Put tuned values into the components of a graph; return the notes on them, by name."""
+    """Put tuned values into the components of a graph; return the results, by component."""
     earlier = {full_name(each): each for each in given_before}
     found = {}
     live = await parameters.live_components(runner)
@@ -132,7 +132,7 @@ async def _keep(
 def _misfit(
     setting: graph_pb2.ParameterSetting, declared: Mapping[str, graph_pb2.ParameterInfo]
 ) -> str:
-    """Return why a value is none of a parameter; empty: it is one."""
+    """Return why a value does not fit a parameter; empty = it fits."""
     found = declared.get(setting.name)
     if found is None:
         return "there is no such parameter any more"

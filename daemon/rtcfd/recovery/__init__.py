@@ -1,1 +1,1 @@
-"""How an executor gets its graph again: adopted, restored, or after a crash."""
+"""Recovery of runners: adoption of executors, restoration of graphs, restarts after crashes."""

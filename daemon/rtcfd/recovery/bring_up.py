@@ -1,7 +1,8 @@
-"""How a runner gets its executor, and that its graph: followed when it is adopted, restored
-when it is new, restored without the culprit when the last one crashed.
+"""Brings up a runner's executor with its graph.
 
-Functions on a RunnerCore; each runs in a turn of it, except recover().
+If the executor is adopted, the desired state follows it; a new executor gets the desired
+graph; after a crash, the graph without the culprit.  Functions on a RunnerCore; each runs
+in a turn of it, except recover().
 """
 
 import time
@@ -29,8 +30,10 @@ _WORDS = {
 
 
 async def bring_up(runner: RunnerCore, only_left_over: bool = False, boot: bool = False) -> bool:
-    """Adopt the executor that is there, or start one (unless `only_left_over`), and load the
-    components; held, or at `boot` as `on_boot` says.  Tell whether there is one."""
+    """Adopt a left-over executor, or start one (unless `only_left_over`), and load the graph.
+
+    The loop is held; at `boot`, `on_boot` decides.  Returns whether there is an executor.
+    """
     asked, stopped_at_ns = runner.loop.stops, runner.loop.stopped_at_ns
     agreed = set(runner.left_out) if runner.loop.wanted else set()
     adopted = await runner.take_executor(only_left_over)
@@ -38,11 +41,11 @@ async def bring_up(runner: RunnerCore, only_left_over: bool = False, boot: bool 
         return False
     executor = runner.executor
     if executor is not None and executor.foreign:
-        runner.loop.told(runner.loop.wanted)  # as far as can be known
+        runner.loop.told(runner.loop.wanted)  # its real state cannot be known
         return True
     await runner.limit()
     if adopted:
-        # A stop that it tells of when it is taken is older than what its loop does from then on.
+        # A direct stop that it reports on adoption is older than the state of its loop then.
         told = runner.loop.stopped_at_ns != stopped_at_ns
         await _follow(runner, asked + told)
     else:
@@ -54,11 +57,11 @@ async def bring_up(runner: RunnerCore, only_left_over: bool = False, boot: bool 
 
 
 async def _follow(runner: RunnerCore, asked: int) -> None:
-    """Make the desired state that of an executor that was adopted; `asked`: the number of stops
-    that are older than what its loop does.
+    """Make the desired state that of an adopted executor; `asked` is the number of stops that
+    are older than the state of its loop.
 
-    What its loop lacks is loaded if it does not run: then the rtcfd before this
-    one died while it restored it.
+    If the loop does not run, missing components are loaded: the previous rtcfd died
+    while it restored the graph.
     """
     await _settle(runner)
     was_running = runner.loop.wanted
@@ -90,13 +93,15 @@ async def _follow(runner: RunnerCore, asked: int) -> None:
 
 
 def _told(runner: RunnerCore, status: runner_pb2.RunnerStatus, asked: int) -> None:
-    """Note what a loop does that another rtcfd started; it is not wanted for that after a stop."""
+    """Note the state of a loop that an earlier rtcfd started; after a stop, it is not wanted."""
     runner.loop.told(status.state == runner_pb2.RUNNER_STATE_RUNNING, asked)
 
 
 def _follow_leased(runner: RunnerCore, found: Iterable[graph_pb2.ComponentInfo]) -> bool:
-    """Take leased components, which are not saved, from the executor that has them; tell whether
-    it lacks one."""
+    """Take the specifications of leased components, which are not saved, from the executor.
+
+    Returns whether it lacks one.
+    """
     before = len(runner.desired.leased)
     live = {str(info.full_name): info for info in found}
     for name in list(runner.desired.leased):
@@ -108,21 +113,21 @@ def _follow_leased(runner: RunnerCore, found: Iterable[graph_pb2.ComponentInfo])
 
 
 async def _restore(runner: RunnerCore) -> None:
-    """Load what is desired into a new executor; what does not load is left out and reported."""
+    """Load the desired components into a new executor; those that fail are left out and logged."""
     runner.left_out = dict(runner.desired.quarantined)
     wanted = [name for name in runner.desired.components if name not in runner.left_out]
     if not wanted:
         return
     runner.trouble = restoring = f"its components are being restored: {len(wanted)}"
     try:
-        # All at once, for speed; one by one if that finds something to refuse.
+        # All at once, for speed; one by one if that fails.
         every = await loads(runner.catalog, [runner.desired.components[name] for name in wanted])
         await runner.ask(wire.Request(apply=wire.Apply(components=every)))
     except Refusal:
         if runner.up:
             await _load_each(runner, wanted)
     finally:
-        if runner.trouble == restoring:  # else it has died since
+        if runner.trouble == restoring:  # else the executor has died meanwhile
             runner.trouble = ""
     if runner.up:
         count = len(runner.desired.components) - len(runner.left_out)
@@ -132,9 +137,9 @@ async def _restore(runner: RunnerCore) -> None:
 
 
 async def _start_at_boot(runner: RunnerCore, asked: int, agreed: set[str]) -> None:
-    """At the start of rtcfd: start a loop that is to run, as `on_boot` says.
+    """Start the loop at the start of rtcfd if `on_boot` says so.
 
-    `agreed`: the components that it ran without before.
+    `agreed` are the components without which it ran before.
     """
     if runner.loop.running or not runner.up:
         return
@@ -157,12 +162,15 @@ async def _start_at_boot(runner: RunnerCore, asked: int, agreed: set[str]) -> No
 
 
 async def recover(runner: RunnerCore, verdict: Verdict, crashes: Crashes, trouble: str) -> None:
-    """After a death that nobody asked for: a new executor, the graph without the culprit."""
+    """Start a new executor after an unexpected end, with the graph without the culprit.
+
+    `trouble` is the cause of the end, for messages.
+    """
     begin = time.monotonic()
     asked = runner.loop.stops
 
     async def work() -> None:
-        # First of all: whatever comes, the culprit is not loaded again.
+        # First of all, so that the culprit is not loaded again even if rtcfd dies now.
         await runner.save()
         if runner.up or runner.closing:
             return
@@ -172,7 +180,7 @@ async def recover(runner: RunnerCore, verdict: Verdict, crashes: Crashes, troubl
         agreed = {*runner.left_out, verdict.culprit}
         await bring_up(runner)
         if not runner.up:
-            return  # that one died too: its own recovery follows
+            return  # the new executor died too, and its own recovery follows
         not_resumed = ""
         missing = _missing(runner, agreed)
         if runner.loop.wanted and missing:
@@ -196,7 +204,7 @@ async def recover(runner: RunnerCore, verdict: Verdict, crashes: Crashes, troubl
 
 
 def require_whole(runner: RunnerCore, agreed: Container[str]) -> None:
-    """Refuse to run cycles without a component that is neither optional nor `agreed` on."""
+    """Raise FailedPrecondition if a left-out component is neither optional nor in `agreed`."""
     missing = _missing(runner, agreed)
     if not missing:
         return
@@ -221,14 +229,14 @@ def _missing(runner: RunnerCore, agreed: Container[str]) -> list[str]:
 
 
 def _give_up(runner: RunnerCore, trouble: str) -> None:
-    """Say why there is no executor, and no other is started by itself."""
+    """Report why there is no executor; rtcfd starts no other on its own."""
     runner.trouble = f"{trouble}; `rtcfctl -r {runner.name} start` tries again"
     runner.log.error("%s", runner.trouble)
     runner.tell()
 
 
 def resumes(runner: RunnerCore, verdict: Verdict, crashes: Crashes) -> bool:
-    """Tell whether a loop that ran goes on without the culprit."""
+    """Return whether a loop that ran resumes without the culprit."""
     culprit = runner.desired.components.get(verdict.culprit)
     return (
         runner.settings().on_crash == runner_pb2.ON_CRASH_RESUME
@@ -239,7 +247,7 @@ def resumes(runner: RunnerCore, verdict: Verdict, crashes: Crashes) -> bool:
 
 
 def _held(runner: RunnerCore, verdict: Verdict, trouble: str) -> str:
-    """Return what the status says after a recovery."""
+    """Return the text of the status after a recovery."""
     name, culprit = runner.name, verdict.culprit
     if culprit not in runner.desired.quarantined:
         loop = "its loop goes on" if runner.loop.running else f"held: `rtcfctl -r {name} start`"
@@ -254,10 +262,10 @@ def _held(runner: RunnerCore, verdict: Verdict, trouble: str) -> str:
 
 
 async def _settle(runner: RunnerCore) -> None:
-    """Wait until a change is done that the rtcfd before this one had asked for.
+    """Wait for a change that the previous rtcfd requested.
 
-    An unload of nothing is refused by the thread that makes the changes, when
-    it comes to it.
+    The graph thread, which handles changes in order, rejects an empty unload when its
+    turn comes.
     """
     try:
         await runner.ask(wire.Request(unload=control_pb2.UnloadRequest()))
@@ -268,7 +276,7 @@ async def _settle(runner: RunnerCore) -> None:
 
 
 async def _load_each(runner: RunnerCore, names: Iterable[str]) -> None:
-    """Load components one by one; what does not load is left out and reported."""
+    """Load components one by one; those that fail are left out and logged."""
     for name in names:
         try:
             (load,) = await loads(runner.catalog, [runner.desired.components[name]])
@@ -276,7 +284,7 @@ async def _load_each(runner: RunnerCore, names: Iterable[str]) -> None:
             runner.left_out.pop(name, None)
         except Refusal as refusal:
             if not runner.up:
-                return  # it died: its recovery sees to the rest
+                return  # the executor died, and its recovery loads the rest
             runner.left_out[name] = str(refusal)
             runner.log.error("%s is left out of the loop: %s", name, refusal)
     if runner.left_out:

@@ -1,6 +1,6 @@
-"""Says where in its source an executor crashed: in the journal, the events and the status.
+"""Reports the source line at which an executor crashed: in the journal, the events, the status.
 
-A function on a RunnerCore; runs beside the recovery, which it does not hold up.
+A function on a RunnerCore; runs beside the recovery, without delaying it.
 """
 
 import asyncio
@@ -17,8 +17,8 @@ _TIMEOUT_S = 15.0  # for all files
 
 
 async def name_source(runner: RunnerCore, trace: Trace, verdict: Verdict) -> None:
-    """Find the source lines of a crash, where there is debug information, and name them."""
-    # As they were: the next executor is about to load them anew.
+    """Find the source lines of a crash, if there is debug information, and report them."""
+    # Read the files first: the next executor is about to load its libraries.
     loaded = {path for path, *_ in runner.code.files().values()}
     changed = set((await runner.code.changed()).values())
     program = str(runner.shared.command.binary.resolve())

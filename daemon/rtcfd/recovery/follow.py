@@ -1,7 +1,7 @@
-"""Compares a running executor with the desired state; the desired state follows.
+"""Makes the desired state follow a running executor, and lists the differences.
 
-What an executor has is true: it may have adopted a change whose save was lost
-when the rtcfd before this one died.  Pure: asks and tells nobody.
+The executor is right: it may have adopted a change whose save was lost when the previous
+rtcfd died.  Pure functions on the desired state.
 """
 
 from collections.abc import Iterable
@@ -18,7 +18,7 @@ def follow_settings(
     defaults: runner_pb2.RunnerSettings,
     found: runner_pb2.RunnerSettings,
 ) -> list[str]:
-    """Make the desired settings those of an executor; return a line for each that differed."""
+    """Make the desired settings those of an executor; return a line for each difference."""
     present = runner_pb2.RunnerSettings()
     present.CopyFrom(found)
     if present.spin_auto:
@@ -34,10 +34,10 @@ def follow_components(
 ) -> tuple[list[str], dict[str, str]]:
     """Make the desired components those of an executor.
 
-    Returns a line for each that differed, and those that the executor does not
-    have, with the reason: they stay in the desired state. If its graph was
-    `restored` once, those of them that were not left out then have been unloaded
-    since, by a change whose save was lost.
+    Returns a line for each difference, and the components that the executor does not have,
+    with the reason; these stay in the desired state.  If the executor's graph was completely
+    `restored` before, a missing component that was not left out has been unloaded since, by a
+    change whose save was lost; it is dropped.
     """
     lines: list[str] = []
     known_left_out = dict(desired.left_out)
@@ -72,7 +72,7 @@ def _difference(
     present: graph_pb2.ComponentSpec,
     info: graph_pb2.ComponentInfo,
 ) -> str:
-    """Return what differs, or nothing."""
+    """Return the names of the fields that differ; empty = none."""
     different = []
     for field in ("package", "type", "first", "ignore", "optional"):
         if getattr(known, field) != getattr(present, field):

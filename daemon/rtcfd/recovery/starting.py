@@ -1,7 +1,7 @@
-"""What runs cycles of a loop: start, steps, replay.  An executor that is down is brought back
-first.
+"""The operations that run cycles of a loop: start, step, replay.  They bring up the executor first
+if it is down.
 
-Functions on a RunnerCore.  All that waits here is withdrawn by a stop.
+Functions on a RunnerCore.  A stop withdraws all that are queued.
 """
 
 import asyncio
@@ -23,8 +23,11 @@ from rtcfd.recovery.bring_up import bring_up, require_whole
 async def start(
     runner: RunnerCore, request: control_pb2.StartRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
-    """Start the loop; without components that are left out only where these are optional, or the
-    request names them."""
+    """Start the loop.
+
+    Raises FailedPrecondition if a component is left out that is not optional, unless the
+    request names it.
+    """
     asked = asked_now(runner)
 
     async def work() -> control_pb2.ChangeResult:
@@ -42,10 +45,12 @@ async def start(
 
 
 async def step(runner: RunnerCore, cycles: int, progress: Progress) -> control_pb2.ChangeResult:
-    """Run cycles of a stopped loop on a simulated clock; takes as long as they take, and ends at
-    a boundary if its caller leaves."""
+    """Run cycles of a stopped loop on a simulated clock.
+
+    Without timeout; ends at a cycle boundary if its caller disconnects.
+    """
     asked = asked_now(runner)
-    left = asyncio.Event()  # the caller has
+    left = asyncio.Event()  # the caller has disconnected
 
     async def work() -> control_pb2.ChangeResult:
         await _need_executor(runner, progress)
@@ -67,7 +72,7 @@ async def step(runner: RunnerCore, cycles: int, progress: Progress) -> control_p
 
 
 async def _end_step(runner: RunnerCore, step: wire.Request, left: asyncio.Event) -> None:
-    """End a step that was asked for at the next boundary, once its caller has left."""
+    """End a running step at the next cycle boundary, once its caller has disconnected."""
     await left.wait()
     with contextlib.suppress(Refusal):
         await runner.ask(wire.Request(end_step=wire.EndStep(step=step.id)))
@@ -78,9 +83,9 @@ async def replay(
     request: control_pb2.ReplayRequest,
     on_done: Callable[[], None] = lambda: None,
 ) -> control_pb2.ReplayResponse:
-    """Run a piece of a recording through the loop; takes as long as its cycles take.
+    """Run a piece of a recording through the loop, without timeout.
 
-    `on_done` is called when that was not refused, also if nobody waits any more.
+    `on_done` is called after a success, even if the caller has disconnected.
     """
     asked = asked_now(runner)
 
@@ -96,13 +101,13 @@ async def replay(
 
 
 def _require_complete(runner: RunnerCore, request: control_pb2.StartRequest) -> None:
-    """Refuse to run cycles without a component, unless the request allows its absence."""
+    """Raise an error if a component is left out, unless the request allows its absence."""
     without = {absolute(name) for name in request.without}
     if unknown := sorted(without - runner.left_out.keys()):
         raise NotFound(
             f"{unknown[0]} is not left out of runner {runner.name} "
-            f"(left out: {listing(runner.left_out)}): `rtcfctl -r {runner.name} unload` takes a "
-            "component out",
+            f"(left out: {listing(runner.left_out)}): `rtcfctl -r {runner.name} unload` removes a "
+            "component",
             errors_pb2.REASON_COMPONENT_NOT_LEFT_OUT,
             component=unknown[0],
         )

@@ -1,7 +1,7 @@
-"""What an executor's death means: what was running, and whether it is taken out.
+"""Judges the death of an executor: which code was running, and which component to quarantine.
 
-Running is not guilty: a component is named because its code was executing.
-It is quarantined only if the thread that died was executing it.
+Running is not guilty: a component is named because its code was running.  It is
+quarantined only if the thread that died was running it.
 """
 
 import signal
@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 from rtcfd.executor.flight_recorder import Note, Thread
 from rtcfd.executor.process import End, describe_signal
 
-# More deaths in this time hold the loop, whatever the policy; still more end the attempts.
+# After more than MOST_CRASHES deaths in WINDOW_S the loop is held under any policy; after
+# MOST_ATTEMPTS no new executor is started.
 WINDOW_S = 60.0
 MOST_CRASHES = 3
 MOST_ATTEMPTS = 6
 
-# Signals that a process brings upon itself; others were sent to it.
+# Signals that a process causes itself; other signals come from another process.
 _OWN_SIGNALS = {
     int(number)
     for number in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT,
@@ -28,20 +29,20 @@ _ADDRESSED = {int(signal.SIGSEGV), int(signal.SIGBUS), int(signal.SIGFPE), int(s
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is said and done about a death."""
+    """The verdict on a death, for messages and for the quarantine."""
 
     how: str  # "was killed by SIGSEGV …"
     running: str  # "while /H1.update was running in cycle 7"
     culprit: str = ""  # full name of the component to quarantine; empty = none
-    orderly: bool = False  # somebody asked the executor itself to end, e.g. by SIGTERM
-    safe: bool = True  # it died in no hook that makes things safe or stops them
+    orderly: bool = False  # the executor ended in order on request, e.g. by SIGTERM
+    safe: bool = True  # False: it died in safe(), or in a hook of the graph thread, as stop()
 
     def __str__(self) -> str:
         return f"{self.how} {self.running}"
 
 
 def judge(end: End, note: Note | None) -> Verdict:
-    """Return the verdict on a death that nobody asked for."""
+    """Return the verdict on an unexpected death."""
     if note is None:
         return Verdict(str(end), "(there is no flight recorder)")
     safe = not (note.updating and note.cycle_hook == "safe") and not (note.hooking and note.hook)
@@ -67,7 +68,7 @@ def _judge(end: End, note: Note) -> Verdict:
         return Verdict(how, running, note.hooking)
     if note.thread == Thread.OTHER:
         return Verdict(how, "in a thread that belongs to no component")
-    # No note of a crash: it ended by exit(), by a signal from outside, or in an unknown way.
+    # Without a recorded crash: it ended by exit(), by a signal from outside, or unknown.
     busy = " and ".join([f"{update} {cycle}"] * bool(update) + [hook] * bool(hook))
     running = f"while {busy} was running" if busy else "while no component was running"
     own = end.status is not None and (end.status >= 0 or -end.status in _OWN_SIGNALS)
@@ -87,12 +88,12 @@ class Crashes:
         self._times: deque[float] = deque()
 
     def add(self) -> None:
-        """Note one, now."""
+        """Count a death now."""
         self._times.append(time.monotonic())
 
     @property
     def recent(self) -> int:
-        """How many there were in the last minute."""
+        """The number of deaths in the last WINDOW_S."""
         while self._times and time.monotonic() - self._times[0] > WINDOW_S:
             self._times.popleft()
         return len(self._times)

@@ -1,1 +1,1 @@
-"""The runners, and who holds them and their components."""
+"""The runners, and the leases on them and their components."""

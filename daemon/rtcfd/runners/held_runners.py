@@ -1,8 +1,8 @@
-"""Runners that somebody holds: rt_runner's, for the life of a launch.
+"""Leases on runners: rt_runner holds a runner for the life of a launch.
 
-A runner that is held has the settings of its holder, and an executor of its
-own from the first to the last moment: so nothing of one launch, a ROS node's
-host name included, is left for the next.  Functions on Runners and a Runner.
+A held runner has the settings of its holder.  It gets a new executor at the begin and at
+the end of the launch, so that nothing of one launch, not even the ROS node's host name,
+is left for the next.  Functions on Runners and a Runner.
 """
 
 import asyncio
@@ -30,7 +30,7 @@ from rtcfd.state.desired import HoldTerms
 
 
 class Hold:
-    """One call's runner.  `open` first, then `end` or `lost`."""
+    """The lease of one call on a runner.  `open` first, then `end` or `lost`."""
 
     def __init__(self, runners: Runners, request: control_pb2.OpenHold, outbox: Outbox) -> None:
         self._runners = runners
@@ -39,11 +39,11 @@ class Hold:
         self._runner: Runner | None = None
 
     async def open(self) -> None:
-        """Take the runner, or come back to it; tell the holder."""
+        """Take the runner, or attach to it again; send its status to the holder."""
         request = self._request
         if not request.token:
             raise InvalidArgument(
-                "a hold needs a token", errors_pb2.REASON_NAME_MISSING, field="token"
+                "HoldRunner requires a token", errors_pb2.REASON_NAME_MISSING, field="token"
             )
         name = request.runner or DEFAULT_RUNNER
         self._outbox.progress(f"taking runner {name}")
@@ -56,13 +56,13 @@ class Hold:
         runner.tell()
 
     async def end(self) -> None:
-        """Give the runner back, at its holder's word."""
+        """Give the runner back, on request of its holder."""
         if self._runner is not None:
             work = release(self._runners, self._runner, self._outbox)
             await self._runners.operations.begin("the end of a launch", lambda: work)
 
     def lost(self) -> None:
-        """The holder has died: likewise."""
+        """Give the runner back after the death of its holder."""
         self._outbox.gone = True
         runner = self._runner
         if runner is None or runner.closing:
@@ -74,20 +74,21 @@ class Hold:
             )
 
     def _taken(self, runner: Runner) -> None:
-        # From here on the death of the holder gives it back.
+        # From here on, lost() gives the runner back.
         self._runner = runner
         runner.hold_outbox = self._outbox
 
     def _require_holder(self, terms: HoldTerms) -> None:
         if self._outbox.gone:
             raise Unavailable(
-                f"{terms.holder}, which wanted the runner, has left", errors_pb2.REASON_CALLER_GONE
+                f"{terms.holder}, which requested the runner, has disconnected",
+                errors_pb2.REASON_CALLER_GONE,
             )
 
     async def _take(self, name: str) -> Runner:
         request = self._request
         runner_settings.check(request.settings)
-        # Of a launch its ROS is as much its user's as its components.
+        # ROS peers of a launch act for its user, so they get the right of the holder.
         holder = caller.current()
         if holder is not None and not request.settings.ros.HasField("peers"):
             request.settings.ros.peers = holder.level.right
@@ -128,7 +129,7 @@ class Hold:
 
 
 def await_holder(runners: Runners, runner: Runner) -> None:
-    """After a restart of rtcfd: give the holder time to come back."""
+    """Give the holder time to reconnect, after a restart of rtcfd."""
 
     async def wait() -> None:
         with contextlib.suppress(TimeoutError):
@@ -145,7 +146,7 @@ def await_holder(runners: Runners, runner: Runner) -> None:
 
 
 async def release(runners: Runners, runner: Runner, outbox: Outbox | None) -> None:
-    """Stop the loop, unload what is leased, give a runner its own settings back or remove it."""
+    """Stop the loop, unload leased components, and restore the runner's settings or remove it."""
     hold = runner.desired.hold
     if hold is None or runner.hold_outbox is not outbox or runner.releasing or runner.closing:
         return
@@ -168,7 +169,7 @@ async def _release(runners: Runners, runner: Runner, hold: HoldTerms) -> None:
         return
 
     async def work() -> None:
-        # Whoever has started it since has started what ends now.
+        # A loop that was started meanwhile belongs to the launch that ends now.
         runner.loop.stop()
         runner.desired.let_go()
         await runner.restart_in_turn()
@@ -186,7 +187,7 @@ def _attach(runners: Runners, name: str, token: str) -> Runner:
     hold = runner.desired.hold
     if hold is not None and runner.releasing:
         raise NotFound(
-            f"runner {name} is being given back, as {hold.holder} was gone: take it anew",
+            f"runner {name} is being given back, as {hold.holder} was gone: request it again",
             errors_pb2.REASON_HOLD_NOT_FOUND,
         )
     if hold is None or hold.token != token or runner.hold_outbox is not None:

@@ -1,8 +1,8 @@
-"""Components that stay as long as somebody holds them: a lease is that caller's connection.
+"""Leases on components: a leased component stays loaded while its client is connected.
 
 Owned by the Runner, on rtcfd's one thread.  The terms of each lease belong to the
-desired state, so that a rtcfd that was restarted knows whom to wait for; the
-components themselves are not saved.
+desired state, so that a restarted rtcfd knows the holders to wait for.  The components
+themselves are not saved.
 """
 
 import asyncio
@@ -20,9 +20,9 @@ from rtcfd.operations.runner_core import RunnerCore
 from rtcfd.runners.outbox import Outbox
 from rtcfd.state.desired import LeaseTerms
 
-# For holders to come back after a restart of rtcfd.
+# Time for holders to reconnect after a restart of rtcfd.
 RETURN_S = 10.0
-# Leases of one run that end within this time of each other leave together.
+# Leases of one launch that end within this time of each other end in one transaction.
 GATHER_S = 0.2
 _LONGEST_GATHER_S = 1.0
 
@@ -30,7 +30,7 @@ _Ended = control_pb2.LeaseEnded
 
 
 class Lease:
-    """One call's component.  `open` or `attach` first, then `end` or `lost`."""
+    """The lease of one call on a component.  `open` first, then `end` or `lost`."""
 
     def __init__(self, leases: "Leases", request: control_pb2.OpenLease, outbox: Outbox) -> None:
         self._leases = leases
@@ -38,7 +38,7 @@ class Lease:
         self._outbox = outbox
 
     async def open(self) -> None:
-        """Load the component, or come back to it; tell the holder."""
+        """Load the component, or attach to it again; send the result to the holder."""
         if self._request.attach:
             result = self._leases.attach(self._request, self._outbox)
         elif self._request.wait:
@@ -50,11 +50,11 @@ class Lease:
         self._outbox.say(loaded=result)
 
     async def end(self) -> None:
-        """Unload the component, at its holder's word."""
+        """Unload the component, on request of its holder."""
         await self._leases.end(full_name(self._request.component), self._outbox)
 
     def lost(self) -> None:
-        """Do what was agreed for the death of the holder."""
+        """Apply `on_lost` of the lease after the death of the holder."""
         self._outbox.gone = True
         self._leases.lost(full_name(self._request.component), self._outbox)
 
@@ -65,13 +65,13 @@ class Leases:
     def __init__(self, runner: RunnerCore, alarm: Callable[[str], None]) -> None:
         self._runner = runner
         self._alarm = alarm
-        self._outboxes: dict[str, Outbox] = {}  # by component; of holders that are there
-        self._told: set[str] = set()  # notes on the loads of this launch
+        self._outboxes: dict[str, Outbox] = {}  # by component, of connected holders
+        self._told: set[str] = set()  # notes that holders of this launch have received
         self._loading: set[str] = set()
-        self._losing: set[str] = set()  # their holders have died, and it is being seen to
+        self._losing: set[str] = set()  # their holders have died, and `on_lost` is being applied
         self._leaving: dict[str, asyncio.Task[None]] = {}
-        self._groups: dict[str, list[str]] = {}  # by run: what leaves in one transaction
-        self._patience: asyncio.Task[None] | None = None  # with holders of before a restart
+        self._groups: dict[str, list[str]] = {}  # by launch, components to unload together
+        self._patience: asyncio.Task[None] | None = None  # waits for holders after a restart
 
     @property
     def _terms(self) -> dict[str, LeaseTerms]:
@@ -86,13 +86,13 @@ class Leases:
         note = library.note(spec)
         name = full_name(spec)
         if leaving := self._leaving.get(name):
-            outbox.waiting(f"waiting for {name} of before to leave")
+            outbox.waiting(f"waiting for the earlier {name} to be unloaded")
             await asyncio.wait({leaving})
 
         async def work() -> control_pb2.ChangeResult:
             if outbox.gone:
                 raise Unavailable(
-                    f"the caller that wanted {name} has left",
+                    f"the client that requested {name} has disconnected",
                     errors_pb2.REASON_CALLER_GONE,
                     component=name,
                 )
@@ -100,12 +100,12 @@ class Leases:
             runner.limits.check_components(len(runner.desired.components) + 1)
             if name in runner.desired.components:
                 raise AlreadyExists(
-                    f"component {name} is there already in runner {runner.name}: "
+                    f"component {name} exists already in runner {runner.name}: "
                     "give this one another name or namespace",
                     errors_pb2.REASON_COMPONENT_EXISTS,
                     component=name,
                 )
-            # Noted ahead: a rtcfd that dies meanwhile must not take it for one that stays.
+            # Saved in advance: if rtcfd dies meanwhile, the next one must know of the lease.
             self._terms[name] = LeaseTerms(
                 request.run_id, request.on_lost or control_pb2.ON_LEASE_LOST_STOP, request.holder
             )
@@ -119,25 +119,25 @@ class Leases:
                 runner.desired.put(name, spec)
                 holder = request.holder or "a lease"
                 runner.happened(
-                    control_pb2.Event.KIND_GRAPH, f"{name} loaded ({what}) for {holder}", name
+                    control_pb2.Event.KIND_GRAPH, f"{name} loaded ({code}) for {holder}", name
                 )
                 parameters.note(runner, name, spec.parameters, {}, None, "launch", holder)
             except BaseException:
                 self._outboxes.pop(name, None)
-                # Left to the next rtcfd, the executor may load it yet: then it is still leased.
+                # An executor left to the next rtcfd may still load it: then the lease must stay.
                 if not runner.leaving:
                     self._terms.pop(name, None)
                     await runner.save()
                 raise
             finally:
                 self._loading.discard(name)
-            runner.log.info("%s loaded (%s) for %s", name, what, holder)
-            if outbox.gone:  # it was never seen: no reason to stop the loop
+            runner.log.info("%s loaded (%s) for %s", name, code, holder)
+            if outbox.gone:  # its holder never used it: unload it without stopping the loop
                 self._leave(name)
             return result
 
-        what = f"{spec.package}/{spec.type}"
-        result = await runner.change(f"the load of {what}", work)
+        code = f"{spec.package}/{spec.type}"
+        result = await runner.change(f"the load of {code}", work)
         if note:
             runner.log.warning(note)
             result.notes.append(note)
@@ -145,7 +145,7 @@ class Leases:
         return result
 
     def _leave_out_told(self, result: control_pb2.ChangeResult) -> None:
-        """Remove notes that another holder has been told: launchers print to one screen."""
+        """Remove notes that another holder has received: launchers print to one screen."""
         if len(self._terms) <= 1:
             self._told.clear()
         fresh = [note for note in result.notes if note not in self._told]
@@ -153,7 +153,7 @@ class Leases:
         result.notes[:] = fresh
 
     def attach(self, request: control_pb2.OpenLease, outbox: Outbox) -> control_pb2.ChangeResult:
-        """Give a component back to its holder."""
+        """Give a component back to its holder, which has reconnected."""
         name = full_name(request.component)
         terms = self._terms.get(name)
         if terms is not None and (name in self._losing or name in self._leaving):
@@ -175,25 +175,25 @@ class Leases:
         return control_pb2.ChangeResult(component=name)
 
     async def end(self, name: str, outbox: Outbox) -> None:
-        """Unload a component because its holder says so; return when it is done."""
+        """Unload a component on request of its holder; return when it is unloaded."""
         if self._outboxes.get(name) is not outbox:
             return
         task = self._leaving.get(name) or self._leave(name)
         await asyncio.wait({task})
 
     def lost(self, name: str, outbox: Outbox) -> None:
-        """Do what was agreed when the connection of a holder ends without a word."""
+        """Apply `on_lost` of a lease after the connection of its holder has broken."""
         if self._outboxes.get(name) is not outbox or name in self._leaving:
             return
         if name in self._loading:
-            return  # open() sees to it
+            return  # open() handles it
         del self._outboxes[name]
         self._runner.operations.in_background(
             f"the end of the lease of {name}", self._lost(name, "has died")
         )
 
     def await_holders(self) -> None:
-        """After a restart of rtcfd: give holders time to come back."""
+        """Give holders time to reconnect, after a restart of rtcfd."""
         waiting = [name for name in self._terms if name not in self._outboxes]
         if waiting:
             self._patience = self._runner.operations.in_background(
@@ -201,7 +201,7 @@ class Leases:
             )
 
     def take_log(self, record: control_pb2.LogRecord) -> bool:
-        """Hand a record to the holder of its component; tell whether that shows it."""
+        """Send a record to the holder of its component; return whether the holder shows it."""
         outbox = self._outboxes.get(record.component)
         if outbox is None:
             return False
@@ -210,33 +210,33 @@ class Leases:
         return warns or not outbox.unseen
 
     def failed(self, component: str, reason: str) -> None:
-        """Tell a holder that its component has failed; the component leaves."""
+        """Tell a holder that its component has failed, and unload the component."""
         outbox = self._outboxes.get(component)
         if outbox is not None and component not in self._leaving | dict.fromkeys(self._loading):
             outbox.end(_Ended.WHY_FAILED, reason)
             self._leave(component)
 
     def settle(self) -> None:
-        """After a change of the graph: tell holders whose component is not in the loop any more."""
+        """Notify holders whose component is no longer in the loop; called after each change."""
         runner = self._runner
         for name, outbox in list(self._outboxes.items()):
             if name in self._loading or name in self._leaving:
                 continue
             if name not in self._terms:
-                outbox.end(_Ended.WHY_UNLOADED, f"{name} was taken out by another client")
+                outbox.end(_Ended.WHY_UNLOADED, f"{name} was unloaded by another client")
                 del self._outboxes[name]
             elif runner.up and name in runner.left_out:
                 self.failed(name, runner.left_out[name])
 
     async def unload_all(self) -> None:
-        """Unload all that is leased, while its holders still hear what it says."""
+        """Unload all leased components, while their holders still receive log records."""
         runner = self._runner
         names = [
             name
             for name in self._outboxes
             if name in runner.desired.components and name not in self._leaving
         ]
-        self._loading.update(names)  # settle() passes over them
+        self._loading.update(names)  # settle() skips them
         try:
             if names:
                 await graph.unload(runner, names, lambda _: None)
@@ -248,14 +248,14 @@ class Leases:
             await asyncio.wait(set(self._leaving.values()))
 
     def end_all(self, why: "control_pb2.LeaseEnded.Why", message: str) -> None:
-        """Tell all holders that it is over; what they hold is ended by the caller."""
+        """Tell all holders that their leases have ended; the caller unloads the components."""
         self.lose_patience()
         for outbox in self._outboxes.values():
             outbox.end(why, message)
         self._outboxes.clear()
 
     def lose_patience(self) -> None:
-        """Wait for holders no more: their runner ends, or rtcfd does."""
+        """Stop waiting for holders, because the runner or rtcfd ends."""
         if self._patience is not None:
             self._patience.cancel()
 
@@ -273,7 +273,7 @@ class Leases:
                 await self._lost(name, f"did not come back within {RETURN_S:g} s")
 
     def _lost(self, name: str, how: str) -> Coroutine[Any, Any, None]:
-        """Return what ends a lease; from now on its holder cannot come back."""
+        """Return the coroutine that ends a lease; from now on its holder cannot reconnect."""
         self._losing.add(name)
 
         async def work() -> None:
@@ -302,7 +302,7 @@ class Leases:
         self._leave(name)
 
     def _leave(self, name: str) -> "asyncio.Task[None]":
-        """Unload a component together with others of its run that leave now."""
+        """Unload a component, together with others of its launch that end now."""
         terms = self._terms.get(name)
         run = terms.run_id if terms and terms.run_id else name
         group = self._groups.get(run)
@@ -331,7 +331,7 @@ class Leases:
             if names and not runner.closing:
                 await graph.unload(runner, names, lambda _: None)
         except Refusal as refusal:
-            # It belongs to nobody now, and shows in the list of components.
+            # It has no holder now; the list of components shows it.
             runner.log.error("%s stays loaded: %s", ", ".join(group), refusal)
         forgotten = [self._terms.pop(name) for name in group if name in self._terms]
         if forgotten and not runner.closing:

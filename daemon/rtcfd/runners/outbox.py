@@ -1,7 +1,7 @@
-"""What is on its way to the holder of a lease: messages, and log records that may be lost.
+"""The queue of messages and log records to the holder of a lease.
 
-Owned by the call that serves the holder, on rtcfd's one thread.  A holder that
-reads slowly costs a bounded amount of memory and holds up nobody.
+Owned by the call that serves the holder, on rtcfd's one thread.  Log records may be
+dropped: a slow holder costs a bounded amount of memory and delays nobody.
 """
 
 import asyncio
@@ -11,7 +11,7 @@ from typing import Any
 
 from rtcf.v1 import control_pb2
 
-# What a loop logs in some seconds; a terminal takes thousands of lines a second.
+# The records of some seconds; a terminal shows thousands of lines a second.
 MOST_RECORDS = 2000
 _BATCH = 200
 
@@ -20,8 +20,8 @@ class Outbox:
     """Messages to one holder, of the response type of its call."""
 
     def __init__(self, response: Any) -> None:
-        self.gone = False  # nobody reads it any more
-        self.unseen = False  # its reader shows warnings alone
+        self.gone = False  # the holder has disconnected
+        self.unseen = False  # the holder shows only warnings
         self._response = response
         self._messages: deque[Any] = deque()
         self._report: control_pb2.HoldReport | None = None
@@ -32,25 +32,25 @@ class Outbox:
         self._wake = asyncio.Event()
 
     def say(self, **kind: Any) -> None:
-        """Send one of the few messages that each holder gets."""
+        """Send a message; these are few per holder, and never dropped."""
         self._messages.append(self._response(**kind))
         self._wake.set()
 
     def progress(self, line: str) -> None:
-        """Say what is being done."""
+        """Send a line on the progress."""
         self.say(progress=line)
 
     def waiting(self, line: str) -> None:
-        """Say what is waited for."""
+        """Send the reason for a wait."""
         self.say(waiting=line)
 
     def report(self, report: control_pb2.HoldReport) -> None:
-        """Send a report, in the place of one that is still on its way."""
+        """Send a report; it replaces one that is still in the queue."""
         self._report = report
         self._wake.set()
 
     def log(self, record: control_pb2.LogRecord) -> None:
-        """Send a record; the oldest one gives way, and is counted."""
+        """Send a record; if the queue is full, the oldest one is dropped and counted."""
         if len(self._records) >= MOST_RECORDS:
             self._records.popleft()
             self._dropped += 1
@@ -58,19 +58,19 @@ class Outbox:
         self._wake.set()
 
     def end(self, why: "control_pb2.LeaseEnded.Why", message: str = "") -> None:
-        """Send the last message; the first that is said counts."""
+        """Send the last message; later calls have no effect."""
         if self._ended is None:
             self._ended = control_pb2.LeaseEnded(why=why, message=message)
             self._wake.set()
 
     def refuse(self, error: BaseException) -> None:
-        """Let the reader raise an error."""
+        """Make the reader raise an error."""
         self._error = error
         self._wake.set()
 
     @property
     def ended(self) -> bool:
-        """Tell whether the last message has been said."""
+        """Whether end() has been called."""
         return self._ended is not None
 
     async def __aiter__(self) -> AsyncIterator[Any]:

@@ -1,7 +1,7 @@
-"""What ROS peers ask of a runner by the services of its executor's node.
+"""Serves calls of the ROS services of a runner's node.
 
-Called by the Runner.  ROS knows no users: everybody who reaches the node may
-call, so what they may have done is one setting of the runner, in the words of `[access]`.
+Called by the Runner.  ROS has no users: every peer that reaches the node may call.  So one
+setting of the runner gives all of them a right, in the words of `[access]`.
 """
 
 import logging
@@ -28,20 +28,20 @@ log = logging.getLogger(__name__)
 
 
 async def serve(runner: RunnerCore, call: wire.ServiceCall) -> wire.ServiceAnswer:
-    """Do what is called for, or refuse it; return the answer, never raise."""
+    """Execute a call or reject it; return the answer, never raise."""
     answer = wire.ServiceAnswer(call=call.call)
     try:
         kind = _allowed(runner, call)
-        runner.log.info("a ROS service asks for: %s", kind)
+        runner.log.info("call of a ROS service: %s", kind)
         result = await _change(runner, call)
         answer.success = True
         lacks = [f"degraded real time: {line}" for line in result.degraded]
         answer.message = "; ".join([*result.notes, *lacks])
     except Refusal as refusal:
         answer.message = bounded(refusal)
-        runner.log.warning("refused to a ROS service: %s", answer.message)
+        runner.log.warning("call of a ROS service rejected: %s", answer.message)
     except Exception as error:
-        answer.message = f"internal error of rtcfd ({type(error).__name__}); its log has more"
+        answer.message = f"internal error of rtcfd ({type(error).__name__}): see its log"
         log.exception("internal error")
     return answer
 
@@ -57,8 +57,8 @@ def _allowed(runner: RunnerCore, call: wire.ServiceCall) -> str:
     has, needed = Level(runner.settings().ros.peers), _NEEDED[kind]
     if has < needed:
         raise FailedPrecondition(
-            f"peers on ROS have {'no right' if has == Level.NONE else f'the right {has.word}'} on "
-            f"runner {runner.name}, and `{kind}` takes {needed.word}: grant it with "
+            f"ROS peers have {'no right' if has == Level.NONE else f'the right {has.word}'} on "
+            f"runner {runner.name}, and `{kind}` requires {needed.word}: grant it with "
             f"rtcfctl runner set {runner.name} --ros-peers {needed.word}, or use "
             f"rtcfctl -r {runner.name} {kind}",
             errors_pb2.REASON_RIGHT_MISSING,
@@ -79,4 +79,4 @@ async def _change(runner: RunnerCore, call: wire.ServiceCall) -> control_pb2.Cha
 
 
 def _ignore(_line: str) -> None:
-    """Take progress that nobody hears of."""
+    """Discard a line on the progress."""

@@ -1,7 +1,7 @@
-"""One runner: what its executor tells, who holds it, and its settings.
+"""One runner: handles the notifications of its executor, its holders, and its settings.
 
-Owned by Runners.  What it stands on, and what changes its components and its
-loop, is in operations/; how an executor gets its graph (again) in recovery/.
+Owned by Runners.  operations/ has its base class and the operations on its components
+and its loop; recovery/ brings up its executor.
 """
 
 import asyncio
@@ -29,24 +29,24 @@ from rtcfd.runners.outbox import Outbox
 from rtcfd.runners.status import status_of
 from rtcfd.state.desired import Desired
 
-# What the cycles before are kept of.
+# The events that leave an incident.
 _INCIDENTS = (control_pb2.Event.KIND_LOOP_FAULT, control_pb2.Event.KIND_COMPONENT_FAULT)
-LEAVE_TIMEOUT_S = 5.0  # for changes under way when rtcfd is restarted
+LEAVE_TIMEOUT_S = 5.0  # for running changes when rtcfd is restarted
 
 _Ended = control_pb2.LeaseEnded
 
 
 class Runner(RunnerCore):
-    """One control loop as rtcfd sees it."""
+    """One control loop."""
 
     def __init__(self, desired: Desired, surroundings: Surroundings) -> None:
         super().__init__(desired, surroundings)
         self.leases = Leases(self, self.alarm)
-        self.hold_outbox: Outbox | None = None  # of the holder, if it is there
+        self.hold_outbox: Outbox | None = None  # of the holder, if it is connected
         self.logs = NumberedLog[wire.LogRecord]()  # of its components and its executor
-        self.releasing = False  # its holder has ended, and cannot come back
+        self.releasing = False  # its holder has ended, and cannot reconnect
         self._crashes = Crashes()
-        self._changed_by_ros: dict[str, set[str]] = {}  # parameters, by component; not noted yet
+        self._changed_by_ros: dict[str, set[str]] = {}  # by component, parameters not noted yet
         self._events = Events(self.name, self, lambda: self.limits)
 
     # -- life ---------------------------------------------------------------
@@ -65,8 +65,11 @@ class Runner(RunnerCore):
         message: str = "it is removed",
         in_order: bool = False,
     ) -> None:
-        """Stop the loop in order and end the executor; holders hear the last records, then why.
-        `in_order`: for good, so that the next rtcfd does not start the loop."""
+        """Stop the loop in order and end the executor.
+
+        Holders receive the last log records, then the reason (`why`, `message`).  `in_order`:
+        permanently, so that the next rtcfd does not start the loop.
+        """
         self.closing = True
         self.loop.stops += 1
         self.operations.withdraw(message, errors_pb2.REASON_RUNNER_ENDING)
@@ -82,10 +85,10 @@ class Runner(RunnerCore):
         await self.saver.finish(LEAVE_TIMEOUT_S)
 
     async def leave(self) -> None:
-        """Let go of the executor, whose loop goes on until the next rtcfd adopts it.
+        """Leave the executor to the next rtcfd; its loop goes on.
 
-        Changes under way come first, but for those that take long: what an
-        executor has then is what the next rtcfd takes over.
+        Running changes end first, unless they take longer than LEAVE_TIMEOUT_S: the next rtcfd
+        takes over the graph that the executor has.
         """
         self.closing = self.leaving = True
         self.leases.lose_patience()
@@ -96,8 +99,7 @@ class Runner(RunnerCore):
         await self.saver.finish(LEAVE_TIMEOUT_S)
 
     async def restart(self) -> None:
-        """Begin anew with a fresh executor, whatever the one of now is stuck in; what is desired
-        is loaded, held."""
+        """Replace the executor by a new one, even if it is stuck; load the graph, held."""
         self.loop.stop()
         self.saver.begin()
         self.operations.withdraw(
@@ -110,7 +112,7 @@ class Runner(RunnerCore):
             await self.save()
 
         async def work() -> None:
-            # Not in a turn: a change that hangs ends with the executor it hangs in.
+            # Not in a turn: a hanging change only ends with its executor.
             await self.end_executor("its executor is being restarted")
             self.loop.held = self.loop.fault = ""
             await self.change("the restart of its executor", fresh)
@@ -119,31 +121,31 @@ class Runner(RunnerCore):
         await self.operations.begin("the restart", work)
 
     async def restart_in_turn(self) -> None:
-        """Likewise, in a turn."""
+        """Replace the executor by a new one; to be called in a turn."""
         await self.end_executor("its executor is being restarted")
         self.loop.held = self.loop.fault = ""
         await bring_up(self)
 
     def end_leases(self, why: "control_pb2.LeaseEnded.Why", message: str) -> None:
-        """Tell the holders of this runner and of its components that it is over."""
+        """Tell the holders of this runner and of its components that their leases have ended."""
         self.leases.end_all(why, message)
         if self.hold_outbox is not None:
             self.hold_outbox.end(why, message)
             self.hold_outbox = None
 
-    # -- what an executor tells -----------------------------------------------
+    # -- notifications from the executor --------------------------------------
 
     def take_unasked(self, response: wire.Response) -> None:
-        """Take what an executor says unasked."""
+        """Handle a notification from the executor."""
         self._events.take(response)
 
     def adopted(self) -> None:
-        """Give holders of before a restart of rtcfd time to come back."""
+        """Give holders time to reconnect, after a restart of rtcfd."""
         self.leases.await_holders()
 
     def executor_ended(self, executor: Executor, end: End, ours: bool) -> None:
-        """See to what follows from the death of an executor."""
-        # One that somebody has stopped meanwhile is not to go on in the next executor.
+        """Handle the death of an executor: report it, and begin the recovery."""
+        # A loop that was stopped meanwhile must not run in the next executor.
         was_running = self.loop.running and self.loop.wanted
         self.loop.gone()
         verdict = judge(end, executor.note())
@@ -160,7 +162,7 @@ class Runner(RunnerCore):
         )
         self.happened(control_pb2.Event.KIND_EXECUTOR_FAULT, died, verdict.culprit)
         if (trace := executor.trace()) is not None:
-            # Not an operation of this runner: its removal does not wait for it.
+            # Not an operation of this runner, so that its removal does not wait for it.
             self.shared.keeping.in_background(
                 "finding the source lines of a crash", name_source(self, trace, verdict)
             )
@@ -171,7 +173,7 @@ class Runner(RunnerCore):
         elif ours:
             self._crashes.add()
             self.desired.quarantine(verdict.culprit, str(verdict))
-            # From here on a `stop` counts.
+            # Decided now, so that a `stop` from here on overrides it.
             self.loop.want(was_running and resumes(self, verdict, self._crashes))
             if not self.loop.wanted:
                 self.loop.fault = died
@@ -181,24 +183,24 @@ class Runner(RunnerCore):
             )
 
     def loop_ended(self, component: str, reason: str) -> None:
-        """The loop has ended by itself."""
+        """Handle the end of the loop by a fault."""
         self.loop.ended(reason)
         self.tell()
         self.leases.failed(component, reason)
         self.operations.in_background("saving its state", self.save())
 
     def component_failed(self, component: str, reason: str) -> None:
-        """A component was taken out of the loop, which goes on."""
+        """Handle the failure of a component without which the loop goes on."""
         self.leases.failed(component, reason)
 
     def told(self, kind: "control_pb2.Event.Kind", event: wire.Event) -> None:
-        """The executor tells of something, which has been seen to."""
+        """Handle an event, after its specific method: publish it, and write an incident."""
         self.happened(kind, event.message, event.component, event.iteration)
         if kind in _INCIDENTS and self.executor is not None:
             keep(self, self.executor, event.message, event.component, event.iteration)
 
     def late(self, message: str) -> None:
-        """Cycles ended late: find out how many."""
+        """Handle a report of late cycles: ask for their number."""
 
         async def look() -> None:
             with contextlib.suppress(Refusal):
@@ -208,8 +210,7 @@ class Runner(RunnerCore):
         self.operations.in_background("counting late cycles", look())
 
     def take_log(self, record: wire.LogRecord) -> None:
-        """Keep a record, and hand it to whom it concerns: the holder of the component, or of the
-        runner."""
+        """Keep a record, and send it to the holder of its component, or of the runner."""
         self.logs.append(record)
         if self.hold_outbox is None and not self.desired.leased:
             return
@@ -226,7 +227,7 @@ class Runner(RunnerCore):
             self.hold_outbox.log(copy)
 
     def alarm(self, text: str) -> None:
-        """Say what went wrong, to the holder of the runner too."""
+        """Log an error, and send it to the holder of the runner."""
         self.log.error("%s", text)
         if self.hold_outbox is not None:
             self.hold_outbox.log(
@@ -234,7 +235,7 @@ class Runner(RunnerCore):
             )
 
     def tell(self) -> None:
-        """After any change: tell who wants to know."""
+        """Notify systemd, event watchers and holders; to be called after each change."""
         super().tell()
         self.leases.settle()
         if self.hold_outbox is not None:
@@ -248,19 +249,19 @@ class Runner(RunnerCore):
             )
 
     def called(self, call: wire.ServiceCall) -> None:
-        """Somebody calls a service of the executor's ROS node."""
+        """Handle a call of a service of the executor's ROS node."""
         self.operations.in_background("the answer to a ROS service", self._answer(call))
 
     async def _answer(self, call: wire.ServiceCall) -> None:
         answer = await self.shared.serve_ros(self, call)
-        # An executor that has ended since has told its caller so.
+        # If the executor has ended meanwhile, its caller has an error already.
         with contextlib.suppress(Refusal):
             await self.alive().request(wire.Request(service_answer=answer))
 
     def stopped_directly(self, stop: wire.DirectStop) -> None:
-        """Somebody has stopped the loop at its executor, while we did not answer or as well."""
+        """Handle a direct stop at the executor."""
         if stop.at_ns <= self.loop.stopped_at_ns:
-            return  # told of again, by a new connection
+            return  # repeated by a new connection
         self.loop.stopped_at_ns = stop.at_ns
         self.loop.stop()
         self.loop.told(False)
@@ -272,19 +273,19 @@ class Runner(RunnerCore):
 
     async def _note_direct_stop(self, stop: wire.DirectStop) -> None:
         self.saver.begin()
-        who = await self.shared.name_of(stop.uid)
+        user = await self.shared.name_of(stop.uid)
         self.happened(
             control_pb2.Event.KIND_RUNNER_STATE,
-            f"stopped at its executor by {who} (pid {stop.pid})",
-            user=who,
+            f"stopped at its executor by {user} (pid {stop.pid})",
+            user=user,
         )
         self.log.warning(
-            "loop stopped at its executor by %s (uid %d, pid %d)", who, stop.uid, stop.pid
+            "loop stopped at its executor by %s (uid %d, pid %d)", user, stop.uid, stop.pid
         )
         await self.save()  # errors show in the status
 
     def parameters_changed(self, changed: wire.ParametersChanged) -> None:
-        """A peer on ROS has changed parameters of a component."""
+        """Handle a change of a component's parameters by a ROS peer."""
         follows = bool(self._changed_by_ros)
         self._changed_by_ros.setdefault(changed.component, set()).update(changed.parameters)
         if not follows:
@@ -293,7 +294,7 @@ class Runner(RunnerCore):
             )
 
     async def _follow_parameters(self) -> None:
-        """Note all that has changed until our turn, and save once."""
+        """Note all changes until the turn begins, and save once."""
 
         async def work() -> None:
             changes, self._changed_by_ros = self._changed_by_ros, {}
@@ -315,13 +316,14 @@ class Runner(RunnerCore):
         return "running" if self.loop.running else "stopped"
 
     async def status(self) -> runner_pb2.RunnerStatus:
-        """Return what the runner is doing, whatever state it is in."""
+        """Return the status, in any state."""
         return await status_of(self)
 
     # -- settings -----------------------------------------------------------
 
     async def set(self, change: runner_pb2.RunnerSettings) -> None:
-        """Change settings; what an executor reads only at its start waits for a stopped loop."""
+        """Change settings; those that an executor reads only at its start take effect when the
+        loop is stopped."""
         runner_settings.check(change)
 
         async def work() -> None:
@@ -338,21 +340,21 @@ class Runner(RunnerCore):
         await self.change("a change of settings", work)
 
     async def _require_acceptable(self, change: runner_pb2.RunnerSettings) -> None:
-        # Its next executor would refuse them, and then there would be none.
+        # Otherwise the next executor would reject them, and the runner would have none.
         after = runner_settings.merged(self.settings(), change)
         binary = self.shared.command.binary
-        if complaint := await asyncio.to_thread(opinion.of_settings, binary, after):
-            raise InvalidArgument(complaint, errors_pb2.REASON_VALUE_INVALID)
+        if error := await asyncio.to_thread(opinion.of_settings, binary, after):
+            raise InvalidArgument(error, errors_pb2.REASON_VALUE_INVALID)
 
     async def follow_limits(self) -> None:
-        """Take over limits that have changed."""
+        """Apply changed limits and access rules."""
         try:
             await self.change("a change of limits", self.limit)
         except Refusal as refusal:
             self.log.error("limits not changed: %s", refusal)
 
     async def follow_defaults(self, before: runner_pb2.RunnerSettings) -> list[str]:
-        """Take over defaults that are others than `before`; return a line for each setting."""
+        """Apply changed defaults; `before` are the old ones.  Return a line for each change."""
         change: runner_pb2.RunnerSettings = runner_settings.changed(
             self.desired.complete(before), self.settings()
         )

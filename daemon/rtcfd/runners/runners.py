@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 _Take = Callable[[Runner], Awaitable[None]]
 
-_LOOK_AGAIN_S = 2.0  # for an executor that did not answer
+_LOOK_AGAIN_S = 2.0  # between attempts to adopt an executor that does not answer
 
 
 class Runners:
@@ -39,17 +39,19 @@ class Runners:
 
     @property
     def incidents(self) -> Incidents:
-        """What is kept of faults."""
+        """The incidents of all runners."""
         return self._shared.incidents
 
     def adopt(self, states: Iterable[Desired]) -> None:
-        """Take runners as they were kept, without starting them yet."""
+        """Add the runners of saved states, without starting them."""
         for desired in states:
             self._runners[desired.runner] = Runner(desired, self._shared)
 
     async def bring_up(self, left_over: Iterable[str] = ()) -> None:
-        """Adopt or start the executors of all runners, and adopt those of runners that are not
-        known but have left an executor; failures are reported and show in the status."""
+        """Adopt or start the executors of all runners, and adopt left-over ones of unknown runners.
+
+        Errors are logged, and show in the status.
+        """
 
         async def one(runner: Runner) -> None:
             try:
@@ -58,7 +60,7 @@ class Runners:
                 self._keep_looking(runner, refusal, self._bring_up_known)
             except Refusal as refusal:
                 runner.log.error("%s", refusal)
-            except Exception:  # the others are not to suffer for it
+            except Exception:  # it must not affect the other runners
                 runner.log.exception("its executor does not start")
 
         unknown = [name for name in left_over if name not in self._runners]
@@ -75,14 +77,16 @@ class Runners:
 
     def _keep_looking(self, runner: Runner, refusal: Silent, take: _Take) -> None:
         runner.log.error("%s", refusal)
-        # Not an operation of the runner: its end waits for those, and may come of this.
+        # Not an operation of the runner: this may end the runner, which waits for its operations.
         self.operations.in_background(
             f"the search for the executor of {runner.name}", self._look_again(runner, take)
         )
 
     async def _look_again(self, runner: Runner, take: _Take) -> None:
-        """Take over an executor that was held up, as by a machine that was suspended: without
-        rtcfd its loop would end."""
+        """Retry until a delayed executor is taken over, as after a suspension of the machine.
+
+        Without rtcfd its loop would end (`orphan_timeout_s`).
+        """
         while True:
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self.closing.wait(), _LOOK_AGAIN_S)
@@ -95,12 +99,12 @@ class Runners:
                 continue
 
     async def _bring_up_held(self, runner: Runner) -> None:
-        """Of a launch: it goes on if its loop does; otherwise it is over."""
+        """Bring up a runner of a launch; if it has no executor any more, the launch is over."""
         if await runner.bring_up(only_left_over=True, boot=True):
             return
         hold = runner.desired.hold
         runner.desired.let_go()
-        runner.loop.want(False)  # that was the launch's loop
+        runner.loop.want(False)  # it was the loop of the launch
         if hold is not None and hold.added:
             await self.remove(runner.name)
             return
@@ -136,7 +140,7 @@ class Runners:
         if runner is None:
             raise NotFound(
                 f'no runner "{wanted}"{suggestion(wanted, self._runners)} '
-                f"(runners: {listing(self._runners)}); `rtcfctl runner add {wanted}` makes it",
+                f"(runners: {listing(self._runners)}); `rtcfctl runner add {wanted}` adds it",
                 errors_pb2.REASON_RUNNER_NOT_FOUND,
                 runner=wanted,
                 suggestion=closest(wanted, self._runners),
@@ -144,7 +148,7 @@ class Runners:
         return runner
 
     def require_some(self, names: Sequence[str]) -> None:
-        """Refuse names of which none is that of a runner."""
+        """Raise NotFound if there are names, but none is that of a runner."""
         if names and not any((name or DEFAULT_RUNNER) in self._runners for name in names):
             self.get(names[0])
 
@@ -162,8 +166,10 @@ class Runners:
         chosen: runner_pb2.RunnerSettings,
         on_added: Callable[[Runner], None] | None = None,
     ) -> Runner:
-        """Add a runner and start its executor; if that fails there is no such runner.
-        `on_added` is called with it first of all, and may refuse."""
+        """Add a runner and start its executor; if that fails, the runner does not exist.
+
+        `on_added` is called with it before all else, and may raise an error to reject it.
+        """
 
         async def work() -> Runner:
             return await self._add(name, chosen, on_added)
@@ -181,7 +187,7 @@ class Runners:
         name = check_base_name("runner", name or DEFAULT_RUNNER)
         if name in self._runners:
             raise AlreadyExists(
-                f"runner {name} is there already; `rtcfctl runner set {name}` changes it",
+                f"runner {name} exists already; `rtcfctl runner set {name}` changes it",
                 errors_pb2.REASON_RUNNER_EXISTS,
             )
         self._shared.limits.check_runners(len(self._runners) + 1)
@@ -196,7 +202,7 @@ class Runners:
         try:
             await runner.bring_up()
         except BaseException:
-            runner.hold_outbox = None  # its holder is told by the refusal
+            runner.hold_outbox = None  # its holder receives the error
             await self._remove(runner)
             raise
         await runner.save()
@@ -206,7 +212,7 @@ class Runners:
     async def apply(
         self, request: control_pb2.ApplyRequest, progress: Progress
     ) -> control_pb2.ChangeResult:
-        """Apply a graph to a runner that may have to be added."""
+        """Apply a graph to a runner, which is added if needed."""
         name = request.runner or DEFAULT_RUNNER
         if name in self._runners:
             return await graph.apply(self._runners[name], request, progress)
@@ -238,7 +244,7 @@ class Runners:
         return await self.operations.begin(f"the application of a graph to {name}", work)
 
     async def remove(self, name: str) -> None:
-        """Stop a runner and forget it."""
+        """Stop and remove a runner."""
         runner = self.get(name)
 
         async def work() -> None:
@@ -252,14 +258,14 @@ class Runners:
 
     async def _remove(self, runner: Runner) -> None:
         if runner in self._leaving:
-            return  # who removes it first sees to it
+            return  # it is already being removed
         self._leaving.add(runner)
         try:
             await runner.shut_down()
             await runner.saver.forget()
         finally:
             self._leaving.discard(runner)
-        # Not before: its executor must be gone when another takes the name.
+        # Not earlier: its executor must have ended before another runner takes the name.
         if self._runners.get(runner.name) is runner:
             del self._runners[runner.name]
         runner.happened(control_pb2.Event.KIND_RUNNER_REMOVED, "runner removed")
@@ -267,8 +273,10 @@ class Runners:
         self._shared.on_change()
 
     async def close(self, in_order: bool) -> None:
-        """Stop all loops in order and end all executors, at once.  `in_order`: for good, and not
-        because the machine goes down."""
+        """Stop all loops in order and end all executors, concurrently.
+
+        `in_order`: permanently, that is, not because the machine shuts down.
+        """
         self.closing.set()
         self.operations.withdraw("rtcfd is ending", errors_pb2.REASON_DAEMON_ENDING)
         cause = control_pb2.LeaseEnded.WHY_DAEMON_ENDED
@@ -279,7 +287,7 @@ class Runners:
         await self._drain()
 
     async def leave(self) -> None:
-        """Let go of all executors, whose loops go on: the next rtcfd adopts them."""
+        """Leave all executors to the next rtcfd; their loops go on."""
         self.closing.set()
         await asyncio.gather(*(runner.leave() for runner in self._runners.values()))
         with contextlib.suppress(TimeoutError):

@@ -1,4 +1,4 @@
-"""What a runner is doing, whatever state it is in.  A function on a RunnerCore."""
+"""The status of a runner, in any state.  Functions on a RunnerCore."""
 
 import asyncio
 from collections.abc import Sequence
@@ -14,27 +14,28 @@ from rtcfd.common.tasks import looked_at
 from rtcfd.operations.runner_core import RunnerCore
 
 _TIMEOUT_S = 2.0
-_WORTH_SAYING_S = 2.0  # a change that takes longer shows
-_NEIGHBOURS_S = 0.5  # for what is asked of others
+_WORTH_SAYING_S = 2.0  # the status shows a change that takes longer
+_NEIGHBOURS_S = 0.5  # longest wait for the statuses of other runners
 
 
 class _Told(Protocol):
-    """Who tells what it is doing: a runner."""
+    """An object with a status: a runner."""
 
     @property
     def name(self) -> str:
-        """By which it is asked for."""
+        """The name of the runner."""
 
     async def status(self) -> runner_pb2.RunnerStatus:
-        """Return what it is doing."""
+        """Return its status."""
 
 
 async def statuses_of(
     chosen: Sequence[_Told], everybody: Sequence[_Told]
 ) -> list[runner_pb2.RunnerStatus]:
-    """Return the statuses of those chosen, each with the loops that share its CPU.
+    """Return the statuses of the chosen runners, each with the loops that share its CPU.
 
-    Of `everybody`, one that is stuck is left out of the neighbours: it holds up no other's status.
+    These loops are searched among `everybody`, without stuck runners: a stuck runner must not
+    delay the status of another.
     """
     names = {each.name for each in chosen}
     mine = [asyncio.create_task(each.status()) for each in chosen]
@@ -56,7 +57,7 @@ async def statuses_of(
 
 
 def note_shared_cpus(statuses: Sequence[runner_pb2.RunnerStatus]) -> None:
-    """Note in each status whose loops run on the same CPU."""
+    """Add to each status the other loops on the same CPU."""
     pinned = [status for status in statuses if status.HasField("loop_cpu")]
     for status in pinned:
         for other in pinned:
@@ -65,7 +66,7 @@ def note_shared_cpus(statuses: Sequence[runner_pb2.RunnerStatus]) -> None:
 
 
 async def status_of(runner: RunnerCore) -> runner_pb2.RunnerStatus:
-    """Return the status, asked of the executor if there is one."""
+    """Return the status; asks the executor if there is one."""
     status = runner_pb2.RunnerStatus(runner=runner.name, state=runner_pb2.RUNNER_STATE_DOWN)
     executor = runner.executor
     lines = [runner.trouble]
@@ -90,7 +91,7 @@ async def status_of(runner: RunnerCore) -> runner_pb2.RunnerStatus:
                 f"{VERSION}; `rtcfctl runner restart {runner.name}` stops the loop and starts "
                 "a new one"
             )
-    # Some settings are rtcfd's alone.
+    # The executor does not know all settings.
     status.settings.CopyFrom(runner_settings.merged(runner.settings(), status.settings))
     desired = runner.desired
     status.incident = runner.incident

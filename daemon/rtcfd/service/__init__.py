@@ -1,1 +1,1 @@
-"""The gRPC face of rtcfd."""
+"""The gRPC service of rtcfd."""

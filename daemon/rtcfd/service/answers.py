@@ -1,6 +1,6 @@
-"""How the methods of the service answer: at once, with progress first, or for as long as they last.
+"""Decorators of the service's methods: unary calls, calls with progress, calls that hold a lease.
 
-Decorators, and the one place that knows when a call's caller has left.
+Only this module notices that a caller has disconnected.
 """
 
 import asyncio
@@ -16,14 +16,14 @@ from rtcfd.common.status_codes import abort
 from rtcfd.executor.link import Progress
 from rtcfd.runners.outbox import Outbox
 
-_SILENCE_S = 2.0  # of a call, until it says that it waits
+_SILENCE_S = 2.0  # without progress, until the first message that the call still waits
 _LONGEST_SILENCE_S = 16.0
 
 Work = Callable[[Progress], Coroutine[Any, Any, Any]]
 
 
 def answering(method: Callable[..., Awaitable[Any]]) -> Any:
-    """Turn a refusal of a unary method into a status."""
+    """Convert errors of a unary method into statuses."""
 
     @functools.wraps(method)
     async def wrapper(self: Any, request: Any, context: Any) -> Any:
@@ -36,9 +36,11 @@ def answering(method: Callable[..., Awaitable[Any]]) -> Any:
 
 
 def lasting(response: Any, last: str) -> Callable[[Callable[..., Work]], Any]:
-    """Stream what a call does, as `response`, then its result in the field `last`; or turn its
-    refusal into a status.  The method returns the work, which tells of its progress; what is
-    silent for long is said to be waited for."""
+    """Stream the progress of a call as `response`, then its result in the field `last`.
+
+    Converts an error into a status.  The method returns the work, which reports its progress.
+    After long silence, the stream has a message that the call still waits.
+    """
 
     def decorate(method: Callable[..., Work]) -> Any:
         @functools.wraps(method)
@@ -55,7 +57,7 @@ def lasting(response: Any, last: str) -> Callable[[Callable[..., Work]], Any]:
                 await abort(context, error, request)
             finally:
                 if task is not None:
-                    task.cancel()  # one that has begun goes on: see operations/operations.py
+                    task.cancel()  # a running operation goes on: see operations/operations.py
 
         return wrapper
 
@@ -63,14 +65,14 @@ def lasting(response: Any, last: str) -> Callable[[Callable[..., Work]], Any]:
 
 
 async def _with_word_of_waiting(lines: "asyncio.Queue[str | None]") -> AsyncIterator[str]:
-    """Yield lines until None comes, and one of ours for each silence that lasts."""
+    """Yield lines until None comes, and a waiting message for each long silence."""
     since, silence_s = time.monotonic(), _SILENCE_S
     while True:
         try:
             line = await asyncio.wait_for(lines.get(), silence_s)
         except TimeoutError:
             waited_s = time.monotonic() - since
-            yield f"not done after {waited_s:.0f} s: `rtcfctl status` tells what is waited for"
+            yield f"still waiting after {waited_s:.0f} s: see `rtcfctl status`"
             silence_s = min(2 * silence_s, _LONGEST_SILENCE_S)
             continue
         if line is None:
@@ -82,20 +84,23 @@ changing = lasting(control_pb2.ChangeResponse, "result")
 
 
 class Tenancy(Protocol):
-    """What a call holds for as long as it lasts: a runner, or a component."""
+    """The lease of a call, on a runner or a component."""
 
     async def open(self) -> None:
-        """Take it."""
+        """Begin the lease."""
 
     async def end(self) -> None:
-        """Give it back, at the caller's word."""
+        """End the lease, on request of the caller."""
 
     def lost(self) -> None:
-        """The caller has left without a word."""
+        """Handle the loss of the caller's connection."""
 
 
 def holding(method: Callable[..., tuple[Outbox, Tenancy]]) -> Any:
-    """Serve a call that holds something: its first message opens, `end` or its death ends it."""
+    """Serve a call that holds a lease.
+
+    Its first message begins the lease; the message `end`, or the loss of the connection, ends it.
+    """
 
     @functools.wraps(method)
     async def wrapper(self: Any, requests: Any, context: Any) -> AsyncIterator[Any]:
@@ -107,7 +112,7 @@ def holding(method: Callable[..., tuple[Outbox, Tenancy]]) -> Any:
             first = await anext(messages, None)
             if first is None or first.WhichOneof("kind") != "open":
                 raise InvalidArgument(
-                    "the first message of such a call is `open`",
+                    "the first message of this call must be `open`",
                     errors_pb2.REASON_REQUEST_MALFORMED,
                 )
             opening_request = first.open
@@ -137,14 +142,17 @@ async def _open(tenancy: Tenancy, outbox: Outbox) -> None:
 async def _listen(
     messages: AsyncIterator[Any], opening: "asyncio.Future[None]", tenancy: Tenancy, outbox: Outbox
 ) -> None:
-    """Wait for the caller's `end`.  A stream that just ends says nothing: the connection counts."""
+    """Wait for the caller's `end`.
+
+    The end of the request stream alone does not end the lease; the loss of the connection does.
+    """
     try:
         async for message in messages:
             if message.WhichOneof("kind") == "end":
                 break
         else:
             return
-    except Exception as error:  # a message that is refused
+    except Exception as error:  # a message was rejected
         outbox.refuse(error)
         return
     await asyncio.wait({opening})

@@ -1,6 +1,6 @@
-"""The gRPC service `rtcf.v1.Control`: requests in, calls on runners, refusals out.
+"""The gRPC service `rtcf.v1.Control`: maps requests to calls on runners, and errors to statuses.
 
-No logic: names and values are checked by what is called.
+No logic: the called functions check names and values.
 """
 
 from collections.abc import AsyncIterator
@@ -31,11 +31,11 @@ from rtcfd.service.replay import Replay
 
 
 class Control(Looking):
-    """Serves one connection or many; owned by the daemon."""
+    """Serves all connections; owned by the daemon."""
 
     @lasting(control_pb2.ReloadResponse, "result")
     def Reload(self, request: control_pb2.ReloadRequest) -> Any:
-        """Read the settings and graphs.d again."""
+        """Reload the settings and graphs.d."""
 
         async def work(progress: Progress) -> control_pb2.ReloadResult:
             progress("reading the settings")
@@ -46,7 +46,7 @@ class Control(Looking):
 
     @lasting(control_pb2.RunnerResponse, "runner")
     def AddRunner(self, request: control_pb2.AddRunnerRequest) -> Any:
-        """A new runner, its executor started."""
+        """Add a runner and start its executor."""
 
         async def work(progress: Progress) -> runner_pb2.RunnerStatus:
             progress(f"starting the executor of {request.runner or DEFAULT_RUNNER}")
@@ -57,7 +57,7 @@ class Control(Looking):
 
     @lasting(control_pb2.RunnerResponse, "runner")
     def SetRunner(self, request: control_pb2.SetRunnerRequest) -> Any:
-        """Other settings."""
+        """Change the settings of a runner."""
         runner = self._runners.get(request.runner)
 
         async def work(progress: Progress) -> runner_pb2.RunnerStatus:
@@ -69,7 +69,7 @@ class Control(Looking):
 
     @lasting(control_pb2.RemoveRunnerResponse, "result")
     def RemoveRunner(self, request: control_pb2.RemoveRunnerRequest) -> Any:
-        """One runner less."""
+        """Remove a runner."""
         runner = self._named(request.runner, "RemoveRunner")
 
         async def work(progress: Progress) -> control_pb2.RemoveRunnerResult:
@@ -81,7 +81,7 @@ class Control(Looking):
 
     @lasting(control_pb2.RunnerResponse, "runner")
     def RestartRunner(self, request: control_pb2.RestartRunnerRequest) -> Any:
-        """A fresh executor."""
+        """Restart the executor of a runner."""
         runner = self._named(request.runner, "RestartRunner")
 
         async def work(progress: Progress) -> runner_pb2.RunnerStatus:
@@ -99,7 +99,7 @@ class Control(Looking):
 
     @changing
     def Stop(self, request: control_pb2.StopRequest) -> Any:
-        """Stop the loop; a caller that names none is told of the others that still run."""
+        """Stop the loop; if the request names no runner, the response lists the running loops."""
         runner = self._runners.get(request.runner)
 
         async def work(progress: Progress) -> control_pb2.ChangeResult:
@@ -107,7 +107,7 @@ class Control(Looking):
             others = [each.name for each in self._runners.all() if each.loop.running]
             if not request.runner and others:
                 result.notes.append(
-                    f"runs on: {', '.join(others)}; `rtcfctl stop --all` ends all loops"
+                    f"still running: {', '.join(others)}; `rtcfctl stop --all` stops all loops"
                 )
             return result
 
@@ -122,7 +122,7 @@ class Control(Looking):
     async def Replay(
         self, requests: AsyncIterator[control_pb2.ReplayRequest], context: Any
     ) -> AsyncIterator[control_pb2.ReplayResponse]:
-        """Run a recording, for as long as its caller is there."""
+        """Replay a recording while its caller is connected."""
         replay = Replay(self._runners)
         try:
             async for request in requests:
@@ -155,7 +155,7 @@ class Control(Looking):
 
     @changing
     def Apply(self, request: control_pb2.ApplyRequest) -> Any:
-        """Make the graph what the request says."""
+        """Apply a graph."""
         return lambda progress: self._runners.apply(request, progress)
 
     @changing
@@ -178,13 +178,13 @@ class Control(Looking):
 
     @changing
     def UndoParameters(self, request: control_pb2.UndoParametersRequest) -> Any:
-        """Take back what was changed last."""
+        """Undo the last change of parameters."""
         runner = self._runners.get(request.runner)
         return lambda progress: parameters.undo(runner, request, progress)
 
     @changing
     def ResetState(self, request: control_pb2.ResetStateRequest) -> Any:
-        """Take a component's state back to its initial values."""
+        """Reset a component's state to its initial values."""
         runner = self._runners.get(request.runner)
         return lambda progress: graph.reset_state(runner, request, progress)
 
@@ -196,59 +196,59 @@ class Control(Looking):
 
     @changing
     def WritePort(self, request: control_pb2.WritePortRequest) -> Any:
-        """Give an input a value."""
+        """Write a value to an input."""
         runner = self._runners.get(request.runner)
         return lambda progress: inputs.write(runner, request, progress)
 
     @answering
     async def TakeSnapshot(self, request: control_pb2.TakeSnapshotRequest) -> Any:
-        """All that the next cycle depends on."""
+        """Take a snapshot of a runner."""
         return await snapshots.take(self._runners.get(request.runner))
 
     @answering
     async def TakeIncident(self, request: incidents_pb2.TakeIncidentRequest) -> Any:
-        """Keep the last cycles now."""
+        """Write an incident with the last cycles now."""
         taken = await incidents.take(self._runners.get(request.runner), request.reason)
         return incidents_pb2.TakeIncidentResponse(incident=taken)
 
     @answering
     async def DeleteIncidents(self, request: incidents_pb2.DeleteIncidentsRequest) -> Any:
-        """Remove files."""
+        """Remove incident files."""
         gone = await self._runners.incidents.remove(request.names)
         return incidents_pb2.DeleteIncidentsResponse(incidents=gone)
 
     @changing
     def RestoreSnapshot(self, request: control_pb2.RestoreSnapshotRequest) -> Any:
-        """Go on from a snapshot."""
+        """Restore a snapshot."""
         runner = self._runners.get(request.runner)
         return lambda progress: snapshots.restore(runner, request.snapshot, progress)
 
     @holding
     def HoldRunner(self, request: control_pb2.OpenHold) -> Any:
-        """A runner, for as long as the call lasts."""
+        """Hold a runner while the call lasts."""
         outbox = Outbox(control_pb2.HoldRunnerResponse)
         return outbox, Hold(self._runners, request, outbox)
 
     @holding
     def LeaseComponent(self, request: control_pb2.OpenLease) -> Any:
-        """A component, for as long as the call lasts."""
+        """Lease a component while the call lasts."""
         outbox = Outbox(control_pb2.LeaseComponentResponse)
         return outbox, Lease(self._runners.get(request.runner).leases, request, outbox)
 
     @answering
     async def ResetStatistics(self, request: control_pb2.ResetStatisticsRequest) -> Any:
-        """New figures."""
+        """Reset the statistics."""
         runner = self._runners.get(request.runner)
         await runner.settle()
         await runner.begin_figures(reset=True)
         return control_pb2.ResetStatisticsResponse()
 
     def _named(self, name: str, call: str) -> Runner:
-        """Return a runner that a call which destroys something must name."""
+        """Return the runner of a destructive call, which must name it."""
         if not name:
             raise InvalidArgument(
-                f"{call} takes the name of a runner: the default one is not meant unless it is "
-                f"named (runners: {listing(each.name for each in self._runners.all())})",
+                f"{call} requires the name of a runner, even of the default one "
+                f"(runners: {listing(each.name for each in self._runners.all())})",
                 errors_pb2.REASON_NAME_MISSING,
                 field="runner",
             )

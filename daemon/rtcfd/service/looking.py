@@ -1,4 +1,4 @@
-"""The calls of `rtcf.v1.Control` that change nothing: what there is, and what happens."""
+"""The read-only calls of `rtcf.v1.Control`: queries and streams."""
 
 import asyncio
 import os
@@ -34,25 +34,25 @@ from rtcfd.service.watching import watch, watch_logs
 _WATCH_MS = 1000
 _SHORTEST_WATCH_MS = 100
 
-_STATUS = 4096  # bytes of a runner's status, about
+_STATUS = 4096  # approximate size of a runner's status, in bytes
 
 
 class Daemon(Protocol):
-    """What the daemon itself does for its clients."""
+    """The part of the daemon that the service calls."""
 
     @property
     def refused(self) -> list[str]:
-        """What of graphs.d is not applied, a line each."""
+        """The errors of graphs.d, a line each."""
 
     def notes(self) -> list[str]:
-        """Return what is to be said about rtcfd itself, a line each."""
+        """Return notes on rtcfd itself, a line each."""
 
     async def reload(self) -> list[str]:
-        """Read settings and graphs.d again; return a line for each thing that has changed."""
+        """Reload settings and graphs.d; return a line for each change."""
 
 
 class Looking(control_pb2_grpc.ControlServicer):
-    """What Control answers from what there is."""
+    """The read-only part of Control."""
 
     def __init__(
         self, runners: Runners, catalog: Catalog, daemon: Daemon, events: EventLog
@@ -65,7 +65,7 @@ class Looking(control_pb2_grpc.ControlServicer):
 
     @answering
     async def GetStatus(self, request: control_pb2.GetStatusRequest) -> Any:
-        """All runners, or one."""
+        """Return the statuses of all runners, or of one."""
         chosen = [self._runners.get(request.runner)] if request.runner else self._runners.all()
         return control_pb2.GetStatusResponse(
             version=VERSION,
@@ -77,19 +77,19 @@ class Looking(control_pb2_grpc.ControlServicer):
 
     @answering
     async def ListRunners(self, request: control_pb2.ListRunnersRequest) -> Any:
-        """All runners, in pages."""
+        """Return the statuses of all runners, in pages."""
         chosen, token = page(self._runners.all(), request, lambda each: str(each.name), _STATUS)
         runners = await statuses_of(chosen, self._runners.all())
         return control_pb2.ListRunnersResponse(runners=runners, next_page_token=token)
 
     @answering
     async def GetHistory(self, request: control_pb2.GetHistoryRequest) -> Any:
-        """Who set what when."""
+        """Return the changes of parameters, with their authors and times."""
         return parameters.history(self._runners.get(request.runner), request)
 
     @answering
     async def ListIncidents(self, request: incidents_pb2.ListIncidentsRequest) -> Any:
-        """Files with the last cycles before faults."""
+        """Return the incidents: files with the last cycles before faults."""
         found = await self._runners.incidents.all(request.runner)
         chosen, token = page(found, request, lambda each: str(each.name))
         return incidents_pb2.ListIncidentsResponse(incidents=chosen, next_page_token=token)
@@ -97,7 +97,7 @@ class Looking(control_pb2_grpc.ControlServicer):
     async def ReadIncident(
         self, request: incidents_pb2.ReadIncidentRequest, context: Any
     ) -> AsyncIterator[incidents_pb2.ReadIncidentResponse]:
-        """The file, piece by piece."""
+        """Stream the file of an incident, piece by piece."""
         try:
             kept = self._runners.incidents
             found = await kept.get(request.name)
@@ -111,7 +111,7 @@ class Looking(control_pb2_grpc.ControlServicer):
 
     @answering
     async def ListComponents(self, request: control_pb2.ListComponentsRequest) -> Any:
-        """All components, in order of the schedule; then those that are left out."""
+        """Return all components in the order of the schedule, then those that are left out."""
         components = await self._components(request.runner)
         runner = self._runners.get(request.runner)
         found = components + graph.left_out(runner)
@@ -124,7 +124,7 @@ class Looking(control_pb2_grpc.ControlServicer):
 
     @answering
     async def GetComponent(self, request: control_pb2.GetComponentRequest) -> Any:
-        """One component, with values."""
+        """Return one component, with values."""
         name = absolute(request.component)
         query = control_pb2.GetComponentRequest(runner=request.runner, component=name)
         runner = self._runners.get(request.runner)
@@ -138,7 +138,7 @@ class Looking(control_pb2_grpc.ControlServicer):
 
     @answering
     async def GetOrder(self, request: control_pb2.GetOrderRequest) -> Any:
-        """The schedule."""
+        """Return the names of the components in the order of the schedule."""
         components = await self._components(request.runner)
         names = [str(component.full_name) for component in components]
         chosen, token = page(names, request, str)
@@ -146,7 +146,7 @@ class Looking(control_pb2_grpc.ControlServicer):
 
     @answering
     async def ListConnections(self, request: control_pb2.ListConnectionsRequest) -> Any:
-        """All connections, by name."""
+        """Return all connections, sorted by name."""
         query = wire.Request(list_connections=wire.ListConnections())
         response = await self._runners.get(request.runner).query(query)
         found = sorted(response.connections.connections, key=lambda each: str(each.name))
@@ -155,7 +155,7 @@ class Looking(control_pb2_grpc.ControlServicer):
 
     @answering
     async def ListTypes(self, request: control_pb2.ListTypesRequest) -> Any:
-        """What can be loaded."""
+        """Return the component types that can be loaded."""
         types, problems = await self._catalog.types(request.package)
         chosen, token = page(types, request, lambda each: f"{each.package}/{each.type}")
         return control_pb2.ListTypesResponse(
@@ -164,14 +164,14 @@ class Looking(control_pb2_grpc.ControlServicer):
 
     @answering
     async def GetStatistics(self, request: control_pb2.GetStatisticsRequest) -> Any:
-        """The figures."""
+        """Return the statistics of a runner."""
         statistics = await self._statistics(request.runner, request.buckets)
         return control_pb2.GetStatisticsResponse(statistics=statistics)
 
     async def WatchStatistics(
         self, request: control_pb2.WatchStatisticsRequest, context: Any
     ) -> AsyncIterator[control_pb2.WatchStatisticsResponse]:
-        """The figures, again and again."""
+        """Stream the statistics of a runner at an interval."""
         interval_s = max(request.interval_ms or _WATCH_MS, _SHORTEST_WATCH_MS) / 1000
         try:
             while True:
@@ -184,7 +184,7 @@ class Looking(control_pb2_grpc.ControlServicer):
     async def WatchEvents(
         self, request: control_pb2.WatchEventsRequest, context: Any
     ) -> AsyncIterator[control_pb2.WatchEventsResponse]:
-        """What happens."""
+        """Stream events."""
         try:
             require_some = partial(self._runners.require_some, request.runners)
             async for response in watch(self._events, request, require_some):
@@ -195,7 +195,7 @@ class Looking(control_pb2_grpc.ControlServicer):
     async def WatchLogs(
         self, request: control_pb2.WatchLogsRequest, context: Any
     ) -> AsyncIterator[control_pb2.WatchLogsResponse]:
-        """What is logged."""
+        """Stream log records."""
         try:
             async for response in watch_logs(self._runners.get(request.runner), request):
                 yield response
@@ -205,7 +205,7 @@ class Looking(control_pb2_grpc.ControlServicer):
     async def WatchPorts(
         self, request: ports_pb2.WatchPortsRequest, context: Any
     ) -> AsyncIterator[ports_pb2.WatchPortsResponse]:
-        """Values of every cycle."""
+        """Stream the values of ports, cycle by cycle."""
         try:
             async for response in watch_ports(self._runners.get(request.runner), request):
                 yield response

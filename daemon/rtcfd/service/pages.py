@@ -1,7 +1,7 @@
-"""Lists in pages: entries that fit into a message of any client, and where the next ones begin.
+"""Divides lists into pages that fit into a message of any client.
 
-A page's token has the place where it begins and a digest of the names of the whole list, so
-that nothing is kept for callers, and a list that has changed meanwhile is not taken for whole.
+A page token has the index of the page's first entry, and a digest of all names of the list.  So
+rtcfd keeps nothing for its callers, and notices if a list has changed between two pages.
 """
 
 import re
@@ -13,14 +13,14 @@ from rtcf.v1 import errors_pb2
 
 from rtcfd.common.refusals import FailedPrecondition, InvalidArgument
 
-LARGEST = 2 * 1024 * 1024  # bytes of one page; clients that are not ours take 4 MiB
+LARGEST = 2 * 1024 * 1024  # bytes of one page; other gRPC clients accept 4 MiB
 _TOKEN = re.compile(r"(\d{1,9})-([0-9a-f]{8})")
 
 Entry = TypeVar("Entry")
 
 
 class Request(Protocol):
-    """What the requests for lists have in common."""
+    """The common fields of requests for lists."""
 
     page_size: int
     page_token: str
@@ -29,9 +29,9 @@ class Request(Protocol):
 def page(
     entries: Sequence[Entry], request: Request, name: Callable[[Entry], str], size: int = 0
 ) -> tuple[list[Entry], str]:
-    """Return the entries that a request is for, and the next page's token, empty if there is none.
+    """Return the entries of the requested page, and the token of the next page (empty = none).
 
-    `size`: bytes of an entry that is no message.
+    `size` is the size in bytes of an entry that is not a message.
     """
     digest = f"{zlib.crc32(chr(0).join(map(name, entries)).encode()):08x}"
     begin = _begin(request.page_token, digest, len(entries))
@@ -51,19 +51,19 @@ def _begin(token: str, digest: str, entries: int) -> int:
     found = _TOKEN.fullmatch(token)
     if not found or (found[2] == digest and not 0 < int(found[1]) < entries):
         raise InvalidArgument(
-            f'page token "{token[:40]}" is none of this list: take next_page_token of the page '
-            "before",
+            f'page token "{token[:40]}" does not belong to this list: use next_page_token of the '
+            "previous page",
             errors_pb2.REASON_PAGE_TOKEN_INVALID,
             field="page_token",
         )
     if found[2] != digest:
         raise FailedPrecondition(
-            "the list has changed since its first page: ask for that again",
+            "the list has changed since its first page: request the first page again",
             errors_pb2.REASON_LIST_CHANGED,
         )
     return int(found[1])
 
 
 def _size(entry: Any) -> int:
-    # A tag and a length besides.
+    # 8: the tag and the length of the field.
     return 8 + (len(entry.encode()) if isinstance(entry, str) else int(entry.ByteSize()))

@@ -1,4 +1,4 @@
-"""Values of ports for one caller: what its executor tells, relayed; a slow caller loses some."""
+"""Relays the values of ports from an executor to one caller; a slow caller loses values."""
 
 import asyncio
 from collections import deque
@@ -9,19 +9,22 @@ from rtcf.v1 import errors_pb2, ports_pb2
 from rtcfd.common.refusals import InvalidArgument
 from rtcfd.runners.runner import Runner
 
-_MOST = 8 * 1024 * 1024  # bytes that wait for the caller
+_MOST = 8 * 1024 * 1024  # bytes in the queue to the caller
 _MOST_NAMES = 256  # each is compared with each output and state, whenever the graph changes
 
 
 class _Waiting:
-    """What the caller has not taken yet.  Of schemas only such are lost of which nothing waits:
-    batches mean nothing without."""
+    """The queue to the caller.
+
+    Batches are meaningless without their schema.  So a schema is dropped only if no batch of it
+    is in the queue.
+    """
 
     def __init__(self, every: int) -> None:
         self._every = max(every, 1)
         self._responses: deque[tuple[ports_pb2.WatchPortsResponse, int]] = deque()
         self._bytes = 0
-        self._lost: ports_pb2.PortBatch | None = None  # no cycles, and how many are missing
+        self._lost: ports_pb2.PortBatch | None = None  # an empty batch with the count of drops
         self.some = asyncio.Event()
 
     def put(self, response: ports_pb2.WatchPortsResponse) -> None:
@@ -35,14 +38,14 @@ class _Waiting:
                 batch.lost += self._lost.lost
                 self._lost = None
         elif self._responses and self._responses[-1][0].WhichOneof("kind") == "schema":
-            # Nothing waits of the one before.
+            # No batch of the previous schema is in the queue.
             self._bytes -= self._responses.pop()[1]
             if self._lost is not None:
                 self._lost.values[:] = [b""] * len(response.schema.columns)
                 if self._lost.places:
                     self._lost.places[:] = self._lost.values
         elif self._lost is not None:
-            # Of the schema before.
+            # The dropped batches belong to the previous schema.
             self._responses.append((ports_pb2.WatchPortsResponse(batch=self._lost), 0))
             self._lost = None
         self._responses.append((response, size))
@@ -74,7 +77,7 @@ class _Waiting:
 async def watch_ports(
     runner: Runner, request: ports_pb2.WatchPortsRequest
 ) -> AsyncGenerator[ports_pb2.WatchPortsResponse, None]:
-    """Yield schemas and batches, without end; raises the executor's refusal, or what ended it."""
+    """Yield schemas and batches, without end; raises the executor's error, or that of its end."""
     if len(request.selection) > _MOST_NAMES:
         raise InvalidArgument(
             f"{len(request.selection)} selections of ports are too many, {_MOST_NAMES} at most: "

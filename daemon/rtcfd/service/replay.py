@@ -1,4 +1,4 @@
-"""One replay: it lasts as long as the call that makes it; when the caller leaves it is ended."""
+"""One replay, which lasts as long as its call; it ends if the caller disconnects."""
 
 from rtcf.v1 import control_pb2, errors_pb2
 
@@ -14,16 +14,16 @@ class Replay:
 
     def __init__(self, runners: Runners) -> None:
         self._runners = runners
-        self._runner: Runner | None = None  # whose replay is under way
-        self._stops = 0  # of its loop, when it was asked for
+        self._runner: Runner | None = None  # runs the replay; None: none is running
+        self._stops = 0  # the stop count of its loop when the replay was requested
         self._ended = False
-        self._gone = False  # its caller
+        self._gone = False  # the caller has disconnected
 
     async def take(self, request: control_pb2.ReplayRequest) -> control_pb2.ReplayResponse:
-        """Run one piece; return what came of it."""
+        """Run one piece of the recording; return its result."""
         if request.begin == (self._runner is not None) or self._ended:
             raise InvalidArgument(
-                "a replay is one call, whose first message has `begin`, and no other",
+                "a replay is one call: its first message must have `begin`, the others must not",
                 errors_pb2.REASON_REQUEST_MALFORMED,
                 field="begin",
             )
@@ -39,13 +39,13 @@ class Replay:
         return await starting.replay(runner, request, lambda: self._begun(runner))
 
     def _begun(self, runner: Runner) -> None:
-        """The executor replays from here on, for a caller who may have left meanwhile."""
+        """Note that the executor replays; the caller may have disconnected meanwhile."""
         self._runner = runner
         if self._gone:
             self.lost()
 
     def _require_no_stop(self, runner: Runner) -> None:
-        """Refuse to go on after a stop: what is replayed there now is somebody else's."""
+        """Raise FailedPrecondition after a stop: a replay that runs there now is another one."""
         if runner.loop.stops != self._stops:
             raise FailedPrecondition(
                 f"runner {runner.name}: its loop was stopped, and this replay with it: "
@@ -54,18 +54,20 @@ class Replay:
             )
 
     async def end(self) -> None:
-        """End one that its caller did not."""
+        """End the replay, if its caller has not."""
         if (runner := self._left()) is not None:
             await stop_quietly(runner)
 
     def lost(self) -> None:
-        """Likewise, where nobody waits any more."""
+        """End the replay in the background, after the loss of the caller."""
         self._gone = True
         if (runner := self._left()) is not None:
             runner.operations.in_background("the end of a replay", stop_quietly(runner))
 
     def _left(self) -> Runner | None:
-        """Return the runner whose replay is to be ended.  After a stop by somebody else what runs
-        there is not ours."""
+        """Return the runner whose replay is to be ended, if any.
+
+        None after a stop by another caller: a replay that runs there now is not ours.
+        """
         runner, self._runner = self._runner, None
         return runner if runner is not None and runner.loop.stops == self._stops else None

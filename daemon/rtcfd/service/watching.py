@@ -1,4 +1,4 @@
-"""Watching events and log records: from a number on, or from now on, for one caller."""
+"""Streams of events and log records for one caller, from a number on or from now on."""
 
 from collections.abc import AsyncGenerator, Callable, Iterable
 from dataclasses import dataclass
@@ -19,11 +19,11 @@ _BATCH = 200
 
 @dataclass
 class _Piece(Generic[Entry]):
-    """What has come since the last piece."""
+    """The entries since the last piece."""
 
     entries: list[Entry]
-    lost: int  # before the first of them
-    upto: int  # number of the last of them, or of the last before
+    lost: int  # number of entries lost before the first one
+    upto: int  # number of the last entry, or of the last one before if there is none
 
 
 async def _follow(
@@ -31,11 +31,13 @@ async def _follow(
     request: control_pb2.WatchEventsRequest | control_pb2.WatchLogsRequest,
     check: Callable[[], None],
 ) -> AsyncGenerator[_Piece[Entry], None]:
-    """Yield where the caller stands, then what comes; without end unless asked for, or until
-    `check`, which is called before each wait, refuses it."""
+    """Yield the caller's position, then new entries.
+
+    Ends only if the request has `until_now`, or if `check`, called before each wait, raises.
+    """
     number = log.last
     if request.HasField("after"):
-        # Numbers of another log say nothing about this one.
+        # A number in another log has no meaning in this one.
         number = min(request.after, log.last) if request.log_id == log.log_id else 0
     until = log.last
     while True:
@@ -52,9 +54,9 @@ async def _follow(
 async def watch(
     log: EventLog, request: control_pb2.WatchEventsRequest, require_some: Callable[[], None]
 ) -> AsyncGenerator[control_pb2.WatchEventsResponse, None]:
-    """Yield where the caller stands, then what happens; without end unless asked for.
+    """Yield the caller's position, then events; ends only if the request has `until_now`.
 
-    `require_some` refuses to wait when none of the runners that are watched is there.
+    `require_some` raises an error if none of the watched runners exists.
     """
     runners = set(request.runners)
     first = True
@@ -73,8 +75,10 @@ async def watch(
 async def watch_logs(
     runner: Runner, request: control_pb2.WatchLogsRequest
 ) -> AsyncGenerator[control_pb2.WatchLogsResponse, None]:
-    """Yield where the caller stands, then what is logged; without end unless asked for, or until
-    the runner is removed."""
+    """Yield the caller's position, then log records.
+
+    Ends only if the request has `until_now`, or when the runner is removed.
+    """
     log = runner.logs
     components = {absolute(each) for each in request.components}
     _check_known(runner, components)
@@ -82,7 +86,7 @@ async def watch_logs(
     def check() -> None:
         if log.ended:
             raise NotFound(
-                f"runner {runner.name} is not there any more", errors_pb2.REASON_RUNNER_NOT_FOUND
+                f"runner {runner.name} no longer exists", errors_pb2.REASON_RUNNER_NOT_FOUND
             )
 
     first = True
@@ -101,7 +105,7 @@ async def watch_logs(
 
 
 def _check_known(runner: Runner, names: Iterable[str]) -> None:
-    """Refuse components that are not there and have logged nothing."""
+    """Raise NotFound for a component that does not exist and has logged nothing."""
     known = dict.fromkeys(runner.desired.components)
     missing = [name for name in names if name not in known]
     if missing:

@@ -1,1 +1,1 @@
-"""What was accepted and outlives a process: desired states, on disk and handed over."""
+"""The state that outlives a process: desired states on disk, and the handover to the next rtcfd."""

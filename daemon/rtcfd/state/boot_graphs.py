@@ -1,7 +1,7 @@
-"""The graphs of graphs.d: what runners are at boot, and applied again when a file changes.
+"""The graphs of graphs.d: applied at boot, and again when a file changes.
 
-Owned by the daemon (reload.py); a file that is not valid is reported and left
-out, whole.
+Owned by the daemon (reload.py).  A file that is not valid is reported and left out as a
+whole.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ _SUFFIXES = (".yaml", ".yml")
 
 @dataclass
 class Given:
-    """One runner's graph, and the file that gives it."""
+    """The graph of one runner, and its file."""
 
     file: Path
     graph: Graph
@@ -39,7 +39,7 @@ class Given:
 
 
 class BootGraphs:
-    """The folder, and what was read from it last."""
+    """The folder graphs.d, and the digests of the files that were last read."""
 
     def __init__(
         self,
@@ -47,14 +47,16 @@ class BootGraphs:
         applied: Mapping[str, str],
         opinion: Callable[[runner_pb2.RunnerSettings], str] = lambda _: "",
     ) -> None:
-        """`applied`: the digests of an earlier rtcfd; `opinion`: why an executor would refuse
-        settings, or nothing."""
+        """`applied` has the digests of the previous rtcfd.
+
+        `opinion` returns why an executor would reject settings; empty = it accepts them.
+        """
         self._folder = folder
         self._opinion = opinion
-        self.digests = dict(applied)  # by file; of what was read last
+        self.digests = dict(applied)  # by file
 
     def read(self) -> tuple[list[Given], list[str]]:
-        """Return all graphs, and a line for each thing that is wrong."""
+        """Return all graphs, and the errors, a line each."""
         graphs: list[Given] = []
         problems: list[str] = []
         owners: dict[str, Path] = {}
@@ -83,8 +85,8 @@ class BootGraphs:
                 given = Given(file, graph, changed)
                 first = owners.setdefault(given.runner, file)
                 if first != file:
-                    digests.pop(str(file), None)  # tried again when the other is gone
-                    problems.append(f"{file}: runner {given.runner} is in {first} already")
+                    digests.pop(str(file), None)  # applied when the other file is gone
+                    problems.append(f"{file}: runner {given.runner} is already in {first}")
                 else:
                     graphs.append(given)
         self.digests = digests
@@ -93,15 +95,15 @@ class BootGraphs:
         return graphs, problems
 
     def forget(self, file: Path) -> None:
-        """Count a file as changed by the next read()."""
+        """Make the next read() treat a file as changed."""
         self.digests.pop(str(file), None)
 
     def _check(self, graph: Graph) -> None:
         check_base_name("runner", graph.runner or DEFAULT_RUNNER)
         runner_settings.check(graph.settings)
         check_graph(graph.components)
-        if graph.settings.ListFields() and (complaint := self._opinion(graph.settings)):
-            raise InvalidArgument(complaint, errors_pb2.REASON_VALUE_INVALID)
+        if graph.settings.ListFields() and (error := self._opinion(graph.settings)):
+            raise InvalidArgument(error, errors_pb2.REASON_VALUE_INVALID)
 
     def _files(self, problems: list[str]) -> Iterator[Path]:
         if self._folder is None:
@@ -120,7 +122,7 @@ class BootGraphs:
 
 
 def become(desired: Desired, graph: Graph) -> None:
-    """Make a desired state what a graph says; whether it ran and what is quarantined stays."""
+    """Replace the graph and the settings of a desired state; quarantines and loop state stay."""
     quarantined = dict(desired.quarantined)
     desired.become(graph.components)
     desired.choose(graph.settings)

@@ -1,4 +1,4 @@
-"""The desired state of one runner: what was accepted, and what came of it.
+"""The desired state of one runner: accepted settings and components, leases, and loop state.
 
 Owned by its Runner; store.py keeps it on disk.
 """
@@ -18,50 +18,50 @@ _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
 
 def this_boot() -> str:
-    """Return what tells one boot of the machine from another."""
+    """Return the id of the current boot of the machine."""
     return _BOOT_ID.read_text(encoding="ascii").strip()
 
 
 @dataclass(frozen=True)
 class LeaseTerms:
-    """Of a component that stays only while it is held; see runners/leases.py."""
+    """The terms of a lease on a component; see runners/leases.py."""
 
     run_id: str
     on_lost: int  # OnLeaseLost
-    holder: str  # for people
+    holder: str  # name for messages
 
 
 @dataclass
 class HoldTerms:
-    """Of a runner that is held for a while; see runners/held_runners.py."""
+    """The terms of a lease on a runner; see runners/held_runners.py."""
 
     token: str
-    holder: str  # for people
-    parked: runner_pb2.RunnerSettings  # the runner's own choice, for afterwards
-    added: bool = False  # there is no such runner otherwise
+    holder: str  # name for messages
+    parked: runner_pb2.RunnerSettings  # the runner's own settings, restored at the end
+    added: bool = False  # the runner exists only for this lease
 
 
 class Desired:
-    """Settings that were chosen (what is unset follows the defaults) and components."""
+    """The chosen settings (unset ones follow the defaults) and the components of a runner."""
 
     def __init__(self, runner: str) -> None:
         self.runner = runner
         self.chosen = runner_pb2.RunnerSettings()
         self.running = False  # the loop was started, and neither stopped nor ended by a fault
-        self.ended_boot = ""  # the boot of the machine in which it was; empty: never, or runs
-        self.quarantined: dict[str, str] = {}  # components that a fault took out, and why
-        self.left_out: dict[str, str] = {}  # components that are not loaded, and why
-        self.leased: dict[str, LeaseTerms] = {}  # components that are held; not saved themselves
+        self.ended_boot = ""  # the boot in which the loop ended; empty: it runs, or never ran
+        self.quarantined: dict[str, str] = {}  # components removed by a fault, with the reason
+        self.left_out: dict[str, str] = {}  # components that are not loaded, with the reason
+        self.leased: dict[str, LeaseTerms] = {}  # leased components, which are not saved
         self.hold: HoldTerms | None = None
         self.history = History()  # of its parameters
         self._components: dict[str, graph_pb2.ComponentSpec] = {}
-        # The text of each component as it is saved: a change of one among
-        # a thousand costs the text of one.
+        # The saved text of each component, cached: a change of one component among a thousand
+        # costs the conversion of one.
         self._texts: dict[str, str] = {}
 
     @property
     def components(self) -> dict[str, graph_pb2.ComponentSpec]:
-        """All components by full name, in the order of loading.  Not to be changed."""
+        """All components by full name, in the order of loading.  Read-only."""
         return self._components
 
     def complete(self, defaults: runner_pb2.RunnerSettings) -> runner_pb2.RunnerSettings:
@@ -71,7 +71,7 @@ class Desired:
     def effect(
         self, change: runner_pb2.RunnerSettings, defaults: runner_pb2.RunnerSettings
     ) -> runner_pb2.RunnerSettings:
-        """Return a change of settings with the defaults that follow from it."""
+        """Return a change of settings, with the priority if it changes as a consequence."""
         chosen = runner_settings.merged(self.chosen, change)
         after = runner_settings.completed(runner_settings.merged(defaults, chosen))
         result = runner_pb2.RunnerSettings()
@@ -81,11 +81,11 @@ class Desired:
         return result
 
     def choose(self, change: runner_pb2.RunnerSettings) -> None:
-        """Note settings that were accepted."""
+        """Note accepted settings."""
         self.chosen = runner_settings.merged(self.chosen, change)
 
     def put(self, full_name: str, spec: graph_pb2.ComponentSpec) -> None:
-        """Note a component, new or changed, with the name and namespace it got."""
+        """Note a new or changed component under its full name."""
         kept = graph_pb2.ComponentSpec()
         kept.CopyFrom(spec)
         namespace, _, kept.name = full_name.rpartition("/")
@@ -95,7 +95,7 @@ class Desired:
         self.quarantined.pop(full_name, None)
 
     def drop(self, full_names: Iterable[str]) -> None:
-        """Forget components."""
+        """Remove components."""
         for name in full_names:
             self._components.pop(name, None)
             self._texts.pop(name, None)
@@ -104,19 +104,19 @@ class Desired:
             self.leased.pop(name, None)
 
     def let_go(self) -> None:
-        """Forget a hold and what is leased; the settings are the runner's own again."""
+        """Remove all leases and leased components, and restore the runner's own settings."""
         self.drop(list(self.leased))
         if self.hold is not None:
             self.chosen = self.hold.parked
             self.hold = None
 
     def quarantine(self, full_name: str, reason: str) -> None:
-        """Note that a component is not to be loaded until it is released."""
+        """Note that a component must not be loaded until it is released."""
         if full_name in self._components:
             self.quarantined[full_name] = reason
 
     def become(self, specs: Iterable[graph_pb2.ComponentSpec]) -> None:
-        """Take a whole graph in the place of what was there."""
+        """Replace all components by those of a graph."""
         before, texts = self._components, self._texts
         self._components, self._texts, self.quarantined = {}, {}, {}
         for spec in specs:
@@ -129,7 +129,7 @@ class Desired:
         }
 
     def set_breaks(self, ports: Iterable[control_pb2.PortName], broken: bool) -> None:
-        """Note loop breaks that were set or removed."""
+        """Note that loop breaks were set or removed."""
         for port in ports:
             name = absolute(port.component)
             spec = self._components.get(name)
@@ -140,7 +140,7 @@ class Desired:
             self._texts.pop(name, None)
 
     def set_parameters(self, component: str, changes: Iterable[graph_pb2.ParameterSetting]) -> None:
-        """Note parameters that were changed."""
+        """Note changed parameters of a component."""
         name = absolute(component)
         spec = self._components.get(name)
         if spec is None:
@@ -153,7 +153,7 @@ class Desired:
         self._texts.pop(name, None)
 
     def component_texts(self) -> list[str]:
-        """Return each component that stays as a line of JSON."""
+        """Return each component that is not leased, as a line of JSON."""
         staying = [name for name in self._components if name not in self.leased]
         for name in staying:
             if name not in self._texts:
@@ -166,12 +166,14 @@ class Desired:
 def replacement(
     old: graph_pb2.ComponentSpec | None, given: graph_pb2.ComponentSpec
 ) -> graph_pb2.ComponentSpec:
-    """Return the spec of a replacement: name, namespace, remaps, flags and breaks that
-    are empty in `given` are those of the old component."""
+    """Return the spec of a replacement.
+
+    Name, namespace, remaps, flags and breaks that are empty in `given` are those of `old`.
+    """
     result = graph_pb2.ComponentSpec()
     if old is not None:
         result.CopyFrom(old)
-        del result.parameters[:]  # the executor knows which of them fit
+        del result.parameters[:]  # the executor keeps those that fit
     for field in ("remaps", "breaks"):
         if getattr(given, field):
             result.ClearField(field)

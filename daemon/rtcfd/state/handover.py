@@ -1,8 +1,8 @@
-"""What one rtcfd leaves for the next beside the executors' sockets, for as long as they last.
+"""The handover from one rtcfd to the next: a file beside the executors' sockets.
 
-The defaults that its runners follow and the graphs that it has applied: so the
-next one tells what an administrator has changed in the settings meanwhile from
-what a client has changed in a runner.
+It has the defaults of the runners, and the digests of the applied graphs.  So the next
+rtcfd can distinguish changes of the settings in the meantime from changes of a runner by
+clients.  The file is removed when no executor is left.
 """
 
 import contextlib
@@ -26,14 +26,14 @@ _NAME = "handover.json"
 
 @dataclass
 class Handover:
-    """What was read last."""
+    """The defaults and graphs that an rtcfd read last."""
 
     defaults: runner_pb2.RunnerSettings  # complete
     graphs: dict[str, str] = field(default_factory=dict)  # digests by file
 
 
 def read(folder: Path) -> Handover | None:
-    """Return what an earlier rtcfd left; None if there is nothing, or nothing of use."""
+    """Return the handover of the previous rtcfd; None if there is none, or it is not usable."""
     file = folder / _NAME
     try:
         document = json.loads(regular_files.read_bytes(file))
@@ -45,12 +45,12 @@ def read(folder: Path) -> Handover | None:
     except FileNotFoundError:
         return None
     except (OSError, *NONSENSE, Refusal):
-        log.warning("%s is of no use: runners are taken as they are", file)
+        log.warning("cannot use %s: runners stay as they are", file)
         return None
 
 
 def write(folder: Path, handover: Handover) -> None:
-    """Replace it; what cannot be written is reported, and missed by the next rtcfd only."""
+    """Replace the file; log an error, which only affects the next rtcfd."""
     document = {
         "defaults": json_format.MessageToDict(handover.defaults, preserving_proto_field_name=True),
         "graphs": handover.graphs,
@@ -62,6 +62,6 @@ def write(folder: Path, handover: Handover) -> None:
 
 
 def remove(folder: Path) -> None:
-    """Forget it, when no executor is left."""
+    """Remove the file, when no executor is left."""
     with contextlib.suppress(OSError):
         (folder / _NAME).unlink(missing_ok=True)

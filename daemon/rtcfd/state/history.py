@@ -1,8 +1,8 @@
-"""Who set which parameter to what, and when: the last changes of one runner's components.
+"""The parameter history of a runner: the last changes, with their authors and times.
 
-Part of its Desired; store.py keeps it on disk.  Bounded by component, so that
-one that is tuned all day leaves the others theirs, and in all: in number and
-in bytes.
+Part of its Desired; store.py keeps it on disk.  Number and bytes are limited in total,
+and for each component, so that a component that is tuned all day does not displace the
+others.
 """
 
 import json
@@ -19,11 +19,11 @@ from rtcfd.common.nonsense import NONSENSE
 
 MOST_OF_A_COMPONENT = 200
 MOST = 4000
-# Texts may be long. The newest that was changed at once stays, however large.
+# String values may be long.  The newest changes of one cycle boundary stay, however large.
 MOST_BYTES_OF_A_COMPONENT = 1024 * 1024
 MOST_BYTES = 8 * 1024 * 1024
 
-# How a value was set that an executor took and did not answer for, as it died.
+# The `how` of a value that was sent to an executor, which died before its response.
 UNANSWERED = "set, unanswered"
 
 Value = graph_pb2.ParameterValue
@@ -31,18 +31,18 @@ Value = graph_pb2.ParameterValue
 
 @dataclass(frozen=True)
 class Change:
-    """Of one parameter.  Those that were made at one cycle boundary have one number."""
+    """A change of one parameter.  Changes at one cycle boundary have the same number."""
 
     number: int
     time_ns: int  # since 1970
     component: str  # full name
     parameter: str
-    before: Value | None  # None: it was not there, or is not known
+    before: Value | None  # None: it did not exist, or is not known
     value: Value
-    who: str  # for people
+    who: str  # author, for messages
     # "set", "undo", "load", "replace", "apply", "restore", "dynamic_reconfigure", UNANSWERED
     how: str
-    takes_back: int = 0  # the number of what it undoes; 0 = nothing
+    takes_back: int = 0  # number of the change that it undoes; 0 = none
 
 
 class History:
@@ -53,9 +53,9 @@ class History:
         self._count = 0
         self._bytes: dict[str, int] = {}  # by component
         self._bytes_on_disk = 0
-        self._last = 0  # number
+        self._last = 0  # number of the newest change
         self._new: list[Change] = []  # not on disk yet
-        self._on_disk = 0  # lines
+        self._on_disk = 0  # lines in the file
 
     def note(
         self,
@@ -65,7 +65,7 @@ class History:
         how: str,
         takes_back: int = 0,
     ) -> None:
-        """Note parameters of one component: name, value before, value."""
+        """Add changes of one component's parameters: name, value before, new value."""
         self._last += 1
         now = time.time_ns()
         for name, before, value in changes:
@@ -84,8 +84,10 @@ class History:
         return sorted(chosen, key=lambda each: each.number)
 
     def to_take_back(self, component: str) -> list[Change]:
-        """Return what was changed last of a component and has not been taken back since: all
-        that was changed at once; nothing if there is none."""
+        """Return the last change of a component that is not undone, with all its parameters.
+
+        Empty if there is none.
+        """
         changes = self._changes.get(component, ())
         undone = {each.takes_back for each in changes}
         numbers = [
@@ -96,8 +98,10 @@ class History:
         return [each for each in changes if numbers and each.number == numbers[-1]]
 
     def to_write(self) -> tuple[list[Change], bool]:
-        """Return what is to be written, and whether that is all there is, in the place of what is
-        on disk; else it is to be appended.  From then on it counts as written."""
+        """Return the changes to write, and whether they replace the file instead of being appended.
+
+        From then on they count as written.
+        """
         changes, self._new = self._new, []
         more = sum(map(_size, changes))
         anew = (
@@ -112,11 +116,11 @@ class History:
         return changes, anew
 
     def not_written(self) -> None:
-        """What to_write() gave did not get to disk: all there is is written the next time."""
+        """Note that the result of to_write() was not written: the next one has all changes."""
         self._on_disk = 2 * MOST + 1
 
     def read(self, text: str) -> None:
-        """Take what was written; a line that is none, as of a power cut, is passed over."""
+        """Load changes from text(); skips invalid lines, as a power cut leaves them."""
         for line in text.splitlines():
             self._on_disk += 1
             self._bytes_on_disk += len(line)
@@ -146,11 +150,11 @@ class History:
             self._drop(self._with_oldest())
 
     def _with_oldest(self) -> str:
-        """Return the component that has the oldest change."""
+        """Return the component with the oldest change."""
         return min(self._changes, key=lambda name: self._changes[name][0].number)
 
     def _drop_oldest(self, component: str) -> None:
-        """Drop all that was changed at once: a part of it is not to be taken back."""
+        """Drop all changes of the oldest number, because undo must restore all or none of them."""
         number = self._changes[component][0].number
         while component in self._changes and self._changes[component][0].number == number:
             self._drop(component)
@@ -164,13 +168,13 @@ class History:
 
 
 def text(changes: Iterable[Change]) -> str:
-    """Return what read() takes; on any thread."""
+    """Return changes as text for read().  On any thread."""
     return "".join(_line(each) for each in changes)
 
 
 def _size(change: Change) -> int:
     before = 0 if change.before is None else int(change.before.ByteSize())
-    # Names, times and numbers besides.
+    # 200: names, time and numbers.
     return 200 + len(change.component) + before + int(change.value.ByteSize())
 
 
@@ -189,5 +193,5 @@ def _change(line: str) -> Change:
             fields[name] = json_format.ParseDict(fields[name], Value())
     change = Change(**fields)
     if type(change.number) is not int or not isinstance(change.component, str):
-        raise ValueError("no change")
+        raise ValueError("not a change")
     return change

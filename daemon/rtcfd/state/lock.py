@@ -1,4 +1,4 @@
-"""One rtcfd for a state folder: two would overwrite each other's states."""
+"""Locks a state folder for one rtcfd: two would overwrite each other's states."""
 
 import fcntl
 import logging
@@ -13,10 +13,10 @@ log = logging.getLogger(__name__)
 
 
 def lock(folder: Path) -> None:
-    """Keep other rtcfds off a folder until this process ends; refuse if there is one.
+    """Lock a folder until this process ends; raises FailedPrecondition if another rtcfd has it.
 
-    The folder itself is locked, which works on a disk that is full or read-only.  Where the file
-    system locks nothing, a line of the log says so.  Blocks.
+    Locks the folder itself, which works on a full or read-only disk.  If the file system has no
+    locks, only logs a warning.  Blocks.
     """
     try:
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
@@ -42,7 +42,7 @@ def lock(folder: Path) -> None:
 
 
 def _holder(descriptor: int) -> str:
-    """Return the process that has locked the open file, if the kernel tells (see proc_locks(5))."""
+    """Return the pid of the process that has locked an open file, if known (proc_locks(5))."""
     inode = f":{os.fstat(descriptor).st_ino}"
     try:
         lines = Path("/proc/locks").read_text().splitlines()

@@ -1,8 +1,8 @@
 """Desired states on disk: one JSON file per runner, replaced atomically.
 
-A file that cannot be read, or is of a newer rtcfd, is set aside and reported; where
-that fails, nothing is saved in its place.  One of an older rtcfd is upgraded, and
-kept beside: a way back.
+A file that cannot be read, or is of a newer rtcfd, is set aside and reported; if that
+fails, it is not overwritten.  A file of an older rtcfd is upgraded, and a copy is kept
+for a downgrade.
 """
 
 import contextlib
@@ -39,21 +39,21 @@ _MARK = ".running"
 _HISTORY = ".history"
 _STOPPED = ".stopped"
 _UNREADABLE = (
-    "it cannot be read ({}); once that is mended, stop rtcfd and rename it back to have it again"
+    "it cannot be read ({}); to restore it, repair that, stop rtcfd and rename the file back"
 )
 
 _Document = dict[str, Any]
 
 
 def _from_1(document: _Document) -> None:
-    """Before components could be left out, quarantined and held, and loops resumed."""
+    """Upgrade from version 1, without loop state, quarantine, left-out components and leases."""
     document.setdefault("running", False)
     for key in ("quarantined", "left_out", "leased"):
         document.setdefault(key, {})
     document.setdefault("hold", None)
 
 
-# What makes a document of the version after out of one of each version.
+# By version, the function that upgrades a document to the next version.
 _UPGRADES: dict[int, Callable[[_Document], None]] = {1: _from_1}
 assert set(_UPGRADES) == set(range(1, VERSION))
 
@@ -63,41 +63,42 @@ class _Newer(ValueError):
 
 
 class Store:
-    """The state folder; None keeps nothing.
+    """The state folder; None = no state is kept.
 
-    `boot_folder`: where stops are noted, until the machine's next boot, that the state folder
-    does not take.
+    `boot_folder` is for notes of stops that could not be written to the state folder.  It lasts
+    until the machine's next boot.
     """
 
     def __init__(self, folder: Path | None, boot_folder: Path | None = None) -> None:
         self._folder = folder
         self._boot_folder = boot_folder
-        self._kept: set[Path] = set()  # what could neither be read nor set aside
-        self._unseen = False  # what is in the folder is not known
-        self.problems: list[str] = []  # that load() met, a line each
+        self._kept: set[Path] = set()  # files that could neither be read nor set aside
+        self._unseen = False  # the folder could not be read
+        self.problems: list[str] = []  # the errors of load(), a line each
 
     def prepare(self) -> None:
-        """Make the folder; raises OSError."""
+        """Create the folder; raises OSError."""
         if self._folder is not None:
             self._folder.mkdir(mode=0o750, parents=True, exist_ok=True)
 
     def lock(self) -> None:
-        """Refuse a folder that another rtcfd uses, and keep others off."""
+        """Lock the folder; raises FailedPrecondition if another rtcfd uses it."""
         if self._folder is not None:
             lock(self._folder)
 
     def mark(self, runner: str) -> Path | None:
-        """Return the file without which a loop is not resumed, whatever the state says.
+        """Return the path of a runner's mark.  Without this file its loop is not resumed, even
+        if the state says so.
 
-        It is there while a loop is to run.  Removing it works on a full disk,
-        and the executor does so when somebody stops its loop without rtcfd.
+        The file exists while the loop is wanted.  It can be removed even on a full disk, and the
+        executor removes it on a direct stop, without rtcfd.
         """
         return None if self._folder is None else self._folder / f"{runner}{_MARK}"
 
     def load(self, alive: Collection[str] = ()) -> list[Desired]:
         """Return all states, by runner.
 
-        `alive`: runners whose executors are there, and say themselves whether their loops run.
+        `alive` are the runners with an executor, which itself reports whether its loop runs.
         """
         if self._folder is None:
             return []
@@ -118,7 +119,7 @@ class Store:
                 if desired.running and (
                     not self._marked(desired.runner) or self._stop_is_noted(desired.runner)
                 ):
-                    # Stopped, and there was nobody or no room to write it down.
+                    # It was stopped, but the state could not be written then.
                     desired.running, desired.ended_boot = False, this_boot()
                 if (
                     desired.running
@@ -128,8 +129,8 @@ class Store:
                     desired.running = False
                     self._report(
                         f"the loop of {desired.runner} is not resumed: state folder "
-                        f"{self._folder} cannot be written, so it would say that the loop runs "
-                        "also if somebody has stopped it; mend that"
+                        f"{self._folder} cannot be written, so that a stop could not be recorded; "
+                        "repair that"
                     )
                 self._read_history(desired)
                 states.append(desired)
@@ -145,8 +146,8 @@ class Store:
             self._unseen = not isinstance(error, FileNotFoundError)
             if self._unseen:
                 self._report(
-                    f"state folder {self._folder} cannot be read, and what is there is not "
-                    f"overwritten: {error.strerror}; mend that and restart rtcfd"
+                    f"state folder {self._folder} cannot be read, and its files are not "
+                    f"overwritten: {error.strerror}; repair that and restart rtcfd"
                 )
             return []
 
@@ -155,12 +156,14 @@ class Store:
         if mark is None:
             return False
         if os.path.lexists(mark) and not _is_mark(mark):
-            self._set_aside(mark, "unreadable", "it is no regular file, its loop is not resumed")
+            self._set_aside(
+                mark, "unreadable", "it is not a regular file, its loop is not resumed"
+            )
         return _is_mark(mark)
 
     def text(self, desired: Desired) -> bytes:
-        """Return what save() is to write; on the thread that owns the state."""
-        # A hold is for now, what it parked is for good.
+        """Return the text for save(); on the thread that owns the state."""
+        # The settings of a lease are temporary; the parked ones are permanent.
         chosen = _json(desired.hold.parked if desired.hold else desired.chosen)
         components = ",\n".join("    " + text for text in desired.component_texts())
         return (
@@ -181,8 +184,8 @@ class Store:
     def save(self, runner: str, text: bytes, running: bool) -> None:
         """Replace a runner's file, durably; raises OSError.  May run on any thread.
 
-        `running`: what the text says of the loop.  That it is not to run is
-        saved whatever becomes of the rest.
+        `running` is the loop's state in the text.  If it is False, this is recorded even if the
+        rest fails.
         """
         mark = self.mark(runner)
         if self._folder is None or mark is None:
@@ -190,7 +193,7 @@ class Store:
         if not running:
             try:
                 _unmark(mark)
-                # At once: the rest may find no room, and the state before says that it runs.
+                # At once: the rest may fail, and in the old state the loop runs.
                 durable.sync_folder(self._folder)
             except OSError:
                 self.note_stop(runner)
@@ -199,14 +202,14 @@ class Store:
         self._require_known(file)
         durable.replace(file, text)
         if running and not _is_mark(mark):
-            # Whatever else has its name is none.
+            # This replaces anything else of that name.
             durable.replace(mark, b"", sync=False)
         durable.sync_folder(self._folder)
 
     def save_history(self, runner: str, changes: Sequence[Change], anew: bool) -> None:
-        """Write what History.to_write() gave; raises OSError.  May run on any thread.
+        """Write the result of History.to_write(); raises OSError.  May run on any thread.
 
-        It is for people, who can do without the last line after a power cut: no fsync.
+        Without fsync: the history is informative, and may lose its last lines in a power cut.
         """
         if self._folder is None or not changes:
             return
@@ -229,7 +232,7 @@ class Store:
             self._set_aside(file, "unreadable", _UNREADABLE.format(error.strerror))
 
     def remove(self, runner: str) -> None:
-        """Forget a runner; raises OSError."""
+        """Remove all files of a runner; raises OSError."""
         if self._folder is None:
             return
         _unmark(self._folder / f"{runner}{_MARK}")
@@ -244,8 +247,10 @@ class Store:
         return None if self._boot_folder is None else self._boot_folder / f"{runner}{_STOPPED}"
 
     def note_stop(self, runner: str) -> None:
-        """Note outside the state folder, where that is known, that a loop is not to run, until
-        save() has it in the folder.  May run on any thread."""
+        """Note in the boot folder, if there is one, that a loop must not run.
+
+        The note is valid until save() has written the state.  May run on any thread.
+        """
         note = self._note(runner)
         if note is not None:
             with contextlib.suppress(OSError):
@@ -285,11 +290,11 @@ class Store:
         log.info("state %s is of version %d: upgraded, kept as %s", file, version, beside.name)
 
     def _require_known(self, file: Path) -> None:
-        """Raise OSError if what a file holds could not be read, and would be lost."""
+        """Raise OSError for a file that could not be read: its content would be lost."""
         if (file in self._kept or self._unseen) and os.path.lexists(file):
             raise OSError(
                 errno.EPERM,
-                f"{file} could not be read, and is not overwritten: mend or move it, and restart "
+                f"{file} could not be read, and is not overwritten: repair or move it, and restart "
                 "rtcfd",
             )
 
@@ -334,17 +339,17 @@ def _hold(desired: Desired) -> str:
 
 
 def _upgraded(text: bytes) -> tuple[_Document, int]:
-    """Return a document of our version, and the version it had."""
+    """Return a document of our version, and its original version."""
     document = json.loads(text)
     if not isinstance(document, dict):
         raise ValueError("it is not a JSON object")
     version = document.get("version")
     if type(version) is not int or version < 1:
-        raise ValueError(f"its version is {version!r}, which there never was")
+        raise ValueError(f"its version is {version!r}, which does not exist")
     if version > VERSION:
         raise _Newer(
-            f"it is of version {version}, of a newer rtcfd than this, which knows {VERSION}; "
-            "install that, stop rtcfd and rename the file back to have it again"
+            f"it is of version {version}, of a newer rtcfd than this, which knows {VERSION}; to "
+            "restore it, install that rtcfd, stop it and rename the file back"
         )
     for step in range(version, VERSION):
         _UPGRADES[step](document)

@@ -174,7 +174,7 @@ def test_an_executor_that_knows_of_no_values_is_asked_for_none(
     with stopped_daemon.client() as client:
         with pytest.raises(rtcf.RefusedError) as refused:
             client.watch_ports()
-        assert "is of rtcf 0.0.9, which tells no values of ports" in str(refused.value)
+        assert "is of rtcf 0.0.9, which sends no values of ports" in str(refused.value)
         assert client.get_status().runners[0].pid
 
 

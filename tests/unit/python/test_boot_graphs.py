@@ -18,7 +18,7 @@ def test_a_graph_counts_when_the_file_that_was_in_its_way_is_gone(tmp_path: Path
         found, problems = graphs.read()
         return [(each.file.name, each.changed) for each in found], problems
 
-    problem = f"{second}: runner arm is in {first} already"
+    problem = f"{second}: runner arm is already in {first}"
     assert read() == ([("a.yaml", True)], [problem])
     assert read() == ([("a.yaml", False)], [problem])
     first.unlink()

@@ -90,14 +90,20 @@ RULES = (
         ("[runner.ros]\nmaster_uri = 'http://x:1'\nqueue = 0", "rtcfd.toml:3: "),
         ("[runner]\nros = {queue = 0}", "rtcfd.toml:2: "),
         (RULES + "most_per_s = 0", "rtcfd.toml:6: access.parameters: most_per_s must be above 0"),
-        (RULES + "runner = '('", "rtcfd.toml:6: access.parameters: '(' is no expression"),
-        (RULES + "names = ['(']", "rtcfd.toml:6: access.parameters: '(' is no expression"),
+        (
+            RULES + "runner = '('",
+            "rtcfd.toml:6: access.parameters: '(' is not a regular expression",
+        ),
+        (
+            RULES + "names = ['(']",
+            "rtcfd.toml:6: access.parameters: '(' is not a regular expression",
+        ),
         (RULES + "whom = []", 'rtcfd.toml:6: unknown key "access.parameters.whom"'),
         ("\n[[access.parameters]]\nrunner = 'a'", "rtcfd.toml:2: access.parameters: who must be"),
         ("x = " + "[" * 3000 + "]" * 3000, "lists or tables in it are nested too deep"),
         ("[access]\ndefault = 'root'", "access.default must be one of none, observe, tune"),
         ("[access]\nobserve = 'alice'", "access.observe must be a list of users and @groups"),
-        ("[access]\nobserve = ['a b']", "'a b' is no user's name, nor @ and a group's"),
+        ("[access]\nobserve = ['a b']", "'a b' is neither a user nor a @group"),
         ("[access]\nobserve=['a']\nadmin=['a']", ":3: access.admin: a is in access.observe"),
         ("[access.default" + ".a" * 5000 + "]", "lists or tables in it are nested too deep"),
         ("[limits]\nclients = 0", ":2: limits.clients of 0 is out of range: 1 to 4096"),
@@ -207,7 +213,7 @@ def test_only_a_file_that_is_not_there_means_the_defaults(
     assert given.access.default.word == "observe"
     assert given.settings.problem == (
         f"cannot read {file}: it is a symbolic link that leads nowhere; the last good settings are "
-        "taken instead"
+        "used instead"
     )
     # Of a folder on the way to it as well.
     file.unlink()

@@ -192,7 +192,7 @@ def test_bad_runner_name_is_refused(client: rtcf.Client, name: str) -> None:
 
 
 def test_a_runner_that_is_there_is_refused(client: rtcf.Client) -> None:
-    with pytest.raises(rtcf.RefusedError, match="runner rt_runner is there already") as refused:
+    with pytest.raises(rtcf.RefusedError, match="runner rt_runner exists already") as refused:
         client.add_runner("rt_runner")
     assert refused.value.code == "ALREADY_EXISTS"
 

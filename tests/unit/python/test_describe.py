@@ -78,7 +78,7 @@ def test_what_did_not_load_is_looked_at_again_though_its_file_is_the_same(
         ("kill -KILL $$", "was killed by SIGKILL", False),
         ("kill -BUS $$", "was killed by SIGBUS", False),
         ("echo libneeded.so: cannot open >&2; exit 1", "libneeded.so: cannot open", False),
-        ("echo nonsense", "did not answer in the protocol", False),
+        ("echo nonsense", "wrote no valid description", False),
         ("exec sleep 3600", "did not end within", False),
     ],
 )
@@ -185,9 +185,9 @@ def test_what_a_library_has_started_ends_with_its_process(library: Path, tmp_pat
 @pytest.mark.parametrize(
     ("odd", "said"),
     [
-        (odd_files.pipe, "cannot read it: it is a named pipe, no regular file"),
-        (odd_files.folder, "cannot read it: it is a folder, no regular file"),
-        (odd_files.device, "cannot read it: it is a device, no regular file"),
+        (odd_files.pipe, "cannot read it: it is a named pipe, not a regular file"),
+        (odd_files.folder, "cannot read it: it is a folder, not a regular file"),
+        (odd_files.device, "cannot read it: it is a device, not a regular file"),
     ],
 )
 def test_what_is_no_file_is_not_opened(

@@ -262,7 +262,7 @@ def test_a_flight_recorder_is_read_through_proc_and_after_its_end() -> None:
 def test_what_is_no_flight_recorder_is_refused() -> None:
     writer = FlightWriter()
     writer.put(0, 0)
-    with pytest.raises(ValueError, match="no flight recorder"):
+    with pytest.raises(ValueError, match="not a flight recorder"):
         FlightRecorder(os.getpid(), writer.descriptor)
 
 

@@ -72,7 +72,7 @@ def test_a_type_that_is_in_two_places_is_said(daemon: DaemonUnderTest, client: r
     daemon.package("demo", "elsewhere", types={"Fine": "fine"})
     (note,) = client.load(rtcf.component("demo", "Fine")).notes
     taken, other = (daemon.packages / "demo" / f"{name}.so" for name in ("elsewhere", "main"))
-    assert note == f"demo/Fine is in several places: {taken} is taken, not {other}"
+    assert note == f"several libraries provide demo/Fine: rtcfd uses {taken}, not {other}"
 
 
 def test_holders_of_one_launch_are_told_a_note_once(
@@ -92,7 +92,7 @@ def test_holders_of_one_launch_are_told_a_note_once(
         assert [each.WhichOneof("kind") for each in messages][-1] == "ended"
 
     first, told = leased("one")
-    assert len(told) == 1 and "is in several places" in told[0]
+    assert len(told) == 1 and "several libraries provide demo/Fine" in told[0]
     second, nothing = leased("two")
     assert nothing == []
     end(*first)
@@ -183,7 +183,7 @@ def test_a_change_outlives_its_caller(
     wait_for(lambda: daemon.executor_pid(), "an answer")
     go.touch()
     wait_for(lambda: client.get_order() == ["/Slow"], "the load")
-    wait_for(lambda: "its caller had left" in daemon.log(), "the log")
+    wait_for(lambda: "its caller had disconnected" in daemon.log(), "the log")
     assert list(saved(daemon)) == ["/Slow"]
 
 
@@ -262,7 +262,7 @@ def test_a_component_can_be_taken_out_while_the_executor_is_down(
     )
     with pytest.raises(rtcf.RefusedError, match="no component /c"):
         client.unload(["c"])
-    assert client.unload(["a"]).notes == ["taken out of the saved graph only"]
+    assert client.unload(["a"]).notes == ["removed from the saved graph only"]
     daemon.executor.write_text(works)
     assert client.start().order == ["/b"]
 

@@ -72,10 +72,10 @@ def test_a_setting_that_is_not_known_is_refused_and_not_stored(
         runner_pb2.RunnerSettings(realtime=UNKNOWN),
         runner_pb2.RunnerSettings(ros=runner_pb2.RosSettings(peers=UNKNOWN)),
     ):
-        with pytest.raises(rtcf.RefusedError, match=" 99 is not known: choose of ") as refused:
+        with pytest.raises(rtcf.RefusedError, match=" 99 is not known: choose one of ") as refused:
             client.set_runner(change)
         assert refused.value.reason == "VALUE_INVALID"
-        with pytest.raises(rtcf.RefusedError, match=" 99 is not known: choose of "):
+        with pytest.raises(rtcf.RefusedError, match=" 99 is not known: choose one of "):
             client.add_runner("arm", change)
     assert daemon.saved() == before
     assert [each.runner for each in client.get_status().runners] == ["rt_runner"]
@@ -111,6 +111,6 @@ def test_a_state_with_a_value_that_is_not_known_is_set_aside(
     place(state)
     (stopped_daemon.state / "rt_runner.json").write_text(json.dumps(state))
     stopped_daemon.start()
-    assert f"it is corrupt ({what} 99 is not known: choose of " in stopped_daemon.log()
+    assert f"it is corrupt ({what} 99 is not known: choose one of " in stopped_daemon.log()
     with stopped_daemon.client() as client:
         assert client.get_status().runners[0].settings.realtime == runner_pb2.REALTIME_PREFERRED

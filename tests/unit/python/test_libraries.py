@@ -36,8 +36,8 @@ def test_a_library_that_no_longer_loads_is_not_replaced_by_one_of_another_folder
             client.load(rtcf.component("demo", "Fine", name="b"))
         assert refused.value.code == "FAILED_PRECONDITION"
         assert str(refused.value) == (
-            f"demo/Fine: {first} does not load, and {later} of a later folder is not taken in its "
-            f"place: mend {first}, or remove it: {first}: undefined symbol: _ZN3FooE"
+            f"demo/Fine: {first} does not load, and {later} in a later folder does not replace "
+            f"it: repair or remove {first}: {first}: undefined symbol: _ZN3FooE"
         )
         # Nothing is offered that cannot be loaded.
         listed = client.list_types("demo")

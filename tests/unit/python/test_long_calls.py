@@ -117,7 +117,7 @@ def test_who_watches_sees_nothing_more_when_the_right_is_gone(stream: str) -> No
             client.reload()
         said = watcher.stdout.readline()
         assert said.startswith("PERMISSION_DENIED Watch")
-        assert "takes the right to observe, and user #54321 has none" in said
+        assert "requires the right to observe, and user #54321 has none" in said
 
 
 @root_only
@@ -133,7 +133,7 @@ def test_a_later_message_takes_the_right_too() -> None:
             client.reload()
         print("go on", file=holder.stdin, flush=True)
         assert holder.stdout.readline().startswith(
-            "PERMISSION_DENIED HoldRunner takes the right to administer, and user #54321 has only"
+            "PERMISSION_DENIED HoldRunner requires the right to administer, and user #54321 has only"
         )
 
 

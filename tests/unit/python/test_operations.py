@@ -93,7 +93,7 @@ def ask_and_leave(
     daemon: DaemonUnderTest, method: str, request: Any, until: Callable[[], Any] | None = None
 ) -> None:
     """Ctrl-C on a client: once `until` is true, or its call is surely queued."""
-    before = daemon.log().count("its caller left")
+    before = daemon.log().count("its caller disconnected")
     with daemon.client() as client:
         ask = getattr(client._stub, method)
         call = ask.future(request) if hasattr(ask, "future") else ask(request)
@@ -102,7 +102,9 @@ def ask_and_leave(
         if until is not None:
             wait_for(until, "the call to begin")
         call.cancel()
-    wait_for(lambda: daemon.log().count("its caller left") > before, "the caller to be missed")
+    wait_for(
+        lambda: daemon.log().count("its caller disconnected") > before, "the caller to be missed"
+    )
 
 
 def test_what_waits_is_withdrawn_when_its_caller_leaves(
@@ -124,7 +126,7 @@ def test_a_start_that_waits_is_withdrawn_by_a_stop(service: DaemonUnderTest, hel
         starting = Call(service, lambda c: c.start())
         with service.client() as client:
             wait_for(lambda: client.stop() and not starting.is_alive(), "the start to be refused")
-    assert "withdrawn: the loop was stopped after it was asked for" in starting.end()
+    assert "withdrawn: the loop was stopped after the request" in starting.end()
     assert call.end() == ""
     assert status(service).state == STOPPED
     assert service.saved()["running"] is False
@@ -136,7 +138,7 @@ def test_a_start_under_way_does_not_outlive_a_stop(service: DaemonUnderTest, hel
         busy_with(service, "the start")
         with service.client() as client:
             client.stop()
-    assert "was stopped after this was asked for" in starting.end()
+    assert "was stopped after this request" in starting.end()
     assert status(service).state == STOPPED
     assert service.saved()["running"] is False
 

@@ -47,7 +47,7 @@ def test_units_are_the_same_with_every_option(words: str, field: str, value: flo
         ("--spin 1.5", "argument --spin: 1.5 is no whole number of µs"),
         ("--spin 1e400us", "argument --spin: 1e400us is no whole number of µs"),
         ("--priority 1e400", "argument --priority: 1e400 is no whole number"),
-        ("--frequency fast", "argument --frequency: fast: a number with one of Hz, kHz, please"),
+        ("--frequency fast", "argument --frequency: fast: give a number with one of Hz, kHz"),
     ],
 )
 def test_what_is_no_such_number_is_a_usage_error(

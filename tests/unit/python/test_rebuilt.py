@@ -57,8 +57,8 @@ def test_apply_says_that_it_left_old_code_running(
     assert daemon.ctl("apply", str(graph)).stderr == ""
     rebuild(library)
     said = daemon.ctl("apply", str(graph)).stderr
-    assert said.startswith("rtcfctl: note: another library than /Late was loaded from is there now")
-    assert said.endswith("--rebuilt takes it\n")
+    assert said.startswith("rtcfctl: note: the library of /Late has changed since it was loaded")
+    assert said.endswith("--rebuilt loads the new one\n")
 
 
 def test_what_changed_while_rtcfd_was_restarted_is_said_by_the_next(

@@ -47,7 +47,7 @@ def test_a_start_with_bad_settings_takes_the_last_good_ones_and_says_so(
     assert status.runners[0].settings.frequency_hz == 250.0
     said = f"{daemon.settings}:2: runner.frequency_hz must be a number"
     assert status.notes[0].startswith(said)
-    assert status.notes[0].endswith("; the last good settings are taken instead")
+    assert status.notes[0].endswith("; the last good settings are used instead")
     assert said in daemon.log()
     # Mended ones are read without a restart.
     daemon.settings.write_text(GOOD.replace("250", "500"))
@@ -70,7 +70,7 @@ def test_a_restart_warns_of_settings_that_the_next_rtcfd_will_not_take(
     daemon.settings.write_text(BAD)
     assert daemon.end(signal.SIGUSR1) == 0
     said = f"{daemon.settings}:2: runner.frequency_hz must be a number"
-    assert f"the next rtcfd will take the last good settings: {said}" in daemon.log()
+    assert f"the next rtcfd will use the last good settings: {said}" in daemon.log()
     # And so it does.
     daemon.start_service()
     with daemon.client() as client:
@@ -127,7 +127,7 @@ def test_settings_that_cannot_be_read_hold_up_no_restart(
     finally:
         hangs.set()
     assert asked.is_set()
-    assert "not known whether the next rtcfd will take the settings" in caplog.text
+    assert "cannot check the settings for the next rtcfd" in caplog.text
     # The executor was left in order to the next one.
     daemon.start_service()
     assert daemon.executor_pid() == pid
@@ -225,7 +225,7 @@ def test_a_reload_fails_when_a_graph_is_refused(stopped_daemon: DaemonUnderTest)
     # Nor does the journal end in another word.
     ends = [line for line in daemon.log().splitlines() if "Reload by" in line]
     assert [line.endswith(": done") for line in ends] == [True, False]
-    assert f"not all of it done: {refused}: " in ends[1]
+    assert f"partly failed: {refused}: " in ends[1]
 
 
 def test_a_reload_that_was_refused_is_told_until_one_is_not(
@@ -236,7 +236,7 @@ def test_a_reload_that_was_refused_is_told_until_one_is_not(
     daemon.start_service()
     daemon.settings.write_text(BAD)
     assert rtcfd(daemon, "--reload").returncode == 1
-    said = f"settings not read again: {daemon.settings}:2: runner.frequency_hz must be a number"
+    said = f"settings not reloaded: {daemon.settings}:2: runner.frequency_hz must be a number"
     with daemon.client() as client:
         (note,) = client.get_status().notes
         assert note.startswith(said)

@@ -74,7 +74,7 @@ def test_half_a_remap_is_refused(text: str) -> None:
 @pytest.mark.parametrize("name", ["remaps", "parameters", "breaks"])
 def test_a_text_is_not_taken_for_several_letters(name: str) -> None:
     given: dict[str, Any] = {name: "in:=/x"}
-    with pytest.raises(TypeError, match=rf"{name} are several, in a list: \['in:=/x'\], not 'in"):
+    with pytest.raises(TypeError, match=rf"{name} must be a list: \['in:=/x'\], not 'in"):
         rtcf.component("p", "T", **given)
 
 
@@ -94,7 +94,7 @@ CALLS: dict[str, Callable[[rtcf.Client], object]] = {
 
 @pytest.mark.parametrize("call", CALLS)
 def test_a_text_is_not_taken_for_several_of_a_calls_names(tmp_path: Path, call: str) -> None:
-    said = rf"{call.split()[0]} are several, in a list: \['/x'\], not '/x'"
+    said = rf"{call.split()[0]} must be a list: \['/x'\], not '/x'"
     with rtcf.Client(tmp_path / "none") as client, pytest.raises(TypeError, match=said):
         CALLS[call](client)
 

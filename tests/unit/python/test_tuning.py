@@ -104,7 +104,7 @@ def test_a_number_changes_no_faster_than_is_allowed(
     [
         ("who = 'ann'", "who must be a list of users and @groups"),
         ("who = ['a b']", "who must be a list of users and @groups"),
-        ("who = ['a']\nnames = ['(']", "'(' is no expression"),
+        ("who = ['a']\nnames = ['(']", "'(' is not a regular expression"),
         ("who = ['a']\nmost_per_s = 0", "most_per_s must be above 0"),
         ("who = ['a']\npace = 1", "unknown key"),
     ],
