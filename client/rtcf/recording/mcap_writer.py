@@ -134,15 +134,15 @@ class McapWriter:
         end = max(int(column.times.max()) for part in merged.values() for column in part)
         records = b"".join(parts)
         name, packed = self._compress(records)
-        self.packed_chunk(Chunk(start, end, len(records), zlib.crc32(records), name, packed), counts)
+        self.packed_chunk(
+            Chunk(start, end, len(records), zlib.crc32(records), name, packed), counts
+        )
 
     def packed_chunk(self, chunk: Chunk, counts: Mapping[int, int]) -> None:
         """Write a chunk that is compressed already, with `counts` messages by channel."""
         head = struct.pack("<QQQI", chunk.start, chunk.end, chunk.size, chunk.crc)
         name = _text(chunk.compression)
-        packed = record(
-            CHUNK, head + name + struct.pack("<Q", len(chunk.packed)) + chunk.packed
-        )
+        packed = record(CHUNK, head + name + struct.pack("<Q", len(chunk.packed)) + chunk.packed)
         mark = len(self._pending)
         at = self._at + mark
         self._pending += packed

@@ -568,10 +568,7 @@ def _column(records: _Records, channel: int, leaf: ros_layout.Leaf) -> "NDArray[
 
     offset = mcap.MESSAGE_HEAD + leaf.offset
     return np.concatenate(
-        [
-            records.field(run, offset, leaf.format, leaf.count)
-            for run in records.runs[channel]
-        ]
+        [records.field(run, offset, leaf.format, leaf.count) for run in records.runs[channel]]
     )
 
 

@@ -156,9 +156,7 @@ class Store:
         if mark is None:
             return False
         if os.path.lexists(mark) and not _is_mark(mark):
-            self._set_aside(
-                mark, "unreadable", "it is not a regular file, its loop is not resumed"
-            )
+            self._set_aside(mark, "unreadable", "it is not a regular file, its loop is not resumed")
         return _is_mark(mark)
 
     def text(self, desired: Desired) -> bytes:
