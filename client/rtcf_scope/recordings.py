@@ -47,9 +47,7 @@ class Recordings:
         first cycle; raises RecordingError."""
         with self._open(name) as recording:
             span = (_stamp(recording, begin_s), _stamp(recording, end_s))
-            numbers, durations, latencies = recording.read_cycles(
-                ("iteration", "duration_ns", "latency_ns"), *span
-            ).values()
+            numbers, durations, latencies = recording.read_cycles(*span).values()
             stamps = numbers.stamps_ns
             if not len(stamps):
                 then = "" if span == (None, None) else " then"
@@ -57,7 +55,7 @@ class Recordings:
             found = [(stamps - recording.begin_ns) / 1e9, numbers.values, latencies.values / 1e3,
                      durations.values / 1e3]  # fmt: skip
             named = {split_element(trace)[0] for trace in traces}
-            signals = recording.read(named & recording.signals.keys(), *span)
+            signals = recording.read_all(named & recording.signals.keys(), *span)
             found += [_placed(signals, trace, stamps) for trace in traces]
         columns = _with_gaps(np.array(found, "<f8"))
         columns, each = _windows(columns, MOST_VALUES // len(columns))

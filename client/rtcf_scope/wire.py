@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from rtcf_scope.chunk import Chunk
 
 CYCLES, SHOT, RECORDED = range(1, 4)
-# Kind, last of a loop, number of `watching`, cycles, columns, lost before these, cycle of the hit; of
-# a recording the cycles of a window, of which two rows tell minima and maxima (1 = each cycle).
+# Kind, last of a loop, number of `watching`, cycles, columns, lost before these, cycle of the hit.
+# Of a recording, the last is the length of a window, whose minimum and maximum are two rows; 1 = a
+# row is a cycle.
 _HEAD = struct.Struct("<BBHIIIdd8x")
 
 

@@ -132,7 +132,8 @@ _COUNT = """
 import sys
 from mcap.reader import make_reader
 with open(sys.argv[1], "rb") as file:
-    print(sum(channel.topic == "/wave/phase" for _, channel, _ in make_reader(file).iter_messages()))
+    messages = make_reader(file).iter_messages()
+    print(sum(channel.topic == "/wave/phase" for _, channel, _ in messages))
 """
 
 
@@ -148,8 +149,9 @@ def test_a_file_whose_writer_was_killed_can_be_read(
         count = len(recording.cycles)
         assert count > 0
         assert np.all(np.diff(recording.cycles) == 1)
-    others = [mcap_python, "-c", _COUNT, file]
-    done = subprocess.run(others, capture_output=True, text=True, env=clean_environment())
+    done = subprocess.run(
+        [mcap_python, "-c", _COUNT, file], capture_output=True, text=True, env=clean_environment()
+    )
     assert (done.stdout, done.returncode) == (f"{count}\n", 0), done.stderr
     whole = tmp_path / "whole.mcap"
     done = running.ctl("convert", "--repair", str(file), str(whole))

@@ -90,13 +90,13 @@ def _write_csv(recording: Recording, file: BinaryIO) -> Iterator[int]:
     for name, signal in recording.signals.items():
         count = signal.leaf.count
         head += [name] if count is None else [f"{name}[{index}]" for index in range(count)]
-    recording.read_cycles("iteration")  # refused before a line is written
+    recording.read_cycles(end_ns=0)  # refused before a line is written
     writer.writerow(head)
     for chunk in range(recording.chunks):
-        first, *others = recording.read_cycles(_CYCLE, chunk=chunk).values()
+        first, *others = recording.read_cycles(chunk=chunk).values()
         columns = [as_list(first.values), as_list(first.stamps_ns)]
         columns += [as_list(other.values) for other in others]
-        for column in recording.read(recording.signals, chunk=chunk).values():
+        for column in recording.read_all(chunk=chunk).values():
             columns += _cells(column, first)
         writer.writerows(zip(*columns, strict=True))
         yield len(first.values)

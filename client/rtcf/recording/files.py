@@ -138,7 +138,7 @@ def _has_cycles(path: Path) -> bool:
     try:
         with read_recording(path) as recording:
             return any(
-                len(recording.read_cycles("iteration", chunk=chunk).values) > 0
+                len(recording.read_cycles(chunk=chunk)["iteration"].values) > 0
                 for chunk in range(recording.chunks)
             )
     except OSError:

@@ -1,8 +1,8 @@
 """Writes MCAP files of ROS 1 messages, many of one channel at a time.
 
-The format is that of https://mcap.dev/spec: version 0, profile `ros1`.  A chunk holds whole columns:
-all messages of a channel follow each other.  It has no index of its messages, which would be larger
-than they are.
+The format is that of https://mcap.dev/spec: version 0, profile `ros1`.  A chunk holds whole
+columns: all messages of a channel follow each other.  It has no index of its messages, which would
+be larger than the messages.
 
 At any time the file is a valid one: it ends in a footer without a summary, which the next chunk
 overwrites last.  Readers open it up to its last chunk, even where the writer was killed.  A pipe

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any
 
 from rtcf_shared.arrays import as_list
 from rtcf_shared.errors import RtcfError
@@ -200,89 +200,70 @@ class Recording(Closing):
     @property
     def cycles(self) -> "NDArray[np.int64]":
         """The numbers of all cycles, in the order in which they were recorded."""
-        return self.read_cycles("iteration").values
+        return self.read_cycles()["iteration"].values
 
     @property
     def stamps_ns(self) -> "NDArray[np.int64]":
         """CLOCK_REALTIME of each cycle's deadline, or the simulated time; ns."""
-        return self.read_cycles("iteration").stamps_ns
+        return self.read_cycles()["iteration"].stamps_ns
 
     @property
     def durations_ns(self) -> "NDArray[np.int64]":
         """Calculation in each cycle; ns."""
-        return self.read_cycles("duration_ns").values
+        return self.read_cycles()["duration_ns"].values
 
     @property
     def latencies_ns(self) -> "NDArray[np.int64]":
         """Wake-up after each deadline; ns."""
-        return self.read_cycles("latency_ns").values
+        return self.read_cycles()["latency_ns"].values
 
     def __getitem__(self, name: str) -> "NDArray[Any]":
         """Return all values of a signal."""
         return self.read(name).values
 
-    @overload
-    def read(
-        self, name: str, begin_ns: int | None = None, end_ns: int | None = None,
-        chunk: int | None = None,
-    ) -> RecordedColumn: ...  # fmt: skip
-
-    @overload
-    def read(
-        self, name: Iterable[str], begin_ns: int | None = None, end_ns: int | None = None,
-        chunk: int | None = None,
-    ) -> dict[str, RecordedColumn]: ...  # fmt: skip
-
     def read(
         self,
-        name: str | Iterable[str],
+        name: str,
         begin_ns: int | None = None,
         end_ns: int | None = None,
         chunk: int | None = None,
-    ) -> RecordedColumn | dict[str, RecordedColumn]:
+    ) -> RecordedColumn:
         """Return the values of a signal whose stamps are from `begin_ns` to before `end_ns`, or
-        those in one chunk; of several signals, by name.
+        those in one chunk; the rest of the file is not read."""
+        return self.read_all([name], begin_ns, end_ns, chunk)[name]
 
-        Each chunk is read once, and others not at all.  Signals of the same cycles share these
-        arrays.
-        """
-        names = [name] if isinstance(name, str) else list(dict.fromkeys(name))
-        for each in names:
-            if each not in self.signals:
-                known = ", ".join(list(self.signals)[:8])
-                raise RecordingError(f"{self.path} has no signal {each}; it has {known or 'none'}")
-        leaves = [(self.signals[each].channel, self.signals[each].leaf) for each in names]
-        with self._whole_only():
-            columns = self._read(leaves, begin_ns, end_ns, chunk)
-        return columns[0] if isinstance(name, str) else dict(zip(names, columns, strict=True))
-
-    @overload
-    def read_cycles(
-        self, name: str, begin_ns: int | None = None, end_ns: int | None = None,
-        chunk: int | None = None,
-    ) -> RecordedColumn: ...  # fmt: skip
-
-    @overload
-    def read_cycles(
-        self, name: Iterable[str], begin_ns: int | None = None, end_ns: int | None = None,
-        chunk: int | None = None,
-    ) -> dict[str, RecordedColumn]: ...  # fmt: skip
-
-    def read_cycles(
+    def read_all(
         self,
-        name: str | Iterable[str],
+        names: Iterable[str] | None = None,
         begin_ns: int | None = None,
         end_ns: int | None = None,
         chunk: int | None = None,
-    ) -> RecordedColumn | dict[str, RecordedColumn]:
-        """Return `iteration`, `duration_ns` or `latency_ns` of cycles, as `read` does of signals."""
+    ) -> dict[str, RecordedColumn]:
+        """Return the values of several signals by name, of all without `names`, as `read` does.
+
+        Each chunk is read once.  Signals of the same cycles share `cycles` and `stamps_ns`.
+        """
+        found = list(dict.fromkeys(self.signals if names is None else names))
+        for name in found:
+            if name not in self.signals:
+                known = ", ".join(list(self.signals)[:8])
+                raise RecordingError(f"{self.path} has no signal {name}; it has {known or 'none'}")
+        leaves = [(self.signals[name].channel, self.signals[name].leaf) for name in found]
+        with self._whole_only():
+            return dict(zip(found, self._read(leaves, begin_ns, end_ns, chunk), strict=True))
+
+    def read_cycles(
+        self,
+        begin_ns: int | None = None,
+        end_ns: int | None = None,
+        chunk: int | None = None,
+    ) -> dict[str, RecordedColumn]:
+        """Return `iteration`, `duration_ns` and `latency_ns` of cycles, as `read_all` does."""
         if not self.cycle_topic:
             raise RecordingError(f"{self.path} tells no cycles: rtcfctl record has not written it")
-        names = [name] if isinstance(name, str) else list(name)
-        leaves = [(self.cycle_topic, _CYCLE[each]) for each in names]
+        leaves = [(self.cycle_topic, leaf) for leaf in _CYCLE.values()]
         with self._whole_only():
-            columns = self._read(leaves, begin_ns, end_ns, chunk)
-        return columns[0] if isinstance(name, str) else dict(zip(names, columns, strict=True))
+            return dict(zip(_CYCLE, self._read(leaves, begin_ns, end_ns, chunk), strict=True))
 
     def messages(self, chunk: int) -> list[tuple[RecordedTopic, int, bytes]]:
         """Return the messages of a chunk as ROS 1 serialises them, with their stamps (ns), in the
@@ -331,7 +312,7 @@ class Recording(Closing):
         """Return a pandas.DataFrame of signals that are numbers, by cycle."""
         import pandas
 
-        columns = self.read(self.signals if names is None else names)
+        columns = self.read_all(names)
         indexes: dict[int, Any] = {}  # one for all signals of the same cycles
         series = {}
         for name, column in columns.items():
@@ -517,7 +498,9 @@ class Recording(Closing):
         self._file.seek(max(size - mcap.FOOTER_SIZE - len(mcap.MAGIC), 0))
         opcode, length = _RECORD.unpack(self._file.read(_RECORD.size))
         (start,) = struct.unpack("<Q", self._file.read(8))
-        return opcode == mcap.FOOTER and length == mcap.FOOTER_SIZE - _RECORD.size and start > 0
+        return bool(
+            opcode == mcap.FOOTER and length == mcap.FOOTER_SIZE - _RECORD.size and start > 0
+        )
 
     def _find_signals(self) -> None:
         outputs = {

@@ -108,8 +108,8 @@ def read(file: Path, opinion: Opinion = lambda _: "") -> Config:
         _read_limits(_table(document, "limits"), config)
         _read_message(_table(document, "runner"), "runner", config.runner)
         _check_runner(config.runner)
-        if config.runner.ListFields() and (error := opinion(config)):
-            raise _Wrong(_key(error), error)
+        if config.runner.ListFields() and (reason := opinion(config)):
+            raise _Wrong(_key(reason), reason)
     except _Wrong as wrong:
         lines = lines_of_keys(text)
         # A missing key, or one of an inline table, has the line of its table.

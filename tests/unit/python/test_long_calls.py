@@ -133,7 +133,8 @@ def test_a_later_message_takes_the_right_too() -> None:
             client.reload()
         print("go on", file=holder.stdin, flush=True)
         assert holder.stdout.readline().startswith(
-            "PERMISSION_DENIED HoldRunner requires the right to administer, and user #54321 has only"
+            "PERMISSION_DENIED HoldRunner requires the right to administer, "
+            "and user #54321 has only"
         )
 
 

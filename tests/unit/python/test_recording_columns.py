@@ -97,14 +97,18 @@ class _Model:
 
     def check(self, recording: Recording) -> None:
         """Check that a recording has all of it."""
-        columns = recording.read_cycles(("iteration", "duration_ns")) if self.cycles else {}
+        columns = recording.read_cycles() if self.cycles else {}
+        expected = {
+            "iteration": self.cycles,
+            "duration_ns": [cycle % 1000 for cycle in self.cycles],
+            "latency_ns": [0] * len(self.cycles),
+        }
         for name, column in columns.items():
-            expected = self.cycles if name == "iteration" else [each % 1000 for each in self.cycles]
-            assert column.values.tolist() == expected
+            assert column.values.tolist() == expected[name]
             assert column.stamps_ns.tolist() == self.stamps
         there = {name: rows for name, rows in self.values.items() if rows}
         assert set(recording.signals) == set(there)
-        found = recording.read(there)
+        found = recording.read_all(there)
         for name, rows in there.items():
             assert found[name].cycles.tolist() == [cycle for cycle, _ in rows], name
             assert np.array_equal(found[name].values, [value for _, value in rows]), name
