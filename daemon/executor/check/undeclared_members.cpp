@@ -13,9 +13,9 @@ constexpr std::size_t kWord = 8;  // granularity, as a number rarely changes in 
 
 }  // namespace
 
-UndeclaredMembers::UndeclaredMembers(const Component& component)
-    // Address of the complete object.
-    : object_(static_cast<const std::byte*>(dynamic_cast<const void*>(&component))) {
+UndeclaredMembers::UndeclaredMembers(const Component& component) {
+    const void* complete = dynamic_cast<const void*>(&component);  // the complete object
+    object_ = static_cast<const std::byte*>(complete);
     const std::size_t size = malloc_usable_size(const_cast<std::byte*>(object_));
     before_.assign(object_, object_ + size);
     changed_.resize(size);

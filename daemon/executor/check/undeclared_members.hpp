@@ -32,7 +32,7 @@ class UndeclaredMembers {
     };
     void add(const void* begin, std::size_t size, std::string name, bool may_change);
 
-    const std::byte* object_;
+    const std::byte* object_ = nullptr;
     std::vector<std::byte> before_;
     std::vector<bool> changed_;
     std::vector<Field> fields_;
