@@ -341,7 +341,7 @@ TEST_F(Image, ThatACycleHasNoTimeForIsRefusedWithTheBound) {
          std::vector<std::function<void()>>{[&] { take(); }, [&] { restore(image); }}) {
         const std::string text = refusal(work);
         EXPECT_NE(text.find("touches 2097"), std::string::npos) << text;
-        EXPECT_NE(text.find("at most 131072 at 1000 Hz"), std::string::npos) << text;
+        EXPECT_NE(text.find("limit is 131072 at 1000 Hz"), std::string::npos) << text;
     }
     EXPECT_EQ(state(), RunnerState::Running);
     stop();
