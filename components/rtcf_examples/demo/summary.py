@@ -47,8 +47,7 @@ def show(outcome: Outcome, errors: list[str]) -> int:
     print(f"\n  G1          received {_of(g1, status)} of /R1_H1R2, last value {g1['newest']}")
     print(f"  G2          received {_of(g2, status)} of /R3_G2H1, last value {g2['newest']};")
     print(
-        f"              published {g2['sent']} values on /G2_R2, "
-        f"of which R2 read {outcome.answers}"
+        f"              published {g2['sent']} values on /G2_R2, of which R2 read {outcome.answers}"
     )
     _show_realtime(status)
     errors = _errors(outcome) + errors
