@@ -55,7 +55,7 @@ def test_who_watches_a_runner_that_never_was_is_told(daemon: DaemonUnderTest, co
     done = daemon.ctl("-r", "nobody", *command.split())
     assert done.returncode == 1
     assert done.stderr == (
-        'rtcfctl: no runner "nobody" (runners: rt_runner); `rtcfctl runner add nobody` makes it\n'
+        'rtcfctl: no runner "nobody" (runners: rt_runner); `rtcfctl runner add nobody` adds it\n'
     )
 
 
