@@ -27,7 +27,7 @@ class Wave final : public rtcf::Component {
     rtcf::Parameter<bool> silent{this, "silent", false, rtcf::Doc("write 0 instead of the wave")};
 
     rtcf::State<double> phase_{this, "phase", 0.0, rtcf::Doc("phase of the wave, from 0 to 1")};
-    rtcf::State<bool> above_{this, "above", false, rtcf::Doc("the sine was above 0")};
+    rtcf::State<bool> above_{this, "above", false, rtcf::Doc("the wave was above 0")};
 
     bool configure() override {
         RTCF_INFO(this, "configured: amplitude {}, rate {} Hz", amplitude.value(), rate.value());
