@@ -286,7 +286,7 @@ def test_what_is_no_flight_recorder_is_refused() -> None:
             "/b",
         ),
         (End(), Note(updating="/a", signal=11, thread=1), "SIGSEGV", "/a"),
-        (End(), Note(updating="/a"), "exit status is unknown", ""),
+        (End(), Note(updating="/a"), "with unknown exit status", ""),
         (End(0), Note(hooking="/b", hook="stop"), "exit status 0 while /b.stop was running", "/b"),
         (End(1), Note(updating="/a", hooking="/b", hook="stop"), "/a.update in cycle 0 and", ""),
         (End(-9), Note(updating="/a"), "was killed by SIGKILL", ""),

@@ -55,7 +55,7 @@ def test_who_watches_a_runner_that_never_was_is_told(daemon: DaemonUnderTest, co
     done = daemon.ctl("-r", "nobody", *command.split())
     assert done.returncode == 1
     assert done.stderr == (
-        'rtcfctl: no runner "nobody" (runners: rt_runner); `rtcfctl runner add nobody` makes it\n'
+        'rtcfctl: no runner "nobody" (runners: rt_runner); `rtcfctl runner add nobody` adds it\n'
     )
 
 
@@ -133,7 +133,8 @@ def test_a_later_message_takes_the_right_too() -> None:
             client.reload()
         print("go on", file=holder.stdin, flush=True)
         assert holder.stdout.readline().startswith(
-            "PERMISSION_DENIED HoldRunner requires the right to administer, and user #54321 has only"
+            "PERMISSION_DENIED HoldRunner requires the right to administer, "
+            "and user #54321 has only"
         )
 
 

@@ -64,12 +64,12 @@ def test_a_list_that_changed_is_not_taken_for_whole() -> None:
 
 @pytest.mark.parametrize("token", ["1", "-1-00000000", "x" * 500, "9999999999-00000000", "1-zz"])
 def test_a_token_that_is_none_is_refused(token: str) -> None:
-    with pytest.raises(InvalidArgument, match="none of this list"):
+    with pytest.raises(InvalidArgument, match="does not belong to this list"):
         page(["a", "b"], Request(page_token=token), str)
 
 
 @pytest.mark.parametrize("begin", [0, 2, 3])
 def test_a_token_that_points_outside_is_refused(begin: int) -> None:
     _, token = page(["a", "b"], Request(page_size=1), str)
-    with pytest.raises(InvalidArgument, match="none of this list"):
+    with pytest.raises(InvalidArgument, match="does not belong to this list"):
         page(["a", "b"], Request(page_token=f"{begin}-{token.partition('-')[2]}"), str)
