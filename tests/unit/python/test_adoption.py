@@ -122,7 +122,7 @@ def test_the_death_of_an_adopted_executor_is_noticed(daemon: DaemonUnderTest, le
     daemon.start()
     os.kill(left, signal.SIGKILL)
     wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
-    assert "unknown exit status" in daemon.log()
+    assert "with unknown exit status" in daemon.log()
     with daemon.client() as client:
         status = client.get_status().runners[0]
         assert status.pid != left

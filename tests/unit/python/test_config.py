@@ -104,7 +104,10 @@ RULES = (
         ("[access]\ndefault = 'root'", "access.default must be one of none, observe, tune"),
         ("[access]\nobserve = 'alice'", "access.observe must be a list of users and @groups"),
         ("[access]\nobserve = ['a b']", "'a b' is neither a user nor a @group"),
-        ("[access]\nobserve=['a']\nadmin=['a']", ":3: access.admin: a is already in access.observe"),
+        (
+            "[access]\nobserve=['a']\nadmin=['a']",
+            ":3: access.admin: a is already in access.observe",
+        ),
         ("[access.default" + ".a" * 5000 + "]", "lists or tables in it are nested too deep"),
         ("[limits]\nclients = 0", ":2: limits.clients of 0 is out of range: 1 to 4096"),
         ("[limits]\nclients = 1.5", "limits.clients must be an integer"),

@@ -70,5 +70,5 @@ def test_a_broken_library_hides_nothing_of_its_own_folder(
     with stopped_daemon.client() as client:
         client.load(rtcf.component("demo", "Fine", name="a"))
         assert offered(client, "Fine") == str(stopped_daemon.packages / "demo" / "main.so")
-        with pytest.raises(rtcf.RefusedError, match="later folder does not replace it"):
+        with pytest.raises(rtcf.RefusedError, match="does not replace it"):
             client.load(rtcf.component("demo", "Other", name="b"))

@@ -43,7 +43,10 @@ def test_units_are_the_same_with_every_option(words: str, field: str, value: flo
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("--spin 30parsecs", "argument --spin: 30parsecs: give a number with one of ns, us, µs, ms, s"),
+        (
+            "--spin 30parsecs",
+            "argument --spin: 30parsecs: give a number with one of ns, us, µs, ms, s",
+        ),
         ("--spin 1.5", "argument --spin: 1.5 is no whole number of µs"),
         ("--spin 1e400us", "argument --spin: 1e400us is no whole number of µs"),
         ("--priority 1e400", "argument --priority: 1e400 is no whole number"),
