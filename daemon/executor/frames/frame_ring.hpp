@@ -43,9 +43,6 @@ class FrameRing {
     /// @param frames wanted capacity; reduced if the ring would exceed kLargestRing
     /// @param memory memory for a ring that outlives the process; null, or memory without room: the
     /// ring is in the process's own memory
-    ///               kLargestRing
-    /// @param memory for a ring that is to outlive the process; null = any. Where that has no room,
-    ///               it is any, too
     FrameRing(std::vector<Source> sources, std::size_t frames, FrameMemory* memory = nullptr);
     FrameRing(const FrameRing&) = delete;
     FrameRing& operator=(const FrameRing&) = delete;

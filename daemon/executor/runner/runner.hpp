@@ -150,7 +150,6 @@ class Runner final : private RunnerView {
     ChangeOutcome unload(const std::vector<std::string>& names, const Progress& progress);
     /// @param reset true = parameters that `definition` does not set get their defaults; false =
     /// they keep valid values of the old component
-    ///              the old component that fit
     ChangeOutcome replace(const std::string& name, ComponentDefinition definition,
                           const std::string& library, bool reset, const Progress& progress);
     /// Changes the graph to the wanted one, in one transaction.

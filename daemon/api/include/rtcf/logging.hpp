@@ -2,6 +2,7 @@
 /// Real-time safe logging. A call stores its arguments in a record of fixed size; a worker thread
 /// formats the text later. Format strings are those of libfmt, checked at compile time. Arguments
 /// are numbers, enums, pointers and strings; strings are cut to 94 bytes.
+///
 ///     RTCF_INFO(this, "gripper at {:.3f} m", position);
 ///     RTCF_WARN_THROTTLE(this, 1.0, "{} lost packets", lost);   // at most once a second
 ///     RTCF_ERROR_ONCE(this, "no reply from {}", device);

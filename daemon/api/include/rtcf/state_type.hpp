@@ -31,6 +31,9 @@
 namespace rtcf {
 
 /// Makes a type a state type. A specialisation has
+///  - `static std::uint64_t identity() noexcept`, real-time safe
+///  - `static std::string name()`, not real-time safe
+///  - `static void print(const T&, std::string&)`, which appends one line; not real-time safe
 template <typename T, typename Enable = void>
 struct StateType;
 
