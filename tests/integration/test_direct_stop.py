@@ -100,7 +100,7 @@ def test_a_start_that_was_asked_before_the_stop_starts_nothing(
         assert daemon.ctl("stop").returncode == 0
         os.kill(daemon.pid, signal.SIGCONT)
         complaint = early.communicate(timeout=60)[1]
-    assert (early.returncode, "ask again" in complaint) == (1, True), complaint
+    assert (early.returncode, "repeat the request" in complaint) == (1, True), complaint
     assert not runs(client)
 
 

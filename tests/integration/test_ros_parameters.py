@@ -163,7 +163,7 @@ def test_a_value_out_of_range_is_refused_where_that_is_set(
     )  # fmt: skip
     assert values(client) == before
     record = wait_for(
-        lambda: next((each for each in listener.records() if "refused" in each["msg"]), None),
+        lambda: next((each for each in listener.records() if "rejected" in each["msg"]), None),
         "the record",
     )
     assert record["name"] == _NAME
@@ -206,7 +206,7 @@ def test_the_loop_follows_the_parameter_server_within_its_bounds(
 
         def told(text: str = why) -> bool:
             return any(
-                "refused" in each["msg"] and text in each["msg"] for each in listener.records()
+                "rejected" in each["msg"] and text in each["msg"] for each in listener.records()
             )
 
         wait_for(told, "the reason")
