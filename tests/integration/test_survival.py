@@ -150,7 +150,9 @@ def test_an_executor_that_neither_answers_nor_has_a_socket_keeps_its_place(daemo
         daemon.start()
         with rtcf.Client(daemon.socket) as client:
             wait_for(lambda: f"`kill {before.pid}` ends it" in state(client).status, "its line")
-            with pytest.raises(rtcf.RefusedError, match=f".pid {before.pid}. exists, but its socket"):
+            with pytest.raises(
+                rtcf.RefusedError, match=f".pid {before.pid}. exists, but its socket"
+            ):
                 client.start()
     with rtcf.Client(daemon.socket) as client:
         wait_for(lambda: state(client).pid == before.pid, "its adoption")
