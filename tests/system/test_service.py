@@ -94,7 +94,7 @@ def test_graphs_d_is_what_a_runner_has_at_boot(service: Service) -> None:
     service.machine.path("/etc/rtcfd/graphs.d/line.yaml").write_text(GRAPH)
     service.start_anew()
     assert service.ctl("-o", "json", "order").stdout.count("/") == 2
-    service.wait_until_said("runner rt_runner is as /etc/rtcfd/graphs.d/line.yaml says")
+    service.wait_until_said("runner rt_runner set up from /etc/rtcfd/graphs.d/line.yaml")
 
 
 def test_a_reload_applies_graphs_that_have_changed(service: Service) -> None:
