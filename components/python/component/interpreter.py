@@ -50,6 +50,8 @@ class _Value:
         if self._member.type.shape:
             return value
         plain = value.item()
+        if plain.__class__ is int and plain >= 2**63:
+            raise OverflowError(f"{self._member.name} does not fit int64")
         enumeration = self._member.type.enumeration
         return enumeration(plain) if enumeration else plain
 
@@ -274,6 +276,11 @@ class Component:
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Refuse what is not declared."""
+        if isinstance(getattr(type(self), name, None), property):
+            raise AttributeError(
+                f"{name} is a property, which is only read: set the members that it is computed "
+                f"from, or write a method: self.set_{name}(…)"
+            )
         if not isinstance(getattr(type(self), name, None), _Attribute):
             raise AttributeError(
                 f"{name} is not declared: write `{name}: State[float]` in class "

@@ -88,6 +88,8 @@ class Faulty(Component):
     c: State[np.int64, 3]
     o: State[float | None]
     mode: State[Mode]
+    g: State[np.float32, 2]
+    h: State[np.uint8, 2]
     LIMIT = 2.0
 """
 
@@ -193,6 +195,24 @@ UPDATE: dict[str, tuple[str, str]] = {
     "comparison with and in one": ("self.on = self.z & self.on", "&"),
     "bits of a float": ("self.n = self.f & 1", "&"),
     "shift of a float": ("self.n = self.f << 1", "<<"),
+    "bools added": ("self.n = (self.z[0] > 0.0) + (self.z[1] > 0.0)", "logic"),
+    "masks added": ("a = (self.z > 0.0) - (self.z < 0.0)", "logic"),
+    "inverted bool": ("self.on = ~self.on", "not"),
+    "negated mask": ("self.on = -(self.z[0] > 0.0)", "bools"),
+    "int or float": (
+        "a = self.n\nif self.on:\n    a = 0.5\nself.f = a",
+        "a is once an int, once a float",
+    ),
+    "largest of an int and a float": ("self.f = max(self.n, 0.5)", "once an int"),
+    "negative element of small ints": ("self.h[0] = -1", "-1 does not fit uint8"),
+    "number that does not fit its array": ("a = self.h + 256", "256 does not fit uint8"),
+    "small ints changed by ints": ("self.h += self.c[:2]", "uint8"),
+    "element of float32 with a number": ("self.f = self.g[0] * 0.1", "NumPy 2"),
+    "array of float32 with an element": ("self.f = np.sum(self.g * self.z[0])", "NumPy 2"),
+    "polynomial of float32": ("self.f = np.polyval(self.g, self.f)", "np.polyval"),
+    "sum of float32": ("self.f = sum(self.g)", "np.sum"),
+    "sine of small ints": ("a = np.sin(self.h)", "np.sin"),
+    "element of float32, or a float": ("a = self.g[0] if self.on else self.f", "float32"),
     "inverted float": ("self.f = ~self.f", "~"),
     "range of a float": ("for i in range(self.kp):  # here\n    self.n += i", "range"),
     "loop over a number": ("for i in self.n:  # here\n    self.n += 1", "int"),
@@ -549,7 +569,7 @@ CLASS: dict[str, tuple[str, str]] = {
     ),
     "property set": (
         "@property\ndef k(self):\n    return 1.0\n\ndef start(self):\n    self.k = 1.0  # here",
-        "property",
+        "k is a property, which is only read: set the members that it is computed from",
     ),
     "method without its call": (
         "def k(self):\n    return 1.0\n\ndef start(self):\n    self.f = self.k  # here",

@@ -1,6 +1,6 @@
 """Random programs for a component in Python: assignments, slices, views, broadcasting, functions of
 NumPy, lists, products of matrices, match and control flow on a state of two vectors, two matrices,
-numbers, of which one may be None, a bool and an enum.
+numbers, of which one may be None, a bool, an enum, and vectors of float32 and of small ints.
 """
 
 import random
@@ -30,6 +30,8 @@ class Programs(Component):
     vectors: Input[np.float64, (2, 6)]
     matrices: Input[np.float64, (6, 3)]
     numbers: Input[np.float64, 2]
+    singles: Input[np.float32, (2, 6)]
+    bytes: Input[np.uint8, 6]
     count: Input[np.int64]
     a: State[np.float64, 6]
     b: State[np.float64, 6]
@@ -41,6 +43,10 @@ class Programs(Component):
     flag: State[bool]
     mode: State[Mode]
     last: State[float | None]
+    g: State[np.float32, 6]
+    h: State[np.float32, 6]
+    u: State[np.uint8, 6]
+    w: State[np.int16, 6]
 
     @property
     def gap(self):
@@ -57,6 +63,10 @@ class Programs(Component):
         self.flag = self.x > self.y
         self.mode = Mode.RUN
         self.last = None
+        self.g[:] = self.singles.value[0]
+        self.h[:] = self.singles.value[1]
+        self.u[:] = self.bytes.value
+        self.w[:] = self.bytes.value
         which = self.which.value % {count}
 """
 _VECTORS = ("self.a", "self.b")
@@ -98,7 +108,7 @@ class Program:
             self._set_slice, self._set_slice, self._change_slice, self._set_matrix, self._set_row,
             self._set_element, self._set_number, self._change_number, self._view, self._change_view,
             self._variable, self._set_whole, self._set_mode, self._set_selected, self._set_any,
-            self._set_several, self._set_several, self._set_last,
+            self._set_several, self._set_several, self._set_last, self._set_narrow,
         ]  # fmt: skip
         if depth < 2 and self._draw.random() < 0.3:
             ways = [self._if, self._for, self._while, self._match, self._walrus]
@@ -207,6 +217,88 @@ class Program:
             lines += ["if self.last is not None:", f"    self.last += {self._float(scope, 1)}"]
         return lines
 
+    def _set_narrow(self, scope: _Scope) -> list[str]:
+        """Set arrays of float32 and of small ints, or numbers from these."""
+        single, small = self._single(scope, 2), self._small(scope, 2)
+        name, index = self._draw.choice("gh"), self._index(scope, _LONG)
+        byte = self._draw.randint(0, 90)
+        return [
+            self._draw.choice(
+                [
+                    f"self.{name}[:] = {single}",
+                    f"self.{name} = {single}",
+                    f"self.{name}[{index}] = {self._float(scope, 1)}",
+                    f"self.{name} {self._draw.choice('+-*')}= {single}",
+                    f"self.{name}[1:5] {self._draw.choice('+-*')}= {self._float_of_python(scope)}",
+                    f"self.{name}[:] = self.a",
+                    f"self.a[:] = {single} * self.b",
+                    f"self.a[:] = {single} * {self._float_of_python(scope)}",
+                    f"self.x = float({single}[{index}]) * self.y",
+                    f"self.x = float(np.{self._draw.choice(['sum', 'mean', 'std', 'max'])}({single}))",
+                    f"self.u[:] = {small}",
+                    f"self.u {self._draw.choice(['+', '-', '*', '&', '|', '^', '>>'])}= {byte}",
+                    f"self.u[{index}] {self._draw.choice('+-*')}= {byte}",
+                    f"self.w[:] = {small} - self.w",
+                    f"self.w[{index}] += self.n",
+                    f"self.a[:] = {small} {self._draw.choice('*/')} {self._float_of_python(scope)}",
+                    f"self.n = int({small}[{index}]) % 7",
+                    f"self.n = int(np.sum({small} > {byte}))",
+                    f"self.flag = bool(np.any({single} > {self._float_of_python(scope)}))",
+                ]
+            )
+        ]
+
+    def _float_of_python(self, scope: _Scope) -> str:
+        number = f"{self._draw.uniform(-4, 4):.2f}"
+        return self._draw.choice(["self.x", "self.y", "self.n", number, f"float({self._float(scope, 1)})"])
+
+    def _single(self, scope: _Scope, depth: int) -> str:
+        """Return a vector of float32."""
+        draw = self._draw.random()
+        if depth == 0 or draw < 0.3:
+            leaves = ["self.g", "self.h", "self.g[::-1]", "self.singles.value[1]"]
+            return self._draw.choice([*leaves, "self.a.astype(np.float32)"])
+        one, other = self._single(scope, depth - 1), self._single(scope, depth - 1)
+        number, operation = self._float_of_python(scope), self._draw.choice("+-*")
+        return self._draw.choice(
+            [
+                f"({one} {operation} {other})",
+                f"({one} {operation} {number})",
+                f"({number} {operation} {one})",
+                f"np.minimum({one}, {number})",
+                f"np.clip({one}, -2.0, {number})",
+                f"np.where({one} > {number}, {other}, {number})",
+                f"np.cumsum({one})",
+                f"np.sort({one})",
+                f"abs({one})",
+                f"-{one}",
+                f"({one} * {other}[{self._index(scope, _LONG)}])",
+                f"({one} * self.u)",
+            ]
+        )
+
+    def _small(self, scope: _Scope, depth: int) -> str:
+        """Return a vector of uint8."""
+        draw = self._draw.random()
+        if depth == 0 or draw < 0.3:
+            return self._draw.choice(["self.u", "self.u[::-1]", "self.bytes.value"])
+        one, other = self._small(scope, depth - 1), self._small(scope, depth - 1)
+        operation = self._draw.choice(["+", "-", "*", "&", "|", "^"])
+        number = self._draw.randint(1, 200)
+        return self._draw.choice(
+            [
+                f"({one} {operation} {other})",
+                f"({one} {operation} {number})",
+                f"({number} {operation} {one})",
+                f"({one} {self._draw.choice(['//', '%'])} {number})",
+                f"({one} {self._draw.choice(['<<', '>>'])} {self._draw.randint(0, 9)})",
+                f"np.minimum({one}, {number})",
+                f"np.where({one} > {other}, {one}, {number})",
+                f"(-{one})",
+                f"(~{one})",
+            ]
+        )
+
     def _set_number(self, scope: _Scope) -> list[str]:
         return [f"self.{self._draw.choice('xy')} = {self._float(scope, 3)}"]
 
@@ -228,6 +320,8 @@ class Program:
 
     def _variable(self, scope: _Scope) -> list[str]:
         name, value = self._name(), self._float(scope, 2)
+        if self._draw.random() < 0.1:
+            value = f"{self._draw.randint(-3, 3)} if {self._bool(scope, 1)} else {value}"
         scope.numbers.append(name)
         return [f"{name} = {value}"]
 
@@ -494,7 +588,10 @@ class Program:
         if draw < 0.6:
             one, other = self._int(scope, depth - 1), self._int(scope, depth - 1)
             return f"({one} {self._draw.choice(['+', '-', '*'])} {other})"
-        if draw < 0.7:
+        if draw < 0.65:
+            how = self._draw.choice(["<< 2", ">> 1", f">> {self._int(scope, 0)}", "<< (self.n % 8)"])
+            return f"({self._int(scope, depth - 1)} {how})"
+        if draw < 0.72:
             how = f"{self._draw.choice(['//', '%'])} {self._draw.choice([2, 3, -3])}"
             return f"({self._int(scope, depth - 1)} {how})"
         if draw < 0.8:

@@ -10,6 +10,7 @@ from rtcf_compile.comparison import verify
 from rtcf_compile.comparison.inside import Inside
 from rtcf_compile.machine_code import lowering
 from rtcf_compile.source import modules
+from rtcf_compile.source.mistake import Mistake
 
 FLOATS = [
     *(0.0, -0.0, 0.5, -0.5, 1.0, -1.0, 1.5, 2.5, -2.5, 3.0, 1e-300, 710.0, -710.0, 1e10, -1e10),
@@ -174,3 +175,252 @@ def test_sums_of_unsigned_ints_are_ints(tmp_path: Path) -> None:
     component.update()
     for name in ("k", "out"):
         assert np.array_equal(record[name], component._record[name])
+
+
+SHIFTS = """\
+import numpy as np
+from rtcf.component import Component, State
+
+
+def halved(x, n):
+    return x >> n
+
+
+class Shifts(Component):
+    which: State[int]
+    x: State[int]
+    n: State[int]
+    small: State[np.int8]
+    k: State[np.int64, 5]
+    b: State[np.uint8, 5]
+    c: State[np.int64, 5]
+    whole: State[int]
+    out: State[np.int64, 5]
+
+    def update(self):
+        x, n, k, b, c = self.x, self.n, self.k, self.b, self.c
+"""
+# What sets `whole`, of ints of Python.
+OF_INTS = [
+    *("x << n", "x >> n", "halved(x, n)", "1 << n", "x >> 70", "x << 64", "self.small >> n"),
+    *("x << (n & 63)", "x << True", "x >> (n & 7) << 1"),
+]
+# Statements, what they leave in `whole`.
+OF_NAMES = ["x <<= n", "x >>= n", "self.x <<= n", "self.x >>= n"]
+# What sets `out`, of arrays of NumPy.
+OF_VECTORS = [
+    *("k << n", "k >> n", "k << c", "k >> c", "1 << c", "x >> c", "k[::-1] >> 64", "b << 1"),
+    *("b >> b", "b << b", "np.left_shift(k, c)", "np.right_shift(k, n)", "k << -1", "k >> -1"),
+]
+
+
+def _goes_round(value: int) -> int:
+    return (value + 2**63) % 2**64 - 2**63
+
+
+@pytest.fixture(scope="module")
+def shifts(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    lines = SHIFTS.splitlines()
+    steps = [f"self.whole = {text}" for text in OF_INTS]
+    steps += [f"{text}; self.whole = {text.split()[0]}" for text in OF_NAMES]
+    steps += [f"self.out[:] = {text}" for text in OF_VECTORS]
+    steps += ["k <<= 3; self.out[:] = k", "k[1:] >>= c[1:]; self.out[:] = k"]
+    for number, text in enumerate(steps):
+        lines += [f"        if self.which == {number}:"]
+        lines += [f"            {each}" for each in text.split("; ")]
+    file = tmp_path_factory.mktemp("shifts") / "shifts.py"
+    file.write_text("\n".join(lines) + "\n")
+    (cls,) = modules.components(modules.load(file))
+    return cls, Inside(lowering.compile_component(cls)), steps
+
+
+COUNTS = (0, 1, 7, 8, 62, 63, 64, 65, 127, 128, 1000, -1, -64)
+
+
+@pytest.mark.parametrize("text", OF_INTS + OF_NAMES)
+def test_ints_are_shifted_as_in_python(text: str, shifts: Any) -> None:
+    cls, compiled, steps = shifts
+    which = next(i for i, each in enumerate(steps) if text in each)
+    for x in (0, 1, -1, 5, -7, 2**62, -(2**63), 2**63 - 1):
+        for n in COUNTS:
+            record = cls()._record
+            record["which"], record["x"], record["n"], record["small"] = which, x, n, x % 5 - 3
+            said = compiled.call("update", record)
+            names = {"x": x, "n": n, "halved": lambda x, n: x >> n}
+            plain = text.replace("self.small", str(x % 5 - 3)).replace("self.x", "x")
+            try:
+                if "=" in text:
+                    exec(plain, names)
+                expected = names["x"] if "=" in text else eval(plain, names)
+            except ValueError as error:
+                assert said is not None and f"ValueError: {error}" in said
+                continue
+            assert said is None
+            assert record["whole"] == _goes_round(expected), (x, n)
+
+
+@pytest.mark.parametrize("text", OF_VECTORS)
+def test_arrays_are_shifted_as_by_numpy(text: str, shifts: Any) -> None:
+    cls, compiled, steps = shifts
+    names = {"k": np.array([1, -1, 77, -(2**63), 2**62]), "b": np.array([1, 2, 8, 9, 200], np.uint8)}
+    for n in COUNTS:
+        for c in ([0, 1, 63, 64, 65], [-1, 3, 1000, -64, 2]):
+            record = cls()._record
+            record["which"] = steps.index(f"self.out[:] = {text}")
+            values = {**names, "c": np.array(c), "n": n, "x": -77}
+            for name, value in values.items():
+                record[name] = value
+            assert compiled.call("update", record) is None
+            with np.errstate(all="ignore"):
+                assert np.array_equal(record["out"], eval(text, {**values, "np": np})), (n, c)
+
+
+def test_arrays_are_shifted_in_place(shifts: Any) -> None:
+    cls, compiled, steps = shifts
+    for which in (len(steps) - 2, len(steps) - 1):
+        component = cls()
+        record = component._record
+        record["which"], record["k"], record["c"] = which, [1, -5, 7, 9, 2**60], [0, 1, 2, 64, 63]
+        found = record.copy()
+        assert compiled.call("update", found) is None
+        component.update()
+        assert np.array_equal(found["out"], record["out"])
+        assert np.array_equal(found["k"], record["k"])
+
+
+NAMES = """\
+        on, off, a, b, v = self.on.value, self.off.value, self.a.value, self.b.value, self.v.value
+        x, n = self.x.value, self.n.value
+"""
+MEMBERS = """\
+import numpy as np
+from rtcf.component import Component, Input, State
+
+
+def largest(a, b):
+    return max(a, b)
+
+
+def either(on, n):
+    if on:
+        return n
+    return 0.5
+
+
+class Tried(Component):
+    which: State[int]
+    on: Input[bool]
+    off: Input[bool]
+    a: Input[np.bool_, 3]
+    b: Input[np.bool_, 3]
+    v: Input[np.float64, 3]
+    x: Input[float]
+    n: Input[int]
+    f: State[float]
+    k: State[int]
+    flag: State[bool]
+    z: State[np.float64, 3]
+"""
+WITH_BOOLS = [
+    *("self.f = float(on)", "self.k = int(off)", "self.k = on + off", "self.k = (x > 0) + (n > 0)"),
+    *("self.k = on * 3 - off", "self.flag = max(on, off)", "self.flag = min(on, off, x > 0.0)"),
+    *("self.f = x * on", "self.f = x * a[0]", "self.k = n + a[1]", "self.z[:] = a * v"),
+    *("self.k = np.sum(a)", "self.k = a.sum() + b.sum()", "self.k = sum(a)", "self.z[:] = a * 2"),
+    *("self.f = np.mean(a)", "self.flag = a.any() and not b.all()", "self.z[:] = a & b"),
+    *("self.z[:] = a | b", "self.z[:] = a ^ b", "self.z[:] = ~a", "self.flag = a[0] & b[0]"),
+    *("self.z[:] = np.where(a, v, 0.0)", "self.k = np.cumsum(a)[2]", "self.f = a[0] / 2.0"),
+    *("self.flag = largest(on, off)", "self.k = np.argmax(a)", "self.z[:] = a + v", "self.k += on"),
+    *("self.f = float(a[0])", "self.k = int(b[1]) + int(b[0])", "self.z[:] = np.minimum(a, b)"),
+    *("self.k = -on", "self.z[:] = a == b"),
+]
+REFUSED_BOOLS = {
+    "self.k = a[0] + b[0]": "logic",
+    "self.k = a[0] * b[0] + 1": "logic",
+    "self.k = (v[0] > 0.0) + (v[1] > 0.0)": "logic",
+    "self.z[:] = a + b": "logic",
+    "self.z[:] = (v > 0.0) - (v < 0.0)": "logic",
+    "self.z[:] = a * b": "logic",
+    "self.z[:] = np.add(a, b)": "logic",
+    "self.z[:] = a ** 2": "logic",
+    "self.z[:] = a + on": "logic",
+    "self.k = -a[0]": "bools",
+    "self.flag = ~on": "write not",
+    "self.f = np.ptp(a)": "bools",
+    "self.f = np.sin(on)": "np.sin",
+    "c = a[0]\nc += b[0]  # here\nself.k = c + 1": "logic",
+}
+SMALL = [
+    "y = 0\nfor i in range(3):\n    y += v[i]\nself.f = y",
+    "y = 1 if on else 0.5\nself.f = y * x",
+    "y = 0\nif on:\n    y = 2 * y + 0.5\nself.f = y // 2",
+    "y = -3\nif on:\n    y = x\nself.f = 2 * y + len(v)",
+    "y = 0.5\nfor i in range(3):\n    if on:\n        y = i\nself.f = y",
+    "y = 0\nfor i in range(4):\n    y += 1 if on else 0.25\nself.f = y",
+    "y = len(v) if on else x\nself.f = y",
+    "y = True if on else 0.25\nself.f = y * 2",
+    "self.f = max(0, x) + min(x, 10)",
+    "y = float(n) if on else x\nself.f = y",
+    "y = n % 10 if on else x\nself.f = y",
+    "self.f = np.where(on, n, 0.5)",
+    "y = n\ny = y * 0.5\nself.f = y",
+    "self.k = n if on else 3\nself.f = n",
+]
+LARGE = {
+    "y = n if on else 0.5  # here\nself.f = y": "is once an int",
+    "y = 0.5\nif on:\n    y = n  # here\nself.f = y": "y is once an int",
+    "y = self.k  # here\nfor i in range(3):\n    y = y * 0.5\nself.f = y": "y is once",
+    "self.f = max(n, 0.5)  # here": "once an int",
+    "self.f = min(x, self.k)  # here": "once an int",
+    "y = 1\nfor i in range(9):  # here\n    y = y * 1000\nif on:\n    y = 0.5\nself.f = y": "y is",
+    "y = 1 if on else 0.5\nself.f = y * n % 7  # here": "y is once an int",
+    "self.f = either(on, n)": "is once an int",
+}
+
+
+def _class(folder: Path, ways: list[str]) -> Any:
+    """Return a component that does one of several things."""
+    lines = MEMBERS.splitlines()
+    for number, way in enumerate(ways):
+        lines += ["", f"    def way_{number}(self):", *NAMES.splitlines()]
+        lines += [f"        {line}" for line in way.split("\n")]
+    lines += ["", "    def update(self):"]
+    for number in range(len(ways)):
+        lines += [f"        if self.which == {number}:", f"            self.way_{number}()"]
+    file = folder / "tried.py"
+    file.write_text("\n".join(lines) + "\n")
+    (cls,) = modules.components(modules.load(file))
+    return cls
+
+
+@pytest.mark.parametrize("ways", [WITH_BOOLS, SMALL], ids=["bools", "small ints"])
+def test_numbers_are_those_of_python(ways: list[str], tmp_path: Path) -> None:
+    cls = _class(tmp_path, ways)
+    compiled = Inside(lowering.compile_component(cls))
+    draw = np.random.default_rng(1)
+    for which in [*range(len(ways))] * 8:
+        component: Any = cls()
+        for name in ("on", "off"):
+            getattr(component, name).put(bool(draw.random() < 0.5))
+        for name in ("a", "b"):
+            getattr(component, name).put(draw.random(3) < 0.5)
+        component.v.put(draw.normal(size=3))
+        component.x.put(draw.normal() * 10)
+        component.n.put(int(draw.integers(-20, 20)))
+        component.which = which
+        record = component._record.copy()
+        assert compiled.call("update", record) is None
+        component.update()
+        for name in ("f", "k", "flag", "z"):
+            assert np.array_equal(record[name], component._record[name]), ways[which]
+
+
+@pytest.mark.parametrize("way", [*REFUSED_BOOLS, *LARGE])
+def test_other_numbers_than_pythons_are_refused(way: str, tmp_path: Path) -> None:
+    cls = _class(tmp_path, [way])
+    with pytest.raises(Mistake, match={**REFUSED_BOOLS, **LARGE}[way]) as raised:
+        lowering.compile_component(cls)
+    text = (tmp_path / "tried.py").read_text().splitlines()
+    marked = next((i for i, line in enumerate(text, 1) if line.endswith("# here")), 0)
+    first = text.index("    def way_0(self):") + 4
+    in_either = text.index("        return n") + 1
+    assert raised.value.line == (in_either if "either" in way else marked or first)

@@ -86,6 +86,12 @@ WRAP = """\
             x -= 2 * np.pi
         self.out.write(x)
 """
+# Compiled, 2**64 is 0; the array divides to infinity in both.
+DIVISIONS = """\
+    def update(self):
+        whole = self.a.value * 2**32 * 2**32
+        self.out.write(np.sum(1.0 / np.zeros(2)) + 1.0 / (whole + 2**40 * 2**24))
+"""
 ENDLESS_PREPARE = """\
     def prepare(self):
         x = self.gain
@@ -120,6 +126,41 @@ def test_a_difference_is_told_with_hook_cycle_member_and_both_values(
     )
     assert "DIFFER; update, cycle" in said.out
     assert not library.exists()
+
+
+def test_a_division_by_zero_of_the_machine_alone_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = written(tmp_path, DIVISIONS, "int", "float")
+    assert main.main([file, "--verify", "100"]) == main.DIFFERENT
+    said = capsys.readouterr().err
+    assert "ZeroDivisionError: division by zero compiled, no fault in the interpreter" in said
+
+
+def test_another_fault_is_a_difference(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = written(tmp_path, "    def update(self):\n        self.out.write(1.0 / 0.0)")
+    monkeypatch.setattr(inside.Inside, "call", lambda *_: "9: IndexError: index 3")
+    assert main.main([file, "--verify", "1"]) == main.DIFFERENT
+    assert re.search(
+        r"IndexError: index 3 compiled, ZeroDivisionError: .* in the interpreter",
+        capsys.readouterr().err,
+    )
+
+
+def test_single_numbers_divide_as_compiled_ones(tmp_path: Path) -> None:
+    body = """\
+    def update(self):
+        v = self.a.value
+        x = v[0] / (v[1] - v[1]) if v[0] > 0.0 else 1.0
+        y = v[0] % v[3] + v[0] // v[2]
+        y /= v[1]
+        v = v / 0.0
+        self.out.write(x + y + divmod(y, x)[1])
+"""
+    file = written(tmp_path, body, "np.float64, 4", "float")
+    assert main.main([file, "--verify", "2000"]) == main.DONE
 
 
 def test_an_element_that_differs_is_named(
@@ -164,10 +205,21 @@ def test_an_infinite_element_says_nothing_about_the_others() -> None:
     assert not verify._is_rounding(np.array([1.0, 7.0, np.nan, 5.0]), theirs, nearby)
 
 
-def test_float32_is_rounded_otherwise_by_numpy(tmp_path: Path) -> None:
-    body = "    def update(self):\n        self.out.write(self.a.value * 0.1)"
+@pytest.mark.parametrize("value", ["self.a.value * 0.1", "np.std(self.a.value)", "SMOOTHED"])
+def test_float32_is_rounded_as_by_numpy(
+    value: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    body = f"    def update(self):\n        self.out.write({value} * np.ones(8))"
+    if value == "SMOOTHED":
+        body = """\
+    def update(self):
+        z = np.zeros(8, np.float32)
+        for _ in range(50):
+            z[:] = 1.9 * z - 0.95 * z + 0.1 * self.a.value
+        self.out.write(z)"""
     file = written(tmp_path, body, "np.float32, 8", "np.float64, 8")
     assert main.main([file, "--verify", "3000"]) == main.DONE
+    assert "cycles, 0 ulp: the same" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

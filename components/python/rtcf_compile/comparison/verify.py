@@ -2,21 +2,22 @@
 
 Inputs are drawn from a seed, values at the bounds among them. After each cycle the state goes on
 from the interpreter's, so that a difference is of one cycle and does not add up. In the interpreter
-`@` and np.linalg are the helpers, which sum in the same order. Other functions of NumPy may round
+`@` and np.linalg are the helpers, which sum in the same order, and so is the division of single
+numbers, of which NumPy's do not raise. Other functions of NumPy may round
 otherwise than the loop's: a difference as large as one in the last place of what the hook reads
 makes is none.
 """
 
 import ast
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from types import FunctionType
+from types import CodeType, FunctionType
 from typing import Any, Protocol
 
 import numpy as np
-from rtcf.component import Component
+from rtcf.component import Component, Fault
 from rtcf.component.declaration import (
     REALTIME_HOOKS,
     Derived,
@@ -32,7 +33,8 @@ from rtcf.component.value_type import ValueType
 
 from rtcf_compile.comparison.inside import Inside
 from rtcf_compile.machine_code.lowering import Compiled
-from rtcf_compile.rewriting.functions import HELPERS, drop_types
+from rtcf_compile.rewriting import operators
+from rtcf_compile.rewriting.functions import HELPERS, drop_types, operator_functions
 from rtcf_compile.rewriting.functions import made as made_of
 from rtcf_compile.rewriting.products import Products
 from rtcf_compile.source.mistake import display, source_line
@@ -196,7 +198,7 @@ class _Comparing:
 
     def _made(self) -> Any:
         """Return the component in the interpreter."""
-        cls = _interpreted(self._cls)
+        cls = _interpreted(self._cls, self._compiled.narrow)
         try:
             with self._bounds.python():
                 return cls()
@@ -218,12 +220,7 @@ class _Comparing:
         if isinstance(error, _PYTHONS_OWN) and said is None:
             result.pythons_own += 1
             return
-        if said is not None and error is None and "division by zero" in said:
-            # Elements of an array are NumPy's numbers to the interpreter, which divide to infinity.
-            component._record[...] = record
-            with np.errstate(divide="raise", invalid="raise"):
-                error = self._raised(hook)
-        if (said is None) != (error is None):
+        if not _same_fault(said, error):
             what = f"{type(error).__name__}: {error}" if error else "no fault"
             self._differ(hook, f"{said or 'no fault'} compiled, {what} in the interpreter")
             return
@@ -314,6 +311,15 @@ class _Comparing:
         if hook not in REALTIME_HOOKS or not inputs:
             return ""
         return " with " + ", ".join(f"{each} = {self._record[each]:g}" for each in inputs[:3])
+
+
+def _same_fault(said: str | None, error: Exception | None) -> bool:
+    """Tell whether compiled code and interpreter have raised the same type, or nothing."""
+    if said is None or error is None:
+        return said is None and error is None
+    return isinstance(error, Fault) or any(
+        said.partition(": ")[2].startswith(each.__name__) for each in type(error).__mro__
+    )
 
 
 def _is_rounding(mine: Any, theirs: Any, nearby: list[Any]) -> bool:
@@ -444,8 +450,10 @@ def _parameters(record: Any, parameters: list[Member], draw: Any) -> None:
             record[member.name] = draw.integers(low, high, member.type.shape, endpoint=True)
 
 
-def _interpreted(cls: type[Component]) -> type[Component]:
-    """Return the class, and its bases, with helpers in the place of `@`, np.linalg and others."""
+def _interpreted(cls: type[Component], narrow: Collection[CodeType]) -> type[Component]:
+    """Return the class, and its bases, with helpers in the place of `@`, np.linalg, divisions and
+    others.
+    """
     copies: dict[type, type] = {}
     known: dict[FunctionType, FunctionType] = {}
     for base in reversed(cls.__mro__):
@@ -461,12 +469,12 @@ def _interpreted(cls: type[Component]) -> type[Component]:
         copies[base] = copy
         for name, value in members.items():
             if isinstance(value, FunctionType) and is_own(value):
-                setattr(copy, name, _with_helpers(value, known, copy, copies))
+                setattr(copy, name, _with_helpers(value, known, narrow, copy, copies))
             elif isinstance(value, staticmethod) and is_own(value.__func__):
-                own = _with_helpers(value.__func__, known, copy, copies)
+                own = _with_helpers(value.__func__, known, narrow, copy, copies)
                 setattr(copy, name, staticmethod(own))
             elif isinstance(value, property) and is_own(value.fget):
-                own = _with_helpers(value.fget, known, copy, copies)
+                own = _with_helpers(value.fget, known, narrow, copy, copies)
                 setattr(copy, name, property(own, value.fset))
     return copies[cls]
 
@@ -474,13 +482,14 @@ def _interpreted(cls: type[Component]) -> type[Component]:
 def _with_helpers(
     function: Any,
     known: dict[FunctionType, FunctionType],
+    narrow: Collection[CodeType],
     owner: type | None = None,
     copies: dict[type, type] | None = None,
 ) -> FunctionType:
     if function in known:
         return known[function]
     source = read(function)
-    products = Products(source)
+    products = Products(source, operator_functions(function, narrow) | operators.COMPARED)
     tree = source.tree
     tree.body = products.statements(tree.body)
     drop_types(tree)
@@ -492,7 +501,7 @@ def _with_helpers(
     for name in function.__code__.co_names:
         value = scope.get(name)
         if isinstance(value, FunctionType) and is_own(value) and name not in HELPERS:
-            scope[name] = _with_helpers(value, known)
+            scope[name] = _with_helpers(value, known, narrow)
     return known[function]
 
 

@@ -26,10 +26,11 @@ _OPERATORS = {
 }
 _BITS = ("&", "|", "^", "<<", ">>", "~")
 # Functions' names in the source, by the helpers in their place.
-_NAMES = {
-    own.__name__: f"{'np.linalg' if 'linalg' in of.__module__ else 'np'}.{of.__name__}"
+NAMES = {
+    own.__name__: f"{'np.linalg' if 'linalg' in module else 'np'}.{of.__name__}"
     for of, own in (*helpers.INSTEAD.items(), *numpy_functions.STANDS_FOR)
-    if (getattr(of, "__module__", None) or "").startswith("numpy")
+    # ufuncs have no module.
+    if (module := getattr(of, "__module__", None) or "numpy").startswith("numpy")
 }
 _SIMPLE = {
     **{"float64": "a float", "float32": "a float", "unicode_type": "a text", "none": "None"},
@@ -116,7 +117,7 @@ def mistake(error: Any, function: FunctionType) -> Mistake:
     name = re.escape(file.rpartition("/")[2])
     lines = [int(each) for each in re.findall(rf'File "(?:[^"]*/)?{name}", line (\d+)', text)]
     place = getattr(error, "loc", None)
-    line = lines[-1] if lines else getattr(place, "line", function.__code__.co_firstlineno)
+    line = lines[0] if lines else getattr(place, "line", function.__code__.co_firstlineno)
     return Mistake(file, line, *_said(text, source_line(file, line)))
 
 
@@ -158,11 +159,13 @@ def _no_implementation(name: str, arguments: list[str], source: str) -> tuple[st
         if kinds[0] in ("a float", "an int", "a bool", "None"):
             return f"{kinds[0]} has no elements", "write it without [ ]"
         return f"{kinds[0]} has no index {_index(arguments[1])}", "use ints, slices and arrays"
-    if name in _OPERATORS:
-        return _operator(_OPERATORS[name], kinds)
+    plain = name.removeprefix("rtcf_op_").removeprefix("rtcf_element_")
+    for each in (plain, f"{plain}_"):
+        if each in _OPERATORS:
+            return _operator(_OPERATORS[each], kinds)
     of = " and ".join(kinds)
     if name.startswith("rtcf_"):
-        done = f"{_NAMES[name]} of {of}" if name in _NAMES else f"is not possible with {of}"
+        done = f"{NAMES[name]} of {of}" if name in NAMES else f"is not possible with {of}"
         way_out = "give it a matrix" if ".linalg." in done else "give it numbers and arrays"
         return done, way_out
     if as_written := re.search(rf"[\w.]*\b{name}(?= ?\()", source):

@@ -9,7 +9,7 @@ import inspect
 import re
 import warnings
 from dataclasses import dataclass, field
-from types import FunctionType
+from types import CodeType, FunctionType
 from typing import Any
 
 import numba
@@ -19,12 +19,14 @@ from rtcf.component.declaration import HOOKS, REALTIME_HOOKS, Description
 from rtcf.component.ros_name import class_name_error
 
 import rtcf_compile.machine_code.numpy_functions
+import rtcf_compile.machine_code.operators
 import rtcf_compile.machine_code.overloads  # noqa: F401, registers them
 from rtcf_compile.machine_code import (
     arena,
     backend,
     explain,
     gate,
+    numbers,
     port_access,
     raised_values,
     source_lines,
@@ -33,7 +35,7 @@ from rtcf_compile.machine_code import (
 )
 from rtcf_compile.machine_code.raises import Raise, raises_in
 from rtcf_compile.rewriting import log_calls
-from rtcf_compile.rewriting.functions import Functions
+from rtcf_compile.rewriting.functions import Compiler, Functions
 from rtcf_compile.rewriting.logs import Logs
 from rtcf_compile.rewriting.products import ARENA
 from rtcf_compile.source.mistake import Mistake
@@ -65,6 +67,7 @@ class Compiled:
     raises: dict[int, Raise] = field(default_factory=dict)
     line: int = 0  # of update
     other_calls: list[tuple[str, int, str, str]] = field(default_factory=list)
+    narrow: set[CodeType] = field(default_factory=set)  # see Functions
 
     def symbol(self, hook: str) -> str:
         """Return the name of a hook's C function."""
@@ -78,10 +81,22 @@ def compile_component(cls: type[Component], arena_bytes: int = ARENA) -> Compile
         what, _, way_out = problem.partition(": ")
         raise Mistake(file, line, f"{cls.__name__} {what}", way_out)
     description = describe(cls)
-    functions = Functions(cls, description, _compiler)
-    hooks = functions.hooks()
-    log_calls.logs_are(functions.logs)
     record = numba.from_dtype(description.record)
+    narrow: set[CodeType] = set()
+    before = -1
+    # Once more where functions are found that compute with narrow numbers: with what they then
+    # return others may, too.
+    while len(narrow) > before:
+        before = len(narrow)
+        compiler = _compiler(narrow)
+        functions = Functions(cls, description, compiler, frozenset(narrow))
+        hooks = functions.hooks()
+        log_calls.logs_are(functions.logs)
+        try:
+            made = {hook: _inner(hooks[hook], record, compiler) for hook in hooks}
+        except Mistake:
+            if len(narrow) == before:
+                raise
     result = Compiled(
         description,
         functions.file(),
@@ -92,8 +107,8 @@ def compile_component(cls: type[Component], arena_bytes: int = ARENA) -> Compile
         functions.lines,
         line=functions.line(),
         other_calls=functions.other_calls,
+        narrow=narrow,
     )
-    made = {hook: _inner(hooks[hook], record) for hook in hooks}
     trial.run(cls, functions.file())
     for thread, allocator in ((REALTIME_HOOKS, arena.arena(arena_bytes)), (_BESIDE, arena.heap())):
         inner = {hook: made[hook] for hook in thread if hook in made}
@@ -105,17 +120,20 @@ def compile_component(cls: type[Component], arena_bytes: int = ARENA) -> Compile
     return result
 
 
-def _compiler(function: FunctionType) -> Any:
-    return numba.njit(**_OPTIONS)(function)
+def _compiler(narrow: set[CodeType]) -> Compiler:
+    """Return what compiles functions and notes those that compute with narrow numbers."""
+    return numba.njit(pipeline_class=numbers.compiler(narrow), **_OPTIONS)  # type: ignore[no-any-return]
 
 
-def _inner(function: FunctionType, record: Any) -> tuple[str, str]:
+def _inner(function: FunctionType, record: Any, compiler: Compiler) -> tuple[str, str]:
     """Return the name of the inner function and the assembly that has it."""
-    dispatcher = _compiler(function)
+    dispatcher = compiler(function)
     try:
         with backend.not_to_run(), source_lines.emitted():
             dispatcher.compile((record,))
             result = next(iter(dispatcher.overloads.values()))
+    except numbers.Stop as stop:
+        raise stop.mistake from None
     except Mistake:
         raise
     except Exception as error:  # numba's own, or what it fails by where it ought to have one

@@ -3,6 +3,7 @@ something is compiled.
 """
 
 import math
+import operator
 from collections.abc import Callable
 from typing import Any
 
@@ -16,11 +17,16 @@ from numba.extending import intrinsic
 from numba.np import arrayobj
 from numba.np.numpy_support import as_dtype
 
-from rtcf_compile.machine_code.overloads import compiled_as, plain, words
-from rtcf_compile.rewriting import helpers
+from rtcf_compile.machine_code.number_types import Operand, operand, together
+from rtcf_compile.machine_code.operators import refuse_bools
+from rtcf_compile.machine_code.overloads import compiled_as, conversions, plain, result_type, words
+from rtcf_compile.rewriting import helpers, operators
 from rtcf_compile.rewriting import numpy_functions as own
+from rtcf_compile.rewriting.operators import is_narrow
 
 _Numbers = types.Number | types.Boolean
+_lower, _higher = operators.OF[np.minimum], operators.OF[np.maximum]
+_minus = operators.OF[operator.sub]
 _LONG = 128  # elements that NumPy sums with eight accumulators, before it halves
 
 
@@ -171,7 +177,7 @@ def _diagonal(a: Any) -> Any:
     return lambda a: own.rtcf_diag(a, 0)
 
 
-@compiled_as(own.rtcf_linspace)
+@compiled_as(own.rtcf_linspace, refused="fiu")
 def _linspace(start: Any, stop: Any, num: Any, endpoint: Any) -> Any:
     def linspace(start: Any, stop: Any, num: Any, endpoint: Any) -> Any:
         if num < 0:
@@ -832,7 +838,10 @@ _reduction(own.rtcf_all, "np.all", _is_all, result=lambda _: np.dtype(np.bool_))
 
 @compiled_as(own.rtcf_ptp, arrays=("a",))
 def _ptp(a: Any, axis: Any) -> Any:
-    return lambda a, axis: own.rtcf_max(a, axis, None) - own.rtcf_min(a, axis, None)
+    _needs(a, "np.ptp")
+    if _dtype(a).kind == "b":
+        raise TypingError("RTCF:np.ptp of bools:convert them: x.astype(int)")
+    return lambda a, axis: _minus(own.rtcf_max(a, axis, None), own.rtcf_min(a, axis, None))
 
 
 def _as_floats(a: Any) -> Any:
@@ -861,11 +870,26 @@ def _elements_along(a: Any, axis: Any) -> Any:
 @compiled_as(own.rtcf_mean, arrays=("a",))
 def _mean(a: Any, axis: Any, keepdims: Any) -> Any:
     if isinstance(a, _Numbers):
-        return lambda a, axis, keepdims: float(a)
+        return lambda a, axis, keepdims: helpers.rtcf_to_float(a)
     _needs(a, "np.mean")
-    return lambda a, axis, keepdims: (
-        own.rtcf_sum(_as_floats(a), axis, keepdims) / _elements(a, axis)
+    return lambda a, axis, keepdims: _divided(
+        own.rtcf_sum(_as_floats(a), axis, keepdims), _elements(a, axis)
     )
+
+
+def _divided(total: Any, count: Any) -> Any:
+    raise NotImplementedError
+
+
+@compiled_as(_divided)
+def _divided_by(total: Any, count: Any) -> Any:
+    """A sum, or sums, by a number of elements: floats of the same size."""
+    if _dtype(total) != np.float32:
+        return lambda total, count: total / count
+    # The quotient of 64 bits is rounded once more to the right one of 32.
+    if isinstance(total, types.Array):
+        return lambda total, count: own.rtcf_array(total / count, np.float32)
+    return lambda total, count: np.float32(total / count)
 
 
 @compiled_as(own.rtcf_var, arrays=("a",))
@@ -876,7 +900,7 @@ def _var(a: Any, axis: Any, ddof: Any) -> Any:
         values = _as_floats(a)
         mean = _kept_mean(values, axis)
         far = values - mean
-        return own.rtcf_sum(far * far, axis, None) / max(_elements(a, axis) - ddof, 0)
+        return _divided(own.rtcf_sum(far * far, axis, None), max(_elements(a, axis) - ddof, 0))
 
     return var
 
@@ -915,15 +939,16 @@ def _count_nonzero(a: Any) -> Any:
 @compiled_as(own.rtcf_median, arrays=("a",))
 def _median(a: Any) -> Any:
     _needs(a, "np.median")
+    to = np.float32 if _dtype(a) == np.float32 else np.float64
 
     def median(a: Any) -> Any:
         ordered = own.rtcf_sort(_as_floats(own.rtcf_ravel(a)), -1)
         n = ordered.shape[0]
         if n == 0 or ordered[n - 1] != ordered[n - 1]:
-            return np.nan
+            return to(np.nan)
         if n % 2:
-            return ordered[n // 2] + 0.0
-        return (ordered[n // 2 - 1] + ordered[n // 2]) / 2.0
+            return to(ordered[n // 2] + 0.0)
+        return to((ordered[n // 2 - 1] + ordered[n // 2]) / 2.0)
 
     return median
 
@@ -1151,6 +1176,9 @@ _clip_elements = numba.vectorize(_clip_number)
 @compiled_as(own.rtcf_clip, arrays=("a", "a_min", "a_max"))
 def _clip(a: Any, a_min: Any, a_max: Any) -> Any:
     low, high = (not isinstance(each, types.NoneType) for each in (a_min, a_max))
+    numbers = [operand(each) for each in (a, a_min, a_max)]
+    if any(each is not None and each.is_narrow for each in numbers):
+        return _clip_narrow(a, a_min, a_max)
     if all(isinstance(each, types.Float) for each in (a, a_min, a_max)):
         return _clip_number
     if low and high and all(_dtype(each) == np.float64 for each in (a, a_min, a_max)):
@@ -1162,6 +1190,18 @@ def _clip(a: Any, a_min: Any, a_max: Any) -> Any:
     if high:
         return lambda a, a_min, a_max: np.minimum(a, a_max)
     raise TypingError("RTCF:np.clip without bounds:give it one")
+
+
+def _clip_narrow(a: Any, a_min: Any, a_max: Any) -> Any:
+    """Return what clips narrow numbers: in one type, as NumPy does."""
+    low, high = (not isinstance(each, types.NoneType) for each in (a_min, a_max))
+    if low and high and result_type(np.clip, a, a_min) != result_type(np.clip, a, a_max):
+        raise TypingError("RTCF:bounds of different types:convert one: x.astype(float)")
+    if not low:
+        return lambda a, a_min, a_max: _lower(a, a_max)
+    if not high:
+        return lambda a, a_min, a_max: _higher(a, a_min)
+    return lambda a, a_min, a_max: _lower(_higher(a, a_min), a_max)
 
 
 @compiled_as(own.rtcf_is_any, arrays=("values",))
@@ -1205,6 +1245,10 @@ def _astype(a: Any, dtype: Any) -> Any:
 def _abs(x: Any) -> Any:
     if isinstance(x, types.Array):
         return lambda x: np.abs(x)
+    number = operand(x)
+    if number is not None and number.is_narrow:
+        to = number.dtype.type
+        return lambda x: to(abs(x))
     return lambda x: abs(x)
 
 
@@ -1223,14 +1267,14 @@ def _about(a: Any, b: Any, rtol: Any, atol: Any, equal_nan: Any) -> Any:
 _isclose_each = _elementwise(_about)
 
 
-@compiled_as(own.rtcf_isclose, arrays=("a", "b"))
+@compiled_as(own.rtcf_isclose, arrays=("a", "b"), refused="fiu")
 def _isclose(a: Any, b: Any, rtol: Any, atol: Any, equal_nan: Any) -> Any:
     return lambda a, b, rtol, atol, equal_nan: _isclose_each(
         a * 1.0, b * 1.0, rtol, atol, equal_nan
     )
 
 
-@compiled_as(own.rtcf_allclose, arrays=("a", "b"))
+@compiled_as(own.rtcf_allclose, arrays=("a", "b"), refused="fiu")
 def _allclose(a: Any, b: Any, rtol: Any, atol: Any, equal_nan: Any) -> Any:
     return lambda a, b, rtol, atol, equal_nan: own.rtcf_all(
         own.rtcf_isclose(a, b, rtol, atol, equal_nan), None
@@ -1255,7 +1299,7 @@ def _array_equal(a1: Any, a2: Any) -> Any:
 @compiled_as(own.rtcf_math_isclose)
 def _math_isclose(a: Any, b: Any, rel_tol: Any, abs_tol: Any) -> Any:
     def isclose(a: Any, b: Any, rel_tol: Any, abs_tol: Any) -> Any:
-        x, y = float(a), float(b)
+        x, y = np.float64(a), np.float64(b)
         if rel_tol < 0.0 or abs_tol < 0.0:
             raise ValueError("tolerances must be non-negative")
         if x == y:
@@ -1272,11 +1316,12 @@ def _math_isclose(a: Any, b: Any, rel_tol: Any, abs_tol: Any) -> Any:
 def _np_round(a: Any, decimals: Any) -> Any:
     if not isinstance(a.dtype if isinstance(a, types.Array) else a, types.Float):
         raise TypingError(f"RTCF:np.round of {words(a)}:give it floats")
+    to = _dtype(a).type
 
     def rounded(a: Any, decimals: Any) -> Any:
         if decimals == 0:
-            return np.rint(a) * 1.0
-        scale = 10.0 ** abs(decimals)
+            return np.rint(a) * to(1.0)
+        scale = to(10.0 ** abs(decimals))
         if decimals > 0:
             return np.rint(a * scale) / scale
         return np.rint(a / scale) * scale
@@ -1295,7 +1340,7 @@ def _replaced(x: Any, nan: Any, posinf: Any, neginf: Any) -> Any:
 _nan_to_num_each = _elementwise(_replaced)
 
 
-@compiled_as(own.rtcf_nan_to_num, arrays=("x",))
+@compiled_as(own.rtcf_nan_to_num, arrays=("x",), refused="fiu")
 def _nan_to_num(x: Any, nan: Any, posinf: Any, neginf: Any) -> Any:
     top = np.finfo(np.float64).max
     up, down = (isinstance(each, types.NoneType) for each in (posinf, neginf))
@@ -1395,6 +1440,10 @@ def _value_or_end(value: Any, fp: Any, place: Any) -> Any:
 def _interp(x: Any, xp: Any, fp: Any, left: Any, right: Any) -> Any:
     _needs(xp, "np.interp", (1,))
     _needs(fp, "np.interp", (1,))
+    if any(is_narrow(_dtype(each)) for each in (xp, fp)):
+        return lambda x, xp, fp, left, right: own.rtcf_interp(
+            x, own.rtcf_asarray(xp, np.float64), own.rtcf_asarray(fp, np.float64), left, right
+        )
     if isinstance(x, _Numbers):
         return lambda x, xp, fp, left, right: _interpolated(
             x, xp, fp, _or_end(left, fp, 0), _or_end(right, fp, -1)
@@ -1417,7 +1466,7 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any, right: Any) -> Any:
     return each
 
 
-@compiled_as(own.rtcf_polyval, arrays=("p", "x"))
+@compiled_as(own.rtcf_polyval, arrays=("p", "x"), refused="fiu")
 def _polyval(p: Any, x: Any) -> Any:
     _needs(p, "np.polyval", (1,))
 
@@ -1441,7 +1490,7 @@ def _polyval(p: Any, x: Any) -> Any:
     return each
 
 
-@compiled_as(own.rtcf_trapz, arrays=("y", "x"))
+@compiled_as(own.rtcf_trapz, arrays=("y", "x"), refused="fiu")
 def _trapz(y: Any, x: Any, dx: Any) -> Any:
     _needs(y, "np.trapz", (1,))
     if isinstance(x, types.NoneType):
@@ -1471,7 +1520,7 @@ def _outer(a: Any, b: Any) -> Any:
     return outer
 
 
-@compiled_as(own.rtcf_cross, arrays=("a", "b"))
+@compiled_as(own.rtcf_cross, arrays=("a", "b"), refused="iu")
 def _cross(a: Any, b: Any) -> Any:
     _needs(a, "np.cross", (1,))
     _needs(b, "np.cross", (1,))
@@ -1498,7 +1547,7 @@ def _inner(a: Any, b: Any) -> Any:
     return lambda a, b: helpers.rtcf_matmul(a, b)
 
 
-@compiled_as(own.rtcf_norm, arrays=("x",))
+@compiled_as(own.rtcf_norm, arrays=("x",), refused="f")
 def _norm(x: Any, ord: Any, axis: Any) -> Any:
     _needs(x, "np.linalg.norm")
     default = isinstance(ord, types.NoneType)
@@ -1533,7 +1582,7 @@ def _norm(x: Any, ord: Any, axis: Any) -> Any:
     return lambda x, ord, axis: np.sqrt(own.rtcf_sum(x * 1.0 * x, axis, None))
 
 
-@compiled_as(own.rtcf_det, arrays=("a",))
+@compiled_as(own.rtcf_det, arrays=("a",), refused="f")
 def _det(a: Any) -> Any:
     _needs(a, "np.linalg.det", (2,))
 
@@ -1564,7 +1613,7 @@ def _det(a: Any) -> Any:
     return det
 
 
-@compiled_as(own.rtcf_matrix_power, arrays=("a",))
+@compiled_as(own.rtcf_matrix_power, arrays=("a",), refused="fiu")
 def _matrix_power(a: Any, n: Any) -> Any:
     _needs(a, "np.linalg.matrix_power", (2,))
 
@@ -1595,6 +1644,11 @@ def _matrix_power(a: Any, n: Any) -> Any:
 
 @compiled_as(own.rtcf_whole_pow)
 def _whole_pow(base: Any, exponent: Any) -> Any:
+    number = operand(base)
+    if number is not None:
+        refuse_bools(operator.pow, number, number)
+        together(operator.pow, number, Operand(np.dtype(np.int64), False))
+
     def power(base: Any, exponent: Any) -> Any:
         square = base
         while exponent % 2 == 0 and exponent > 0:
@@ -1619,13 +1673,14 @@ def _by_libm(helper: Any, name: str) -> None:
     function = getattr(np, name)
     if function.nin == 2:
 
-        @compiled_as(helper, arrays=("x", "y"))
+        @compiled_as(helper, arrays=("x", "y"), refused="biu")
         def _binary(x: Any, y: Any) -> Any:
-            return lambda x, y: function(x, y)
+            as_x, as_y = conversions(function, x, y)
+            return lambda x, y: function(as_x(x), as_y(y))
 
         return
 
-    @compiled_as(helper, arrays=("x",))
+    @compiled_as(helper, arrays=("x",), refused="biu")
     def _unary(x: Any) -> Any:
         return lambda x: function(x)
 
@@ -1636,4 +1691,4 @@ for _helper, _name in own.BY_LIBM.items():
 
 @compiled_as(own.rtcf_math_hypot)
 def _math_hypot(x: Any, y: Any) -> Any:
-    return lambda x, y: math.hypot(x, y)
+    return lambda x, y: math.hypot(np.float64(x), np.float64(y))

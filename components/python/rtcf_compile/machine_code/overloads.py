@@ -15,11 +15,12 @@ from numba.extending import intrinsic, lower_builtin, lower_cast, overload, regi
 from numba.np.numpy_support import as_dtype
 
 from rtcf_compile.machine_code import backend
-from rtcf_compile.machine_code.explain import kind_of
+from rtcf_compile.machine_code.explain import NAMES, kind_of
+from rtcf_compile.machine_code.number_types import Operand, operand, plain_of, together
 from rtcf_compile.machine_code.raised_values import note
 from rtcf_compile.machine_code.sharing import overlaps, shares
 from rtcf_compile.machine_code.tile import ROWS
-from rtcf_compile.rewriting import helpers, numpy_functions
+from rtcf_compile.rewriting import helpers, numpy_functions, operators
 
 # numba takes an overload apart by its parameters' names and reads its returned function as source.
 _OPTIONS: dict[str, Any] = {
@@ -34,10 +35,12 @@ def compiled_as(
     checked: bool = False,
     arrays: Sequence[str] = (),
     in_line: bool = False,
+    refused: str = "",
 ) -> Callable[[Callable[..., Any]], None]:
     """Register what chooses a helper's implementation by types; numba wants no annotations.
     `checked` are the indices that it uses; arguments of the names `arrays` may be numbers in rows.
     `in_line`: always, so that its temporaries may be variables of the caller (stack.py).
+    `refused`: the kinds of narrow types, and b for bools, that NumPy computes in another way.
     """
 
     def register(choose: Callable[..., Any]) -> None:
@@ -52,6 +55,8 @@ def compiled_as(
                     changed[name] = f"some({name})"
                 elif name in arrays and isinstance(kind, types.BaseTuple):
                     changed[name] = f"array({name}, None)"
+                elif refused:
+                    _refuse_narrow(helper, kind, refused)
             if changed:
                 return _again(helper, names, changed)
             implementation = choose(*types_of, **named)
@@ -63,6 +68,16 @@ def compiled_as(
         overload(helper, jit_options=options)(typed)
 
     return register
+
+
+def _refuse_narrow(helper: Callable[..., Any], kind: Any, refused: str) -> None:
+    number = operand(kind)
+    other = number is not None and (number.is_narrow or number.is_bool)
+    if number is not None and other and number.dtype.kind in refused:
+        way_out = "convert it: x.astype(float)" if number.is_array else plain_of(number)
+        raise TypingError(
+            f"RTCF:{NAMES.get(helper.__name__, 'this')} of {number.words}:{way_out}"
+        )
 
 
 def _again(helper: Callable[..., Any], names: list[str], changed: dict[str, str]) -> Any:
@@ -185,6 +200,9 @@ def _equal(a, b):  # type: ignore[no-untyped-def]
         return lambda a, b: False if a is None else helpers.rtcf_equal(_unwrapped(a), b)
     if isinstance(b, types.Optional):
         return lambda a, b: False if b is None else helpers.rtcf_equal(a, _unwrapped(b))
+    if any(each is not None and each.is_narrow for each in (operand(a), operand(b))):
+        equal = operators.OF[operator.eq]
+        return lambda a, b: equal(a, b)
     return lambda a, b: a == b
 
 
@@ -251,8 +269,10 @@ def _store(target: Any, value: Any) -> Any:
 def _to_float(value: Any) -> Any:
     if isinstance(value, types.IntEnumMember):
         return lambda value: float(value.value)
-    if isinstance(value, types.Number | types.Boolean):
-        return lambda value: float(value)
+    if isinstance(value, types.Boolean):
+        return lambda value: 1.0 if value else 0.0
+    if isinstance(value, types.Number):
+        return lambda value: np.float64(value)
     raise TypingError(f"RTCF:float of {words(value)}:give it a number")
 
 
@@ -261,7 +281,7 @@ def _float(value: Any) -> Any:
     if isinstance(value, types.IntEnumMember):
         return lambda value: float(value.value)
     if isinstance(value, types.Float | types.Integer):
-        return lambda value: float(value)
+        return lambda value: np.float64(value)
     raise TypingError(f"RTCF:a number is set to {words(value)}:give it a float")
 
 
@@ -302,10 +322,9 @@ def _matmul(a: Any, b: Any) -> Any:
         raise TypingError(
             f"RTCF:@ of {words(a)} and {words(b)}:make one of them floats: x.astype(float)"
         )
-    if (a.ndim, b.ndim) == (1, 1):
-        return _inner_product
-    if (a.dtype, b.dtype) != (types.float64, types.float64):
-        return _PLAIN_PRODUCTS[a.ndim, b.ndim]
+    if (a.ndim, b.ndim) == (1, 1) or (a.dtype, b.dtype) != (types.float64, types.float64):
+        dtype = np.promote_types(as_dtype(a.dtype), as_dtype(b.dtype))
+        return _plain_product(a.ndim, b.ndim, dtype)
     if (a.ndim, b.ndim) == (2, 1):
         row = _row(a, "sum", "out")
 
@@ -342,48 +361,49 @@ def _matmul(a: Any, b: Any) -> Any:
     return matrix
 
 
-def _inner_product(a: Any, b: Any) -> Any:
-    _require_fit(a.shape[0], b.shape[0])
-    total = 0.0
-    for k in range(a.shape[0]):
-        total += a[k] * b[k]
-    return total
+@functools.cache
+def _plain_product(left: int, right: int, dtype: np.dtype[Any]) -> Any:
+    """Return a product of any elements, by the dimensions of both; its elements are of a type."""
+    to = dtype.type
 
+    def inner(a: Any, b: Any) -> Any:
+        _require_fit(a.shape[0], b.shape[0])
+        total = to(0)
+        for k in range(a.shape[0]):
+            total += to(a[k]) * to(b[k])
+        return total
 
-def _plain_times_vector(a: Any, b: Any) -> Any:
-    _require_fit(a.shape[1], b.shape[0])
-    result = np.zeros(a.shape[0])
-    for i in range(a.shape[0]):
-        for k in range(a.shape[1]):
-            result[i] += a[i, k] * b[k]
-    return result
+    def times_vector(a: Any, b: Any) -> Any:
+        _require_fit(a.shape[1], b.shape[0])
+        result = np.zeros(a.shape[0], dtype)
+        for i in range(a.shape[0]):
+            for k in range(a.shape[1]):
+                result[i] += to(a[i, k]) * to(b[k])
+        return result
 
-
-def _plain_vector_times(a: Any, b: Any) -> Any:
-    _require_fit(a.shape[0], b.shape[0])
-    result = np.zeros(b.shape[1])
-    for k in range(a.shape[0]):
-        for j in range(b.shape[1]):
-            result[j] += a[k] * b[k, j]
-    return result
-
-
-def _plain_matrix(a: Any, b: Any) -> Any:
-    _require_fit(a.shape[1], b.shape[0])
-    result = np.zeros((a.shape[0], b.shape[1]))
-    for i in range(a.shape[0]):
-        for k in range(a.shape[1]):
+    def vector_times(a: Any, b: Any) -> Any:
+        _require_fit(a.shape[0], b.shape[0])
+        result = np.zeros(b.shape[1], dtype)
+        for k in range(a.shape[0]):
             for j in range(b.shape[1]):
-                result[i, j] += a[i, k] * b[k, j]
-    return result
+                result[j] += to(a[k]) * to(b[k, j])
+        return result
 
+    def matrix(a: Any, b: Any) -> Any:
+        _require_fit(a.shape[1], b.shape[0])
+        result = np.zeros((a.shape[0], b.shape[1]), dtype)
+        for i in range(a.shape[0]):
+            for k in range(a.shape[1]):
+                for j in range(b.shape[1]):
+                    result[i, j] += to(a[i, k]) * to(b[k, j])
+        return result
 
-# Of other elements than float64 in either, by the dimensions of both.
-_PLAIN_PRODUCTS = {
-    (2, 1): _plain_times_vector,
-    (1, 2): _plain_vector_times,
-    (2, 2): _plain_matrix,
-}
+    return {
+        (1, 1): inner,
+        (2, 1): times_vector,
+        (1, 2): vector_times,
+        (2, 2): matrix,
+    }[left, right]
 
 
 def _row(matrix: Any, by_rows: str, by_columns: str) -> Any:
@@ -419,6 +439,9 @@ def _assign(target: Any, value: Any) -> Any:
     new = value.dtype if isinstance(value, types.Array) else value
     if isinstance(new, types.Float) and not isinstance(target.dtype, types.Float):
         raise TypingError(f"RTCF:elements of {target.dtype} are set to {new}:round them first")
+    if (convert := _fitted(target, value)) is not None:
+        fill = plain(_filling(target.ndim))
+        return lambda target, value: fill(target, convert(value))
     if isinstance(value, types.Number | types.Boolean):
         return _filling(target.ndim)
     if isinstance(value, types.UniTuple | types.Tuple) and target.ndim == 1:
@@ -450,6 +473,70 @@ def _assign(target: Any, value: Any) -> Any:
             copying(target, value)
 
     return assign
+
+
+def _fitted(target: Any, value: Any) -> Any:
+    """Return what looks whether a single int fits an array's ints; None where it always does."""
+    number = operand(value)
+    if number is None or number.is_array or number.dtype.kind not in "iu":
+        return None
+    dtype = as_dtype(target.dtype)
+    if dtype.kind not in "iu" or np.can_cast(number.dtype, dtype):
+        return None
+    return conversion(dtype)
+
+
+@functools.cache
+def conversion(dtype: np.dtype[Any]) -> Any:
+    """Return what makes a single number an element of such an array: see as_element."""
+    to = dtype.type
+    if dtype.kind not in "iu":
+        return plain(lambda number: to(number))
+    limits = np.iinfo(dtype)
+    low, high = limits.min, min(limits.max, 2**63 - 1)  # of int64
+    text = f"a number does not fit {dtype.name}"
+
+    def convert(number: Any) -> Any:
+        if number < low or number > high:
+            raise OverflowError(text)
+        return to(number)
+
+    return plain(convert)
+
+
+@plain
+def _same(value: Any) -> Any:
+    return value
+
+
+def conversions(operation: Any, x: Any, y: Any) -> tuple[Any, Any]:
+    """Return what converts each of two numbers or arrays before they meet."""
+    one, other = operand(x), operand(y)
+    if one is None or other is None:
+        return _same, _same
+    meeting = together(operation, one, other)
+    return _conversion(one, meeting.left), _conversion(other, meeting.right)
+
+
+def _conversion(given: Operand, to: np.dtype[Any] | None) -> Any:
+    if to is None:
+        return _same
+    return _array_conversion(to) if given.is_array else conversion(to)
+
+
+@functools.cache
+def _array_conversion(dtype: np.dtype[Any]) -> Any:
+    return plain(lambda array: numpy_functions.rtcf_array(array, dtype.type))
+
+
+def result_type(operation: Any, x: Any, y: Any) -> np.dtype[Any]:
+    """Return the type of the elements that two numbers or arrays make."""
+    one, other = operand(x), operand(y)
+    assert one is not None and other is not None
+    meeting = together(operation, one, other)
+    result = np.promote_types(meeting.left or one.dtype, meeting.right or other.dtype)
+    is_quotient = operation is operator.truediv and result.kind != "f"
+    return np.dtype(np.float64) if is_quotient else result
 
 
 @plain
@@ -601,6 +688,12 @@ def _set(base: Any, index: Any, value: Any) -> Any:
         return lambda base, index, value: helpers.rtcf_assign(base[index], value)
     if not isinstance(value, types.Number | types.Boolean):
         raise TypingError(f"RTCF:an element is set to {words(value)}:give it a number")
+    if (convert := _fitted(base, value)) is not None:
+
+        def fitted(base: Any, index: Any, value: Any) -> None:
+            base[index] = convert(value)
+
+        return fitted
 
     def element(base: Any, index: Any, value: Any) -> None:
         base[index] = value
@@ -966,14 +1059,32 @@ def _changing(helper: Any, operation: Any) -> None:
 
     @compiled_as(helper)
     def _change(target: Any, value: Any) -> Any:
+        numbers = operand(target), operand(value)
+        plainly = None in numbers or not any(each.is_narrow for each in numbers if each)
+        operate = operation if plainly else operators.OF[operation]
         if not isinstance(target, types.Array):
-            return lambda target, value: operation(target, value)
+            return lambda target, value: operate(target, value)
+        require_kind(operation, target, value)
 
         def change(target: Any, value: Any) -> Any:
-            helpers.rtcf_assign(target, operation(target, value))
+            helpers.rtcf_assign(target, operate(target, value))
             return target
 
         return change
+
+
+def require_kind(operation: Any, target: Any, value: Any) -> None:
+    """Refuse to change an array by values of another kind, as NumPy does."""
+    if operand(value) is None or not isinstance(target, types.Array):
+        return
+    if isinstance(target.dtype, types.Float):
+        return
+    result = result_type(operation, target, value)
+    if not np.can_cast(result, as_dtype(target.dtype), "same_kind"):
+        raise TypingError(
+            f"RTCF:elements of {target.dtype} are changed to {result}:"
+            f"convert what they are changed by: ….astype(np.{target.dtype})"
+        )
 
 
 def _with_lists(helper: Any, operation: Any) -> None:
@@ -998,6 +1109,7 @@ for _helper in helpers.IN_PLACE.values():
 def _changed(target: Any, value: Any) -> Any:
     if not isinstance(target, types.Array):
         return lambda target, value: value
+    require_kind(operator.or_, target, value)
 
     def changed(target: Any, value: Any) -> Any:
         helpers.rtcf_assign(target, value)
@@ -1022,7 +1134,7 @@ def _checking(helper: Any, function: Any) -> None:
             )
 
         def checked(value: Any) -> Any:
-            result = function(float(value))
+            result = function(np.float64(value))
             if math.isnan(result) and not math.isnan(value):
                 raise ValueError("math domain error")
             if math.isinf(result) and not math.isinf(value):
@@ -1041,7 +1153,7 @@ for _function, _checked_function in helpers.MATH.items():
 @compiled_as(helpers.rtcf_math_fmod)
 def _fmod(x: Any, y: Any) -> Any:
     def fmod(x: Any, y: Any) -> Any:
-        result = np.fmod(float(x), float(y))
+        result = np.fmod(np.float64(x), np.float64(y))
         if math.isnan(result) and not (math.isnan(x) or math.isnan(y)):
             raise ValueError("math domain error")
         return result
@@ -1052,8 +1164,12 @@ def _fmod(x: Any, y: Any) -> Any:
 @compiled_as(helpers.rtcf_pow)
 def _pow(base: Any, exponent: Any) -> Any:
     numbers = types.Number | types.Boolean
+    as_base, as_exponent = conversions(operator.pow, base, exponent)
     if not isinstance(base, numbers) or not isinstance(exponent, numbers):
-        return _power_of_arrays(base, exponent)
+        power_of = plain(_power_of_arrays(base, exponent))
+        return lambda base, exponent: power_of(as_base(base), as_exponent(exponent))
+    for each in (base, exponent):
+        _refuse_narrow(helpers.rtcf_pow, each, "f")
     if not isinstance(base, types.Float) and not isinstance(exponent, types.Float):
 
         def whole(base: Any, exponent: Any) -> Any:
@@ -1081,6 +1197,17 @@ def _pow(base: Any, exponent: Any) -> Any:
 def _power_of_arrays(base: Any, exponent: Any) -> Any:
     """Return what computes it of floats, where 0 to a negative power is infinite, or of ints."""
     kinds = [getattr(each, "dtype", each) for each in (base, exponent)]
+    if isinstance(kinds[0], types.Float) and isinstance(exponent, types.Float):
+
+        def by_number(base: Any, exponent: Any) -> Any:
+            # NumPy has functions of its own for these.
+            if exponent == 0.5:
+                return np.sqrt(base)
+            if exponent == -1.0:
+                return np.reciprocal(base)
+            return base**exponent
+
+        return by_number
     if isinstance(kinds[1], types.Float):
         return lambda base, exponent: base**exponent
     if isinstance(kinds[0], types.Float):
@@ -1112,7 +1239,7 @@ def _negative_pow(base: Any, exponent: Any) -> Any:
 
 @compiled_as(helpers.rtcf_math_pow)
 def _math_pow(base: Any, exponent: Any) -> Any:
-    return lambda base, exponent: helpers.rtcf_pow(float(base), float(exponent))
+    return lambda base, exponent: helpers.rtcf_pow(np.float64(base), np.float64(exponent))
 
 
 @compiled_as(helpers.rtcf_to_int)
@@ -1120,7 +1247,7 @@ def _to_int(value: Any) -> Any:
     if isinstance(value, types.IntEnumMember):
         return lambda value: value.value
     if isinstance(value, types.Integer):
-        return lambda value: value
+        return lambda value: operators.rtcf_plain(value)
     if not isinstance(value, types.Float | types.Boolean):
         raise TypingError(f"RTCF:int of {words(value)}:give it a number")
 
@@ -1187,7 +1314,7 @@ def _front(ring: Any, oldest: Any, count: Any) -> Any:
     def front(ring: Any, oldest: Any, count: Any) -> Any:
         if count == 0:
             raise IndexError("front of an empty queue")
-        return ring[oldest]
+        return operators.rtcf_plain(ring[oldest])
 
     return front
 
@@ -1213,12 +1340,13 @@ def _where(condition: Any, x: Any, y: Any) -> Any:
     ):
         kinds = ", ".join(words(each) for each in given)
         raise TypingError(f"RTCF:np.where of {kinds}:give it arrays of one shape, and numbers")
+    as_x, as_y = conversions(np.where, x, y)
     if not dimensions:
         return lambda condition, x, y: x if condition else y
-    dtype = np.result_type(*(as_dtype(types.unliteral(getattr(each, "dtype", each)))
-                             for each in (x, y)))  # fmt: skip
+    dtype = result_type(np.where, x, y)
 
-    def where(condition: Any, x: Any, y: Any) -> Any:
+    @plain
+    def chosen(condition: Any, x: Any, y: Any) -> Any:
         shape = _shape(condition, x, y)
         if not (_fits(condition, shape) and _fits(x, shape) and _fits(y, shape)):
             raise ValueError("np.where of shapes that do not fit")
@@ -1230,7 +1358,7 @@ def _where(condition: Any, x: Any, y: Any) -> Any:
                 result[place] = _element(y, place)
         return result
 
-    return where
+    return lambda condition, x, y: chosen(condition, as_x(x), as_y(y))
 
 
 def _shape(condition: Any, x: Any, y: Any) -> Any:
@@ -1268,7 +1396,7 @@ def _element_or_number(value: Any, place: Any) -> Any:
     return lambda value, place: value
 
 
-@compiled_as(helpers.rtcf_solve)
+@compiled_as(helpers.rtcf_solve, refused="f")
 def _solve(a: Any, b: Any) -> Any:
     if b.ndim == 1:
 
@@ -1328,12 +1456,12 @@ def _eliminate(a: Any, b: Any) -> Any:
     return eliminate
 
 
-@compiled_as(helpers.rtcf_inv)
+@compiled_as(helpers.rtcf_inv, refused="f")
 def _inv(a: Any) -> Any:
     return lambda a: _eliminated(a, np.eye(a.shape[0]))
 
 
-@compiled_as(helpers.rtcf_cholesky)
+@compiled_as(helpers.rtcf_cholesky, refused="f")
 def _cholesky(a: Any) -> Any:
     def cholesky(a: Any) -> Any:
         n = a.shape[0]

@@ -4,7 +4,7 @@ import ast
 import dataclasses
 import enum
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from rtcf.component import Component, Fault
 from rtcf.component.declaration import HOOKS, REALTIME_HOOKS, Description
 
-from rtcf_compile.rewriting import helpers, numpy_functions
+from rtcf_compile.rewriting import helpers, numpy_functions, operators
 from rtcf_compile.rewriting.logs import Logs
 from rtcf_compile.rewriting.methods import Method, Methods
 from rtcf_compile.rewriting.products import ARENA, Products
@@ -25,15 +25,25 @@ from rtcf_compile.source.modules import Source, is_own, read
 HELPERS = {**helpers.BY_NAME, **numpy_functions.BY_NAME}
 # What makes a compiled function of a Python one, and what stands for a log call.
 Compiler = Callable[[FunctionType], Any]
-# An attribute of rewritten functions: the name of the author's function, as `Observer.update`.
-WRITTEN_NAME = "rtcf_written_name"
+# Attributes of rewritten functions: the name of the author's function, as `Observer.update`, and
+# its code.
+WRITTEN_NAME, WRITTEN_CODE = "rtcf_written_name", "rtcf_written_code"
 
 
 class Functions:
     """Hooks, methods and module functions of a class, made when they are asked for."""
 
-    def __init__(self, cls: type[Component], description: Description, compiler: Compiler) -> None:
-        """Prepare those of a class."""
+    def __init__(
+        self,
+        cls: type[Component],
+        description: Description,
+        compiler: Compiler,
+        narrow: Collection[CodeType] = (),
+    ) -> None:
+        """Prepare those of a class; `narrow`: the code of functions that compute with numbers of
+        other types than Python's.
+        """
+        self._narrow = narrow
         self.description = description
         self.logs = Logs(description.name)
         self.lines: set[int] = set()
@@ -142,7 +152,10 @@ class Functions:
         # Lines are those of one file: a base's hook in another one has the line of the class.
         is_here = source.file == self.file()
         line = 0 if is_here or not is_hook else inspect.getsourcelines(self._cls)[1]
-        hook = Hook(source, self.description, self._methods, method.owner, self.logs, is_here, line)
+        hook = Hook(
+            source, self.description, self._methods, method.owner, self.logs,
+            operator_functions(function, self._narrow), is_here, line,
+        )  # fmt: skip
         tree = hook.function()
         self._hooks[function] = hook
         self.used |= hook.used
@@ -205,7 +218,7 @@ class Functions:
         source = read(function)
         self._begin(function, source)
         check(source)
-        products = Products(source)
+        products = Products(source, operator_functions(function, self._narrow))
         source.tree.body = products.statements(source.tree.body)
         drop_types(source.tree)
         self._note_calls(products)
@@ -236,6 +249,13 @@ class Functions:
                 what = "a function of another module"
                 raise at(source.file, node, what, "import it by its name")
         return scope
+
+
+def operator_functions(
+    function: FunctionType, narrow: Collection[CodeType]
+) -> frozenset[type[ast.AST]]:
+    """Return the operators of a function that become functions themselves."""
+    return operators.NARROW if function.__code__ in narrow else operators.ALWAYS
 
 
 def drop_types(tree: ast.FunctionDef) -> None:
@@ -284,6 +304,7 @@ def made(tree: ast.FunctionDef, scope: dict[str, Any], source: Source) -> Functi
     defaults = source.function.__defaults__ if tree.name == source.tree.name else None
     function = FunctionType(inner, scope, tree.name, defaults)
     vars(function)[WRITTEN_NAME] = source.function.__qualname__.rpartition("<locals>.")[2]
+    vars(function)[WRITTEN_CODE] = source.function.__code__
     return function
 
 

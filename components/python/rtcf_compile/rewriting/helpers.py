@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from rtcf_compile.rewriting import operators
+
 Array = np.ndarray[Any, Any]
 _WHOLE = (int, np.integer)
 
@@ -23,26 +25,35 @@ def rtcf_matmul(a: Any, b: Any) -> Any:
     a, b = np.asarray(a), np.asarray(b)
     if not a.ndim or not b.ndim or a.shape[-1] != b.shape[0]:
         raise ValueError(f"@ of shapes {a.shape} and {b.shape}")
-    left = a if a.ndim == 2 else a[None, :]
-    right = b if b.ndim == 2 else b[:, None]
-    result = np.zeros((left.shape[0], right.shape[1]))
+    dtype = np.promote_types(a.dtype, b.dtype)
+    left = (a if a.ndim == 2 else a[None, :]).astype(dtype)
+    right = (b if b.ndim == 2 else b[:, None]).astype(dtype)
+    result = np.zeros((left.shape[0], right.shape[1]), dtype)
     for k in range(left.shape[1]):
         result = result + left[:, k, None] * right[None, k, :]
     if a.ndim == 1:
         result = result[0]
     if b.ndim == 1:
         result = result[..., 0]
-    return float(result) if result.ndim == 0 else result
+    return result[()]
 
 
 def rtcf_assign(target: Any, value: Any) -> None:
     """Set all elements of an array, from a number or an array that NumPy broadcasts to its shape.
     The two may share memory.
     """
+    new = _elements(target, value)
+    target[...] = new
+
+
+def _elements(target: Any, value: Any) -> Any:
+    """Return what an array is set to; raise where its elements cannot be that."""
     new = np.asarray(value)
     if new.dtype.kind == "f" and target.dtype.kind != "f":
         raise TypeError(f"elements are {target.dtype.name}, not {new.dtype.name}")
-    target[...] = new
+    if new.ndim == 0 and new.dtype.kind in "iu" and target.dtype.kind in "iu":
+        return operators.as_element(new.item(), target.dtype)
+    return new
 
 
 def rtcf_get(base: Any, index: Any) -> Any:
@@ -57,21 +68,21 @@ def rtcf_set(base: Any, index: Any, value: Any) -> None:
     numbers selects. The arrays may share memory, also where NumPy would not have it: the value for
     an array of numbers is copied.
     """
-    new = np.asarray(value)
+    new = np.asarray(_elements(base, value))
     parts = index if isinstance(index, tuple) else (index,)
     if any(isinstance(each, np.ndarray) and each.dtype.kind in "iu" for each in parts):
         new = new.copy()
-    if new.dtype.kind == "f" and base.dtype.kind != "f":
-        raise TypeError(f"elements are {base.dtype.name}, not {new.dtype.name}")
     base[index] = new
 
 
 def _in_place(operation: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    operate = operators.OF[operation]
+
     def change(target: Any, value: Any) -> Any:
         """Return what `target += value` leaves in target: an array is changed in place."""
         if not isinstance(target, np.ndarray):
-            return operation(target, value)
-        rtcf_assign(target, operation(target, value))
+            return operate(target, value)
+        rtcf_assign(target, operate(target, value))
         return target
 
     change.__name__ = f"rtcf_in_place_{operation.__name__}"
@@ -148,7 +159,7 @@ def rtcf_math_fmod(x: Any, y: Any) -> float:
 def rtcf_pow(base: Any, exponent: Any) -> Any:
     """Return base ** exponent; raises where that is no float, or no int of two ints."""
     if isinstance(base, np.ndarray) or isinstance(exponent, np.ndarray):
-        return base**exponent
+        return operator.pow(*operators.alike(base, exponent))
     if isinstance(base, _WHOLE) and isinstance(exponent, _WHOLE):
         if exponent < 0:
             raise ValueError("an int to a negative power: make it a float")
@@ -297,7 +308,7 @@ def rtcf_where(condition: Any, x: Any, y: Any) -> Any:
     shapes = {np.shape(each) for each in (condition, x, y)} - {()}
     if len(shapes) > 1:
         raise ValueError(f"np.where of shapes {sorted(shapes)}")
-    return np.where(condition, x, y)[()]
+    return np.where(condition, *operators.alike(x, y))[()]
 
 
 def rtcf_solve(a: Any, b: Any) -> Any:
@@ -364,6 +375,8 @@ INSTEAD: dict[Callable[..., Any], Callable[..., Any]] = {
     builtins.int: rtcf_to_int,
     builtins.float: rtcf_to_float,
     builtins.pow: rtcf_pow,
+    builtins.divmod: operators.rtcf_divmod,
+    **{each: operators.OF[of] for each, of in operators.SHIFT_UFUNCS.items()},
     **MATH,
 }
 BY_NAME = {
@@ -386,5 +399,6 @@ BY_NAME = {
         *IN_PLACE.values(),
         *OF_LISTS.values(),
         *INSTEAD.values(),
+        *operators.BY_NAME.values(),
     )
 }

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from rtcf_compile.rewriting import helpers
+from rtcf_compile.rewriting import helpers, operators
 
 Function = Callable[..., Any]
 
@@ -302,8 +302,8 @@ def rtcf_clip(a: Any, a_min: Any, a_max: Any) -> Any:
     """
     if a_min is None and a_max is None:
         return np.clip(a, a_min, a_max)
-    raised = a if a_min is None else np.maximum(a, a_min)
-    return raised if a_max is None else np.minimum(raised, a_max)
+    raised = a if a_min is None else operators.OF[np.maximum](a, a_min)
+    return raised if a_max is None else operators.OF[np.minimum](raised, a_max)
 
 
 @_stands_for(any)
@@ -489,23 +489,23 @@ _LIBM = ctypes.CDLL(ctypes.util.find_library("m") or "libm.so.6")
 
 
 def _of_the_c_library(function: Function, name: str) -> Function:
-    c_function = _LIBM[name]
     count = 2 if name in ("atan2", "hypot", "pow") else 1
-    c_function.argtypes, c_function.restype = [ctypes.c_double] * count, ctypes.c_double
-    elementwise = np.vectorize(c_function, otypes=[np.float64])
+    by_type = {}
+    for suffix, c_type, dtype in (("", ctypes.c_double, np.float64), ("f", ctypes.c_float, np.float32)):
+        c_function = _LIBM[name + suffix]
+        c_function.argtypes, c_function.restype = [c_type] * count, c_type
+        by_type[np.dtype(dtype)] = np.vectorize(c_function, otypes=[dtype])
 
     def call(*arguments: Any) -> Any:
-        if any(np.asarray(each).dtype == np.float32 for each in arguments) or any(
-            np.size(each) == 0 for each in arguments
-        ):
+        if any(np.size(each) == 0 for each in arguments):
             return function(*arguments)
-        result = elementwise(*arguments)
-        return result if result.ndim else np.float64(result)
+        dtype = np.result_type(np.float32, *(np.asarray(each).dtype for each in arguments))
+        return by_type[dtype](*arguments)[()]
 
     if count == 2:
 
         def binary(x: Any, y: Any) -> Any:
-            return call(x, y)
+            return call(*operators.alike(x, y))
 
         return binary
 

@@ -12,6 +12,7 @@ from rtcf.component.declaration import PORTS, Description, Input, Member, Output
 from rtcf.component.message_type import MessageType
 from rtcf.component.value_type import ValueType
 
+from rtcf_compile.rewriting.operators import is_narrow
 from rtcf_compile.rewriting.products import Products, call_of, like, loaded
 from rtcf_compile.source.checks import check_index
 from rtcf_compile.source.modules import Source
@@ -24,11 +25,13 @@ _QUEUE_FIELDS = {"size": "__count", "dropped": "__dropped", "connected": "__conn
 class Ports(Products):
     """Puts fields of the record in the place of ports."""
 
-    def __init__(self, source: Source, description: Description) -> None:
-        """Rewrite a method of a class that has these members."""
+    def __init__(
+        self, source: Source, description: Description, functions: frozenset[type[ast.AST]]
+    ) -> None:
+        """Rewrite a method of a class that has these members; see Products."""
         self._description = description
         self._self = source.tree.args.args[0].arg if source.tree.args.args else ""
-        super().__init__(source)
+        super().__init__(source, functions)
         self.used: set[str] = set()
         self.touched: dict[str, ast.AST] = {}
 
@@ -87,9 +90,13 @@ class Ports(Products):
         return super()._is_uncertain(node, names)
 
     def _read(self, name: str, kind: ValueType) -> ast.expr:
-        """Return a field's value; an array as a view, whose type has no sizes."""
-        field = self._field(name, ast.Load())
-        return call_of("rtcf_view", field) if kind.shape else field
+        """Return a field's value: a number as Python's own, an array as a view, whose type has no
+        sizes.
+        """
+        field: ast.expr = self._field(name, ast.Load())
+        if kind.shape:
+            return call_of("rtcf_view", field)
+        return call_of("rtcf_plain", field) if is_narrow(kind.scalar) else field
 
     def _as_enum(self, field: ast.expr, kind: ValueType, checked: bool = False) -> ast.expr:
         """Return an int of the record as the enum that it is declared as."""

@@ -13,13 +13,18 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from rtcf_compile.rewriting import numpy_functions
+from rtcf_compile.rewriting import numpy_functions, operators
 from rtcf_compile.rewriting.helpers import IN_PLACE, INSTEAD, OF_LISTS, rtcf_round
 from rtcf_compile.source.checks import resolve
 from rtcf_compile.source.mistake import at
 from rtcf_compile.source.modules import Source, is_own
 
 _Node = TypeVar("_Node", bound=ast.AST)
+_OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
+    node: operators.OF[operation]
+    for by_node in (operators.BINARY, operators.SHIFTS, operators.COMPARISONS)
+    for node, operation in by_node.items()
+}
 _STANDS_FOR = [*INSTEAD.items(), *numpy_functions.STANDS_FOR]
 # Temporaries of a cycle in the real-time thread, bytes.
 ARENA = 64 * 1024
@@ -34,9 +39,12 @@ _TYPED = {np.zeros: 1, np.ones: 1, np.empty: 1, np.full: 2, np.zeros_like: 1, np
 class Products(ast.NodeTransformer):
     """Puts the helpers in the place of `@`, np.linalg and assignment to slices."""
 
-    def __init__(self, source: Source) -> None:
-        """Rewrite a function of that source."""
+    def __init__(
+        self, source: Source, functions: frozenset[type[ast.AST]] = operators.ALWAYS
+    ) -> None:
+        """Rewrite a function of that source; `functions`: the operators that become some."""
         self.source = source
+        self._functions = functions
         self.constants: dict[str, Any] = {}
         # Seen before anything is rewritten.
         self._counters = self._find_counters()
@@ -271,6 +279,9 @@ class Products(ast.NodeTransformer):
             node.left = self._arrays(node.left)
             node.comparators = [self._arrays(each) for each in node.comparators]
         self.generic_visit(node)
+        if len(node.ops) == 1 and type(node.ops[0]) in self._functions:
+            compare = _OPERATORS[type(node.ops[0])].__name__
+            return like(node, call_of(compare, node.left, node.comparators[0]))
         return node
 
     def _may_be_none(self, node: ast.expr) -> bool:
@@ -312,7 +323,17 @@ class Products(ast.NodeTransformer):
         if isinstance(node.op, ast.Pow):
             power = _power(node.right)
             return like(node, call_of(power, node.left, node.right))
+        if type(node.op) in self._functions:
+            return like(node, call_of(_OPERATORS[type(node.op)].__name__, node.left, node.right))
         return node
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        """`-a`."""
+        is_constant = isinstance(node.operand, ast.Constant)
+        self.generic_visit(node)
+        if type(node.op) not in self._functions or is_constant:
+            return node
+        return like(node, call_of("rtcf_negative", node.operand))
 
     def visit_List(self, node: ast.List) -> ast.AST:
         """`[1.0, x]`, whose size is constant."""
@@ -408,6 +429,10 @@ class Products(ast.NodeTransformer):
                 for each in (self.visit(each) for each in node.args)
             ]
             return node
+        if operators.NARROW == self._functions and isinstance(target, np.ufunc):
+            of = operators.UFUNCS.get(target)
+            if of is not None and len(node.args) == target.nin and not node.keywords:
+                return self._instead(node, operators.OF[of], node.args)
         if isinstance(target, np.ufunc) and len(node.args) + len(node.keywords) > target.nin:
             raise self.mistake(
                 node, f"{target.__name__} has an argument too many", "set what it returns: x[:] = …"
@@ -447,6 +472,9 @@ class Products(ast.NodeTransformer):
             )
         if self._is_other(node, target):
             self.others.append(node)
+        if operators.NARROW == self._functions and getattr(target, "__module__", "") == "math":
+            node.args = [like(each, call_of("rtcf_plain", self.visit(each))) for each in node.args]
+            return node
         self.generic_visit(node)
         return node
 
@@ -737,10 +765,13 @@ class Products(ast.NodeTransformer):
         """`x += value`, `x[1:3] += value`, `x @= m`."""
         before, target = self._steady(node.target, node.value)
         in_parts = isinstance(target, ast.Subscript)
-        if in_parts or isinstance(node.op, ast.MatMult | ast.Pow):
+        is_function = type(node.op) in self._functions and type(node.op) not in IN_PLACE
+        if in_parts or is_function or isinstance(node.op, ast.MatMult | ast.Pow):
             value: ast.expr = ast.BinOp(loaded(target), node.op, node.value)
+            if in_parts and operators.NARROW == self._functions:
+                value = changed_elements(loaded(target), node.op, node.value)
             # An array is changed, whatever names it has.
-            if isinstance(target, ast.Name) and isinstance(node.op, ast.Pow):
+            if isinstance(target, ast.Name) and not isinstance(node.op, ast.MatMult):
                 value = call_of("rtcf_changed", loaded(target), value)
         elif type(node.op) in IN_PLACE:
             value = call_of(IN_PLACE[type(node.op)].__name__, loaded(target), node.value)
@@ -884,6 +915,14 @@ def _sliced(node: ast.expr) -> ast.expr:
         return node
     bounds = [each or ast.Constant(None) for each in (node.lower, node.upper, node.step)]
     return like(node, call_of("slice", *bounds[: 3 if node.step else 2]))
+
+
+def changed_elements(target: ast.expr, operation: ast.operator, value: ast.expr) -> ast.expr:
+    """Return what `target += value` sets elements to."""
+    helper = operators.OF_ELEMENTS.get(type(operation))
+    if helper is None:
+        return ast.BinOp(target, operation, value)
+    return call_of(helper.__name__, target, value)
 
 
 def _power(exponent: ast.expr) -> str:

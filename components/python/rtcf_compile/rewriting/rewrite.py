@@ -10,6 +10,7 @@ import difflib
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 from rtcf.component.declaration import (
     HOOKS,
     LOG_LEVELS,
@@ -29,7 +30,7 @@ from rtcf.component.value_type import ValueType
 from rtcf_compile.rewriting.logs import Logs, with_name
 from rtcf_compile.rewriting.methods import Method, Methods
 from rtcf_compile.rewriting.ports import Ports, a_kind
-from rtcf_compile.rewriting.products import call_of, like, loaded
+from rtcf_compile.rewriting.products import call_of, changed_elements, like, loaded
 from rtcf_compile.source.checks import METHODS, check_arguments, resolve
 from rtcf_compile.source.modules import Source
 
@@ -44,6 +45,7 @@ class Hook(Ports):
         methods: Methods,
         owner: type,
         logs: Logs,
+        functions: frozenset[type[ast.AST]],
         is_noted: bool = True,
         entry_line: int = 0,
     ) -> None:
@@ -52,7 +54,7 @@ class Hook(Ports):
         `is_noted`: its lines are noted while it runs, as it is in the file of the component.
         `entry_line`: a line that is noted before it runs.
         """
-        super().__init__(source, description)
+        super().__init__(source, description, functions)
         self._is_noted, self._entry_line = is_noted, entry_line
         self._methods, self._owner, self._logs = methods, owner, logs
         self.called: dict[str, Method] = {}
@@ -345,8 +347,10 @@ class Hook(Ports):
         self._check_elements(target)
         if isinstance(target, ast.Attribute) and self._is_self(target.value):
             member = self._settable(target)
-            value = self.visit(like(node, ast.BinOp(loaded(target), node.op, node.value)))
-            return self._set(node, member, value)
+            new: ast.expr = ast.BinOp(loaded(target), node.op, node.value)
+            if member.type.shape and member.type.scalar != np.float64:
+                new = changed_elements(loaded(target), node.op, node.value)
+            return self._set(node, member, self.visit(like(node, new)))
         if part := self._settable_part(target):
             value = self.visit(like(node, ast.BinOp(loaded(target), node.op, node.value)))
             return self._set_field(node, *part, value)
@@ -380,7 +384,10 @@ class Hook(Ports):
             method = self._methods.find(node.attr)
             if method is not None and method.kind == "property":
                 raise self.mistake(
-                    node, "a property is set", f"call a method: self.set_{node.attr}(…)"
+                    node,
+                    f"{node.attr} is a property, which is only read",
+                    f"set the members that it is computed from, or write a method: "
+                    f"self.set_{node.attr}(…)",
                 )
             raise self._undeclared(node)
         if member.kind is Parameter:

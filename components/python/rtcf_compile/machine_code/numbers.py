@@ -1,0 +1,640 @@
+"""A pass of numba's behind its inference of types: refuses what the machine's numbers do otherwise
+than Python's and NumPy's.
+
+- Functions that compute with narrow numbers are noted, to be rewritten for these.
+- A number of NumPy where one of Python is needed, as the releases of NumPy differ for it.
+- Arithmetic of bools of NumPy, which is logic there.
+- A variable that is an int in one place and a float in another, and may be a large int: the machine
+  has it as a float, which has 53 bits.
+"""
+
+import builtins
+import functools
+import math
+import operator
+from collections.abc import Callable, Iterator
+from types import CodeType
+from typing import Any
+
+import numpy as np
+from numba.core import ir, types
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import AnalysisPass, register_pass
+from numba.core.errors import TypingError
+from numba.core.typed_passes import NopythonTypeInference
+
+from rtcf_compile.machine_code.number_types import Operand, operand, plain_of, together
+from rtcf_compile.rewriting import helpers, numpy_functions, operators
+from rtcf_compile.rewriting.functions import WRITTEN_CODE
+from rtcf_compile.source.mistake import Mistake
+
+_LARGEST = 2**53  # up to which floats have all ints
+_TURNS = 2**31  # of a loop, at most
+_COMPARISONS = tuple(operators.COMPARISONS.values())
+_OPERATIONS = (*operators.BINARY.values(), *operators.SHIFTS.values(), *_COMPARISONS)
+# Two bools of NumPy make a bool, or raise; two of Python make an int.
+_ARITHMETIC = (
+    *(operator.add, operator.sub, operator.mul, operator.floordiv, operator.mod, operator.pow),
+)
+_IN_PLACE = {getattr(operator, f"i{each.__name__.strip('_')}"): each for each in _OPERATIONS
+             if hasattr(operator, f"i{each.__name__.strip('_')}")}  # fmt: skip
+# Helpers that compute as an operator does, which of their arguments meet each other.
+_MEETING: dict[Callable[..., Any], tuple[Callable[..., Any], tuple[tuple[int, int], ...]]] = {
+    **{own: (of, ((0, 1),)) for of, own in operators.OF.items()},
+    **{own: (operators.BINARY[node], ((0, 1),)) for node, own in operators.OF_ELEMENTS.items()},
+    **{own: (operators.BINARY[node], ((0, 1),)) for node, own in helpers.IN_PLACE.items()},
+    **{own: (np.hypot, ((0, 1),)) for own, name in numpy_functions.BY_LIBM.items()
+       if name in ("hypot", "arctan2")},
+    helpers.rtcf_equal: (operator.eq, ((0, 1),)),
+    helpers.rtcf_where: (np.where, ((1, 2),)),
+    helpers.rtcf_pow: (operator.pow, ((0, 1),)),
+    helpers.rtcf_negative_pow: (operator.pow, ((0, 1),)),
+    numpy_functions.rtcf_clip: (np.clip, ((0, 1), (0, 2))),
+}  # fmt: skip
+# Functions that give numbers of Python, and those that do for numbers of Python.
+_PYTHONS = (
+    *(len, bool, helpers.rtcf_to_int, helpers.rtcf_to_float, helpers.rtcf_floor, helpers.rtcf_ceil),
+    *(helpers.rtcf_round, helpers.rtcf_index, helpers.rtcf_front, helpers.rtcf_age),
+    *(helpers.rtcf_math_fmod, helpers.rtcf_math_pow, helpers.rtcf_is, helpers.rtcf_is_known),
+    *(operators.rtcf_plain, numpy_functions.rtcf_math_hypot, numpy_functions.rtcf_math_isclose),
+    *helpers.MATH.values(),
+)
+_AS_ARGUMENTS = (
+    *(abs, max, min, numpy_functions.rtcf_abs, numpy_functions.rtcf_whole_pow, helpers.rtcf_pow),
+    *(helpers.rtcf_negative_pow, helpers.rtcf_maybe, helpers.rtcf_or_old, helpers.rtcf_equal),
+    *(helpers.rtcf_get, helpers.rtcf_items, operators.rtcf_negative, operators.rtcf_divmod),
+    *operators.OF.values(),
+    *operators.OF_ELEMENTS.values(),
+    *helpers.IN_PLACE.values(),
+)
+# What numba has of NumPy for narrow numbers as NumPy has it: of one, and of two of one type.
+_NARROW_UFUNCS = (
+    *(np.floor, np.ceil, np.trunc, np.rint, np.sqrt, np.square, np.absolute, np.fabs, np.sign),
+    *(np.negative, np.isnan, np.isfinite, np.isinf, np.signbit, np.logical_not, np.logical_and),
+    *(np.logical_or, np.logical_xor, np.invert, np.fmin, np.fmax, np.copysign, np.fmod),
+)
+_FLOATS_ONLY = (np.floor, np.ceil, np.trunc, np.rint, np.sqrt, np.fabs, np.copysign, np.fmod)
+
+
+class Stop(BaseException):
+    """Ends a compilation from within numba, which takes other exceptions for its own."""
+
+    def __init__(self, mistake: Mistake) -> None:
+        """Carry a mistake."""
+        self.mistake = mistake
+
+
+class _NarrowError(Exception):
+    """A function computes with narrow numbers."""
+
+
+def compiler(narrow: set[CodeType]) -> Any:
+    """Return numba's compiler with the pass, which notes the code of functions that compute with
+    narrow numbers.
+    """
+    return type("Compiler", (_Compiler,), {"narrow": narrow})
+
+
+class _Compiler(CompilerBase):  # type: ignore[misc]
+    narrow: set[CodeType]
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the passes."""
+        self.state.rtcf_narrow = self.narrow
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.add_pass_after(_NumbersPass, NopythonTypeInference)
+        passes.finalize()
+        return [passes]
+
+
+@register_pass(mutates_CFG=False, analysis_only=True)
+class _NumbersPass(AnalysisPass):  # type: ignore[misc]
+    _name = "rtcf_numbers"
+
+    def __init__(self) -> None:
+        AnalysisPass.__init__(self)
+
+    def run_pass(self, state: Any) -> bool:
+        """Look at a function whose types are known."""
+        try:
+            Numbers(state.func_ir, state.typemap).check()
+        except _NarrowError:
+            state.rtcf_narrow.add(vars(state.func_id.func)[WRITTEN_CODE])
+        return False
+
+
+class Numbers:
+    """The numbers of a function."""
+
+    def __init__(self, function: Any, types_of: dict[str, Any]) -> None:
+        """Look at numba's intermediate representation."""
+        self._file = function.loc.filename
+        self._is_own = WRITTEN_CODE in vars(function.func_id.func)
+        self._types = types_of
+        self._assigned: dict[str, list[Any]] = {}
+        self._statements: list[Any] = []
+        for _, block in sorted(function.blocks.items()):
+            for each in block.body:
+                if isinstance(each, ir.Assign):
+                    self._statements.append(each)
+                    self._assigned.setdefault(each.target.name, []).append(each.value)
+
+    def check(self) -> None:
+        """Raise Stop, or that it is narrow, for the first thing that is found."""
+        for each in self._statements:
+            self._line = each.loc.line
+            self._joined(each)
+            if isinstance(each.value, ir.Expr):
+                self._expression(each.value)
+        if any(map(self._becomes_float, self._statements)):
+            Bounds(self).check()
+
+    def stop(self, what: str, way_out: str, line: int = 0) -> Stop:
+        """Return a mistake at the present line."""
+        return Stop(Mistake(self._file, line or self._line, what, way_out))
+
+    def _joined(self, assignment: Any) -> None:
+        """Refuse a variable that is a narrow number in one place, and another one elsewhere."""
+        joined = self.number(assignment.target)
+        for each in self._sources(assignment):
+            number = self.number(each)
+            if joined is None or number is None or number.is_array or not number.is_narrow:
+                continue
+            if number.dtype != joined.dtype:
+                raise self.stop(
+                    f"is once {number.words}, once a number of another type", plain_of(number)
+                )
+
+    def _sources(self, assignment: Any) -> list[Any]:
+        """Return the variables whose value another one gets as it is."""
+        value = assignment.value
+        if isinstance(value, ir.Var):
+            return [value]
+        if isinstance(value, ir.Expr) and value.op == "phi":
+            return [each for each in value.incoming_values if each is not ir.UNDEFINED]
+        return [value.value] if isinstance(value, ir.Expr) and value.op == "cast" else []
+
+    def _becomes_float(self, assignment: Any) -> bool:
+        """Tell whether ints are set to a variable that is a float, or are the largest beside one."""
+        value, sources = assignment.value, self._sources(assignment)
+        if isinstance(value, ir.Expr) and value.op == "call":
+            sources = list(value.args) if self.function(value.func) in (max, min) else []
+        return isinstance(self.type_of(assignment.target.name), types.Float) and any(
+            isinstance(self.type_of(each.name), types.Integer) for each in sources
+        )
+
+    # Operators and calls.
+
+    def _expression(self, value: Any) -> None:
+        operation = self.operation(value)
+        if operation is not None and value.op != "call":
+            self._operator(value, operation, self.operands(value))
+        elif value.op == "unary":
+            self._unary(value)
+        elif value.op == "call":
+            self._call(value, self.function(value.func))
+
+    def operation(self, value: Any) -> Callable[..., Any] | None:
+        """Return the operator that an expression is."""
+        if value.op == "binop":
+            return value.fn  # type: ignore[no-any-return]
+        if value.op == "inplace_binop":
+            return value.immutable_fn  # type: ignore[no-any-return]
+        if value.op == "call":
+            met = _MEETING.get(_hashable(self.function(value.func)))
+            return met[0] if met else None
+        return None
+
+    def operands(self, value: Any) -> list[Any]:
+        """Return the variables that an operator, or a function, has."""
+        if value.op == "call":
+            return list(value.args)
+        return [value.lhs, value.rhs]
+
+    def _operator(self, value: Any, operation: Any, variables: list[Any]) -> None:
+        numbers = [self.number(each) for each in variables]
+        if None in numbers:
+            return
+        if all(each.is_bool for each in numbers if each):
+            self._bools(operation, variables)
+        if any(each.is_narrow for each in numbers if each):
+            if operation in _COMPARISONS and not any(each.is_array for each in numbers if each):
+                self._met(operation, variables)
+            else:
+                self._narrow()
+
+    def _narrow(self) -> None:
+        if self._is_own:
+            raise _NarrowError
+
+    def _bools(self, operation: Any, variables: list[Any]) -> None:
+        """Refuse arithmetic of bools, unless all are Python's."""
+        if operation not in _ARITHMETIC or all(map(self.is_python, variables)):
+            return
+        raise self.stop(
+            "arithmetic of bools is logic in NumPy",
+            "write a or b, a and b (a | b, a & b of arrays), or convert them: int(…), "
+            "….astype(int)",
+        )
+
+    def _unary(self, value: Any) -> None:
+        number = self.number(value.value)
+        if number is None:
+            return
+        if number.is_narrow and value.fn in (operator.neg, operator.invert):
+            if number.is_array:
+                return
+            if value.fn is operator.invert:
+                raise self.stop(f"~ of {number.words}", plain_of(number))
+            self._narrow()
+        if number.is_bool and value.fn is operator.invert and not number.is_array:
+            raise self.stop("~ of a bool is an int in Python", "write not")
+        if number.is_bool and value.fn in (operator.neg, operator.pos) and not self.is_python(
+            value.value
+        ):  # fmt: skip
+            raise self.stop("- and + of bools are not in NumPy", "convert them: int(…)")
+
+    def _call(self, value: Any, function: Any) -> None:
+        function = _hashable(function)
+        if function in _MEETING:
+            operation, pairs = _MEETING[function]
+            for pair in pairs:
+                variables = [value.args[place] for place in pair if place < len(value.args)]
+                numbers = [self.number(each) for each in variables]
+                if len(variables) < 2 or None in numbers:
+                    continue
+                if all(each.is_bool for each in numbers if each):
+                    self._bools(operation, variables)
+                if function in operators.OF_ELEMENTS.values() and self._is_stored(*variables):
+                    continue
+                self._met(operation, variables)
+        elif function in (helpers.rtcf_assign, helpers.rtcf_store, helpers.rtcf_set):
+            self._set(value.args[0], value.args[-1])
+        elif isinstance(function, np.ufunc):
+            self._ufunc(value, function)
+        elif getattr(function, "__module__", None) == "math":
+            if any(number.is_narrow for each in value.args if (number := self.number(each))):
+                self._narrow()
+        elif function is sum and value.args:
+            number = self.number(value.args[0])
+            if number is not None and number.is_narrow:
+                raise self.stop(f"sum of {number.words}", "use np.sum")
+        elif function in (max, min) and len(value.args) > 1:
+            self._extreme(value)
+
+    def _is_stored(self, element: Any, value: Any) -> bool:
+        """Tell whether an element of small ints is changed by an int, which goes round as it is
+        stored; refuse a constant that it cannot be.
+        """
+        one, other = self.number(element), self.number(value)
+        if one is None or other is None or one.is_array or other.is_array:
+            return False
+        self._set(element, value)
+        return one.dtype.kind in "iu" and other.dtype == np.int64
+
+    def _set(self, target: Any, value: Any) -> None:
+        """Refuse to set elements to a constant that they cannot be."""
+        number, constant = self.number(target), self.constant(value)
+        if number is None or number.dtype.kind not in "iu" or type(constant) is not int:
+            return
+        if not operators.fits(constant, number.dtype):
+            limits = np.iinfo(number.dtype)
+            what = f"{constant} does not fit {number.dtype.name}"
+            raise self.stop(what, f"use {limits.min} to {limits.max}")
+
+    def _extreme(self, value: Any) -> None:
+        """Refuse the largest of numbers that have different types in Python, too."""
+        numbers = [number for each in value.args if (number := self.number(each)) is not None]
+        if len({each.dtype for each in numbers}) < 2:
+            return
+        for each in numbers:
+            if each.is_narrow:
+                raise self.stop(f"{each.words} beside numbers of other types", plain_of(each))
+
+    def _ufunc(self, value: Any, function: Any) -> None:
+        """A function of NumPy that is numba's."""
+        numbers = [number for each in value.args if (number := self.number(each)) is not None]
+        of = operators.UFUNCS.get(function)
+        narrow = [each for each in numbers if each.is_narrow]
+        if of is not None and len(numbers) == 2:
+            if all(each.is_bool for each in numbers):
+                self._bools(of, list(value.args))
+            if narrow:
+                self._narrow()
+        if not narrow:
+            return
+        same = len({(each.dtype, each.is_array) for each in numbers}) == 1
+        small = any(each.dtype.kind != "f" for each in narrow) and function in _FLOATS_ONLY
+        if function not in _NARROW_UFUNCS or not same or small:
+            raise self.stop(
+                f"np.{function.__name__} of {narrow[0].words}",
+                "convert it: x.astype(float)" if narrow[0].is_array else plain_of(narrow[0]),
+            )
+
+    def _met(self, operation: Any, variables: list[Any]) -> None:
+        """Refuse what differs between releases of NumPy."""
+        numbers = [self.number(each) for each in variables]
+        one, other = numbers
+        assert one is not None and other is not None
+        if not one.is_narrow and not other.is_narrow:
+            return
+        is_exact = self._is_exact(variables, one, other)
+        try:
+            meeting = together(operation, one, other, is_exact)
+        except TypingError as error:
+            what, way_out = str(error.msg).removeprefix("RTCF:").split(":", 1)
+            raise self.stop(what, way_out) from None
+        for to, variable in ((meeting.left, variables[0]), (meeting.right, variables[1])):
+            constant = self.constant(variable)
+            if to is not None and to.kind in "iu" and type(constant) is int:
+                if not operators.fits(constant, to):
+                    raise self.stop(f"{constant} does not fit {to.name}", "convert the array: "
+                                    "x.astype(int)")  # fmt: skip
+        if meeting.weak is not None and not self.is_python(variables[meeting.weak]):
+            array, number = (one, other) if one.is_array else (other, one)
+            raise self.stop(
+                f"{array.words} with a number that may be NumPy's makes {array.dtype.name} in "
+                f"NumPy 1, {np.promote_types(array.dtype, number.dtype).name} in NumPy 2",
+                plain_of(number),
+            )
+
+    def _is_exact(self, variables: list[Any], one: Operand, other: Operand) -> bool:
+        """Tell whether the wide one of two numbers is a constant that the narrow type has."""
+        for variable, number, narrow in ((variables[0], one, other), (variables[1], other, one)):
+            constant = self.constant(variable)
+            if not number.is_narrow and narrow.dtype == np.float32 and constant is not None:
+                with np.errstate(all="ignore"):
+                    return bool(np.float32(constant) == constant)
+        return False
+
+    # What variables are.
+
+    def number(self, variable: Any) -> Operand | None:
+        """Return a variable as an operand."""
+        return operand(self._types[variable.name])
+
+    def type_of(self, name: str) -> Any:
+        """Return numba's type of a variable."""
+        return types.unliteral(self._types[name])
+
+    def assignments(self) -> Iterator[Any]:
+        """Yield all assignments."""
+        yield from self._statements
+
+    def function(self, variable: Any) -> Any:
+        """Return the function that a variable is."""
+        values = self._assigned.get(variable.name, [])
+        if len(values) != 1:
+            return None
+        value = values[0]
+        if isinstance(value, ir.Global | ir.FreeVar):
+            return value.value
+        if isinstance(value, ir.Var):
+            return self.function(value)
+        if isinstance(value, ir.Expr) and value.op == "getattr":
+            return getattr(self.function(value.value), value.attr, None)
+        return None
+
+    def constant(self, variable: Any) -> Any:
+        """Return the number that a variable always is; None for others."""
+        values = self._assigned.get(variable.name, [])
+        if len(values) != 1:
+            return None
+        value = values[0]
+        if isinstance(value, ir.Const | ir.Global | ir.FreeVar):
+            return value.value if type(value.value) in (int, float, bool) else None
+        if isinstance(value, ir.Var):
+            return self.constant(value)
+        if isinstance(value, ir.Expr) and value.op == "unary" and value.fn is operator.neg:
+            inner = self.constant(value.value)
+            return None if inner is None else -inner
+        return None
+
+    def is_python(self, variable: Any) -> bool:
+        """Tell whether a number is surely one of Python in the interpreter, too."""
+        return variable.name in self._pythons
+
+    @functools.cached_property
+    def _pythons(self) -> set[str]:
+        return self._find_pythons()
+
+    def _find_pythons(self) -> set[str]:
+        found = set(self._assigned)
+        before = -1
+        while len(found) != before:
+            before = len(found)
+            found = {
+                name
+                for name in found
+                if all(self._gives_python(each, found) for each in self._assigned[name])
+            }
+        return found
+
+    def _gives_python(self, value: Any, known: set[str]) -> bool:
+        if isinstance(value, ir.Var):
+            return value.name in known
+        if isinstance(value, ir.Const | ir.Global | ir.FreeVar):
+            return _is_pythons(value.value)
+        if not isinstance(value, ir.Expr):
+            return False
+        if value.op == "getattr":
+            return not isinstance(self._types.get(value.value.name), types.Array) or value.attr in (
+                "shape", "size", "ndim",
+            )  # fmt: skip
+        if value.op == "call":
+            function = _hashable(self.function(value.func))
+            if function in _PYTHONS:
+                return True
+            given = [each.name for each in value.args
+                     if not isinstance(self._types[each.name], types.Function)]  # fmt: skip
+            return function in (*_AS_ARGUMENTS, range) and set(given) <= known
+        if value.op == "static_getitem" and (item := self._item(value)) is not None:
+            return item.name in known
+        if value.op in ("getitem", "static_getitem", "typed_getitem"):
+            is_array = isinstance(self._types[value.value.name], types.Array)
+            return not is_array and value.value.name in known
+        if value.op in ("getiter", "iternext", "pair_first", "exhaust_iter", "cast", "unary"):
+            kind = self._types.get(value.value.name)
+            return not isinstance(kind, types.Array) and value.value.name in known
+        if value.op == "phi":
+            return all(each is ir.UNDEFINED or each.name in known for each in value.incoming_values)
+        if value.op == "build_tuple":
+            return all(each.name in known for each in value.items)
+        if value.op in ("binop", "inplace_binop"):
+            return {value.lhs.name, value.rhs.name} <= known
+        return False
+
+
+    def _item(self, value: Any) -> Any:
+        """Return the variable that an element of several values is; None if it is not known."""
+        made = self._assigned.get(value.value.name, [])
+        while len(made) == 1 and (
+            isinstance(made[0], ir.Var)
+            or (isinstance(made[0], ir.Expr) and made[0].op == "exhaust_iter")
+        ):
+            of = made[0] if isinstance(made[0], ir.Var) else made[0].value
+            made = self._assigned.get(of.name, [])
+        if len(made) == 1 and isinstance(made[0], ir.Expr) and made[0].op == "build_tuple":
+            return made[0].items[value.index] if isinstance(value.index, int) else None
+        return None
+
+
+def _is_pythons(value: Any) -> bool:
+    if isinstance(value, tuple):
+        return all(map(_is_pythons, value))
+    return not isinstance(value, np.generic | np.ndarray)
+
+
+def _hashable(function: Any) -> Any:
+    try:
+        hash(function)
+    except TypeError:
+        return None
+    return function
+
+
+class Bounds:
+    """How large an int a variable may be in Python where it is a float here.
+
+    A bound is None for what is never an int. Loops are followed some turns; what grows by the same
+    in each is bounded by the turns that a cycle may have, what grows by more is not.
+    """
+
+    def __init__(self, numbers: Numbers) -> None:
+        """Bound the numbers of a function."""
+        self._numbers = numbers
+        self._bounds: dict[str, float | None] = {}
+        history: list[dict[str, float | None]] = []
+        for _ in range(12):
+            for each in numbers.assignments():
+                self._bounds[each.target.name] = self._join(
+                    self._bounds.get(each.target.name), self._bound(each)
+                )
+            history.append(dict(self._bounds))
+        self._widen(history)
+
+    def check(self) -> None:
+        """Raise Stop for a float that may be a large int in Python."""
+        for each in self._numbers.assignments():
+            name = each.target.name
+            if isinstance(self._numbers.type_of(name), types.Float):
+                self._check(each)
+
+    def _check(self, assignment: Any) -> None:
+        bound = self._bounds.get(assignment.target.name)
+        if bound is None or bound <= _LARGEST:
+            return
+        name = self._joined_name(assignment)
+        subject = f"{name} is" if name.isidentifier() and not name.startswith("rtcf_") else "is"
+        raise self._numbers.stop(
+            f"{subject} once an int, once a float, which has 53 bits",
+            "convert the int: float(…)",
+            self._line(assignment),
+        )
+
+    def _joined_name(self, assignment: Any) -> str:
+        """Return the variable that is both: a new one, or one that an operator meets."""
+        value, names = assignment.value, [assignment.target.name]
+        if isinstance(value, ir.Expr) and self._numbers.operation(value) is not None:
+            names = [
+                each.name
+                for each in self._numbers.operands(value)
+                if isinstance(self._numbers.type_of(each.name), types.Float)
+            ] or names
+        return names[0].partition(".")[0]
+
+    def _line(self, assignment: Any) -> int:
+        """Return where an int comes to what joins several values, else the assignment's line."""
+        value = assignment.value
+        if isinstance(value, ir.Expr) and value.op == "phi":
+            names = {each.name for each in value.incoming_values if each is not ir.UNDEFINED}
+            for each in self._numbers.assignments():
+                is_int = isinstance(self._numbers.type_of(each.target.name), types.Integer)
+                if each.target.name in names and is_int:
+                    return int(each.loc.line)
+        return int(assignment.loc.line)
+
+    def _widen(self, history: list[dict[str, float | None]]) -> None:
+        last, before, first = history[-1], history[-2], history[-3]
+        for name, bound in last.items():
+            values = (bound, before.get(name), first.get(name))
+            if None in values or values[0] == values[1]:
+                continue
+            a, b, c = (float(each) for each in values if each is not None)
+            grows_evenly = math.isclose(a - b, b - c)
+            self._bounds[name] = a + (a - b) * _TURNS if grows_evenly else math.inf
+
+    def _join(self, one: float | None, other: float | None) -> float | None:
+        if one is None or other is None:
+            return other if one is None else one
+        return max(one, other)
+
+    def _of(self, variable: Any) -> float | None:
+        return self._bounds.get(variable.name)
+
+    def _bound(self, assignment: Any) -> float | None:
+        value, kind = assignment.value, self._numbers.type_of(assignment.target.name)
+        number = operand(kind)
+        is_range = isinstance(kind, types.RangeType | types.RangeIteratorType | types.Pair)
+        if isinstance(value, ir.Const | ir.Global | ir.FreeVar):
+            given = value.value
+            return float(abs(given)) if type(given) in (int, bool) else None
+        if isinstance(value, ir.Var):
+            return self._of(value)
+        bound = self._of_expression(value) if isinstance(value, ir.Expr) else None
+        if bound is None and number is not None and not number.is_array:
+            return _by_type(number.dtype)
+        return bound if number is None or number.is_array or is_range else min(
+            bound if bound is not None else math.inf, _by_type(number.dtype) or math.inf
+        )  # fmt: skip
+
+    def _of_expression(self, value: Any) -> float | None:
+        if value.op == "phi":
+            result: float | None = None
+            for each in value.incoming_values:
+                if each is not ir.UNDEFINED:
+                    result = self._join(result, self._of(each))
+            return result
+        if value.op in ("cast", "unary", "getiter", "iternext", "pair_first"):
+            return self._of(value.value)
+        operation = self._numbers.operation(value)
+        if operation is not None and operation not in (np.where, np.clip, np.hypot):
+            return self._of_operator(operation, self._numbers.operands(value)[:2])
+        if value.op == "call":
+            function = _hashable(self._numbers.function(value.func))
+            if function is len:
+                return float(_TURNS)
+            if function in (abs, max, min, range, numpy_functions.rtcf_abs, builtins.divmod):
+                result = None
+                for each in value.args:
+                    result = self._join(result, self._of(each))
+                return result
+            if function is helpers.rtcf_index:
+                return self._of(value.args[0])
+        return None
+
+    def _of_operator(self, operation: Any, variables: list[Any]) -> float | None:
+        bounds = [self._of(each) for each in variables]
+        if operation in _COMPARISONS:
+            return 1.0
+        if None in bounds or operation is operator.truediv:
+            return None
+        left, right = (float(each) for each in bounds if each is not None)
+        if operation in (operator.add, operator.sub, operator.or_, operator.xor):
+            return left + right
+        if operation is operator.mul:
+            return left * right
+        if operation is operator.mod:
+            return right
+        if operation in (operator.floordiv, operator.rshift, np.minimum, np.maximum):
+            return left
+        if operation is operator.and_:
+            return max(left, right)
+        return math.inf
+
+
+def _by_type(dtype: np.dtype[Any]) -> float | None:
+    """Return the largest int of a type; None for floats."""
+    if dtype.kind == "b":
+        return 1.0
+    return float(max(abs(np.iinfo(dtype).min), np.iinfo(dtype).max)) if dtype.kind in "iu" else None
