@@ -33,6 +33,11 @@ class Browser(Closing):
         self._loop = asyncio.new_event_loop()
         self._session = self._run(_session())
 
+    @property
+    def pid(self) -> int:
+        """Return the first of its processes, which begins the others."""
+        return self._process.pid
+
     def close(self) -> None:
         if self._loop.is_closed():
             return
@@ -112,6 +117,23 @@ class Page:
     def picture(self, file: Path) -> None:
         """Write what is seen, as PNG."""
         file.write_bytes(base64.b64decode(self.call("Page.captureScreenshot")["data"]))
+
+    def trace(self, seconds: float, categories: list[str]) -> list[dict[str, Any]]:
+        """Return what the browser does meanwhile, as events for about:tracing."""
+        self.call("Tracing.start", transferMode="ReportEvents",
+                  traceConfig={"includedCategories": categories})  # fmt: skip
+        time.sleep(seconds)
+        self.call("Tracing.end")
+        return self._loop.run_until_complete(asyncio.wait_for(self._traced(), DEADLINE_S))
+
+    async def _traced(self) -> list[dict[str, Any]]:
+        events: list[dict[str, Any]] = []
+        while True:
+            told = await self._socket.receive_json()
+            if told.get("method") == "Tracing.dataCollected":
+                events += told["params"]["value"]
+            elif told.get("method") == "Tracing.tracingComplete":
+                return events
 
     async def _call(self, method: str, words: dict[str, Any]) -> Any:
         self._number += 1

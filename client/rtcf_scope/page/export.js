@@ -12,7 +12,7 @@ function hand(blob, name) {
 
 export function toPng(scope) {
   const ratio = 2, head = 22;
-  const sizes = scope.panes.map((pane) => [pane.canvas.clientWidth, pane.canvas.clientHeight]);
+  const sizes = scope.panes.map((pane) => [pane.face.clientWidth, pane.face.clientHeight]);
   const width = Math.max(...sizes.map(([each]) => each)), height = sizes.reduce((sum, [, each]) => sum + each + head, 0);
   const canvas = document.createElement("canvas");
   canvas.width = width * ratio; canvas.height = height * ratio;
@@ -24,7 +24,7 @@ export function toPng(scope) {
   scope.panes.forEach((pane, i) => {
     g.save();
     g.translate(0, top + head);
-    pane.paint(g, ...sizes[i]);
+    pane.paint(g, ...sizes[i], ratio);
     g.restore();
     let left = 64;
     for (const { name, number } of pane.traces) {

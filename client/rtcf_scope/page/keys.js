@@ -13,7 +13,7 @@ export function mind(scope, does) {
     " ": () => does.freeze(), "+": () => scope.view.step(-1), "=": () => scope.view.step(-1), "-": () => scope.view.step(1),
     ArrowLeft: () => { scope.freeze(); scope.view.pan(-scope.view.span / 10); },
     ArrowRight: () => { scope.freeze(); scope.view.pan(scope.view.span / 10); },
-    End: () => scope.run(), a: () => scope.panes.forEach((pane) => { pane.scale = null; }),
+    End: () => scope.run(), a: () => scope.panes.forEach((pane) => pane.refit()),
     c: () => scope.clearCursors(), n: () => scope.addPane(), Delete: () => scope.removePane(scope.active),
     "/": () => does.search(), t: () => does.mode(), d: () => does.theme(), "?": () => does.help(),
   };

@@ -255,8 +255,8 @@ function buttons() {
     mode: () => mode(scope.mode === "trigger" ? "roll" : "trigger") });
 }
 
-function frame() {
-  if (scope.frame()) figures.frames++;
+function frame(now) {
+  if (scope.frame(now)) figures.frames++;
   requestAnimationFrame(frame);
 }
 
@@ -273,7 +273,7 @@ async function begin() {
   await Promise.all([layouts(), recordings.show()]);
   new ResizeObserver(() => scope.changed()).observe($("panes"));
   setInterval(slow, SLOW_MS);
-  frame();
+  requestAnimationFrame(frame);
 }
 
 begin().catch((error) => trouble("page", error.message));

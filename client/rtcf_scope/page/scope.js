@@ -1,7 +1,7 @@
 // What is shown, and how: the panes, the view, what is at hand to draw. Panels change it by its
 // methods; `changed` has all drawn anew in the next frame.
 import { Pane } from "./drawing/pane.js";
-import { View } from "./drawing/view.js";
+import { Pace, View } from "./drawing/view.js";
 import { minded } from "./drawing/pointer.js";
 import { DURATION, LATENCY, Store } from "./data/store.js";
 
@@ -12,6 +12,7 @@ export class Scope {
     this.box = box;
     this.live = new Store();
     this.view = new View();
+    this.pace = new Pace();
     this.mode = "roll"; // or "trigger", or "recording"
     this.panes = [];
     this.active = null;
@@ -27,6 +28,9 @@ export class Scope {
     this.onTraces = () => {}; // others are watched
     this.onLayout = () => {}; // something that a layout holds is another
     this.dirty = true;
+    this.drawn = { end: NaN, time: NaN }; // of the live cycles, in the frame before
+    this.found = null; // the marks, until something changes
+    this.marksNumber = 0; // another one when they are others
     this.addPane();
   }
 
@@ -42,7 +46,11 @@ export class Scope {
 
   unit(name) { return this.units.get(name) ?? ""; }
   traces() { return this.panes.flatMap((pane) => pane.traces); }
-  changed() { this.dirty = true; this.onLayout(); }
+  changed() {
+    this.dirty = true;
+    if (this.found) this.found.baseNs = null;
+    this.onLayout();
+  }
 
   addPane() {
     const pane = new Pane(this);
@@ -139,23 +147,38 @@ export class Scope {
     this.changed();
   }
 
-  // Events, warnings and errors at the times of the axis that is shown.
+  // Events, warnings and errors, and the hit of a trigger, at the times of the axis that is shown.
   marks() {
-    if (this.mode === "recording") return [];
-    const shift = this.mode === "trigger" ? this.shot?.hitTime ?? 0 : 0;
-    return this.events.filter((event) => !isForInformation(event)).map((event) => ({
-      time: Number(BigInt(event.time_ns) - this.baseNs) / 1e9 - shift,
-      ink: isBad(event) ? "bad" : "change", event,
-    }));
+    if (this.found && this.found.baseNs === this.baseNs) return this.found.marks;
+    const marks = this.#marks();
+    const state = `${this.mode} ${marks.length} ${marks[0]?.time} ${marks.at(-1)?.time}`;
+    if (state !== this.found?.state) this.marksNumber++;
+    this.found = { marks, state, baseNs: this.baseNs };
+    return marks;
   }
 
-  // Draws what has changed; called for each frame.
-  frame() {
-    if (this.mode === "roll" && this.view.follows && !this.live.empty) {
-      if (this.view.end !== this.live.lastTime) this.dirty = true;
-      this.view.end = this.live.lastTime;
+  #marks() {
+    if (this.mode === "recording") return [];
+    const shift = this.mode === "trigger" ? this.shot?.hitTime ?? 0 : 0;
+    const found = this.events.filter((event) => !isForInformation(event)).map((event) => ({
+      time: Number(BigInt(event.time_ns) - this.baseNs) / 1e9 - shift,
+      ink: isBad(event) ? "bad" : "change", label: labelOf(event), title: titleOf(event), event,
+    }));
+    if (this.mode === "trigger" && this.shot) found.push({ time: 0, ink: "hit", label: "trigger" });
+    return found.sort((one, other) => one.time - other.time);
+  }
+
+  // Draws what has changed; called for each frame with its time, ms.
+  frame(now = performance.now()) {
+    const { live, view } = this;
+    if (this.mode === "roll" && !live.empty) {
+      const end = view.follows ? this.pace.step(now, live.lastTime) : view.end;
+      // Cycles behind what is in sight change nothing.
+      if (end !== view.end || (live.end !== this.drawn.end && !(end < this.drawn.time))) this.dirty = true;
+      view.end = end;
     }
     if (!this.dirty) return false;
+    this.drawn = { end: live.end, time: live.empty ? NaN : live.lastTime };
     this.dirty = false;
     for (const pane of this.panes) pane.draw();
     return true;
@@ -168,6 +191,14 @@ export function isBad(event) {
 
 export function isForInformation(event) {
   return event.what === "info";
+}
+
+function labelOf({ what, component }) {
+  return what.replaceAll("_", " ") + (component ? ` ${component}` : "");
+}
+
+function titleOf(event) {
+  return [labelOf(event), event.message, event.user && `by ${event.user}`, `cycle ${event.iteration}`].filter(Boolean).join(", ");
 }
 
 const EMPTY = new Store(1);

@@ -6,47 +6,95 @@ export const BLOCK = STEP ** LEVELS;
 export class Column {
   constructor(capacity) { // a multiple of BLOCK
     this.values = new Float64Array(capacity).fill(NaN);
+    // 1 where a cycle wrote NaN or an infinity; 0 where no cycle is, too.
+    this.odd = new Uint8Array(capacity);
     this.levels = [];
     for (let size = STEP; size <= BLOCK; size *= STEP)
       this.levels.push({
         size, low: new Float64Array(capacity / size).fill(Infinity),
-        high: new Float64Array(capacity / size).fill(-Infinity),
+        high: new Float64Array(capacity / size).fill(-Infinity), odd: new Uint8Array(capacity / size),
       });
+    // Results of `scan`.
+    this.low = Infinity;
+    this.high = -Infinity;
+    this.strange = 0;
   }
 
-  // `at` is the number of the value since the beginning, of which the ring keeps the last ones.
-  set(at, value) {
-    this.values[at % this.values.length] = value;
-    for (const { size, low, high } of this.levels) {
-      const place = Math.floor(at / size) % low.length;
-      if (at % size === 0) { low[place] = Infinity; high[place] = -Infinity; }
-      if (value < low[place]) low[place] = value;
-      if (value > high[place]) high[place] = value;
+  // `at` is the number of the first value since the beginning; the ring keeps the last ones.
+  write(at, values) {
+    const capacity = this.values.length;
+    for (let i = 0; i < values.length; i++) {
+      const value = values[i], place = (at + i) % capacity;
+      this.values[place] = value;
+      this.odd[place] = value - value === 0 ? 0 : 1;
     }
+    for (const level of this.levels) fill(level, at, values);
+  }
+
+  // No cycle is at this place, or none that told this value.
+  blank(at) {
+    const place = at % this.values.length;
+    this.values[place] = NaN;
+    this.odd[place] = 0;
+    for (const level of this.levels) if (at % level.size === 0) reset(level, at / level.size % level.low.length);
   }
 
   get(at) { return this.values[at % this.values.length]; }
+  isOdd(at) { return this.odd[at % this.odd.length] !== 0; }
 
   // Minimum and maximum from `begin` to before `end`: [Infinity, -Infinity] where no number is.
   range(begin, end) {
-    let least = Infinity, most = -Infinity, at = begin;
+    this.scan(begin, end);
+    return [this.low, this.high];
+  }
+
+  // Sets `low` and `high` of the numbers, and `strange` where values are none.
+  scan(begin, end) {
+    const { values, odd, levels } = this, capacity = values.length;
+    let low = Infinity, high = -Infinity, strange = 0, at = begin;
     while (at < end) {
-      let level = null;
-      for (const each of this.levels) {
-        if (at % each.size !== 0 || at + each.size > end) break;
-        level = each;
+      if (at % STEP !== 0 || at + STEP > end) {
+        const place = at++ % capacity;
+        if (odd[place]) { strange = 1; continue; }
+        const value = values[place];
+        if (value < low) low = value;
+        if (value > high) high = value;
+        continue;
       }
-      if (level === null) {
-        const value = this.get(at++);
-        if (value < least) least = value;
-        if (value > most) most = value;
-      } else {
-        const place = Math.floor(at / level.size) % level.low.length;
-        if (level.low[place] < least) least = level.low[place];
-        if (level.high[place] > most) most = level.high[place];
-        at += level.size;
-      }
+      let number = 0;
+      while (number + 1 < LEVELS && at % levels[number + 1].size === 0 && at + levels[number + 1].size <= end) number++;
+      const level = levels[number], place = at / level.size % level.low.length;
+      if (level.low[place] < low) low = level.low[place];
+      if (level.high[place] > high) high = level.high[place];
+      strange |= level.odd[place];
+      at += level.size;
     }
-    return [least, most];
+    this.low = low;
+    this.high = high;
+    this.strange = strange;
+  }
+}
+
+function reset(level, place) {
+  level.low[place] = Infinity;
+  level.high[place] = -Infinity;
+  level.odd[place] = 0;
+}
+
+function fill(level, at, values) {
+  const { size } = level, count = values.length;
+  for (let i = 0; i < count;) {
+    const place = Math.floor((at + i) / size) % level.low.length;
+    if ((at + i) % size === 0) reset(level, place);
+    let low = level.low[place], high = level.high[place], odd = level.odd[place];
+    for (const end = Math.min(count, i + size - (at + i) % size); i < end; i++) {
+      const value = values[i];
+      if (value - value !== 0) { odd = 1; continue; }
+      if (value < low) low = value;
+      if (value > high) high = value;
+    }
+    level.low[place] = low;
+    level.high[place] = high;
+    level.odd[place] = odd;
   }
 }

@@ -1,43 +1,74 @@
 // Spectrum of evenly spaced values: Hann's window, amplitudes of the sines it is made of.
-const MOST = 1 << 15;
+const MOST = 1 << 16; // values, the newest ones
+const FINER = 2; // as many points at least as the values alone would give
 
+// `amplitudes[i]` is that of the frequency `i * step`; sines nearer than `resolution` are one peak.
 export function spectrum(values, rate) {
-  let size = 1;
-  while (size * 2 <= Math.min(values.length, MOST)) size *= 2;
-  if (size < 16) return null;
+  const count = Math.min(values.length, MOST), first = values.length - count;
+  if (count < 16) return null;
+  let size = 32;
+  while (size < count * FINER) size *= 2;
   const real = new Float64Array(size), imaginary = new Float64Array(size);
-  const newest = values.slice(-size);
-  const mean = newest.reduce((a, b) => a + b, 0) / size;
-  for (let i = 0; i < size; i++) real[i] = (newest[i] - mean) * (0.5 - 0.5 * Math.cos(2 * Math.PI * i / size));
+  let mean = 0;
+  for (let i = 0; i < count; i++) mean += values[first + i] / count;
+  for (let i = 0; i < count; i++) real[i] = (values[first + i] - mean) * (0.5 - 0.5 * Math.cos(2 * Math.PI * i / count));
   transform(real, imaginary);
   const amplitudes = new Float64Array(size / 2);
   // The window takes half of the amplitude.
-  for (let i = 0; i < size / 2; i++) amplitudes[i] = Math.hypot(real[i], imaginary[i]) * 4 / size;
-  return { amplitudes, step: rate / size };
+  for (let i = 0; i < size / 2; i++) amplitudes[i] = Math.sqrt(real[i] * real[i] + imaginary[i] * imaginary[i]) * 4 / count;
+  return { amplitudes, step: rate / size, resolution: rate / count };
+}
+
+// Where the peak is that is highest at point `at`: the top of the parabola through the logarithms of
+// it and its neighbours, which Hann's window comes near to.
+export function peak({ amplitudes, step }, at) {
+  const [before, top, after] = [at - 1, at, at + 1].map((each) => Math.log(Math.max(amplitudes[each] ?? 0, 1e-300)));
+  const bend = before - 2 * top + after;
+  const by = bend < 0 ? Math.min(Math.max((before - after) / bend / 2, -0.5), 0.5) : 0;
+  return { frequency: (at + by) * step, amplitude: Math.exp(top - (before - after) * by / 4) };
+}
+
+// The point of the highest peak; what is left of the mean is none.
+export function highest({ amplitudes, step, resolution }) {
+  let found = Math.min(Math.ceil(resolution / step), amplitudes.length - 1);
+  for (let i = found + 1; i < amplitudes.length; i++) if (amplitudes[i] > amplitudes[found]) found = i;
+  return found;
 }
 
 // Cooley and Tukey, in place; the length is a power of two.
 export function transform(real, imaginary) {
-  const size = real.length;
+  const size = real.length, half = size / 2;
   for (let i = 1, j = 0; i < size; i++) {
     let bit = size >> 1;
     for (; j & bit; bit >>= 1) j ^= bit;
     j ^= bit;
     if (i < j) {
-      [real[i], real[j]] = [real[j], real[i]];
-      [imaginary[i], imaginary[j]] = [imaginary[j], imaginary[i]];
+      const r = real[i], m = imaginary[i];
+      real[i] = real[j]; imaginary[i] = imaginary[j];
+      real[j] = r; imaginary[j] = m;
     }
   }
+  const { cos, sin } = turns(size);
   for (let length = 2; length <= size; length *= 2) {
-    const angle = -2 * Math.PI / length, half = length / 2;
-    for (let i = 0; i < half; i++) {
-      const c = Math.cos(angle * i), s = Math.sin(angle * i);
-      for (let at = i; at < size; at += length) {
-        const to = at + half;
+    const wide = length / 2, stride = half / wide;
+    for (let begin = 0; begin < size; begin += length)
+      for (let i = 0; i < wide; i++) {
+        const at = begin + i, to = at + wide, c = cos[i * stride], s = sin[i * stride];
         const r = real[to] * c - imaginary[to] * s, m = real[to] * s + imaginary[to] * c;
         real[to] = real[at] - r; imaginary[to] = imaginary[at] - m;
         real[at] += r; imaginary[at] += m;
       }
-    }
   }
+}
+
+let known = { size: 0 };
+
+function turns(size) {
+  if (known.size === size) return known;
+  const cos = new Float64Array(size / 2), sin = new Float64Array(size / 2);
+  for (let i = 0; i < size / 2; i++) {
+    cos[i] = Math.cos(-2 * Math.PI * i / size);
+    sin[i] = Math.sin(-2 * Math.PI * i / size);
+  }
+  return known = { size, cos, sin };
 }

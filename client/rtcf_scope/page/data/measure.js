@@ -1,29 +1,33 @@
 // What a stretch of a trace is, in figures.
 const MOST = 400_000; // values
 
-// The values of a column between two times, those that are no numbers left out.
+// The values of a column between two times, those that are no numbers left out. The arrays are used
+// again by the next call.
+let times = new Float64Array(0), numbers = new Float64Array(0);
+
 export function values(store, column, begin, end) {
   const first = store.find(begin), last = Math.min(store.find(end), store.end);
   const every = Math.max(1, Math.ceil((last - first) / MOST));
-  const found = { times: [], values: [], every };
+  const most = Math.ceil((last - first) / every);
+  if (times.length < most) { times = new Float64Array(most + 1000); numbers = new Float64Array(most + 1000); }
+  let count = 0;
   for (let at = first; at < last; at += every) {
     const value = column.get(at);
-    if (isFinite(value)) { found.times.push(store.time(at)); found.values.push(value); }
+    if (value - value !== 0) continue;
+    times[count] = store.time(at);
+    numbers[count++] = value;
   }
-  return found;
+  return { times: times.subarray(0, count), values: numbers.subarray(0, count), every };
 }
 
 export function measured(store, column, begin, end) {
   const { times, values: found } = values(store, column, begin, end);
   if (!found.length) return null;
-  let sum = 0, squares = 0, min = Infinity, max = -Infinity;
-  for (const value of found) {
-    sum += value; squares += value * value;
-    if (value < min) min = value;
-    if (value > max) max = value;
-  }
-  const mean = sum / found.length;
-  return { min, max, mean, rms: Math.sqrt(squares / found.length), span: max - min,
+  // Of all values, however many: no spike is left out.
+  const [min, max] = column.range(store.find(begin), Math.min(store.find(end), store.end));
+  let sum = 0, squares = 0;
+  for (let i = 0; i < found.length; i++) { sum += found[i]; squares += found[i] * found[i]; }
+  return { min, max, mean: sum / found.length, rms: Math.sqrt(squares / found.length), span: max - min,
     frequency: frequency(times, found, min, max), ...step(times, found) };
 }
 
@@ -48,30 +52,32 @@ export function frequency(times, found, min, max) {
 }
 
 // Rise from 10 to 90 %, overshoot in %, settling into 2 %: of a step from where it begins to where
-// it ends.  Of what does not end where it stays there is none.
+// it ends. What does not end where it stays, and what comes back to where it began, is no step.
 export function step(times, found) {
   const none = { rise: NaN, overshoot: NaN, settling: NaN };
-  const edge = Math.max(1, Math.floor(found.length / 20));
-  const mean = (part) => part.reduce((a, b) => a + b, 0) / part.length;
-  const from = mean(found.slice(0, edge)), tail = found.slice(-2 * edge), to = mean(tail);
-  const size = to - from;
-  if (found.length < 10 || size === 0 || tail.some((value) => Math.abs(value - to) > Math.abs(size) * 0.05)) return none;
-  const part = found.map((value) => (value - from) / size);
-  if (part.slice(0, edge).some((value) => Math.abs(value) > 0.05)) return none;
-  const low = part.findIndex((value) => value >= 0.1), high = part.findIndex((value) => value >= 0.9);
-  let settled = part.length - 1;
-  while (settled > 0 && Math.abs(part[settled - 1] - 1) <= 0.02) settled--;
-  return { rise: times[high] - times[low], overshoot: Math.max(0, Math.max(...sparse(part)) - 1) * 100,
-    settling: times[settled] - times[low] };
+  const count = found.length, edge = Math.max(1, Math.floor(count / 20)), tail = count - 2 * edge;
+  if (count < 10) return none;
+  const from = mean(found, 0, edge), to = mean(found, tail, count), size = to - from;
+  if (size === 0) return none;
+  // A ramp does not stay, however short the piece of it.
+  if (Math.abs(mean(found, tail, tail + edge) - mean(found, tail + edge, count)) > Math.abs(size) * 0.015) return none;
+  for (let i = tail; i < count; i++) if (Math.abs(found[i] - to) > Math.abs(size) * 0.05) return none;
+  for (let i = 0; i < edge; i++) if (Math.abs(found[i] - from) > Math.abs(size) * 0.05) return none;
+  let low = -1, high = -1, most = -Infinity, settled = 0;
+  for (let i = 0; i < count; i++) {
+    const part = (found[i] - from) / size;
+    if (low < 0 && part >= 0.1) low = i;
+    if (high < 0 && part >= 0.9) high = i;
+    if (high >= 0 && part <= 0.1) return none;
+    if (part > most) most = part;
+    if (Math.abs(part - 1) > 0.02) settled = i + 1;
+  }
+  settled = Math.min(settled, count - 1);
+  return { rise: times[high] - times[low], overshoot: Math.max(0, most - 1) * 100, settling: times[settled] - times[low] };
 }
 
-// Not more than can be handed to Math.max.
-function sparse(part) {
-  const found = [];
-  for (let i = 0; i < part.length; i += 1000) {
-    let most = -Infinity;
-    for (let j = i; j < Math.min(i + 1000, part.length); j++) most = Math.max(most, part[j]);
-    found.push(most);
-  }
-  return found;
+function mean(found, begin, end) {
+  let sum = 0;
+  for (let i = begin; i < end; i++) sum += found[i];
+  return sum / (end - begin);
 }

@@ -2,7 +2,9 @@
 import { BLOCK, Column } from "./column.js";
 
 export const LATENCY = "~latency", DURATION = "~duration";
-const KEPT = 128 * BLOCK; // cycles: 4 minutes of 2 kHz, 4 MB a trace
+const KEPT = 128 * BLOCK; // cycles: 4 minutes of 2 kHz, 5 MB a trace
+
+let serial = 0;
 
 export class Store {
   constructor(capacity = KEPT) {
@@ -23,6 +25,8 @@ export class Store {
     this.columns = new Map([[LATENCY, new Column(this.capacity)], [DURATION, new Column(this.capacity)]]);
     this.end = 0; // all that have come
     this.lost = 0;
+    this.gaps = []; // {from, to, cycles}: times between which cycles are missing, oldest first
+    this.serial = ++serial; // no other content has the same
   }
 
   get begin() { return Math.max(0, this.end - this.capacity); }
@@ -41,18 +45,29 @@ export class Store {
     names.forEach((name, i) => columns.set(name, message.traces[i]));
     for (const name of columns.keys())
       if (!this.columns.has(name)) this.columns.set(name, new Column(this.capacity));
-    // Where cycles are missing lines are broken.
-    const gap = !this.empty && (message.lost || message.cycles[0] > this.cycle(this.end - 1) + 1);
-    if (gap) this.#append(this.lastTime, NaN, () => NaN, columns);
-    for (let i = 0; i < message.count; i++)
-      this.#append(message.times[i], message.cycles[i], (values) => values ? values[i] : NaN, columns);
+    // Where cycles are missing, and where a loop begins anew, lines are broken.
+    const missing = this.empty ? 0 : message.lost || message.cycles[0] - this.cycle(this.end - 1) - 1;
+    if (missing !== 0) this.#gap(message.times[0], Math.max(missing, 0));
+    for (const [name, column] of this.columns) {
+      const values = columns.get(name);
+      if (values) column.write(this.end, values);
+      else for (let i = 0; i < message.count; i++) column.blank(this.end + i);
+    }
+    for (let i = 0; i < message.count; i++) {
+      this.times[(this.end + i) % this.capacity] = message.times[i];
+      this.cycles[(this.end + i) % this.capacity] = message.cycles[i];
+    }
+    this.end += message.count;
+    while (this.gaps.length && this.gaps[0].to <= this.firstTime) this.gaps.shift();
   }
 
-  #append(time, cycle, value, columns) {
-    const at = this.end++;
+  // A place that is no cycle, and has the time of the last one.
+  #gap(until, cycles) {
+    const time = this.lastTime, at = this.end++;
+    this.gaps.push({ from: time, to: until, cycles });
     this.times[at % this.capacity] = time;
-    this.cycles[at % this.capacity] = cycle;
-    for (const [name, column] of this.columns) column.set(at, value(columns.get(name)));
+    this.cycles[at % this.capacity] = NaN;
+    for (const column of this.columns.values()) column.blank(at);
   }
 
   // Columns that nobody looks at any more.
@@ -62,8 +77,16 @@ export class Store {
   }
 
   // The place of the first cycle that is not before `time`.
-  find(time) {
-    let low = this.begin, high = this.end;
+  find(time) { return this.#between(time, this.begin, this.end); }
+
+  // The same, of a time that is not long after that of the place `from`, where the search begins.
+  findAfter(time, from) {
+    let low = Math.max(from, this.begin), step = 1;
+    while (low + step < this.end && this.time(low + step) < time) { low += step; step *= 2; }
+    return this.#between(time, low, Math.min(low + step + 1, this.end));
+  }
+
+  #between(time, low, high) {
     while (low < high) {
       const middle = Math.floor((low + high) / 2);
       if (this.time(middle) < time) low = middle + 1; else high = middle;

@@ -1,31 +1,69 @@
 // Numbers for people, and where an axis has its ticks.
 const PREFIXES = [[1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
+const CHARACTERS = 8; // of a tick's text
+const THIN = "\u202f"; // a narrow space
 
-// The steps of 1, 2 and 5 that divide a range into about `wanted`.
-export function ticks(low, high, wanted) {
-  const raw = (high - low) / Math.max(wanted, 1);
-  if (!(raw > 0) || !isFinite(raw)) return { step: 1, at: [] };
+// The step of 1, 2 or 5 that divides a range into about `wanted`.
+export function tickStep(range, wanted) {
+  const raw = range / Math.max(wanted, 1);
+  if (!(raw > 0) || !isFinite(raw)) return 0;
   const power = 10 ** Math.floor(Math.log10(raw));
-  const step = power * [1, 2, 5, 10].find((each) => each * power >= raw * 0.999);
-  const at = [];
+  return power * [1, 2, 5, 10].find((each) => each * power >= raw * 0.999);
+}
+
+export function ticks(low, high, wanted) {
+  const step = tickStep(high - low, wanted), at = [];
+  if (!step) return { step: 1, at };
+  // A range that is narrower than the numbers around it tell apart has no ticks.
+  if (low + step === low || high - step === high) return { step, at };
   for (let n = Math.ceil(low / step - 1e-9); n * step <= high + step * 1e-9; n++) at.push(n * step);
   return { step, at };
 }
 
+const digitsOf = (step) => Math.max(-Math.floor(Math.log10(step) + 1e-9), 0);
+
 // A tick, with as many digits as its step has.
 export function tickText(value, step) {
-  const digits = Math.min(Math.max(-Math.floor(Math.log10(step) + 1e-9), 0), 9);
-  if (Math.abs(value) >= 1e6 || step < 1e-6) return value.toExponential(2);
-  return (Math.abs(value) < step * 1e-6 ? 0 : value).toFixed(digits);
+  if (Math.abs(value) < step * 1e-6) value = 0;
+  if (Math.abs(value) >= 1e15) return value.toExponential(3);
+  return value.toFixed(Math.min(digitsOf(step), 12)).replace("-", "−");
 }
 
-// A measured value: four digits that matter.
+// Texts of ticks, which differ, in few characters: `note` tells what is to be multiplied or added.
+export function tickTexts(at, step) {
+  const most = at.reduce((found, value) => Math.max(found, Math.abs(value)), 0);
+  const digits = digitsOf(step);
+  const characters = (size, places) => Math.max(Math.floor(Math.log10(size) + 1e-9), 0) + 1 + (places ? places + 1 : 0);
+  if (!most) return { texts: at.map(() => "0"), note: "" };
+  if (most < 1e6 && characters(most, digits) <= CHARACTERS) return { texts: at.map((value) => grouped(tickText(value, step))), note: "" };
+  const power = 3 * Math.floor(Math.log10(most) / 3 + 1e-9), unit = 10 ** power;
+  if (characters(most / unit, digitsOf(step / unit)) <= CHARACTERS)
+    return { texts: at.map((value) => tickText(value / unit, step / unit)), note: `×10${superscript(power)}` };
+  // Long numbers that are nearly the same: the differences from one of them.
+  const coarse = 10 ** Math.ceil(Math.log10(at.at(-1) - at[0] + step) + 1e-9);
+  const base = Math.floor(at[0] / coarse + 1e-9) * coarse;
+  if (!base) return { texts: at.map((value) => value.toExponential(3)), note: "" };
+  const rest = tickTexts(at.map((value) => value - base), step);
+  const many = Math.abs(base) >= 1e15 ? base.toExponential(9) : grouped(tickText(base, Math.min(coarse, 1e15)));
+  return { texts: rest.texts, note: `${rest.note}${base < 0 ? " − " : " + "}${many.replace("−", "")}`.trim() };
+}
+
+const superscript = (power) => String(power).replace(/./g, (each) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(each)]);
+
+// Thousands apart, from five digits on.
+function grouped(text) {
+  const [whole, part] = text.split(".");
+  const apart = whole.replace("−", "").length < 5 ? whole : whole.replace(/\B(?=(\d{3})+$)/g, THIN);
+  return part === undefined ? apart : `${apart}.${part}`;
+}
+
+// A measured value: five digits that matter, and all of those before the point.
 export function figure(value, unit = "") {
   if (value === undefined || value === null || Number.isNaN(value)) return "–";
   if (!isFinite(value)) return value > 0 ? "∞" : "−∞";
   const size = Math.abs(value);
-  const text = size !== 0 && (size >= 1e6 || size < 1e-4) ? value.toExponential(3)
-    : String(Number(value.toPrecision(5)));
+  const text = size !== 0 && (size >= 1e12 || size < 1e-4) ? value.toExponential(4).replace("e+", "e")
+    : size >= 1e4 ? grouped(String(Math.round(value)).replace("-", "−")) : String(Number(value.toPrecision(5)));
   return text.replace("-", "−") + (unit ? " " + unit : "");
 }
 

@@ -2,32 +2,38 @@
 const DRAG = 4; // pixels that make a click a drag
 
 export function minded(pane, scope) {
-  const { canvas } = pane;
+  const { face } = pane;
   let held = null;
-  canvas.addEventListener("wheel", (event) => {
+  const place = ({ clientX, clientY }) => {
+    const { left, top } = face.getBoundingClientRect();
+    return { x: clientX - left, y: clientY - top };
+  };
+  face.addEventListener("wheel", (event) => {
     event.preventDefault();
+    const { x, y } = place(event);
     const factor = Math.exp(Math.sign(event.deltaY) * Math.min(Math.abs(event.deltaY), 200) / 400);
-    if (event.shiftKey || event.offsetX < pane.area.left) {
-      const at = pane.valueAt(event.offsetY), { low, high } = pane.shown;
+    if (event.shiftKey || x < pane.area.left) {
+      const at = pane.valueAt(y), { low, high } = pane.shown;
       pane.scale = { low: at - (at - low) * factor, high: at + (high - at) * factor };
-    } else scope.view.zoom(factor, pane.timeAt(event.offsetX));
+    } else scope.view.zoom(factor, pane.timeAt(x));
     scope.changed();
   }, { passive: false });
-  canvas.addEventListener("pointerdown", (event) => {
+  face.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
-    canvas.setPointerCapture(event.pointerId);
+    face.setPointerCapture(event.pointerId);
     scope.activate(pane);
-    const near = (time) => time !== null && Math.abs(pane.timeAt(event.offsetX) - time) < scope.view.span / pane.area.width * 6;
+    const { x, y } = place(event);
+    const near = (time) => time !== null && Math.abs(pane.timeAt(x) - time) < scope.view.span / pane.area.width * 6;
     const { a, b } = scope.cursors;
-    held = { x: event.clientX, y: event.clientY, end: scope.view.end, shown: { ...pane.shown },
+    held = { x, y, end: scope.view.end, shown: { ...pane.shown },
       scale: pane.scale, cursor: near(a) ? "a" : near(b) ? "b" : "", moved: false };
   });
-  canvas.addEventListener("pointermove", (event) => {
+  face.addEventListener("pointermove", (event) => {
     if (!held) return;
-    const dx = event.clientX - held.x, dy = event.clientY - held.y;
+    const { x, y } = place(event), dx = x - held.x, dy = y - held.y;
     held.moved ||= Math.hypot(dx, dy) > DRAG;
     if (!held.moved) return;
-    if (held.cursor) scope.cursors[held.cursor] = pane.timeAt(event.offsetX);
+    if (held.cursor) scope.cursors[held.cursor] = pane.timeAt(x);
     else {
       scope.freeze();
       scope.view.end = held.end - dx / pane.area.width * scope.view.span;
@@ -38,12 +44,10 @@ export function minded(pane, scope) {
     }
     scope.changed();
   });
-  canvas.addEventListener("pointerup", (event) => {
-    if (held && !held.moved) {
-      scope.setCursor(event.shiftKey ? "b" : "a", pane.timeAt(event.offsetX));
-    }
+  face.addEventListener("pointerup", (event) => {
+    if (held && !held.moved) scope.setCursor(event.shiftKey ? "b" : "a", pane.timeAt(place(event).x));
     held = null;
   });
-  canvas.addEventListener("pointercancel", () => { held = null; });
-  canvas.addEventListener("dblclick", () => { pane.scale = null; scope.clearCursors(); });
+  face.addEventListener("pointercancel", () => { held = null; });
+  face.addEventListener("dblclick", () => { pane.refit(); scope.clearCursors(); });
 }

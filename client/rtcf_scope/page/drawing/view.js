@@ -26,3 +26,45 @@ export class View {
 
   show(begin, end) { this.follows = false; this.end = end; this.span = Math.max(end - begin, LEAST); }
 }
+
+const OFTEN_S = 1, LONGEST_LAG_S = 0.3;
+const PAUSE_MS = 250; // without a frame: nobody looked
+
+// Moves the end of what is followed evenly, though cycles come some dozens at a time: it stays about
+// as far behind the newest one as they come in one go.
+export class Pace {
+  constructor() { this.end = NaN; }
+
+  // The end of the view now, ms of the page, while `newest` is the time of the newest cycle.
+  step(now, newest) {
+    const looked = newest >= this.newest ? now - this.now : 0;
+    const passed = Math.min(Math.max(looked, 0), PAUSE_MS) / 1000;
+    this.now = now;
+    if (!(newest >= this.newest)) // the first ones, or those of a clock that went back
+      this.#begin(now, newest);
+    if (newest > this.newest) {
+      // What comes in one go: the most of late, forgotten slowly.
+      this.jump = Math.max(looked < PAUSE_MS ? newest - this.newest : 0, this.jump * 0.98);
+      this.newest = newest;
+    }
+    if (now - this.since.now >= OFTEN_S * 1000) {
+      // A loop that stands will go on as before.
+      if (newest > this.since.newest) this.rate = (newest - this.since.newest) / (now - this.since.now) * 1000;
+      this.since = { now, newest };
+    }
+    const wanted = Math.min(1.5 * this.jump, LONGEST_LAG_S), lag = newest - this.end;
+    if (lag > 3 * wanted + LONGEST_LAG_S) this.end = newest - wanted;
+    else {
+      const hurry = Math.min(Math.max((lag - wanted) / (wanted + 0.02) * 0.2, -0.5), 1);
+      this.end = Math.min(this.end + passed * this.rate * (1 + hurry), newest);
+    }
+    return this.end;
+  }
+
+  #begin(now, newest) {
+    this.newest = this.end = newest;
+    this.jump = 0;
+    this.rate = 1;
+    this.since = { now, newest };
+  }
+}

@@ -4,19 +4,12 @@ import { measured } from "../data/measure.js";
 import { colour } from "../drawing/palette.js";
 
 const HEADS = ["", "trace", "A", "B", "B − A", "min", "max", "peak-peak", "mean", "RMS", "frequency", "rise 10–90 %", "overshoot", "settling 2 %"];
+const MOST_MS = 12; // of one call: the traces that are left come next
 
 export class Measurements {
-  constructor(scope, box) { this.scope = scope; this.box = box; }
-
-  show() {
-    const { scope } = this;
-    const { a, b } = scope.cursors;
-    const both = a !== null && b !== null;
-    const begin = both ? Math.min(a, b) : scope.view.begin, end = both ? Math.max(a, b) : scope.view.end;
-    const caption = document.createElement("caption");
-    caption.textContent = both
-      ? `between the cursors: ${scaled(end - begin, "s")}, ${scaled(1 / (end - begin), "Hz")}, ${cycles(scope.store, a, b)} cycles`
-      : "of all in sight; a click sets cursor A, with Shift B, a double click takes them away";
+  constructor(scope, box) {
+    this.scope = scope;
+    this.box = box;
     const table = document.createElement("table");
     const head = table.createTHead().insertRow();
     for (const text of HEADS) {
@@ -24,30 +17,57 @@ export class Measurements {
       cell.textContent = text;
       head.append(cell);
     }
-    const body = table.createTBody();
-    const sources = scope.sources();
-    for (const trace of scope.traces())
-      sources.forEach((store, second) => this.#row(body.insertRow(), trace, store, begin, end, second));
-    table.append(caption);
-    this.box.replaceChildren(table);
+    this.caption = table.createCaption();
+    this.body = table.createTBody();
+    box.append(table);
+    this.next = 0; // row
+    this.shown = ""; // what the rows are of
   }
 
-  #row(row, { name, number }, store, begin, end, second) {
+  show() {
+    const { scope } = this;
+    const { a, b } = scope.cursors;
+    const both = a !== null && b !== null;
+    const begin = both ? Math.min(a, b) : scope.view.begin, end = both ? Math.max(a, b) : scope.view.end;
+    say(this.caption, both
+      ? `between the cursors: ${scaled(end - begin, "s")}, ${scaled(1 / (end - begin), "Hz")}, ${cycles(scope.store, a, b)} cycles`
+      : "of all in sight; a click sets cursor A, with Shift B, a double click takes them away");
+    const rows = scope.traces().flatMap((trace) => scope.sources().map((store, second) => ({ trace, store, second })));
+    const still = `${rows.map(({ trace, store }) => `${trace.name} ${store.serial}`)} ${a} ${b}`;
+    const all = still !== this.shown;
+    this.shown = still;
+    while (this.body.rows.length > rows.length) this.body.deleteRow(-1);
+    while (this.body.rows.length < rows.length) this.#row();
+    const until = performance.now() + MOST_MS;
+    for (let done = 0; done < rows.length && (all || performance.now() < until); done++) {
+      this.next = this.next % rows.length;
+      this.#fill(this.body.rows[this.next], rows[this.next], begin, end);
+      this.next++;
+    }
+  }
+
+  #row() {
+    const row = this.body.insertRow();
+    row.insertCell().append(document.createElement("i"));
+    for (let i = 1; i < HEADS.length; i++) row.insertCell();
+  }
+
+  #fill(row, { trace: { name, number }, store, second }, begin, end) {
     const { scope } = this;
     const { a, b } = scope.cursors;
     const column = store.column(name), unit = scope.unit(name);
-    const dot = document.createElement("i");
-    dot.style.background = colour(number);
-    row.insertCell().append(dot);
-    row.insertCell().textContent = scope.mode === "recording" ? `${name} · ${scope.recordings[second].name}` : name;
+    row.cells[0].firstChild.style.background = colour(number);
     const at = (time) => (column && time !== null && !store.empty ? column.get(store.nearest(time)) : NaN);
     const found = column && !store.empty ? measured(store, column, begin, end) : null;
-    const cells = [figure(at(a), unit), figure(at(b), unit), figure(at(b) - at(a), unit)];
+    const cells = [scope.mode === "recording" ? `${name} · ${scope.recordings[second].name}` : name,
+      figure(at(a), unit), figure(at(b), unit), figure(at(b) - at(a), unit)];
     if (found) cells.push(...[found.min, found.max, found.span, found.mean, found.rms].map((each) => figure(each, unit)),
       scaled(found.frequency, "Hz"), scaled(found.rise, "s"), isFinite(found.overshoot) ? `${figure(found.overshoot)} %` : "–", scaled(found.settling, "s"));
     else cells.push(...Array(9).fill("–"));
-    for (const text of cells) row.insertCell().textContent = text;
+    cells.forEach((text, i) => say(row.cells[i + 1], text));
   }
 }
+
+function say(element, text) { if (element.textContent !== text) element.textContent = text; }
 
 function cycles(store, a, b) { return Math.abs(store.cycle(store.nearest(a)) - store.cycle(store.nearest(b))); }

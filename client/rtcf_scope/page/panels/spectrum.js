@@ -1,9 +1,10 @@
 // The spectrum of each trace, of what is in sight or between the cursors.
 import { figure, scaled, tickText, ticks } from "../drawing/axes.js";
 import { blank } from "../drawing/canvas.js";
-import { spectrum } from "../data/fft.js";
+import { highest, peak, spectrum } from "../data/fft.js";
 import { values } from "../data/measure.js";
 import { colour, ink } from "../drawing/palette.js";
+import { Seldom } from "./seldom.js";
 
 const AREA = { left: 64, top: 8, right: 12, bottom: 22 };
 const DECADES = 5;
@@ -13,34 +14,56 @@ export class Spectrum {
     this.scope = scope;
     this.canvas = canvas;
     this.pointer = null;
-    canvas.onpointermove = (event) => { this.pointer = event.offsetX; this.show(); };
-    canvas.onpointerleave = () => { this.pointer = null; this.show(); };
+    this.isLog = true;
+    this.found = [];
+    this.seldom = new Seldom();
+    canvas.onpointermove = (event) => { this.pointer = event.offsetX; this.#draw(); };
+    canvas.onpointerleave = () => { this.pointer = null; this.#draw(); };
+    this.button = document.createElement("button");
+    this.button.className = "corner";
+    this.button.onclick = () => { this.isLog = !this.isLog; this.#draw(); };
+    canvas.parentElement.append(this.button);
   }
 
   show() {
-    const { canvas, scope } = this;
+    this.seldom.run(() => { this.found = this.#spectra(); });
+    this.#draw();
+  }
+
+  #draw() {
+    const { canvas, found } = this;
+    this.button.textContent = this.isLog ? "log" : "linear";
+    this.button.title = "frequencies: logarithmic or linear";
     const { g, width, height } = blank(canvas);
-    const found = this.#spectra();
     if (!found.length) {
       g.fillStyle = ink("soft");
       g.fillText("no spectrum: choose a signal, and at least 16 cycles in sight", AREA.left, 30);
       return;
     }
-    const most = Math.max(...found.map(({ of }) => Math.max(...of.amplitudes)), 1e-12);
-    const top = Math.ceil(Math.log10(most)), bottom = top - DECADES;
+    const most = Math.max(...found.map(({ of }) => of.amplitudes[highest(of)]), 1e-12);
+    const top = Math.ceil(Math.log10(most) + 1e-9), bottom = top - DECADES;
+    const from = Math.min(...found.map(({ of }) => of.resolution));
     const limit = Math.max(...found.map(({ of }) => of.step * of.amplitudes.length));
     const w = width - AREA.left - AREA.right, h = height - AREA.top - AREA.bottom;
-    const x = (hertz) => AREA.left + hertz / limit * w;
-    const y = (size) => AREA.top + (top - Math.max(Math.log10(size), bottom)) / (top - bottom) * h;
-    this.#axes(g, { w, h, top, bottom, limit, x, y });
+    const decades = Math.log10(limit / from);
+    const axis = { w, h, top, bottom, from, limit,
+      x: this.isLog ? (hertz) => AREA.left + Math.log10(hertz / from) / decades * w : (hertz) => AREA.left + hertz / limit * w,
+      hertz: this.isLog ? (x) => from * 10 ** ((x - AREA.left) / w * decades) : (x) => (x - AREA.left) / w * limit,
+      y: (size) => AREA.top + (top - Math.max(Math.log10(size), bottom)) / (top - bottom) * h };
+    this.#axes(g, axis);
+    g.save();
+    g.beginPath();
+    g.rect(AREA.left, AREA.top, w, h);
+    g.clip();
     for (const { number, of } of found) {
       g.strokeStyle = colour(number);
       g.lineWidth = 1.3;
       g.beginPath();
-      for (let i = 1; i < of.amplitudes.length; i++) g.lineTo(x(i * of.step), y(of.amplitudes[i]));
+      for (const [x, y] of this.#line(of, axis)) g.lineTo(x, y);
       g.stroke();
     }
-    this.#point(g, found, limit, w, x, y, h);
+    g.restore();
+    this.#point(g, axis);
   }
 
   #spectra() {
@@ -61,7 +84,23 @@ export class Spectrum {
     return found;
   }
 
-  #axes(g, { w, h, top, bottom, limit, x, y }) {
+  // The points of the line: of those that fall into one pixel the highest.
+  #line({ amplitudes, step }, { x, y }) {
+    const points = [];
+    let pixel = -1, most = 0;
+    for (let i = 1; i < amplitudes.length; i++) {
+      const at = Math.round(x(i * step));
+      if (at === pixel) {
+        if (amplitudes[i] <= most) continue;
+        points.pop();
+      } else pixel = at;
+      most = amplitudes[i];
+      points.push([x(i * step), y(most)]);
+    }
+    return points;
+  }
+
+  #axes(g, { w, h, top, bottom, from, limit, x, y }) {
     g.strokeStyle = ink("grid");
     g.fillStyle = ink("soft");
     g.beginPath();
@@ -71,11 +110,10 @@ export class Spectrum {
       g.moveTo(AREA.left, place); g.lineTo(AREA.left + w, place);
       g.fillText(power >= -3 && power <= 3 ? String(Number((10 ** power).toPrecision(1))) : `1e${power}`, AREA.left - 6, place + 4);
     }
-    const columns = ticks(0, limit, w / 110);
     g.textAlign = "center";
-    for (const hertz of columns.at) {
+    for (const { hertz, text } of this.isLog ? decadeTicks(from, limit) : linearTicks(limit, w)) {
       g.moveTo(Math.round(x(hertz)) + 0.5, AREA.top); g.lineTo(Math.round(x(hertz)) + 0.5, AREA.top + h);
-      if (x(hertz) < AREA.left + w - 40) g.fillText(tickText(hertz, columns.step), x(hertz), AREA.top + h + 15);
+      if (text && x(hertz) < AREA.left + w - 40) g.fillText(text, x(hertz), AREA.top + h + 15);
     }
     g.stroke();
     g.textAlign = "right";
@@ -86,18 +124,42 @@ export class Spectrum {
   }
 
   // The highest peak of each, or what the mouse points at.
-  #point(g, found, limit, w, x, y, h) {
+  #point(g, { w, x, y, hertz }) {
     g.textAlign = "left";
-    found.slice(0, 8).forEach(({ name, number, of }, row) => {
-      let at = 1;
-      if (this.pointer !== null) at = Math.min(Math.max(Math.round((this.pointer - AREA.left) / w * limit / of.step), 1), of.amplitudes.length - 1);
-      else for (let i = 2; i < of.amplitudes.length; i++) if (of.amplitudes[i] > of.amplitudes[at]) at = i;
+    this.found.slice(0, 8).forEach(({ name, number, of }, row) => {
+      const at = this.pointer === null ? highest(of)
+        : Math.min(Math.max(Math.round(hertz(this.pointer) / of.step), 1), of.amplitudes.length - 1);
+      const { frequency, amplitude } = this.pointer === null ? peak(of, at) : { frequency: at * of.step, amplitude: of.amplitudes[at] };
       g.fillStyle = colour(number);
       g.beginPath();
-      g.arc(x(at * of.step), y(of.amplitudes[at]), 3.5, 0, 7);
+      g.arc(x(frequency), y(amplitude), 3.5, 0, 7);
       g.fill();
-      const text = `${name}  ${scaled(at * of.step, "Hz")}  ${figure(of.amplitudes[at], this.scope.unit(name))}`;
+      const text = `${name}  ${hertzText(frequency, of.resolution)}  ${figure(amplitude, this.scope.unit(name))}`;
       g.fillText(text, AREA.left + w - g.measureText(text).width - 10, AREA.top + 16 + row * 15);
     });
+    g.fillStyle = ink("soft");
+    g.fillText(`Hann's window; resolution ${scaled(this.found[0].of.resolution, "Hz")}`, AREA.left + 70, AREA.top + 16);
   }
+}
+
+// With the digits that a peak has that is known to a hundredth of the resolution.
+export function hertzText(frequency, resolution) {
+  const unit = 10 ** Math.floor(Math.log10(resolution / 100) + 1e-9);
+  return scaled(Math.round(frequency / unit) * unit, "Hz");
+}
+
+function linearTicks(limit, w) {
+  const { at, step } = ticks(0, limit, w / 110);
+  return at.map((hertz) => ({ hertz, text: tickText(hertz, step) }));
+}
+
+// 1, 2, 5 of each decade have a number, all others a line.
+function decadeTicks(from, limit) {
+  const found = [];
+  for (let power = Math.floor(Math.log10(from)); 10 ** power <= limit; power++)
+    for (let n = 1; n < 10; n++) {
+      const hertz = n * 10 ** power;
+      if (hertz >= from && hertz <= limit) found.push({ hertz, text: n === 1 || n === 2 || n === 5 ? String(Number(hertz.toPrecision(2))) : "" });
+    }
+  return found;
 }

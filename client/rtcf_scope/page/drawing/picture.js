@@ -1,0 +1,54 @@
+// Draws columns of a plot: ground, grid, missing cycles, then the traces over each other.
+import { colour, ink, pixel, symbol } from "./palette.js";
+import { Slices } from "./slices.js";
+import { drawTrace, reach } from "./trace.js";
+
+const GAP = 0.28; // how much of the ground's colour missing cycles take
+const SHIFT = 53; // pixels between the symbols of one trace and the next
+
+// Columns from `from` to before `to` of a raster whose first one is column `base` of the sight.
+export function drawColumns(raster, sight, base, from, to, sources, traces) {
+  const paper = pixel(ink("paper")), grid = pixel(ink("grid")), bad = pixel(ink("bad"));
+  raster.clear(from, to, paper);
+  for (const value of sight.rows.at) raster.row(Math.round(sight.row(value)), from, to, grid);
+  for (const n of sight.ticks(base + from - 1, base + to)) {
+    const x = Math.round(sight.column(n * sight.step)) - base;
+    if (x >= from && x < to) raster.bar(x, 0, raster.height, grid);
+  }
+  sources.forEach((store, second) => {
+    if (store.empty) return;
+    for (const gap of store.gaps) {
+      const begin = Math.floor(sight.column(gap.from)) - base, end = Math.max(Math.ceil(sight.column(gap.to)) - base, begin + 1);
+      for (let x = Math.max(begin, from); x < Math.min(end, to); x++) raster.bar(x, 0, raster.height, bad, GAP);
+    }
+    const slices = new Slices(store, sight.seconds, base, from, to, reachOf(sight, traces));
+    traces.forEach(({ name, number }, order) => {
+      const column = store.column(name);
+      if (column)
+        drawTrace(raster, slices, column, sight, { colour: pixel(colour(number)), paper, symbol: symbol(number),
+          shift: Math.round(number * SHIFT * sight.ratio), order, second: second > 0 });
+    });
+  });
+}
+
+// What is new in the columns of a sight, as cycles come and the oldest ones go: those from `final` on
+// may still become others, from `drawn` on there is nothing yet; before `gone` there is nothing any
+// more, and between `gone` and `held` cycles are going.
+export function newsOf(sight, sources, traces) {
+  const near = reachOf(sight, traces) + 1;
+  const news = { stamp: 0, final: Infinity, drawn: -Infinity, held: -Infinity, gone: -Infinity };
+  for (const store of sources) {
+    news.stamp += store.end;
+    if (store.end - store.begin < 2) { news.final = -Infinity; news.drawn = Infinity; continue; }
+    // What the line to the last cycle looks like depends on the next one.
+    news.final = Math.min(news.final, Math.floor(sight.column(store.time(store.end - 2))) - near);
+    news.drawn = Math.max(news.drawn, Math.ceil(sight.column(store.lastTime)) + near);
+    if (store.begin === 0) continue;
+    const oldest = sight.column(store.firstTime);
+    news.held = Math.max(news.held, Math.ceil(oldest) + near);
+    news.gone = Math.max(news.gone, Math.floor(oldest) - near);
+  }
+  return news;
+}
+
+function reachOf({ ratio }, traces) { return reach(ratio, traces.some(({ number }) => symbol(number))); }

@@ -1,0 +1,29 @@
+// What moves with time: an element that is shifted as a whole, by whole pixels of the screen, so
+// that what is in it is drawn once.
+const FAR = 1 << 20; // pixels that it may be shifted
+
+export class Strip {
+  constructor(name) {
+    this.box = document.createElement("div");
+    this.box.className = `strip ${name}`;
+    this.origin = NaN; // column at its left
+    this.seconds = NaN;
+    this.number = 0; // another one when the places of what is in it are
+    this.shift = null;
+  }
+
+  move(sight) {
+    const { first, ratio, seconds } = sight;
+    if (seconds !== this.seconds || ratio !== this.ratio || !(Math.abs(first - this.origin) < FAR)) {
+      this.seconds = seconds;
+      this.ratio = ratio;
+      this.origin = first;
+      this.number++;
+    }
+    const shift = `translateX(${(this.origin - first) / ratio}px)`;
+    if (shift !== this.shift) this.box.style.transform = this.shift = shift;
+  }
+
+  // Where a column is in it.
+  left(column) { return `${(column - this.origin) / this.ratio}px`; }
+}
