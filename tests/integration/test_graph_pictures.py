@@ -2,11 +2,13 @@
 
 import json
 import re
+import subprocess
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from pathlib import Path
 
 import fig_1
+import graphs
 import pytest
 import rtcf
 from daemon_process import Daemon
@@ -70,6 +72,64 @@ def test_large_graphs_can_be_drawn(client: rtcf.Client, daemon: Daemon, tmp_path
     assert done.returncode == 0, done.stderr
     titles = {each.text for each in ElementTree.parse(picture).iter() if each.tag.endswith("title")}
     assert {f"/arm{i // 40}/m{i}" for i in range(_MANY)} <= titles
+
+
+@pytest.mark.parametrize("name", list(graphs.GRAPHS))
+def test_long_and_wide_graphs_fit_a_screen(
+    client: rtcf.Client, daemon: Daemon, tmp_path: Path, name: str
+) -> None:
+    client.apply(graphs.GRAPHS[name])
+    picture = tmp_path / "large.svg"
+    done = daemon.ctl("graph", "-o", str(picture))
+    assert done.returncode == 0, done.stderr
+    root = ElementTree.parse(picture).getroot()
+    wide, high = (float(root.get(each, "").removesuffix("pt")) for each in ("width", "height"))
+    assert 0.4 < wide / high < 4 and wide < 4000
+    titles = [each.text for each in root.iter() if each.tag.endswith("title")]
+    lines = graphs.LINES[name]
+    assert {graphs.name(number) for number in range(_MANY)} <= set(titles)
+    assert sorted(each for each in titles if each and "->" in each) == sorted(
+        f"{graphs.name(a)}->{graphs.name(b)}" for a, b in lines
+    )
+    texts = [each.text for each in root.iter() if each.tag.endswith("text")]
+    broken = sum(graphs.is_break(*each) for each in lines)
+    assert texts.count("1/z") == broken
+    dashed = [each for each in root.iter() if each.get("stroke-dasharray")]
+    assert len([each for each in dashed if each.tag.endswith("path")]) == broken
+    boxes = dict(boxes_in(root))
+    assert len({(round(x), round(y)) for x, y in boxes.values()}) >= _MANY
+    for a, b in boxes.values():
+        assert -1 <= a <= wide and -high - 1 <= b <= 1
+    # The .dot file has the same places, whoever draws it.
+    source = tmp_path / "large.dot"
+    assert daemon.ctl("graph", "-o", str(source)).returncode == 0
+    again = subprocess.run(["dot", "-Tsvg", source], capture_output=True, check=True).stdout
+    assert dict(boxes_in(ElementTree.fromstring(again))) == boxes
+
+
+def boxes_in(root: ElementTree.Element) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Yield the middle of each node of a picture."""
+    for group in root.iter():
+        if group.get("class") == "node":
+            title, text = (
+                next(each for each in group.iter() if each.tag.endswith(tag))
+                for tag in ("title", "text")
+            )
+            yield title.text or "", (float(text.get("x", "")), float(text.get("y", "")))
+
+
+def test_a_short_chain_is_drawn_from_left_to_right(
+    client: rtcf.Client, daemon: Daemon, tmp_path: Path
+) -> None:
+    client.apply(graphs.chain(8, closed=True))
+    picture = tmp_path / "short.svg"
+    assert daemon.ctl("graph", "-o", str(picture)).returncode == 0
+    root = ElementTree.parse(picture).getroot()
+    boxes = dict(boxes_in(root))
+    across = [boxes[graphs.name(number)][0] for number in range(8)]
+    assert across == sorted(across)
+    texts = [(each.text or "").strip() for each in root.iter() if each.tag.endswith("text")]
+    assert sum(each.endswith("1/z") for each in texts) == 1
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,17 @@
 """`rtcfctl metrics` and `rtcfctl stats --plot`: figures for Prometheus, and as a picture."""
 
 import importlib
+import json
+import re
 import socket
 import subprocess
 import urllib.request
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from xml.etree.ElementTree import Element
 
 import pytest
 import rtcf
@@ -147,10 +151,104 @@ def test_a_picture_is_drawn(counted: Daemon, tmp_path: Path, name: str, begin: b
     assert [each.name for each in pictures.iterdir()] == [name]
 
 
+@pytest.fixture
+def outlier(daemon: Daemon, client: rtcf.Client) -> Daemon:
+    """Give a loop one of whose cycles took far longer than the others."""
+    client.load(
+        rtcf.component("rtcf_faults", "Stumbles", name="slow", parameters=["spin_us:=60000"])
+    )
+    client.start()
+    wait_for(lambda: iteration(client) > 500, "500 cycles")
+    client.set_parameters("slow", [rtcf.parse_parameter("turn:=1")])
+    wait_for(lambda: client.get_statistics().duration.max_ns > 50e6, "the slow cycle")
+    client.stop()
+    return daemon
+
+
+def test_a_picture_shows_an_outlier_and_the_others(
+    outlier: Daemon, client: rtcf.Client, tmp_path: Path
+) -> None:
+    figures = client.get_statistics(buckets=True)
+    picture = tmp_path / "loop.svg"
+    assert outlier.ctl("stats", "--plot", str(picture)).returncode == 0
+    root = ElementTree.parse(picture).getroot()
+    texts = {each.text or "" for each in root.iter() if each.tag.endswith("text")}
+    for panel, found in (("calculation", figures.duration), ("wake-up", figures.latency)):
+        bars = ids(root, f"{panel} bar ")
+        assert sum(int(each.get("id", "").split()[-1]) for each in bars) == found.count
+        # On a linear axis all but one cycle are in the first bar.
+        lefts = {round(min(across(each))) for each in bars}
+        assert len(lefts) == len(bars) >= 4
+        marks = {
+            each.get("id", "").rpartition("mark ")[2]: min(across(each))
+            for each in ids(root, f"{panel} mark ")
+        }
+        assert list(marks) == ["50 %", "99 %", "99.9 %", "max"]
+        assert marks["50 %"] <= marks["99 %"] <= marks["99.9 %"] <= marks["max"]
+    (median,) = ids(root, "calculation mark 50 %")
+    (longest,) = ids(root, "calculation mark max")
+    assert min(across(longest)) - min(across(median)) > 100
+    assert any(re.fullmatch(r"max: 6\d{4} µs", each) for each in texts), texts
+    assert {"1", "10", "100"} <= texts  # cycles, as numbers that can be read
+
+
+def ids(root: Element, begin: str) -> list[Element]:
+    """Return the parts of a picture whose name begins so."""
+    return [each for each in root.iter() if each.get("id", "").startswith(begin)]
+
+
+def across(part: Element) -> list[float]:
+    """Return where a part of a picture is, from left to right."""
+    numbers = [
+        float(number)
+        for each in part.iter()
+        for number in re.findall(r"-?\d+(?:\.\d+)?", each.get("d", ""))
+    ]
+    return numbers[0::2]
+
+
+def test_bars_in_the_terminal_show_an_outlier_and_the_others(
+    outlier: Daemon, client: rtcf.Client
+) -> None:
+    figures = client.get_statistics()
+    done = outlier.ctl("stats", "--plot")
+    assert done.returncode == 0, done.stderr
+    assert all(len(line) <= 80 for line in done.stdout.split("\n\n", 2)[2].splitlines())
+    for title, found in (
+        ("calculation duration", figures.duration), ("wake-up latency", figures.latency),
+    ):  # fmt: skip
+        after = done.stdout.partition(f"\n{title} (µs), ")[2]
+        assert after.startswith(f"{found.count} cycles; bars are logarithmic\n")
+        bars = re.findall(
+            r"^ *([\d.]+) to +([\d.]+) ([█▏▎▍▌▋▊▉]*) +(\d[\d ]*?)(?:  (.*))?$",
+            after.partition("\n\n")[0], re.MULTILINE,
+        )  # fmt: skip
+        counts = [int(each[3].replace(" ", "")) for each in bars]
+        assert sum(counts) == found.count
+        assert 4 <= len(bars) <= 24
+        longest = max(range(len(bars)), key=lambda at: len(bars[at][2]))
+        assert counts[longest] == max(counts)
+        assert all(each[2] for each, count in zip(bars, counts, strict=True) if count)
+        for name, value_ns in (
+            ("50 %", found.p50_ns), ("99 %", found.p99_ns), ("99.9 %", found.p999_ns),
+            ("max", found.max_ns),
+        ):  # fmt: skip
+            ((low, high, _, _, _),) = [each for each in bars if name in each[4].split(", ")]
+            assert float(low) * 0.95 < value_ns / 1e3 < float(high) * 1.05
+    # What stands between them and the outlier is one line.
+    assert "…" in done.stdout
+
+
+def test_programs_get_the_buckets(counted: Daemon) -> None:
+    told = json.loads(counted.ctl("stats", "--plot", "-o", "json").stdout)
+    assert sum(each["count"] for each in told["duration_buckets"]) == told["duration"]["count"]
+
+
 def test_pictures_that_cannot_be_are_refused(daemon: Daemon, tmp_path: Path) -> None:
     for words, code, said in (
         (("loop.gif",), 2, "loop.gif: a picture is .svg, .png, .pdf"),
         (("loop.png", "--watch"), 2, "--plot draws one picture: give it without --watch"),
+        ((), 1, "rt_runner has run no cycle: there is nothing to draw"),
         (("loop.png",), 1, "rt_runner has run no cycle: there is nothing to draw"),
     ):
         done = daemon.ctl("stats", "--plot", *words)

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import rtcf
 from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for
@@ -81,6 +82,73 @@ def test_each_cycle_is_there_and_what_components_took(running: Daemon, tmp_path:
     names = {each["name"] for each in events if each["ph"] == "C"}
     assert names == {"wake-up latency (µs)", "/wave (µs, mean)", "/mimo (µs, mean)"}
     assert next(e for e in events if e["name"] == "process_name")["args"]["name"] == "rt_runner"
+
+
+def test_components_are_spans_inside_of_their_cycles(
+    daemon: Daemon, client: rtcf.Client, tmp_path: Path
+) -> None:
+    client.load(rtcf.component("rtcf_faults", "Sleeps", name="slow", parameters=["after:=0"]))
+    client.load(rtcf.component("rtcf_examples", "Wave", name="half", every=2))
+    client.load(rtcf.component("rtcf_examples", "Mimo", name="mimo"))
+    client.load(rtcf.component("rtcf_examples", "Wave", name="wave"))
+    order = [each.full_name for each in client.list_components()]
+    client.start()
+    file = tmp_path / "trace.json"
+    done = daemon.ctl("trace", "-o", str(file), "--cycles", "300", "--components")
+    assert done.returncode == 0, done.stderr
+    events = read(file)
+    spans: dict[int, list[Event]] = {}
+    for each in cycles(events):
+        spans.setdefault(each["args"]["cycle"], []).append(each)
+    assert len(spans) == 300
+    for number, (cycle, *components) in spans.items():
+        assert cycle["name"] in ("cycle", "late cycle")
+        names = [each["name"] for each in components]
+        assert names == [each for each in order if each != "/half" or number % 2 == 0], number
+        assert {each["tid"] for each in components} == {cycle["tid"]}
+        # One after the other, and all in their cycle, to the digits that are written.
+        end = cycle["ts"]
+        for each in components:
+            assert each["ts"] >= end - 0.002
+            end = each["ts"] + each["dur"]
+        assert end <= cycle["ts"] + cycle["dur"] + 0.002
+        took = {each["name"]: each["dur"] for each in components}
+        assert took["/slow"] >= 100  # µs that it sleeps
+        assert took["/mimo"] < cycle["dur"] - 100
+    # Nobody who does not ask for them gets any.
+    assert daemon.ctl("trace", "-o", str(file), "--cycles", "50", "--force").returncode == 0
+    assert len(cycles(read(file))) == 50
+
+
+def test_spans_of_components_go_on_over_changes_and_end_with_the_loop(
+    running: Daemon, client: rtcf.Client
+) -> None:
+    with client.watch_ports((), component_times=True) as stream:
+        client.load(rtcf.component("rtcf_examples", "Wave", name="more"))
+        client.unload(["mimo"])
+        client.stop()
+        seen = []
+        for batch in stream:
+            if not len(batch):
+                continue
+            seen.append(batch.schema.turns)
+            turns = batch.turns_ns
+            assert turns.shape == (len(batch), 1 + len(batch.schema.turns))
+            ran = turns[:-1] if batch.last_of_loop else turns
+            assert (ran >= 0).all()
+            assert (np.diff(ran, axis=1) >= 0).all()
+            assert (ran[:, -1] <= batch.durations_ns[: len(ran)]).all()
+            assert (batch.part(1).turns_ns == turns[1:]).all()
+            if batch.last_of_loop:
+                assert (turns[-1] == -1).all()  # components made safe
+                break
+    assert seen[0] == ("/mimo", "/wave")
+    assert seen[-1] == ("/more", "/wave")
+
+
+def test_times_of_components_are_not_told_of_windows(running: Daemon, client: rtcf.Client) -> None:
+    with pytest.raises(rtcf.RtcfError, match="of cycles, not of windows"):
+        client.watch_ports((), every=10, min_max=True, component_times=True)
 
 
 def test_changes_faults_and_log_records_are_marks(

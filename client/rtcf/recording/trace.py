@@ -39,6 +39,7 @@ class Trace:
         self._last_ns = 0
         self._tracks: dict[str, int] = {}
         self._sums: dict[str, tuple[int, float]] = {}  # of components: calls, and ns
+        self.spans = 0  # of components in cycles
         self._file = path.open("w", encoding="utf-8")
         self._file.write("[\n")
         self._write(self._named("process_name", 0, runner))
@@ -61,11 +62,14 @@ class Trace:
         self._file.close()
 
     def add_cycles(self, batch: PortBatch, on_late: OnLate | None = None) -> None:
-        """Add cycles in order: beginning, duration and lateness of each.
+        """Add cycles in order: beginning, duration and lateness of each, and in it what each
+        component took, if the stream tells.
 
         `on_late` gets the number of each late one, its deadline, its beginning, its end, and by
         how much it was late, ns."""
         message = batch.message
+        turns = batch.turns_ns.tolist() if batch.schema.turns else []
+        names = [json.dumps(each, ensure_ascii=False) for each in batch.schema.turns]
         for index, stamp_ns in enumerate(message.stamps_ns):
             cycle = batch.first_cycle + index * batch.every
             latency_ns, duration_ns = message.latencies_ns[index], message.durations_ns[index]
@@ -85,6 +89,8 @@ class Trace:
                 {"name": name, "ph": "X", "pid": 1, "tid": _CYCLES, "ts": self._us(begin_ns),
                  "dur": duration_ns / 1e3, "args": facts}
             )  # fmt: skip
+            if turns:
+                self._add_turns(cycle, begin_ns, turns[index], names)
             self._count("wake-up latency (µs)", begin_ns, latency_ns / 1e3)
             if late_ns > 0:
                 self.late += 1
@@ -94,6 +100,23 @@ class Trace:
                     _EVENTS, "overrun", begin_ns + duration_ns, {**facts, "late_us": late_ns / 1e3}
                 )
             self.cycles += 1
+
+    def _add_turns(self, cycle: int, begin_ns: int, turns: list[int], names: list[str]) -> None:
+        """Add what ran in a cycle, as spans inside of its own.  There are many: no dicts."""
+        before = turns[0]
+        begin_us = self._us(begin_ns)
+        spans = []
+        for name, after in zip(names, turns[1:], strict=True):
+            if after < 0:
+                continue
+            spans.append(
+                f'{{"name": {name}, "ph": "X", "pid": 1, "tid": {_CYCLES}, '
+                f'"ts": {begin_us + before / 1e3:.3f}, "dur": {(after - before) / 1e3:.3f}, '
+                f'"args": {{"cycle": {cycle}}}}},\n'
+            )
+            before = after
+        self.spans += len(spans)
+        self._file.write("".join(spans))
 
     def add_culprit(self, cycle: int, end_ns: int, words: str) -> None:
         """Add the cause of a late cycle at its end, on a track of the kernel."""

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 _STATE = re.compile(
     r"^(bool|float|double|u?int(?:8|16|32|64))(?:\[(\d+)(?:x(\d+)(,RowMajor)?)?\])?$"
 )
+_OLDER = (
+    "its executor is older and tells no {}: `rtcfctl runner restart` stops the loop and starts one "
+    "that does"
+)
 _FORMATS = {"bool": "?", "float": "<f4", "double": "<f8"}
 
 
@@ -44,6 +48,7 @@ class PortSchema:
     columns: tuple[ports_pb2.PortColumn, ...] = ()
     notes: tuple[str, ...] = ()  # what matches and is not there, a line each
     signals: dict[str, Signal] = field(default_factory=dict)  # by name, in schedule order
+    turns: tuple[str, ...] = ()  # components in schedule order, of a stream with their times
 
 
 @dataclass(frozen=True)
@@ -109,10 +114,31 @@ class PortBatch:
         """Return the cycle in which each maximum was there first."""
         return self._places(name)[1::2]
 
+    @property
+    def turns_ns(self) -> "NDArray[np.int64]":
+        """Of a stream with times of components: by cycle, when the first one's turn began, and when
+        the update() of each of `schema.turns` had ended, which is when the next one's began; ns
+        after the beginning of the calculation; -1 = it did not run."""
+        numbers: NDArray[np.int64] = _numpy().frombuffer(self.message.turns, dtype="<i8")
+        return numbers.reshape(len(self), 1 + len(self.schema.turns))
+
+    @property
+    def window_begins(self) -> "NDArray[np.int64]":
+        """The first cycle of each window that is in its minima and maxima; not the window's own
+        first cycle where the stream began later, or cycles were lost."""
+        return self.cycles + _integers(self.message.begins or [0] * len(self))
+
+    @property
+    def window_ends(self) -> "NDArray[np.int64]":
+        """The last cycle of each window that is in its minima and maxima."""
+        # An older executor does not tell it: the window's own last cycle.
+        return self.cycles + _integers(self.message.ends or [self.every - 1] * len(self))
+
     def part(self, begin: int, end: int | None = None) -> "PortBatch":
         """Return some of its cycles as a batch; not of minima and maxima."""
         end = len(self) if end is None else end
         old = self.message
+        turn = len(old.turns) // max(len(self), 1)  # bytes of a cycle
         message = ports_pb2.PortBatch(
             first_cycle=self.first_cycle + begin * self.every,
             lost=old.lost if begin == 0 else 0,
@@ -124,6 +150,7 @@ class PortBatch:
                 values[begin * column.size : end * column.size]
                 for values, column in zip(old.values, self.schema.columns, strict=True)
             ],
+            turns=old.turns[begin * turn : end * turn],
         )
         return PortBatch(
             self.schema,
@@ -182,6 +209,7 @@ class PortStream(Closing):
         self._socket = socket
         self._every = max(request.every, 1)
         self._min_max = request.min_max
+        self._times = request.component_times
         self._call = method(request)
         self._next()  # the schema: from here on nothing is missed
 
@@ -191,10 +219,9 @@ class PortStream(Closing):
                 continue
             batch = response.batch
             if self._min_max and len(batch.counts) != len(batch.stamps_ns):
-                raise RtcfError(
-                    "its executor is older and tells no minima: `rtcfctl runner restart` "
-                    "stops the loop and starts one that does"
-                )
+                raise RtcfError(_OLDER.format("minima"))
+            if self._times and batch.stamps_ns and not batch.turns:
+                raise RtcfError(_OLDER.format("times of components"))
             yield PortBatch(
                 self.schema, self._every, batch.first_cycle, batch.lost, batch.last_of_loop, batch
             )
@@ -228,7 +255,7 @@ def schema_of(message: ports_pb2.PortSchema) -> PortSchema:
         name = signal_name(column.component, column.name, also_output and _is_state(column))
         for signal in _signals(number, name, column):
             signals[signal.name] = signal
-    return PortSchema(tuple(message.columns), tuple(message.notes), signals)
+    return PortSchema(tuple(message.columns), tuple(message.notes), signals, tuple(message.turns))
 
 
 def signal_name(component: str, name: str, hidden: bool) -> str:

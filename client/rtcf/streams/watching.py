@@ -83,11 +83,14 @@ class Watching(Connection):
         every: int = 1,
         *,
         min_max: bool = False,
+        component_times: bool = False,
     ) -> "PortStream":
         """Watch values of outputs and declared state, of each `every`-th cycle, or (`min_max`) the
         minima and maxima of each `every` cycles, which hide no value: see PortBatch.minima().
 
         `selection` names them with the wildcards of a shell, e.g. "/arm/*.effort"; all without.
+        With `component_times` each cycle also tells when the update() of each component ended: see
+        PortBatch.turns_ns; not with `min_max`.
         Nothing is missed from here on; what the caller does not take in time is counted.
         """
         # Few commands need it, and each import is time.
@@ -101,5 +104,6 @@ class Watching(Connection):
                 selection=several("selection", selection),
                 every=every,
                 min_max=min_max,
+                component_times=component_times,
             ),
         )

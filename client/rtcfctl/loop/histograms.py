@@ -1,22 +1,81 @@
-"""The picture of `rtcfctl stats --plot`: two histograms, as Fig. 2 of the paper shows them."""
+"""How often a loop took how long: `rtcfctl stats --plot`, as bars in a terminal or as a picture.
+
+Both have logarithmic axes: a cycle in a million that takes a hundred times as long as the others is
+seen, and so are the others.
+"""
 
 import io
-from collections.abc import Sequence
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import rtcf
 from rtcf.v1 import runner_pb2
 from rtcf_shared import durable
 
+from rtcfctl.terminal.pictures import bar
+
 _FORMATS = (".svg", ".png", ".pdf")
+_LEAST_NS = 10.0  # what is shorter, or early, is counted with that
+# Bins are wider than the buckets that they are made of, which are 3.2 % wide.
+_BINS_OF_DECADE = (40, 20, 10, 5, 2, 1)
+_MOST_BINS, _MOST_LINES = 120, 24
+_FEWEST_FOLDED = 3  # empty lines that one with … stands for
+_LONGEST_BAR, _SHORTEST_BAR = 60, 10
+_LOWEST, _SHARE_OF_BARS = 0.7, 0.7  # of the picture: cycles at the bottom, and height of the bars
+_MARKS = (("50 %", "p50_ns"), ("99 %", "p99_ns"), ("99.9 %", "p999_ns"), ("max", "max_ns"))
+_DASHES = (":", "--", "-.", "-")  # of their lines
+
+
+@dataclass(frozen=True)
+class Bin:
+    """Cycles that took more than `low_ns`, and `high_ns` at most."""
+
+    low_ns: float
+    high_ns: float
+    count: int
+
+
+def bins(buckets: Sequence[runner_pb2.Bucket], most: int, most_filled: int) -> list[Bin]:
+    """Return bins side by side, equally wide on a logarithmic axis: at most so many, and so many
+    that are not empty."""
+    uppers = [max(each.upper_ns, _LEAST_NS) for each in buckets]
+    for of_decade in _BINS_OF_DECADE:
+        numbers = [math.ceil(of_decade * math.log10(each) - 1e-6) for each in uppers]
+        if numbers[-1] - numbers[0] < most and len(set(numbers)) <= most_filled:
+            break
+    counts = dict.fromkeys(range(numbers[0], numbers[-1] + 1), 0)
+    for number, bucket in zip(numbers, buckets, strict=True):
+        counts[number] += bucket.count
+    return [
+        Bin(10 ** ((number - 1) / of_decade), 10 ** (number / of_decade), count)
+        for number, count in counts.items()
+    ]
+
+
+def require_cycles(found: runner_pb2.RunnerStatistics) -> None:
+    """Raises RtcfError if there is nothing to draw."""
+    if not found.duration.count:
+        raise rtcf.RtcfError(f"{found.runner} has run no cycle: there is nothing to draw")
+
+
+def lines(found: runner_pb2.RunnerStatistics, width: int) -> Iterator[str]:
+    """Yield bars for a terminal, whose lengths are the logarithms of their counts."""
+    for title, buckets, figures in _panels(found):
+        if buckets:
+            yield f"{title} (µs), {_grouped(figures.count)} cycles; bars are logarithmic"
+            yield from _bars(bins(buckets, _MOST_BINS, _MOST_LINES), figures, width)
+            yield ""
 
 
 def draw(found: runner_pb2.RunnerStatistics, file: Path) -> None:
-    """Write it.  Raises ValueError of a file name, and RtcfError."""
+    """Write a picture.  Raises ValueError of a file name, and RtcfError."""
     if file.suffix not in _FORMATS:
         raise ValueError(f"{file}: a picture is {', '.join(_FORMATS)}")
-    if not found.duration.count:
-        raise rtcf.RtcfError(f"{found.runner} has run no cycle: there is nothing to draw")
+    require_cycles(found)
     try:
         import matplotlib
 
@@ -26,25 +85,113 @@ def draw(found: runner_pb2.RunnerStatistics, file: Path) -> None:
         raise rtcf.RtcfError(
             "nothing here draws histograms: sudo apt install python3-matplotlib"
         ) from None
-    figure, axes = pyplot.subplots(1, 2, figsize=(10, 4), layout="constrained")
-    figure.suptitle(f"{found.runner}, {found.iterations} cycles")
-    panels: tuple[tuple[str, Sequence[runner_pb2.Bucket], runner_pb2.Distribution], ...] = (
-        ("(a) calculation duration [µs]", found.duration_buckets, found.duration),
-        ("(b) wake-up latency [µs]", found.latency_buckets, found.latency),
-    )
-    for axis, (label, buckets, figures) in zip(axes, panels, strict=True):
-        ends = [each.upper_ns / 1e3 for each in buckets]
-        counts = [each.count for each in buckets]
-        axis.hist(ends, bins=100, weights=counts, log=True, color="#2b7bba")
-        limit = figures.p999_ns / 1e3
-        axis.axvline(limit, color="black", linestyle="--", label=f"99.9 %: {limit:.1f} µs")
-        axis.set_xlabel(label)
+    figure, axes = pyplot.subplots(1, 2, figsize=(11, 4.5), layout="constrained")
+    figure.suptitle(f"{found.runner}, {_grouped(found.iterations)} cycles")
+    for axis, letter, (title, buckets, figures) in zip(axes, "ab", _panels(found), strict=True):
+        axis.set_xlabel(f"({letter}) {title} [µs]")
         axis.set_ylabel("cycles")
-        axis.legend()
+        if buckets:
+            _draw(axis, title, bins(buckets, _MOST_BINS, _MOST_BINS), figures)
     picture = io.BytesIO()
-    figure.savefig(picture, dpi=150, format=file.suffix.removeprefix("."))
+    # In an SVG, text that can be searched for.
+    with matplotlib.rc_context({"svg.fonttype": "none"}):
+        figure.savefig(picture, dpi=150, format=file.suffix.removeprefix("."))
     pyplot.close(figure)
     try:
         durable.write_named(file, picture.getvalue())
     except OSError as error:
         raise rtcf.RtcfError(f"{file}: {error.strerror or error}") from None
+
+
+_Panel = tuple[str, Sequence[runner_pb2.Bucket], runner_pb2.Distribution]
+
+
+def _panels(found: runner_pb2.RunnerStatistics) -> tuple[_Panel, _Panel]:
+    return (
+        ("calculation duration", found.duration_buckets, found.duration),
+        ("wake-up latency", found.latency_buckets, found.latency),
+    )
+
+
+def _draw(axis: Any, title: str, found: Sequence[Bin], figures: runner_pb2.Distribution) -> None:
+    from matplotlib import ticker
+
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    bars = axis.bar(
+        [each.low_ns / 1e3 for each in found],
+        [each.count for each in found],
+        [(each.high_ns - each.low_ns) / 1e3 for each in found],
+        align="edge", color="#8fbbdb", edgecolor="#2b7bba", linewidth=0.4,
+    )  # fmt: skip
+    for each, rectangle in zip(found, bars, strict=True):
+        if each.count:
+            rectangle.set_gid(f"{title.split()[0]} bar {each.count}")
+    for (name, field), dashes in zip(_MARKS, _DASHES, strict=True):
+        value_us = max(getattr(figures, field), _LEAST_NS) / 1e3
+        line = axis.axvline(
+            value_us, color="black", linewidth=1, linestyle=dashes,
+            label=f"{name}: {_edge(getattr(figures, field))} µs",
+        )  # fmt: skip
+        line.set_gid(f"{title.split()[0]} mark {name}")
+    low, high = found[0].low_ns / 1e3, found[-1].high_ns / 1e3
+    # A narrow distribution is shown as one.
+    room = max(math.sqrt(10 * low / high), 1.1)
+    axis.set_xlim(low / room, high * room)
+    # Above the bars there is room for the legend.
+    most = max(each.count for each in found)
+    axis.set_ylim(_LOWEST, _LOWEST * (most / _LOWEST) ** (1 / _SHARE_OF_BARS))
+    plain = ticker.FuncFormatter(lambda value, _: f"{value:g}")
+    few = math.log10(high * room / (low / room)) < 2
+    axis.xaxis.set_major_locator(ticker.LogLocator(subs=(1, 2, 5) if few else (1,), numticks=12))
+    axis.xaxis.set_major_formatter(plain)
+    axis.xaxis.set_minor_formatter(ticker.NullFormatter())
+    axis.yaxis.set_major_locator(ticker.LogLocator(numticks=12))
+    axis.yaxis.set_major_formatter(ticker.FuncFormatter(lambda value, _: _grouped(round(value))))
+    axis.yaxis.set_minor_formatter(ticker.NullFormatter())
+    axis.grid(axis="y", color="#d8dde1", linewidth=0.6)
+    axis.set_axisbelow(True)
+    axis.legend(loc="upper right")
+
+
+def _bars(found: Sequence[Bin], figures: runner_pb2.Distribution, width: int) -> Iterator[str]:
+    most = max(each.count for each in found)
+    digits = len(_grouped(most))
+    marks = _marks(found, figures)
+    edges = max(len(_edge(each.high_ns)) for each in found)
+    edges = max(edges, len(_edge(found[0].low_ns)))
+    room = width - (2 * edges + 5) - digits - 2 - max(map(len, marks)) - 2
+    room = min(max(room, _SHORTEST_BAR), _LONGEST_BAR)
+    for is_gap, group in itertools.groupby(
+        zip(found, marks, strict=True), lambda each: not each[0].count
+    ):
+        together = list(group)
+        if is_gap and len(together) >= _FEWEST_FOLDED:
+            yield f"{'…':>{2 * edges + 4}}"
+            continue
+        for each, mark in together:
+            share = (1 + math.log10(each.count)) / (1 + math.log10(most)) if each.count else 0.0
+            yield (
+                f"{_edge(each.low_ns):>{edges}} to {_edge(each.high_ns):>{edges}} "
+                f"{bar(share, room):<{room}} {_grouped(each.count):>{digits}}  {mark}"
+            ).rstrip()
+
+
+def _marks(found: Sequence[Bin], figures: runner_pb2.Distribution) -> list[str]:
+    """Return what is to stand beside each bin; figures are inexact by the width of a bucket."""
+    names: list[list[str]] = [[] for _ in found]
+    filled = [number for number, each in enumerate(found) if each.count]
+    for name, field in _MARKS:
+        value_ns = getattr(figures, field)
+        at = next((each for each in filled if found[each].high_ns >= value_ns), filled[-1])
+        names[at].append(name)
+    return [", ".join(each) for each in names]
+
+
+def _edge(nanoseconds: float) -> str:
+    microseconds = nanoseconds / 1e3
+    return f"{microseconds:.{2 if microseconds < 10 else 1 if microseconds < 100 else 0}f}"
+
+
+def _grouped(count: int) -> str:
+    return f"{count:,}".replace(",", " ")

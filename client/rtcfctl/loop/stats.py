@@ -13,6 +13,8 @@ from rtcfctl.terminal.words import amount, counted, microseconds
 
 _FIGURES = ("min_ns", "mean_ns", "p50_ns", "p99_ns", "p999_ns", "max_ns")
 _SHORTEST_WATCH_S, _LONGEST_WATCH_S = 0.1, 86400.0
+_HERE = Path()  # of a picture: in the terminal
+_WIDTH = 80  # where there is no terminal
 _COLUMNS = ("count", "min", "mean", "p50", "p99", "p99.9", "max")
 
 
@@ -29,7 +31,12 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
         help="again and again, each second or each S seconds (or 500ms), until Ctrl-C",
     )
     stats.add_argument(
-        "--plot", metavar="FILE", type=Path, help="draw how often the loop took how long, too"
+        "--plot",
+        metavar="FILE",
+        type=Path,
+        nargs="?",
+        const=_HERE,
+        help="draw how often the loop took how long, too: here, or as a picture",
     )
     stats.set_defaults(run=show)
 
@@ -42,11 +49,20 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         _watch(client, args, output)
         return
     found = client.get_statistics(args.runner, buckets=args.plot is not None)
-    if args.plot is not None:
+    if args.plot is None:
+        _print(found, output)
+    else:
         from rtcfctl.loop import histograms
 
-        histograms.draw(found, args.plot)
-    _print(found, output)
+        if args.plot is _HERE:
+            histograms.require_cycles(found)
+        else:
+            histograms.draw(found, args.plot)
+        _print(found, output)
+        if args.plot is _HERE and output.for_people:
+            output.line("")
+            for line in histograms.lines(found, output.width or _WIDTH):
+                output.line(line)
     if args.reset:
         client.reset_statistics(args.runner)
 

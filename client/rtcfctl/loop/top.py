@@ -3,9 +3,11 @@
 import argparse
 import math
 import sys
+import textwrap
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import rtcf
@@ -20,9 +22,18 @@ from rtcfctl.terminal.words import amount, counted, microseconds
 
 _SHORTEST_S, _LONGEST_S = 0.1, 3600.0
 _KEPT = 200  # values of a row of blocks
-_SPARK = 16  # of them that a component's row shows
-_NARROWEST_NAME = 12
-_HELP = "q end  s sort  o schedule's order  r reset  TAB next runner"
+_SPARK, _SHORTEST_SPARK = 16, 6  # of them that a component's row shows
+_TITLE = "COMPONENT µs"
+_NARROWEST_NAME, _READABLE_NAME = len(_TITLE), 18
+_ELSEWHERE = 80  # columns where there is no terminal
+# The first one that fits is shown.
+_HELPS = (
+    "q end  ↑ ↓ PgUp PgDn Home End scroll  s sort: m mean p p99 w worst v overruns n name o order"
+    "  r reset  TAB next runner",
+    "q end  ↑ ↓ PgUp PgDn scroll  s sort  o order  r reset  TAB next runner",
+    "q end  ↑ ↓ scroll  s sort  o order  r reset  TAB runner",
+    "q end  ↑ ↓  s sort",
+)
 
 Key = Callable[[runner_pb2.ComponentStatistics], Any]
 _SORTS: dict[str, Key] = {
@@ -32,6 +43,16 @@ _SORTS: dict[str, Key] = {
     "over": lambda each: -each.overruns,
     "name": lambda each: each.component,
 }
+_ORDERS = ("order", *_SORTS)
+_SORT_WORDS = {
+    "order": "in the order of the schedule",
+    "mean": "by mean",
+    "p99": "by the 99 % mark",
+    "max": "by the worst",
+    "over": "by overruns",
+    "name": "by name",
+}
+_SORT_KEYS = {"m": "mean", "p": "p99", "w": "max", "v": "over", "n": "name", "o": "order"}
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
@@ -41,9 +62,7 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
         "--interval", type=amount("s"), default=1.0, metavar="S", help="between looks (1)"
     )
     top.add_argument("-n", type=int, metavar="N", help="end after so many looks")
-    top.add_argument(
-        "--sort", choices=("order", *_SORTS), default="order", help="of the components (order)"
-    )
+    top.add_argument("--sort", choices=_ORDERS, default="order", help="of the components (order)")
     top.set_defaults(run=show)
 
 
@@ -89,7 +108,7 @@ def _print(top: "_Top", args: argparse.Namespace, output: Output) -> None:
     left = args.n
     while True:
         if output.for_people:
-            print("\n".join(top.lines(80, 10**6)[:-1]), end="\n\n", flush=True)
+            print("\n".join(top.table(_ELSEWHERE)), end="\n\n", flush=True)
         else:
             output.record({"status": top.status, "statistics": top.found})
             sys.stdout.flush()
@@ -98,6 +117,50 @@ def _print(top: "_Top", args: argparse.Namespace, output: Output) -> None:
             return
         time.sleep(args.interval)
         top.look()
+
+
+@dataclass(frozen=True)
+class _Column:
+    """One of the figures of a component."""
+
+    title: str
+    width: int
+    sort: str  # the order that it is the key of; empty = of none
+    text: Callable[[runner_pb2.ComponentStatistics, float], str]  # of its share, too
+
+
+_COLUMNS = (
+    _Column("MEAN", 8, "mean", lambda each, _: microseconds(each.duration.mean_ns)),
+    _Column("P50", 8, "", lambda each, _: microseconds(each.duration.p50_ns)),
+    _Column("P99", 8, "p99", lambda each, _: microseconds(each.duration.p99_ns)),
+    _Column("MAX", 9, "max", lambda each, _: microseconds(each.duration.max_ns)),
+    _Column("SHARE", 6, "", lambda _, share: f"{share:.1%}"),
+    _Column("OVER", 6, "over", lambda each, _: str(each.overruns)),
+)
+# Where there is not room for all.
+_LEFT_OUT = ((), ("P50",), ("P50", "P99"), ("P50", "P99", "SHARE"))
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """What of the components' figures fits into a width."""
+
+    name: int
+    columns: Sequence[_Column]
+    spark: int  # 0 = none
+
+    @classmethod
+    def of(cls, width: int, longest_name: int) -> "_Layout":
+        for titles in _LEFT_OUT:
+            columns = [each for each in _COLUMNS if each.title not in titles]
+            left = width - sum(each.width + 1 for each in columns)
+            if left >= _NARROWEST_NAME:
+                break
+        most = left - _SHORTEST_SPARK - 1
+        name = min(longest_name, most if most >= _READABLE_NAME else left)
+        name = max(name, _NARROWEST_NAME)
+        lately = min(left - name - 1, _SPARK)
+        return cls(name, columns, lately if lately >= _SHORTEST_SPARK else 0)
 
 
 class _Means:
@@ -124,6 +187,8 @@ class _Top:
         self._runner = runner
         self._sort = sort
         self._trouble = ""
+        self._above = 0  # components that are scrolled out of sight
+        self._room = 1  # components that were in sight
         self.status = runner_pb2.RunnerStatus()
         self.found = runner_pb2.RunnerStatistics()
         self._means: dict[str, _Means] = {}
@@ -148,12 +213,18 @@ class _Top:
 
     def press(self, key: str) -> None:
         """Do what a key says."""
-        orders = ("order", *_SORTS)
+        page = max(self._room - 1, 1)
+        steps = {
+            "up": -1, "k": -1, "down": 1, "j": 1, "page up": -page, "page down": page, " ": page,
+            "home": -self._above, "end": len(self.found.components),
+        }  # fmt: skip
         try:
-            if key == "s":
-                self._sort = orders[(orders.index(self._sort) + 1) % len(orders)]
-            elif key == "o":
-                self._sort = "order"
+            if key in steps:
+                self._above = max(self._above + steps[key], 0)
+            elif key == "s":
+                self._order(_ORDERS[(_ORDERS.index(self._sort) + 1) % len(_ORDERS)])
+            elif key in _SORT_KEYS:
+                self._order(_SORT_KEYS[key])
             elif key == "r":
                 self._client.reset_statistics(self._runner)
                 self.look()
@@ -163,14 +234,31 @@ class _Top:
             self._trouble = str(error)
 
     def lines(self, width: int, height: int) -> list[str]:
-        """Return what is shown, one line of help last."""
-        head = [*self._about(width), *self._cycles(width)]
+        """Return what a terminal shows: as many components as it has room for, where among all
+        those are, and the keys."""
+        head = self._head(width)
+        # Of the troubles the end is left out before all components are.
+        head = head[: max(height - 6, 1)]
+        if height - len(head) > 6:
+            head.append("")
         rows = self._components(width)
-        room = height - len(head) - 3
-        if len(rows) > room:
-            left = len(rows) - max(room - 1, 0)
-            rows = [*rows[: max(room - 1, 0)], f"… {counted(left, 'component')} more"]
-        return [*head, "", self._columns(width), *rows, _styled(_HELP[:width], "bold")]
+        self._room = max(height - len(head) - 3, 1)
+        self._above = min(self._above, max(len(rows) - self._room, 0))
+        shown = rows[self._above : self._above + self._room]
+        which = f"{self._above + 1} to {self._above + len(shown)} of " * (len(shown) < len(rows))
+        place = f"{which}{counted(len(rows), 'component')}, {_SORT_WORDS[self._sort]}"
+        keys = next((each for each in _HELPS if len(each) <= width), _HELPS[-1])
+        return [
+            *head, self._columns(width), *shown, _fit(place, width),
+            _styled(_fit(keys, width), "bold"),
+        ]  # fmt: skip
+
+    def table(self, width: int) -> list[str]:
+        """Return all of it, as it stands where nothing scrolls."""
+        return [*self._head(width), "", self._columns(width), *self._components(width)]
+
+    def _order(self, sort: str) -> None:
+        self._sort, self._above = sort, 0
 
     def _mean(self, name: str) -> _Means:
         return self._means.setdefault(name, _Means())
@@ -179,32 +267,39 @@ class _Top:
         names = [each.runner for each in self._client.get_status().runners]
         at = names.index(self._runner) + 1 if self._runner in names else 0
         self._runner = names[at % len(names)]
-        self.status, self._means = runner_pb2.RunnerStatus(), {}
+        self.status, self._means, self._above = runner_pb2.RunnerStatus(), {}, 0
         self.look()
+
+    def _head(self, width: int) -> list[str]:
+        return [*self._about(width), *self._cycles(width), *self._counts(width)]
 
     def _about(self, width: int) -> list[str]:
         status = self.status
         state = enumerator(status, "state")
-        rate = f"{status.settings.frequency_hz:g} Hz"
-        text = f"{self._runner}  {state}  {rate}  cycle {status.iteration}"
+        rate, cycle = f"{status.settings.frequency_hz:g} Hz", f"cycle {status.iteration}"
         clock = time.strftime("%H:%M:%S")
-        lines = [_fit(f"{text:<{width - len(clock) - 1}.{width - len(clock) - 1}} {clock}", width)]
-        style = STYLES.get(status.state, "")
-        lines[0] = lines[0].replace(state, _styled(state, style), 1)
+        room = width - len(clock) - 1
+        shortest = min(len(self._runner), _NARROWEST_NAME)
+        for words in ((state, rate, cycle), (state, cycle), (state,)):
+            rest = "".join(f"  {word}" for word in words)
+            if shortest + len(rest) <= room:
+                break
+        text = _fit(f"{_short(self._runner, max(room - len(rest), 1))}{rest}", room)
+        in_style = _styled(state, STYLES.get(status.state, ""))
+        first = f"{text:<{room}} {clock}".replace(f"  {state} ", f"  {in_style} ", 1)
         troubles = [
             *([f"!! {self._trouble}"] if self._trouble else []),
             *(f"!! NOT REAL TIME: {each}" for each in status.degraded),
             *([f"!! LATE: {status.late}"] if status.late else []),
             *([status.status] if status.status else []),
         ]
-        return lines + [_styled(_fit(each, width), "bold red") for each in troubles]
+        return [first, *(line for each in troubles for line in _folded(each, width, "bold red"))]
 
     def _cycles(self, width: int) -> list[str]:
-        found = self.found
         lines = []
         for title, figures, name in (
-            ("calculation", found.duration, "~duration"),
-            ("wake-up", found.latency, "~latency"),
+            ("calculation", self.found.duration, "~duration"),
+            ("wake-up", self.found.latency, "~latency"),
         ):
             if not figures.count:
                 lines.append(f"{title:<12} nothing yet")
@@ -213,25 +308,35 @@ class _Top:
                 f"{title:<12} mean {microseconds(figures.mean_ns):>8}  "
                 f"p99 {microseconds(figures.p99_ns):>8}  max {microseconds(figures.max_ns):>9} µs  "
             )
-            lines.append(_fit(text + spark(self._mean(name).kept, width - len(text)), width))
+            lately = spark(self._mean(name).kept, max(width - len(text), 0))
+            lines.append(_fit((text + lately).rstrip(), width))
+        return lines
+
+    def _counts(self, width: int) -> list[str]:
+        found = self.found
         faults = found.minor_faults + found.major_faults
         losses = found.log_dropped + found.tap_dropped
-        figures_line = (
+        text = (
             f"{counted(found.overruns, 'overrun')}, {found.missed} missed, "
             f"{counted(faults, 'page fault')}"
         )
         if losses:
-            figures_line += f", {losses} records and values lost"
+            text += f", {losses} records and values lost"
         bad = found.overruns or found.missed or losses
-        return [*lines, _styled(_fit(figures_line, width), "bold red" if bad else "")]
+        return _folded(text, width, "bold red" if bad else "")
+
+    def _layout(self, width: int) -> _Layout:
+        longest = max((len(each.component) for each in self.found.components), default=0)
+        return _Layout.of(width, longest)
 
     def _columns(self, width: int) -> str:
-        name = self._name_width(width)
-        sorts = {"mean": "MEAN", "p99": "P99", "max": "MAX", "over": "OVER"}
-        head = f"{'COMPONENT µs':<{name}}"
-        for key, size in (("mean", 8), ("p50", 8), ("p99", 8), ("max", 9)):
-            head += f" {sorts.get(key, key.upper()):>{size}}"
-        head += f" {'SHARE':>6} {'OVER':>6} LATELY"
+        layout = self._layout(width)
+        head = f"{'▼' * (self._sort == 'name')}{_TITLE}"[: layout.name].ljust(layout.name)
+        for each in layout.columns:
+            title = f"{'▼' * (each.sort == self._sort)}{each.title}"
+            head += f" {title:>{each.width}}"
+        if layout.spark:
+            head += " LATELY"
         return _styled(_fit(head, width), "bold")
 
     def _components(self, width: int) -> list[str]:
@@ -239,27 +344,19 @@ class _Top:
         if self._sort != "order":
             rows.sort(key=_SORTS[self._sort])
         period_ns = 1e9 / self.status.settings.frequency_hz if self.found.runner else math.inf
-        name = self._name_width(width)
-        return [_fit(self._row(each, name, period_ns, width), width) for each in rows]
+        layout = self._layout(width)
+        return [_fit(self._row(each, layout, period_ns), width) for each in rows]
 
-    def _row(
-        self, each: runner_pb2.ComponentStatistics, name: int, period_ns: float, width: int
-    ) -> str:
+    def _row(self, each: runner_pb2.ComponentStatistics, layout: _Layout, period_ns: float) -> str:
         figures = each.duration
-        text = f"{_short(each.component, name):<{name}}"
-        if not figures.count:
-            return f"{text} {'-':>8} {'-':>8} {'-':>8} {'-':>9}"
-        for value, size in (
-            (figures.mean_ns, 8), (figures.p50_ns, 8), (figures.p99_ns, 8), (figures.max_ns, 9),
-        ):  # fmt: skip
-            text += f" {microseconds(value):>{size}}"
         share = figures.mean_ns * figures.count / max(self.found.iterations, 1) / period_ns
-        text += f" {share:>6.1%} {each.overruns:>6} "
-        return text + spark(self._mean(each.component).kept, min(_SPARK, width - len(text)))
-
-    @staticmethod
-    def _name_width(width: int) -> int:
-        return max(_NARROWEST_NAME, width - 4 * 9 - 1 - 2 * 7 - 1 - _SPARK)
+        text = f"{_short(each.component, layout.name):<{layout.name}}"
+        for column in layout.columns:
+            said = column.text(each, share) if figures.count else "-"
+            text += f" {said:>{column.width}}"
+        if layout.spark and figures.count:
+            text += " " + spark(self._mean(each.component).kept, layout.spark)
+        return text
 
 
 def _short(name: str, width: int) -> str:
@@ -268,6 +365,11 @@ def _short(name: str, width: int) -> str:
 
 def _fit(text: str, width: int) -> str:
     return text if len(text) <= width else f"{text[: width - 1]}…"
+
+
+def _folded(text: str, width: int, style: str) -> list[str]:
+    lines = textwrap.wrap(text, width, subsequent_indent="   ") or [""]
+    return [_styled(each, style) for each in lines]
 
 
 def _styled(text: str, style: str) -> str:

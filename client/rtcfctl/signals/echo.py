@@ -99,16 +99,21 @@ def _print_extremes(batch: PortBatch, index: int, output: Output) -> None:
         )
         for name in batch.schema.signals
     }
-    cycle, count = batch.first_cycle + index * batch.every, batch.message.counts[index]
+    first, last = int(batch.window_begins[index]), int(batch.window_ends[index])
+    count = batch.message.counts[index]
     if not output.for_people:
         values = {
             name: {"min": least, "min_cycle": least_at, "max": most, "max_cycle": most_at}
             for name, (least, least_at, most, most_at) in found.items()
         }
         stamp_ns = batch.message.stamps_ns[index]
-        output.record({"cycle": cycle, "cycles": count, "stamp_ns": stamp_ns, "values": values})
+        output.record(
+            {"cycle": first, "last_cycle": last, "cycles": count, "stamp_ns": stamp_ns,
+             "values": values}
+        )  # fmt: skip
         return
-    output.line(f"cycles {cycle} to {cycle + count - 1}", "bold")
+    lacking = last - first + 1 - count
+    output.line(f"cycles {first} to {last}{f', {lacking} of them lost' if lacking else ''}", "bold")
     for name, (least, least_at, most, most_at) in found.items():
         unit = batch.schema.signals[name].unit
         where = f" (cycle {least_at}, {most_at})" if not isinstance(least, list) else ""

@@ -44,6 +44,11 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
         "--cycles", type=whole, metavar="N", help="end after so many (default: Ctrl-C)"
     )
     verb.add_argument(
+        "--components",
+        action="store_true",
+        help="what each component took in each cycle, too",
+    )
+    verb.add_argument(
         "--kernel", action="store_true", help="tell of each late cycle what ran instead (as root)"
     )
     verb.add_argument("--force", action="store_true", help="write over a file that is there")
@@ -63,7 +68,7 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
                 # Refused where there is nothing to see.
                 with (
                     _kernel(trace, status, args) as late,  # before the first cycle
-                    client.watch_ports((), runner) as stream,
+                    client.watch_ports((), runner, component_times=args.components) as stream,
                     ended_by_signals(stream),
                 ):
                     say_if_idle(client, runner, output)

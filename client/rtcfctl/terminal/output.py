@@ -32,6 +32,11 @@ class Output:
         """Tell whether tables and sentences are wanted."""
         return self._kind == "table"
 
+    @property
+    def width(self) -> int | None:
+        """Columns of the terminal; None where there is none."""
+        return _width()
+
     def data(self, value: Any) -> None:
         """Print messages, lists or dicts for machines."""
         document = _plain(value)

@@ -1,9 +1,10 @@
-"""Numbers as pictures of characters: a row of blocks, and curves of braille dots."""
+"""Numbers as pictures of characters: a row of blocks, bars, and curves of braille dots."""
 
 import math
 from collections.abc import Sequence
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
+_PARTS = " ▏▎▍▌▋▊▉"  # of a block, in eighths of its width
 # Of a braille character's 2 by 4 dots, by column and row.
 _DOTS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
 _BLANK = 0x2800
@@ -11,7 +12,7 @@ _BLANK = 0x2800
 
 def spark(values: Sequence[float], width: int) -> str:
     """Return the last values as blocks from zero to the largest; a space for what is no number."""
-    shown = list(values)[-width:]
+    shown = list(values)[-width:] if width > 0 else []
     most = max((each for each in shown if math.isfinite(each)), default=0.0)
 
     def block(value: float) -> str:
@@ -20,6 +21,12 @@ def spark(values: Sequence[float], width: int) -> str:
         return _BLOCKS[round(max(value, 0.0) / most * (len(_BLOCKS) - 1)) if most > 0 else 0]
 
     return "".join(block(each) for each in shown)
+
+
+def bar(share: float, width: int) -> str:
+    """Return a bar from the left, of a share of so many characters."""
+    eighths = round(min(max(share, 0.0), 1.0) * width * 8)
+    return (_BLOCKS[-1] * (eighths // 8) + _PARTS[eighths % 8]).rstrip()
 
 
 class Curves:

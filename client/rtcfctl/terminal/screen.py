@@ -1,6 +1,9 @@
 """A terminal that is drawn again and again, and its keys; left as it was found, however it ends."""
 
+import codecs
+import contextlib
 import os
+import re
 import select
 import signal
 import sys
@@ -11,8 +14,21 @@ from types import FrameType
 from typing import Any, Self
 
 _ENTER, _LEAVE = "\x1b[?1049h\x1b[?25l\x1b[?7l", "\x1b[?7h\x1b[?25h\x1b[?1049l"
+# Terminals that know it show what comes between these at once.
+_BEGIN, _END = "\x1b[?2026h", "\x1b[?2026l"
 _HOME, _REST_OF_LINE, _BELOW = "\x1b[H", "\x1b[K", "\x1b[J"
-_NAMES = {"\x1b[A": "up", "\x1b[B": "down", "\t": "tab", "\x1b": "escape"}
+_ESCAPE = "\x1b"
+_WHOLE_S = 0.05  # in which the rest of a key's characters comes, also over ssh
+# What one key sends; ESC alone is one only if nothing follows.
+_KEY = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|O[ -~]|[^\[O\x1b])|\x1b(?=\x1b)|[^\x1b]")
+_NAMES = {
+    "\t": "tab",
+    _ESCAPE: "escape",
+    "\x1b[A": "up", "\x1bOA": "up", "\x1b[B": "down", "\x1bOB": "down",
+    "\x1b[5~": "page up", "\x1b[6~": "page down",
+    "\x1b[H": "home", "\x1bOH": "home", "\x1b[1~": "home", "\x1b[7~": "home",
+    "\x1b[F": "end", "\x1bOF": "end", "\x1b[4~": "end", "\x1b[8~": "end",
+}  # fmt: skip
 
 
 class Screen:
@@ -21,12 +37,19 @@ class Screen:
 
     def __init__(self) -> None:
         self._keys = sys.stdin.fileno() if sys.stdin.isatty() else -1
+        self._typed = ""  # characters of keys that nobody has taken yet
+        self._decoder = codecs.getincrementaldecoder("utf-8")("replace")
+        self._resized = -1, -1  # a pipe that the signal of a new size writes to
         self._before: list[Any] = []
         self._handlers: dict[int, Any] = {}
 
     def __enter__(self) -> Self:
+        self._resized = os.pipe()
+        for end in self._resized:
+            os.set_blocking(end, False)
         for number in (signal.SIGTERM, signal.SIGHUP):
             self._handlers[number] = signal.signal(number, _end)
+        self._handlers[signal.SIGWINCH] = signal.signal(signal.SIGWINCH, self._note_size)
         if self._keys >= 0:
             self._before = termios.tcgetattr(self._keys)
             tty.setcbreak(self._keys)
@@ -43,6 +66,8 @@ class Screen:
                 termios.tcsetattr(self._keys, termios.TCSADRAIN, self._before)
             for number, handler in self._handlers.items():
                 signal.signal(number, handler)
+            for end in self._resized:
+                os.close(end)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -56,20 +81,48 @@ class Screen:
     def draw(self, lines: list[str]) -> None:
         """Show lines, which may be styled; what does not fit below is left out."""
         _, height = self.size
-        shown = [f"{line}{_REST_OF_LINE}" for line in lines[:height]]
-        sys.stdout.write(_HOME + "\n".join(shown) + _BELOW)
+        # A line is emptied before it is written: behind one that fills its row, the cursor is still
+        # on the last character, which would go, too.
+        shown = [f"{_REST_OF_LINE}{line}" for line in lines[:height]]
+        below = [_BELOW] if len(shown) < height else []
+        sys.stdout.write(_BEGIN + _HOME + "\n".join([*shown, *below]) + _END)
         sys.stdout.flush()
 
     def key(self, wait_s: float) -> str:
-        """Return the next key, by name if it has one; empty if none comes in time."""
-        if self._keys < 0:
-            time.sleep(wait_s)
+        """Return the next key, by name if it has one, or "resize" when the terminal has another
+        size; empty if nothing comes in time."""
+        until = time.monotonic() + wait_s
+        while not (key := self._next_key()):
+            # What has begun goes on at once, or is a key of its own.
+            left = _WHOLE_S if self._typed else max(until - time.monotonic(), 0.0)
+            ready, _, _ = select.select([end for end in self._ends if end >= 0], [], [], left)
+            if self._resized[0] in ready:
+                os.read(self._resized[0], 4096)
+                return "resize"
+            if not ready:
+                begun, self._typed = self._typed, ""
+                return _NAMES.get(begun, "")
+            text = os.read(self._keys, 1024)
+            if not text:
+                return "q"  # of an empty terminal, as that of a connection that has ended
+            self._typed += self._decoder.decode(text)
+        return key
+
+    @property
+    def _ends(self) -> tuple[int, int]:
+        return self._keys, self._resized[0]
+
+    def _next_key(self) -> str:
+        """Take the first key off what was typed; empty if none is whole."""
+        found = _KEY.match(self._typed)
+        if found is None:
             return ""
-        if not select.select([self._keys], [], [], wait_s)[0]:
-            return ""
-        text = os.read(self._keys, 16).decode(errors="replace")
-        # Of an empty terminal, as that of a connection that has ended.
-        return _NAMES.get(text, text[:1]) if text else "q"
+        self._typed = self._typed[found.end() :]
+        return _NAMES.get(found[0], found[0])
+
+    def _note_size(self, _: int, __: FrameType | None) -> None:
+        with contextlib.suppress(BlockingIOError):  # it is full of such notes
+            os.write(self._resized[1], b"!")
 
 
 def _end(number: int, _: FrameType | None) -> None:

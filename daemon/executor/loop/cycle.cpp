@@ -64,7 +64,6 @@ void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles) {
     // Hooks may have written outputs since the last cycle.
     if (frames_ != nullptr) frames_->setBase();
     figures_.iteration.store(0, std::memory_order_relaxed);
-    exchanged_at_ = UINT64_MAX;
     fault_ = {};
     active_ = true;
 }
@@ -132,8 +131,7 @@ bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     feed();
     if (!schedule_->latches.empty() && !copyLatches()) return kAbandoned;
     const std::int64_t end = readCycleCounter();  // not part of any component's duration
-    exchanged_ticks_ = end - begin_ticks;
-    exchanged_at_ = clock_.iteration;
+    marks_ = {begin_ticks, end};
     return end;
 }
 
@@ -344,11 +342,12 @@ void Cycle::apply(Adoption& adoption) noexcept {
     for (const Audience& audience : adoption.audiences)
         audience.output->setConnected(audience.present);
     for (StagedValue* value : adoption.values) value->commit();
-    if (adoption.schedule != nullptr) {
-        schedule_ = adoption.schedule;
-        noteSchedule();
+    if (adoption.schedule != nullptr) schedule_ = adoption.schedule;
+    if (adoption.frames != nullptr) {
+        frames_ = adoption.frames;
+        timed_ = adoption.timed;
     }
-    if (adoption.frames != nullptr) frames_ = adoption.frames;
+    noteSchedule();
     if (frames_ != nullptr && (adoption.frames != nullptr || adoption.restoration != nullptr))
         frames_->setBase();
     if (adoption.period_ns != 0) {
@@ -448,7 +447,6 @@ bool Cycle::restore(Restoration& restoration) noexcept {
     clock_.iteration = image.iteration;
     figures_.iteration.store(image.iteration, std::memory_order_relaxed);
     total_elapsed_ns_ = image.total_elapsed_ns;
-    exchanged_at_ = UINT64_MAX;
     if (restoration.sets_time) {
         clock_.time_ns = image.time_ns;
         clock_.stamp_ns = image.stamp_ns;
@@ -459,7 +457,7 @@ bool Cycle::restore(Restoration& restoration) noexcept {
 }
 
 void Cycle::noteSchedule() noexcept RTCF_NONBLOCKING {
-    exchanges_ = !schedule_->feeds.empty() || !schedule_->latches.empty() ||
+    exchanges_ = timed_ || !schedule_->feeds.empty() || !schedule_->latches.empty() ||
                  !schedule_->queues.empty() || !schedule_->taps.empty();
 }
 
@@ -473,8 +471,8 @@ void Cycle::feed() noexcept RTCF_NONBLOCKING {
 }
 
 void Cycle::blame(std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept RTCF_NONBLOCKING {
-    const bool exchanged = exchanged_at_ + 1 == clock_.iteration;
-    if (!exchanged || begin_ticks + exchanged_ticks_ <= limit_ticks) {
+    const bool exchanged = marks_.begin >= begin_ticks;
+    if (!exchanged || marks_.ready <= limit_ticks) {
         for (const Step& step : schedule_->steps) {
             if (step.ended_ticks < begin_ticks || step.ended_ticks <= limit_ticks)
                 continue;  // did not run in this cycle, or ended in time

@@ -45,6 +45,13 @@ inline void bump(std::atomic<std::uint64_t>& number, std::uint64_t by = 1) noexc
     number.store(number.load(std::memory_order_relaxed) + by, std::memory_order_relaxed);
 }
 
+/// When the last cycle that exchanged something, or whose components are timed, began and had
+/// taken over what comes from outside. Ticks of the cycle counter; of whoever runs cycles.
+struct CycleMarks {
+    std::int64_t begin = INT64_MIN;
+    std::int64_t ready = INT64_MIN;
+};
+
 class Cycle {
    public:
     /// @param recorder notes the running component; outlives the cycle
@@ -109,6 +116,8 @@ class Cycle {
         stamp_offset_ns_.store(offset_ns, std::memory_order_relaxed);
     }
     const CycleCounter& counter() const noexcept { return counter_; }
+    /// For frames of timed components, which whoever runs cycles copies.
+    const CycleMarks& marks() const noexcept { return marks_; }
     SpscRing<CycleRecord, 16384>& records() noexcept { return records_; }
     const SpscRing<CycleRecord, 16384>& records() const noexcept { return records_; }
     /// @}
@@ -145,7 +154,7 @@ class Cycle {
     const FlightRecorder::RealtimeNotes notes_;
     LoopClock clock_;
     std::uint64_t warmup_cycles_ = 0;
-    bool exchanges_ = false;       // the schedule has feeds, latches, queues or taps
+    bool exchanges_ = false;       // has feeds, latches, queues or taps, or components are timed
     bool active_ = false;          // from begin() to the last cycle
     FrameRing* frames_ = nullptr;  // filled by the cycles
     bool counted_ = false;         // the present cycle's durations count
@@ -155,11 +164,11 @@ class Cycle {
 
     CycleCounter counter_;
     // Owned by the cycle thread, too.
-    std::int64_t boundary_time_ns_ = 0;        // loop time of the cycle after the present boundary
-    std::int64_t total_elapsed_ns_ = 0;        // sum of elapsed_ns of all cycles
-    std::int64_t exchanged_ticks_ = 0;         // duration of the last exchange,
-    std::uint64_t exchanged_at_ = UINT64_MAX;  // and its iteration
-    std::int64_t given_ticks_ = 0;             // when the taps were last filled
+    std::int64_t boundary_time_ns_ = 0;  // loop time of the cycle after the present boundary
+    std::int64_t total_elapsed_ns_ = 0;  // sum of elapsed_ns of all cycles
+    CycleMarks marks_;
+    bool timed_ = false;            // a watch takes the components' times of each cycle
+    std::int64_t given_ticks_ = 0;  // when the taps were last filled
     LoopFault fault_;
     LoopFigures figures_;
     DeviceFigures uncounted_;  // device statistics of cycles that are not counted

@@ -150,6 +150,7 @@ class Loop {
         held ? cycle_.figures().counting.hold() : cycle_.figures().counting.release();
     }
     const CycleCounter& counter() const noexcept { return cycle_.counter(); }
+    const Cycle& cycle() const noexcept { return cycle_; }
     /// Cycle records lost because the ring was full.
     std::uint64_t recordsDropped() const noexcept { return cycle_.records().dropped(); }
     /// @}

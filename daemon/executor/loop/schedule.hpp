@@ -155,6 +155,7 @@ struct Adoption {
     std::vector<StagedValue*> values;  ///< parameters and derived values
     std::int64_t period_ns = 0;        ///< the loop's new period, ns; 0 = no change
     FrameRing* frames = nullptr;       ///< ring that cycles fill from now on; null = no change
+    bool timed = false;                ///< the ring's frames have the components' times
     /// Restores an earlier state before all other changes; if that fails, nothing else changes.
     Restoration* restoration = nullptr;
 };

@@ -96,6 +96,7 @@ std::vector<std::string> Runner::adopt(Change change, const Progress& progress) 
     std::shared_ptr<const FrameTable> frames = framesOf(*plan);
     // Frames must not copy values of leaving components, even if a client watches them.
     adoption.frames = frames->ring.get();
+    adoption.timed = frames->turns.wanted();
     if (loop_.running() || state_ == RunnerState::Stepping) {
         for (const auto& instance : change.arriving) {
             progress("starting " + instance->fullName());

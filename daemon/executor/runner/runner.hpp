@@ -186,9 +186,9 @@ class Runner final : private RunnerView {
     std::vector<std::string> states(const std::string& name);
     /// Values of a component's ports, inputs first. Empty if the loop reaches no boundary in time.
     std::vector<Probe::Value> probe(const std::string& name);
-    /// Keeps the values of a selection in frames, for a watch.
+    /// Keeps the values of a watch in frames.
     /// @param watch unique number of the watch
-    void watch(std::uint64_t watch, PortSelection selection);
+    void watch(std::uint64_t watch, Watch wanted);
     /// Ends a watch; does nothing if the number is unknown.
     void endWatch(std::uint64_t watch);
     /// The present settings.

@@ -16,9 +16,9 @@ constexpr std::chrono::milliseconds kLook{1};
 
 }  // namespace
 
-void Runner::watch(std::uint64_t watch, PortSelection selection) {
-    requireMatches(selection, *plan_);
-    watches_.emplace(watch, std::move(selection));
+void Runner::watch(std::uint64_t watch, Watch wanted) {
+    requireMatches(wanted.selection, *plan_);
+    watches_.emplace(watch, std::move(wanted));
     try {
         renewFrames();
     } catch (...) {
@@ -71,7 +71,7 @@ void Runner::awaitReaders() {
 
 std::shared_ptr<const FrameTable> Runner::framesOf(const Plan& plan) {
     return makeFrameTable(plan, {watches_, settings_.frequency_hz, settings_.frame_bytes,
-                                 &frame_memory_, frames_.get()});
+                                 loop_.cycle(), &frame_memory_, frames_.get()});
 }
 
 void Runner::renewFrames() {
@@ -79,6 +79,7 @@ void Runner::renewFrames() {
     std::shared_ptr<const FrameTable> frames = framesOf(*plan_);
     Adoption adoption;
     adoption.frames = frames->ring.get();
+    adoption.timed = frames->turns.wanted();
     adoptAtBoundary(adoption);
     publishFrames(std::move(frames));
 }

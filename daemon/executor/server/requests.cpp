@@ -269,17 +269,22 @@ void Server::beginWatch(std::uint64_t connection, const v1::Request& request) {
     requireNotStuck();
     const std::uint64_t id = request.id();
     const std::uint64_t watch = next_watch_++;
-    const auto& patterns = request.watch_ports().selection();
-    const PortSelection selection({patterns.begin(), patterns.end()});
-    ports_.begin({connection, id}, watch, selection, request.watch_ports().every(),
-                 request.watch_ports().min_max());
+    const pb::WatchPortsRequest& asked = request.watch_ports();
+    if (asked.component_times() && asked.min_max()) {
+        throw Refusal(RefusalKind::InvalidArgument,
+                      "what components take is told of cycles, not of windows: ask for min_max "
+                      "without component_times");
+    }
+    const auto& patterns = asked.selection();
+    const Watch wanted{PortSelection({patterns.begin(), patterns.end()}), asked.component_times()};
+    ports_.begin({connection, id}, watch, wanted, asked.every(), asked.min_max());
     const auto nothing = [id] {
         return errorResponse(id, RefusalKind::Unavailable, "the stream has ended");
     };
     waiting_[{connection, id}] = {INT64_MAX, nothing, nullptr};
-    runner_->post([this, connection, id, watch, selection] {
+    runner_->post([this, connection, id, watch, wanted] {
         try {
-            runner_->watch(watch, selection);
+            runner_->watch(watch, wanted);
         } catch (const Refusal& refusal) {
             post(connection, errorResponse(id, refusal.kind(), refusal.what()), true);
         } catch (const std::exception& error) {

@@ -40,15 +40,15 @@ void skipGone(std::uint64_t& next, std::uint64_t& lost, const FrameRing& ring, s
 
 }  // namespace
 
-void PortStreams::begin(const Id& id, std::uint64_t watch, const PortSelection& selection,
-                        std::uint32_t every, bool min_max) {
+void PortStreams::begin(const Id& id, std::uint64_t watch, const Watch& wanted, std::uint32_t every,
+                        bool min_max) {
     if (streams_.size() >= kMost) {
         throw Refusal(RefusalKind::ResourceExhausted,
                       fmt::format("{} streams of ports are open, which is the limit: "
                                   "end another one",
                                   kMost));
     }
-    streams_.try_emplace(id, id, watch, selection, every == 0 ? 1 : every, min_max);
+    streams_.try_emplace(id, id, watch, wanted, every == 0 ? 1 : every, min_max);
 }
 
 std::uint64_t PortStreams::end(const Id& id) {
@@ -121,7 +121,8 @@ void PortStreams::chooseColumns(Stream& stream) {
     const FrameTable& table = *stream.tables.front();
     stream.columns.clear();
     for (std::size_t i = 0; i < table.columns.size(); ++i) {
-        if (stream.selection.matches(table.columns[i].fullName())) stream.columns.push_back(i);
+        if (stream.wanted.selection.matches(table.columns[i].fullName()))
+            stream.columns.push_back(i);
     }
     stream.told = false;
     stream.windows = stream.min_max
@@ -169,6 +170,7 @@ bool PortStreams::sendFrames(Stream& stream, const Send& send) {
     const std::vector<PortPacker> packers = packersOf(table, stream.columns);
     std::size_t bytes_of_cycle = 64;
     for (const PortPacker& packer : packers) bytes_of_cycle += packer.length();
+    if (stream.wanted.turns) bytes_of_cycle += table.turns.length();
     const std::uint64_t end = ring.end();
     while (stream.next < end) {
         skipGone(stream.next, stream.lost, ring, stream.step());
@@ -203,6 +205,7 @@ bool PortStreams::sendFrames(Stream& stream, const Send& send) {
             batch.add_durations_ns(cycle.duration_ns);
             for (std::size_t i = 0; i < packers.size(); ++i)
                 packers[i].pack(frame_.values(), *batch.mutable_values(static_cast<int>(i)));
+            if (stream.wanted.turns) table.turns.pack(frame_, *batch.mutable_turns());
             bytes += bytes_of_cycle;
             ++stream.next;
         }
@@ -271,6 +274,9 @@ v1::Response PortStreams::schemaOf(const Stream& stream) const {
     const FrameTable& table = *stream.tables.front();
     pb::PortSchema& schema = *response.mutable_ports()->mutable_schema();
     for (const std::string& note : table.notes) schema.add_notes(note);
+    if (stream.wanted.turns) {
+        for (const std::string& component : table.turns.components()) schema.add_turns(component);
+    }
     for (const std::size_t index : stream.columns) {
         const FrameColumn& from = table.columns[index];
         pb::PortColumn& column = *schema.add_columns();

@@ -35,8 +35,8 @@ class PortStreams {
     /// @param min_max true = minima and maxima of each window of `every` cycles; false = each
     /// `every`-th cycle
     /// @throws Refusal if there are too many streams
-    void begin(const Id& id, std::uint64_t watch, const PortSelection& selection,
-               std::uint32_t every, bool min_max);
+    void begin(const Id& id, std::uint64_t watch, const Watch& wanted, std::uint32_t every,
+               bool min_max);
     /// Ends a stream.
     /// @return the number of its watch; 0 = there is no such stream
     std::uint64_t end(const Id& id);
@@ -50,16 +50,16 @@ class PortStreams {
 
    private:
     struct Stream {
-        Stream(Id of, std::uint64_t number, PortSelection chosen, std::uint32_t step, bool extremes)
+        Stream(Id of, std::uint64_t number, Watch what, std::uint32_t step, bool extremes)
             : id(std::move(of)),
               watch(number),
-              selection(std::move(chosen)),
+              wanted(std::move(what)),
               every(step),
               min_max(extremes) {}
 
         Id id;
         std::uint64_t watch;
-        PortSelection selection;
+        Watch wanted;
         std::uint32_t every;
         bool min_max;
         std::deque<Table> tables;          // the first one is being read

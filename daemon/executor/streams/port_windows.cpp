@@ -38,6 +38,7 @@ void PortWindows::add(const Frame& frame, const std::vector<PortPacker>& packers
     const auto place = static_cast<std::uint32_t>(cycle.iteration % every_);
     if (count_ == 0) {
         first_ = cycle.iteration - place;
+        earliest_ = cycle.iteration;
         stamp_ns_ = cycle.stamp_ns;
         latency_ns_ = cycle.latency_ns;
         duration_ns_ = cycle.duration_ns;
@@ -61,6 +62,8 @@ std::size_t PortWindows::close(::rtcf::v1::PortBatch& batch) {
     batch.add_latencies_ns(latency_ns_);
     batch.add_durations_ns(duration_ns_);
     batch.add_counts(count_);
+    batch.add_begins(static_cast<std::uint32_t>(earliest_ - first_));
+    batch.add_ends(static_cast<std::uint32_t>(latest_ - first_));
     for (std::size_t i = 0; i < extremes_.size(); ++i)
         extremes_[i].take(*batch.mutable_values(static_cast<int>(i)),
                           *batch.mutable_places(static_cast<int>(i)));

@@ -56,7 +56,7 @@ std::vector<Candidate> candidatesOf(const Plan& plan) {
 bool watched(const Candidate& candidate, const Watches& watches) {
     const std::string name = candidate.column.fullName();
     return std::any_of(watches.begin(), watches.end(),
-                       [&](const auto& watch) { return watch.second.matches(name); });
+                       [&](const auto& watch) { return watch.second.selection.matches(name); });
 }
 
 // Chooses all needed candidates, and others while there is room, watched ones first. The result is
@@ -112,6 +112,10 @@ std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const FrameDe
         sources.push_back({candidate.from, candidate.column.size});
         table->columns.push_back(std::move(candidate.column));
     }
+    const bool turns = std::any_of(demand.watches.begin(), demand.watches.end(),
+                                   [](const auto& watch) { return watch.second.turns; });
+    const std::size_t first_of_turns = sources.size();
+    if (turns) ComponentTurns::appendSources(plan.schedule, demand.cycle, sources);
     const auto frames =
         table->kept ? static_cast<std::size_t>(std::ceil(kSeconds * demand.frequency_hz)) : 1;
     const std::size_t capacity = FrameRing::capacityFor(sources, frames);
@@ -121,10 +125,12 @@ std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const FrameDe
         previous->ring->sources() == sources && previous->ring->capacity() == capacity &&
         previous->shortness == table->shortness) {
         table->ring = previous->ring;
+        table->turns = previous->turns;
         return table;
     }
     table->ring = std::make_shared<FrameRing>(std::move(sources), frames,
                                               table->kept ? demand.memory : nullptr);
+    if (turns) table->turns = {plan.schedule, demand.cycle.counter(), *table->ring, first_of_turns};
     if (const auto& block = table->ring->block(); block != nullptr) {
         std::vector<std::string> remarks = table->notes;
         if (!table->shortness.empty()) remarks.push_back(table->shortness);

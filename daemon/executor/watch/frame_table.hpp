@@ -11,21 +11,30 @@
 #include <vector>
 
 #include "frames/frame_ring.hpp"
+#include "loop/cycle.hpp"
 #include "ordering/plan.hpp"
+#include "watch/component_turns.hpp"
 #include "watch/frame_column.hpp"
 #include "watch/port_selection.hpp"
 
 namespace rtcf::executor {
 
-/// Selections, by number of the watch.
-using Watches = std::map<std::uint64_t, PortSelection>;
+/// Values that a reader takes from each cycle.
+struct Watch {
+    PortSelection selection;  ///< outputs and states
+    bool turns = false;       ///< also the end of each component's update()
+};
+
+/// Watches, by number.
+using Watches = std::map<std::uint64_t, Watch>;
 
 struct FrameTable {
     std::vector<FrameColumn> columns;  ///< in schedule order, like the ring's sources
     std::vector<std::string> notes;    ///< omitted values, one line each
     std::string shortness;             ///< message if less than one second is kept; else empty
     std::shared_ptr<FrameRing> ring;
-    Watches watches;  ///< watches that read the ring
+    ComponentTurns turns;  ///< empty unless a watch takes them
+    Watches watches;       ///< watches that read the ring
     /// Frames are kept for watches or an incident; else only the last one is used, by the loop.
     bool kept = false;
 };
@@ -37,6 +46,7 @@ struct FrameDemand {
     /// Most bytes of states and staged outputs per frame, watched or not; 0 = only watched ones.
     /// Other outputs are always in the frame: the loop restores them after an update() that throws.
     std::size_t most_bytes;
+    const Cycle& cycle;   ///< the cycle that fills the frames
     FrameMemory* memory;  ///< memory that outlives the process; may be null
     /// Table whose ring is reused if the sources are the same; may be null.
     const FrameTable* previous;

@@ -92,7 +92,8 @@ void BenchGraph::adopt(const executor::Graph& graph) {
 
 void BenchGraph::keepFrames() {
     frames_ = executor::makeFrameTable(
-        *plan_, {{}, kFrequencyHz, executor::kLargestFrame, &frame_memory_, nullptr});
+        *plan_,
+        {{}, kFrequencyHz, executor::kLargestFrame, loop_.cycle(), &frame_memory_, nullptr});
     executor::Adoption adoption;
     adoption.frames = frames_->ring.get();
     loop_.adopt(adoption, kAdoptionTimeoutNs);

@@ -1,8 +1,11 @@
-// The graph as a picture: components from left to right as values go, coloured by what they cost;
-// a value stands at what is pointed at.
+// The graph as a picture: components as values go, in rows that turn where the panel ends, coloured by
+// what they cost; a value stands at what is pointed at.
 import { scaled } from "../drawing/axes.js";
+import { left, place, route, top } from "./graph_layout.js";
 
-const WIDE = 150, HIGH = 40, GAP_X = 70, GAP_Y = 18, PAD = 16;
+const SIZES = { wide: 150, high: 40, gapX: 46, gapY: 24, laneX: 5, laneY: 4, port: 6 };
+const ROUND = 5, LETTERS = 20, SHORTEST_MARKED = 16;
+const FEWEST_COLUMNS = 3;
 const NS = "http://www.w3.org/2000/svg";
 
 export class Graph {
@@ -10,27 +13,59 @@ export class Graph {
     this.box = box;
     this.values = values;
     this.told = { components: [], connections: [] };
+    this.figures = null;
+    this.columns = 0; // of the picture; 0 = there is none
     this.nodes = new Map();
+    this.says = document.createElement("p");
+    this.says.className = "says";
+    new ResizeObserver(() => { if (this.#room() !== this.columns) this.#draw(); }).observe(box);
   }
 
   show({ components, connections }) {
     this.told = { components, connections };
-    const place = layered(components, connections);
-    const wide = Math.max(...[...place.values()].map((each) => each.x), 0) + WIDE + PAD * 2;
-    const high = Math.max(...[...place.values()].map((each) => each.y), 0) + HIGH + PAD * 2 + 20;
+    this.#draw();
+  }
+
+  // Columns that are in sight; 0 of a panel that is not.
+  #room() {
+    const { clientWidth } = this.box;
+    if (!clientWidth) return 0;
+    return Math.max(Math.floor((clientWidth - SIZES.gapX) / (SIZES.wide + SIZES.gapX)), FEWEST_COLUMNS);
+  }
+
+  #draw() {
+    this.columns = this.#room();
+    if (!this.columns) return;
+    const components = [...this.told.components].sort((a, b) => a.position - b.position);
+    const links = this.#links(components);
+    const cells = place(components.map((each) => each.name), links, this.columns);
+    const ends = [...cells.values()];
+    const wide = left(Math.max(...ends.map((each) => each.column), 0) + 1, SIZES);
+    const high = top(Math.max(...ends.map((each) => each.row), 0) + 1, SIZES);
     const svg = element("svg", { viewBox: `0 0 ${wide} ${high}`, width: wide, height: high });
-    svg.append(arrow());
-    for (const each of connections) this.#edges(svg, each, place);
+    svg.append(arrow("arrow", "head"), arrow("arrow-back", "head back"));
+    route(cells, links, SIZES).forEach((way, at) => svg.append(...this.#line(links[at], way)));
     this.nodes.clear();
-    for (const each of components) svg.append(this.#node(each, place.get(each.name)));
-    this.says = document.createElement("p");
-    this.says.className = "says";
-    this.says.textContent = components.length ? "Point at a component or a connection." : "The graph is empty.";
-    this.box.replaceChildren(this.says, svg);
+    for (const each of components) svg.append(this.#node(each, cells.get(each.name)));
+    const breaks = links.some((each) => each.broken) ? " Dashed, 1/z: a loop break, the value of the cycle before." : "";
+    this.says.textContent = components.length ? `Point at a component or a connection.${breaks}` : "The graph is empty.";
+    this.box.replaceChildren(this.says, ...(components.length ? [svg] : []));
+    if (this.figures) this.tell(this.figures);
+  }
+
+  #links(components) {
+    const known = new Set(components.map((each) => each.name));
+    // An input that nothing feeds has no line.
+    return this.told.connections.filter((each) => each.writer || each.subscribed).flatMap((connection) => connection.readers
+      .filter(([reader]) => known.has(reader))
+      .map(([reader, port, broken]) => ({
+        net: connection.name, writer: known.has(connection.writer?.[0]) ? connection.writer[0] : null, reader, broken, port, connection,
+      })));
   }
 
   // Colours by what each component takes of a cycle.
   tell(figures) {
+    this.figures = figures;
     const most = Math.max(...Object.values(figures.components).map((each) => each.mean), 1e-9);
     for (const [name, { mean, overruns }] of Object.entries(figures.components)) {
       const node = this.nodes.get(name);
@@ -40,13 +75,16 @@ export class Graph {
     }
   }
 
-  #node({ name, type, state, fault, doc }, { x, y }) {
-    const group = element("g", { class: `node ${state}`, transform: `translate(${x + PAD},${y + PAD})`, tabindex: 0 });
-    const rect = element("rect", { width: WIDE, height: HIGH, rx: 6 });
+  #node({ name, type, state, fault, doc, position }, { column, row }) {
+    const moved = `translate(${left(column, SIZES)},${top(row, SIZES)})`;
+    const group = element("g", { class: `node ${state}`, transform: moved, tabindex: 0, "data-component": name });
+    const rect = element("rect", { width: SIZES.wide, height: SIZES.high, rx: 6 });
+    const number = element("text", { x: SIZES.wide - 7, y: 32, class: "number" });
+    number.textContent = position + 1;
     const label = element("text", { x: 8, y: 17, class: "name" });
-    label.textContent = name.length > 22 ? `…${name.slice(-21)}` : name;
+    label.textContent = name.length > LETTERS ? `…${name.slice(1 - LETTERS)}` : name;
     const cost = element("text", { x: 8, y: 32, class: "cost" });
-    group.append(rect, label, cost);
+    group.append(rect, label, cost, number);
     this.nodes.set(name, { rect, cost });
     group.onpointerenter = group.onfocus = async () => {
       this.says.textContent = `${name} (${type}): ${fault || doc}`;
@@ -57,54 +95,52 @@ export class Graph {
     return group;
   }
 
-  #edges(svg, connection, place) {
-    const { writer, readers, name, type } = connection;
-    for (const [reader, port, broken] of readers) {
-      const to = place.get(reader), from = writer ? place.get(writer[0]) : null;
-      if (!to) continue;
-      const x2 = to.x + PAD, y2 = to.y + PAD + HIGH / 2;
-      const x1 = from ? from.x + PAD + WIDE : x2 - GAP_X + 24, y1 = from ? from.y + PAD + HIGH / 2 : y2;
-      const back = x1 > x2;
-      const bend = back ? 60 : Math.max((x2 - x1) / 2, 20), sink = back ? HIGH + 10 : 0;
-      const path = element("path", {
-        d: back ? `M${x1},${y1} C${x1 + bend},${y1 + sink * 1.4} ${x2 - bend},${y2 + sink * 1.4} ${x2},${y2}`
-          : `M${x1},${y1} C${x1 + bend},${y1} ${x2 - bend},${y2} ${x2},${y2}`,
-        class: `edge${broken ? " broken" : ""}${writer ? "" : " outside"}`, "marker-end": "url(#arrow)",
-      });
-      path.onpointerenter = async () => {
-        const ends = `${writer ? writer.join(".") : "from outside"} → ${reader}.${port}${broken ? " (value of the previous cycle)" : ""}`;
-        this.says.textContent = `${name}: ${ends}, ${type}`;
-        const [component, at] = writer ?? [reader, port];
-        const value = (await this.values(component))[at];
-        if (value !== undefined) this.says.textContent += ` = ${value.replace(/^data: /, "").replace(/\s+/g, " ").slice(0, 120)}`;
-      };
-      svg.append(path);
-    }
+  // A line, and its mark if it is a loop break.
+  #line({ connection: { name, type, writer }, reader, port, broken }, way) {
+    const path = element("path", {
+      d: rounded(way), class: `edge${broken ? " broken" : ""}${writer ? "" : " outside"}`,
+      "marker-end": `url(#${broken ? "arrow-back" : "arrow"})`,
+      "data-from": writer ? writer[0] : "", "data-to": reader,
+    });
+    path.onpointerenter = async () => {
+      const ends = `${writer ? writer.join(".") : "from outside"} → ${reader}.${port}${broken ? " (loop break: the value of the cycle before)" : ""}`;
+      this.says.textContent = `${name}: ${ends}, ${type}`;
+      const [component, at] = writer ?? [reader, port];
+      const value = (await this.values(component))[at];
+      if (value !== undefined) this.says.textContent += ` = ${value.replace(/^data: /, "").replace(/\s+/g, " ").slice(0, 120)}`;
+    };
+    if (!broken) return [path];
+    const mark = element("g", { class: "break", transform: `translate(${markAt(way).join()})` });
+    const ground = element("rect", { x: -11, y: -8, width: 22, height: 16, rx: 4 }), text = element("text", { y: 4 });
+    text.textContent = "1/z";
+    mark.append(ground, text);
+    return [path, mark];
   }
 }
 
-// Columns by the longest way from a source, loop breaks not counted; rows by where values come from.
-export function layered(components, connections) {
-  const known = new Set(components.map((each) => each.name));
-  const sources = new Map(components.map((each) => [each.name, []]));
-  for (const { writer, readers } of connections)
-    for (const [reader, , broken] of readers)
-      if (writer && !broken && known.has(writer[0]) && known.has(reader) && writer[0] !== reader) sources.get(reader).push(writer[0]);
-  const layers = new Map();
-  const placed = [...components].sort((a, b) => a.position - b.position);
-  for (const { name } of placed)
-    layers.set(name, Math.max(-1, ...sources.get(name).map((each) => layers.get(each) ?? -1)) + 1);
-  const rows = new Map(), used = new Map();
-  for (const { name } of [...placed].sort((a, b) => layers.get(a.name) - layers.get(b.name))) {
-    const layer = layers.get(name), above = sources.get(name).map((each) => rows.get(each)).filter((each) => each !== undefined);
-    const taken = used.get(layer) ?? new Set();
-    let row = above.length ? Math.round(above.reduce((a, b) => a + b, 0) / above.length) : 0;
-    while (taken.has(row)) row++;
-    taken.add(row);
-    used.set(layer, taken);
-    rows.set(name, row);
+// A line along corners, which are rounded.
+function rounded(way) {
+  let d = `M${way[0].join()}`;
+  for (let at = 1; at + 1 < way.length; at++) {
+    const [before, here, after] = way.slice(at - 1, at + 2);
+    d += ` L${towards(here, before).join()} Q${here.join()} ${towards(here, after).join()}`;
   }
-  return new Map(placed.map(({ name }) => [name, { x: layers.get(name) * (WIDE + GAP_X), y: rows.get(name) * (HIGH + GAP_Y) }]));
+  return `${d} L${way.at(-1).join()}`;
+}
+
+// Where a corner's rounding begins or ends.
+function towards(from, to) {
+  const dx = to[0] - from[0], dy = to[1] - from[1], length = Math.hypot(dx, dy);
+  const share = length ? Math.min(ROUND, length / 2) / length : 0;
+  return [from[0] + dx * share, from[1] + dy * share];
+}
+
+// The middle of the stretch by which a line comes to its reader, or of its longest one.
+function markAt(way) {
+  const stretches = way.slice(1).map((b, at) => { const a = way[at]; return { a, b, length: Math.hypot(b[0] - a[0], b[1] - a[1]) }; });
+  const last = stretches.at(-2);
+  const { a, b } = last?.length >= SHORTEST_MARKED ? last : stretches.reduce((most, each) => (each.length > most.length ? each : most));
+  return [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2];
 }
 
 function element(name, attributes) {
@@ -113,10 +149,10 @@ function element(name, attributes) {
   return made;
 }
 
-function arrow() {
+function arrow(id, style) {
   const defs = element("defs", {});
-  const marker = element("marker", { id: "arrow", viewBox: "0 0 8 8", refX: 8, refY: 4, markerWidth: 7, markerHeight: 7, orient: "auto" });
-  marker.append(element("path", { d: "M0,0 L8,4 L0,8 z", class: "head" }));
+  const marker = element("marker", { id, viewBox: "0 0 8 8", refX: 8, refY: 4, markerWidth: 7, markerHeight: 7, markerUnits: "userSpaceOnUse", orient: "auto" });
+  marker.append(element("path", { d: "M0,0 L8,4 L0,8 z", class: style }));
   defs.append(marker);
   return defs;
 }
