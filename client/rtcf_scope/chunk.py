@@ -1,5 +1,6 @@
 """Cycles one after the other, as the tabs of a runner get them, and the last ones of them."""
 
+import re
 from collections import deque
 from dataclasses import dataclass, field
 from typing import Any
@@ -9,6 +10,9 @@ from numpy.typing import NDArray
 from rtcf.streams.ports import PortBatch, PortSchema
 
 ELEMENTS = 64  # of an array that are told, each as a signal of its own
+_LONGEST = 1000  # characters of a name
+_COLUMN = re.compile(r"(?:/[A-Za-z]\w*)+\.[A-Za-z_]\w*", re.ASCII)
+_ELEMENT = re.compile(r"(.+)\[([0-9]{1,9})\]")
 
 
 @dataclass
@@ -50,13 +54,10 @@ class Chunk:
 
     def values(self, name: str) -> NDArray[np.float64]:
         """Return the values of a trace; NaN where the graph has no such signal."""
+        if not is_there(self.batch.schema, name):
+            return np.full(len(self), np.nan)
         signal, index = split_element(name)
-        found = self.batch.schema.signals.get(signal)
-        if found is None:
-            return np.full(len(self), np.nan)
         values: NDArray[Any] = self.batch[signal].reshape(len(self), -1)
-        if index >= values.shape[1]:
-            return np.full(len(self), np.nan)
         return values[:, index].astype(np.float64)
 
 
@@ -70,6 +71,9 @@ class Memory:
 
     def __iter__(self) -> Any:
         return iter(self._chunks)
+
+    def __len__(self) -> int:
+        return len(self._chunks)
 
     def add(self, chunk: Chunk) -> None:
         """Keep it; the oldest ones go."""
@@ -98,16 +102,24 @@ def _size(chunk: Chunk) -> int:
 
 def split_element(name: str) -> tuple[str, int]:
     """Return signal and place of "/arm.q[2]"; of one that is a number, place 0."""
-    if name.endswith("]"):
-        signal, _, index = name[:-1].rpartition("[")
-        if signal and index.isdecimal():
-            return signal, int(index)
-    return name, 0
+    found = _ELEMENT.fullmatch(name)
+    return (found[1], int(found[2])) if found else (name, 0)
 
 
 def column_of(name: str) -> str:
-    """Return the output or state that a trace is of: "/arm.cmd" of "/arm.cmd.twist.linear.x"."""
-    return ".".join(split_element(name)[0].split(".")[:2])
+    """Return the output or state that a trace is of: "/arm.cmd" of "/arm.cmd.twist.linear.x".
+
+    Empty of what is no name of a signal.
+    """
+    found = _COLUMN.match(name) if len(name) <= _LONGEST else None
+    return found[0] if found else ""
+
+
+def is_there(schema: PortSchema, name: str) -> bool:
+    """Tell whether a trace has values in a stream."""
+    signal, index = split_element(name)
+    found = schema.signals.get(signal)
+    return found is not None and index < max(int(np.prod(found.shape)), 1)
 
 
 def traces(schema: PortSchema) -> list[dict[str, str]]:

@@ -1,11 +1,19 @@
-"""Who comes in: whoever has the token, by a name of this machine, from the page itself.
+"""Who comes in: whoever shows the token or a session, by a name of this machine, from the page.
+
+The page itself is no secret, what it asks is.  The token is exchanged for a session, which the page
+keeps where pages of this host and port alone can read it, and shows in a header.  No cookie has it:
+a browser sends cookies of one port to all servers of a machine.  Sessions are known to this process
+alone and end with it, so that another server, which has its port later, gets nothing of use.
 
 A page of another site may not ask anything (its Origin is another), nor by a name of its own that
 it lets lead here (the Host is another: DNS rebinding).
 """
 
 import asyncio
+import hashlib
 import hmac
+import secrets
+from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -13,20 +21,14 @@ from urllib.parse import urlsplit
 
 from aiohttp import web
 
+from rtcf_scope.connection import HEADERS, Connection
+from rtcf_scope.line import line
+
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
-_NEW_S = 1.0
+_MOST_SESSIONS = 256  # those that were shown least lately go
+_SESSION_PROTOCOL = "session."  # of a WebSocket, before its session: it has no other header
 _STRANGER_S = 5.0  # for a first request with the token
-_HEADERS = {
-    "Content-Security-Policy": (
-        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
-        "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-    ),
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-    "Cross-Origin-Opener-Policy": "same-origin",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Cache-Control": "no-store",
-}
+_LONGEST = 80  # characters that are said again in a refusal
 _CROWDED = (
     b"HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\nConnection: close\r\n\r\n"
     b"too many connections: close some tabs\n"
@@ -49,8 +51,31 @@ class Door:
         )
         self._names = {*LOOPBACK, *(name.lower() for name in names)}
         self._most = most_connections
+        self._sessions: OrderedDict[bytes, None] = OrderedDict()  # by their hash, newest last
+        self._tickets: dict[bytes, Callable[[], None]] = {}
         self._new: set[Any] = set()
         self._known: set[Any] = set()  # connections that have shown the token
+
+    def ticket(self, used: Callable[[], None]) -> str:
+        """Return a token that gives one session, once; `used` is called then."""
+        ticket = secrets.token_urlsafe(24)
+        self._tickets[_hash(ticket)] = used
+        return ticket
+
+    async def enter(self, request: web.Request) -> web.Response:
+        """Answer with a new session for the token, or a ticket."""
+        given = _bearer(request)
+        used = self._tickets.pop(_hash(given), None)
+        if used is not None:
+            used()
+        elif not self._is_token(given):
+            raise self._stranger()
+        session = secrets.token_urlsafe(24)
+        self._sessions[_hash(session)] = None
+        if len(self._sessions) > _MOST_SESSIONS:
+            self._sessions.popitem(last=False)
+        self._known.add(request.protocol)
+        return web.json_response({"session": session})
 
     def middleware(self) -> Any:
         """Return what looks at each request before it is answered."""
@@ -63,6 +88,7 @@ class Door:
 
     def open(self, server: web.Server) -> Callable[[], asyncio.Protocol]:
         """Return what makes a connection's protocol: of too many, one that refuses."""
+        loop = asyncio.get_running_loop()
 
         def connection() -> asyncio.Protocol:
             there = {*server.connections}
@@ -70,10 +96,8 @@ class Door:
             # The server counts a connection a little later than it makes one.
             if len(there | self._new) >= self._most:
                 return _Refusal()
-            protocol = server()
+            protocol = Connection(server, loop, self._new.discard)
             self._new.add(protocol)
-            loop = asyncio.get_running_loop()
-            loop.call_later(_NEW_S, self._new.discard, protocol)
             loop.call_later(_STRANGER_S, self._drop_stranger, protocol)
             return protocol
 
@@ -85,47 +109,50 @@ class Door:
 
     async def _middleware(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         try:
-            answer = await self._checked(request, handler)
+            self._check(request)
+            answer = await handler(request)
         except web.HTTPException as refusal:
-            refusal.headers.update(_HEADERS)
+            refusal.headers.update(HEADERS)
             raise
         if not answer.prepared:
-            answer.headers.update(_HEADERS)
+            answer.headers.update(HEADERS)
         return answer
 
-    async def _checked(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+    def _check(self, request: web.Request) -> None:
         host = request.headers.get("Host", "")
         if not self._is_ours(host):
-            raise web.HTTPForbidden(text=f"{host} is not a name of this scope: see --name\n")
+            text = f"{line(host[:_LONGEST])} is not a name of this scope: see --name\n"
+            raise web.HTTPForbidden(text=text)
         origin = request.headers.get("Origin")
         if origin is not None and origin not in (f"http://{host}", f"https://{host}"):
-            raise web.HTTPForbidden(text=f"pages of {origin} may not ask here\n")
-        changes = request.method != "GET" or "Upgrade" in request.headers
-        if changes and origin is None and "Authorization" not in request.headers:
-            raise web.HTTPForbidden(text="a browser says from which page it asks: no Origin\n")
-        cookie = cookie_name(request)
-        if request.path == "/" and self._is_token(request.query.get("token")):
-            # Out of the address bar and the history.
-            self._known.add(request.protocol)
-            to_page = web.HTTPFound("/")
-            to_page.set_cookie(
-                cookie, request.query["token"], httponly=True, samesite="Lax", path="/"
-            )
-            raise to_page
-        given = request.headers.get("Authorization", "").removeprefix("Bearer ")
-        if not self._is_token(request.cookies.get(cookie)) and not self._is_token(given):
-            raise web.HTTPForbidden(text=f"the address with its token is {self._where}\n")
+            raise web.HTTPForbidden(text=f"pages of {line(origin[:_LONGEST])} may not ask here\n")
+        if is_public(request.path):
+            return
+        if not self._knows(_bearer(request)) and not self._knows(_session_of_protocols(request)):
+            raise self._stranger()
         self._known.add(request.protocol)
-        return await handler(request)
+
+    def _knows(self, given: str) -> bool:
+        if self._is_token(given):
+            return True
+        session = _hash(given)
+        if session not in self._sessions:
+            return False
+        self._sessions.move_to_end(session)
+        return True
+
+    def _stranger(self) -> web.HTTPForbidden:
+        return web.HTTPForbidden(text=f"the address with its token is {self._where}\n")
 
     def _is_ours(self, host: str) -> bool:
         try:
-            return urlsplit(f"//{host}").hostname in self._names
+            found = urlsplit(f"//{host}")
+            return found.hostname in self._names and found.port != 0
         except ValueError:
             return False
 
-    def _is_token(self, given: str | None) -> bool:
-        return given is not None and hmac.compare_digest(given.encode(), self._token)
+    def _is_token(self, given: str) -> bool:
+        return hmac.compare_digest(_bytes(given), self._token)
 
 
 class _Refusal(asyncio.Protocol):
@@ -135,6 +162,27 @@ class _Refusal(asyncio.Protocol):
         transport.close()
 
 
-def cookie_name(request: web.Request) -> str:
-    """Return the name of the cookie: browsers send those of one port to all of a machine."""
-    return f"rtcf_scope_{urlsplit(f'//{request.host}').port or 80}"
+def is_public(path: str) -> bool:
+    """Tell whether a path is the page's, which holds nothing of the loop, or the way in."""
+    return path in ("/", "/api/session") or path.startswith("/page/")
+
+
+def _bearer(request: web.Request) -> str:
+    kind, _, given = request.headers.get("Authorization", "").partition(" ")
+    return given.strip() if kind.lower() == "bearer" else ""
+
+
+def _session_of_protocols(request: web.Request) -> str:
+    for each in request.headers.get("Sec-WebSocket-Protocol", "").split(","):
+        if each.strip().startswith(_SESSION_PROTOCOL):
+            return each.strip().removeprefix(_SESSION_PROTOCOL)
+    return ""
+
+
+def _hash(given: str) -> bytes:
+    return hashlib.sha256(_bytes(given)).digest()
+
+
+def _bytes(given: str) -> bytes:
+    # A header has any bytes.
+    return given.encode(errors="surrogateescape")

@@ -44,9 +44,11 @@ class Layouts:
             json.loads(text)
         except ValueError as error:
             raise LayoutError(f"layout {name} is no JSON: {error}") from None
-        if not file.exists() and len(self.names()) >= MOST:
-            raise LayoutError(f"there are {MOST} layouts: remove some")
+        except RecursionError:
+            raise LayoutError(f"layout {name} is nested too deeply") from None
         try:
+            if not file.exists() and len(self.names()) >= MOST:
+                raise LayoutError(f"there are {MOST} layouts: remove some")
             self._folder.mkdir(parents=True, exist_ok=True)
             durable.replace(file, text.encode())
         except OSError as error:

@@ -5,9 +5,10 @@ One thread of each, while there are tabs.
 """
 
 import asyncio
+import contextlib
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import rtcf
@@ -31,6 +32,11 @@ class News:
         self._ended: threading.Event | None = None
         self._streams: list[Any] = []
 
+    @property
+    def is_empty(self) -> bool:
+        """Tell whether nobody listens."""
+        return not self._tabs
+
     def join(self, tab: Listener) -> None:
         """Begin to tell a tab."""
         self._tabs.add(tab)
@@ -51,7 +57,7 @@ class News:
         if self._ended is not None:
             self._ended.set()
             self._ended = None
-        for stream in self._streams:
+        for stream in tuple(self._streams):
             stream.close()
         self._streams.clear()
 
@@ -70,7 +76,7 @@ class News:
         while not ended.is_set():
             try:
                 follow(ended, tell)
-            except RtcfError as error:
+            except (RtcfError, ValueError) as error:  # ValueError: of a name that no message has
                 tell({"kind": "state", "state": "unknown", "status": str(error)})
             ended.wait(_EVERY_S)
 
@@ -80,6 +86,16 @@ class News:
         for tab in tuple(self._tabs):
             tab.tell(message)
 
+    @contextlib.contextmanager
+    def _closed_with(self, stream: Any) -> Iterator[None]:
+        """Have close() end a stream, inside."""
+        self._streams.append(stream)
+        try:
+            yield
+        finally:
+            with contextlib.suppress(ValueError):  # closed meanwhile
+                self._streams.remove(stream)
+
     def _follow_state(self, ended: threading.Event, tell: Callable[[dict[str, Any]], None]) -> None:
         for status in self._client.get_status(self._runner).runners:
             tell({"kind": "state"} | catalog.runner(status))
@@ -87,8 +103,7 @@ class News:
     def _follow_events(
         self, ended: threading.Event, tell: Callable[[dict[str, Any]], None]
     ) -> None:
-        with self._client.watch_events([self._runner]) as stream:
-            self._streams.append(stream)
+        with self._client.watch_events([self._runner]) as stream, self._closed_with(stream):
             if ended.is_set():
                 return
             for found in stream:
@@ -98,8 +113,10 @@ class News:
                     tell(catalog.event(found))
 
     def _follow_logs(self, ended: threading.Event, tell: Callable[[dict[str, Any]], None]) -> None:
-        with self._client.watch_logs(self._runner, level="info") as stream:
-            self._streams.append(stream)
+        with (
+            self._client.watch_logs(self._runner, level="info") as stream,
+            self._closed_with(stream),
+        ):
             if ended.is_set():
                 return
             begin, told, left_out = time.monotonic(), 0, 0

@@ -10,11 +10,13 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import rtcf
 from aiohttp import web
 from rtcf_shared.errors import RtcfError
 
+from rtcf_scope.connection import logger
 from rtcf_scope.door import LOOPBACK, Door
 from rtcf_scope.layouts import Layouts
 from rtcf_scope.recordings import Recordings
@@ -92,8 +94,8 @@ def options(args: argparse.Namespace, files: Sequence[Path] = ()) -> Options:
     )  # fmt: skip
 
 
-async def serve(given: Options, ready: Callable[[str], None]) -> None:
-    """Serve until SIGINT or SIGTERM; `ready` gets the address with its token.
+async def serve(given: Options, ready: Callable[[str, Door], None]) -> None:
+    """Serve until SIGINT or SIGTERM; `ready` gets the address, and the door that has its token.
 
     Raises RtcfError if the address cannot be had.
     """
@@ -101,12 +103,12 @@ async def serve(given: Options, ready: Callable[[str], None]) -> None:
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, ended.set)
+    loop.set_exception_handler(_log)
     door = Door(given.token, given.names, MOST_CONNECTIONS, given.token_file)
     recordings = Recordings(given.files, given.recordings)
     with rtcf.Client(given.socket) as client:
         site = Site(client, door, given.right, Layouts(given.layouts), recordings)
-        # Requests have the token in their line, once: not for a log.
-        running = web.AppRunner(site.app, access_log=None)
+        running = web.AppRunner(site.app)
         await running.setup()
         assert running.server is not None
         try:
@@ -120,7 +122,7 @@ async def serve(given: Options, ready: Callable[[str], None]) -> None:
                 ) from None
             async with server:
                 port = server.sockets[0].getsockname()[1]
-                ready(f"http://{_called(given)}:{port}/?token={given.token}")
+                ready(f"http://{_called(given)}:{port}/", door)
                 await ended.wait()
         finally:
             site.close()
@@ -144,9 +146,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _tell_service_manager(address: str) -> None:
+def _log(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """Log what nobody waits for, in one line."""
+    logger().error("%s: %r", context.get("message"), context.get("exception"))
+
+
+def _tell_service_manager(address: str, _: Door) -> None:
     # The token is for those who may read it in its file, not for all who read the journal.
-    print(f"serving {address.partition('?')[0]}", flush=True)
+    print(f"serving {address}", flush=True)
     path = os.environ.get("NOTIFY_SOCKET")
     if path:
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as to:
@@ -156,8 +163,8 @@ def _tell_service_manager(address: str) -> None:
 
 def _called(given: Options) -> str:
     host = given.names[0] if given.names else given.address
-    if host in ("0.0.0.0", "::"):
-        host = "localhost"
+    # Not localhost, which may be an address at which somebody else listens.
+    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
     return f"[{host}]" if ":" in host else host
 
 

@@ -19,12 +19,14 @@ from rtcf_scope import catalog
 from rtcf_scope.door import Door
 from rtcf_scope.hub import Hub
 from rtcf_scope.layouts import MOST_BYTES, LayoutError, Layouts
+from rtcf_scope.line import line
 from rtcf_scope.news import News
 from rtcf_scope.recordings import Recordings
-from rtcf_scope.tab import Tab
+from rtcf_scope.tab import PROTOCOL, Tab
 
 RIGHTS = ("observe", "tune", "operate")
 MOST_TABS = 32
+_LONGEST = 500  # characters of a refusal
 _PAGE = Path(__file__).with_name("page")
 _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css",
           ".svg": "image/svg+xml"}  # fmt: skip
@@ -54,6 +56,7 @@ class Site:
         route = self.app.router
         route.add_get("/", self._file)
         route.add_get("/page/{name:.*}", self._file)
+        route.add_post("/api/session", door.enter)
         route.add_get("/api/about", self._told(self._about))
         route.add_get("/api/graph", self._told(self._graph))
         route.add_get("/api/statistics", self._told(self._statistics))
@@ -80,7 +83,7 @@ class Site:
     async def _file(self, request: web.Request) -> web.Response:
         path = "/page/index.html" if request.path == "/" else request.path
         if path not in self._files:
-            raise web.HTTPNotFound(text=f"nothing at {request.path}\n")
+            raise web.HTTPNotFound(text=f"nothing at {line(path[:_LONGEST])}\n")
         data, kind = self._files[path]
         return web.Response(body=data, content_type=kind, charset="utf-8")
 
@@ -91,6 +94,10 @@ class Site:
             try:
                 return web.json_response(await answer(request))
             except (RtcfError, LayoutError, ValueError) as error:
+                return refused(error)
+            except RecursionError:
+                return refused("this is nested too deeply")
+            except LookupError as error:  # of the name of an encoding
                 return refused(error)
 
         return handle
@@ -200,12 +207,16 @@ class Site:
         return web.Response(
             body=await self._ask(write),
             content_type="application/octet-stream",
-            headers={"Content-Disposition": f'attachment; filename="{quote(runner)}.mcap"'},
+            headers={
+                "Content-Disposition": f'attachment; filename="{quote(runner, errors="replace")}.mcap"'
+            },
         )
 
     async def _stream(self, request: web.Request) -> web.StreamResponse:
         if len(self._tabs) >= MOST_TABS:
             return refused(f"{MOST_TABS} pages are open already: close some", 503)
+        if not web.WebSocketResponse(protocols=(PROTOCOL,)).can_prepare(request):
+            return refused("a stream is a WebSocket")
         runner = runner_of(request) or "rt_runner"
         hub = self._hubs.setdefault(runner, Hub(self._client, runner))
         news = self._news.setdefault(runner, News(self._client, runner))
@@ -217,6 +228,10 @@ class Site:
         finally:
             news.leave(tab)
             self._tabs.discard(tab)
+            if hub.is_empty:  # of a runner that is not there, as far as is known
+                self._hubs.pop(runner, None)
+            if news.is_empty:
+                self._news.pop(runner, None)
 
 
 def runner_of(request: web.Request) -> str:
@@ -226,5 +241,5 @@ def runner_of(request: web.Request) -> str:
 
 def refused(error: object, status: int = 400) -> web.Response:
     """Return an answer that says what is wrong, in one line."""
-    text = json.dumps({"refused": " ".join(str(error).split())})
+    text = json.dumps({"refused": " ".join(str(error).split())[:_LONGEST]})
     return web.Response(text=text, content_type="application/json", status=status)

@@ -8,17 +8,26 @@ import asyncio
 import contextlib
 import json
 from collections import deque
+from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
 from aiohttp import WSMsgType, web
+from numpy.typing import NDArray
+from rtcf.streams.ports import PortSchema
 
 from rtcf_scope import wire
-from rtcf_scope.chunk import Chunk
-from rtcf_scope.hub import Hub, columns_of
-from rtcf_scope.trigger import Search, Trigger, TriggerError, parse
+from rtcf_scope.chunk import Chunk, column_of, is_there
+from rtcf_scope.hub import Hub
+from rtcf_scope.line import line
+from rtcf_scope.trigger import CYCLE, Search, Trigger, TriggerError, parse
+
+PROTOCOL = "rtcf-scope"  # of the WebSocket
 
 _MOST_WAITING = 8 * 1024 * 1024  # bytes for a page that does not take them
 MOST_TRACES = 256
+_NAMED = 5  # signals in a message
+_LONGEST_NAMED = 200  # characters
 _BEAT_S = 20.0  # a page that answers no ping in so long is gone
 
 
@@ -26,20 +35,30 @@ class Tab:
     """A page at its WebSocket; a listener of its hub."""
 
     def __init__(self, hub: Hub) -> None:
-        self.columns: frozenset[str] = frozenset()
+        self.wants = False
+        self.columns: tuple[str, ...] = ()
         self._hub = hub
-        self._names: list[str] = []
+        self._shows = False  # cycles
+        self._asked: list[str] = []  # the traces that the page shows
+        self._over: list[str] = []  # those that are too many
+        self._schema: PortSchema | None = None  # of the last cycles
+        self._names: list[str] = []  # those asked for that have values in these
         self._number = 0  # of what it watches
         self._told = -1  # the number that `watching` has told
+        self._missing = _Missing()  # as the page knows it
+        self._told_trouble: str | None = None
         self._waiting: deque[tuple[bytes | str, int]] = deque()  # what to send, cycles in it
         self._bytes = 0
         self._lost = 0  # cycles
+        self._has_begun = False  # to tell cycles: those before are not lost
         self._news = asyncio.Event()
         self._armed: _Armed | None = None
 
     async def serve(self, request: web.Request) -> web.WebSocketResponse:
         """Talk until the page goes."""
-        socket = web.WebSocketResponse(heartbeat=_BEAT_S, max_msg_size=256 * 1024)
+        socket = web.WebSocketResponse(
+            heartbeat=_BEAT_S, max_msg_size=256 * 1024, protocols=(PROTOCOL,)
+        )
         await socket.prepare(request)
         self._hub.join(self)
         sending = asyncio.create_task(self._send(socket))
@@ -56,19 +75,41 @@ class Tab:
 
     def take(self, chunk: Chunk) -> None:
         """Queue cycles, and look whether the trigger hits."""
-        if not self._names:
-            return
+        if chunk.batch.schema is not self._schema:
+            self._schema = chunk.batch.schema
+            self._choose()
+        if self._shows:
+            self._show(chunk)
+        if self._armed is not None:
+            for begin, hit, end in self._armed.search(chunk):
+                self._shoot(begin, hit, end)
+
+    def _show(self, chunk: Chunk) -> None:
         base_ns = self._tell_watching()
         body = wire.body(chunk, self._names, base_ns)
-        lost, self._lost = self._lost + chunk.lost, 0
+        lost, self._lost = self._lost + (chunk.lost if self._has_begun else 0), 0
+        self._has_begun = True
         head = wire.head(
             wire.CYCLES, self._number, len(chunk), len(self._names) + 4,
             lost=lost, last=chunk.batch.last_of_loop,
         )  # fmt: skip
         self._queue(head + body, len(chunk) + lost)
-        if self._armed is not None:
-            for begin, hit, end in self._armed.search(chunk):
-                self._shoot(begin, hit, end)
+
+    def know(self, schema: PortSchema) -> None:
+        """Tell the page which of its signals the graph does not have."""
+        self._tell_missing(
+            _Missing(
+                tuple(name for name in self._asked if not is_there(schema, name)),
+                tuple(name for name in self._watched() if not is_there(schema, name)),
+                tuple(self._over),
+            )
+        )
+
+    def trouble(self, text: str) -> None:
+        """Tell the page what keeps its values away."""
+        if text != self._told_trouble:
+            self._told_trouble = text
+            self.tell({"kind": "trouble", "text": text})
 
     def tell(self, message: dict[str, Any]) -> None:
         """Queue a text message."""
@@ -77,33 +118,77 @@ class Tab:
     def _hear(self, text: str) -> None:
         try:
             told = json.loads(text)
-            if not isinstance(told, dict):
-                raise TriggerError("not an object")
-            if "watch" in told:
-                self._watch([str(name) for name in told["watch"]])
-            if "trigger" in told:
-                self._arm(told["trigger"])
-        except (TypeError, ValueError) as error:
-            self.tell({"kind": "refused", "text": str(error)})
+        except (ValueError, RecursionError):
+            told = None
+        if not isinstance(told, dict):
+            self.tell({"kind": "refused", "text": "a page says an object of JSON"})
+            return
+        if "watch" in told:
+            self._watch(told["watch"])
+        if "trigger" in told:
+            self._arm(told["trigger"])
 
-    def _watch(self, names: list[str]) -> None:
-        if len(names) > MOST_TRACES:
-            raise ValueError(f"{len(names)} traces: at most {MOST_TRACES}")
-        self._names = list(dict.fromkeys(names))
-        self._number = (self._number + 1) & 0xFFFF
+    def _watch(self, told: Any) -> None:
+        if not isinstance(told, list):
+            self.tell({"kind": "refused", "text": "a page says what it watches as a list of names"})
+            return
+        names = list(dict.fromkeys(name for name in told if isinstance(name, str)))
+        # Of the cycle itself each message tells.
+        traces = [name for name in names if not name.startswith("~")]
+        self._asked, self._over = traces[:MOST_TRACES], traces[MOST_TRACES:]
+        self._shows = bool(names)
+        if not self._shows:
+            self._has_begun = False
+        self._choose()
         self._retune()
 
     def _arm(self, told: Any) -> None:
-        self._armed = None if told is None else _Armed(parse(told))
+        """Arm what a page says; of what cannot be, nothing is armed either."""
+        self._armed, refusal = None, ""
+        try:
+            if told is not None:
+                self._armed = _Armed(parse(told))
+        except TriggerError as error:
+            refusal = str(error)
+            self.tell({"kind": "refused", "text": refusal})
+        self.tell(
+            {"kind": "trigger", "state": "off" if self._armed is None else "armed",
+             "signals": [] if self._armed is None else self._armed.trigger.signals,
+             "refused": refusal}
+        )  # fmt: skip
         self._retune()
-        self.tell({"kind": "trigger", "state": "off" if told is None else "armed"})
+
+    def _watched(self) -> list[str]:
+        """Return the signals of outputs and states that the trigger looks at."""
+        signals = [] if self._armed is None else self._armed.trigger.signals
+        return [name for name in signals if not name.startswith("~")]
 
     def _retune(self) -> None:
-        wanted = [*self._names]
-        if self._armed is not None:
-            wanted += [each for each in self._armed.trigger.signals if not each.startswith("~")]
-        self.columns = columns_of(wanted)
+        names = (*self._asked, *self._watched())
+        self.columns = tuple(dict.fromkeys(column for n in names if (column := column_of(n))))
+        self.wants = self._shows or self._armed is not None
+        before = self._missing  # as far as it is still asked for
+        self._tell_missing(
+            _Missing(
+                tuple(name for name in before.names if name in self._asked),
+                tuple(name for name in before.trigger if name in self._watched()),
+                tuple(self._over),
+            )
+        )
         self._hub.changed()
+
+    def _tell_missing(self, missing: "_Missing") -> None:
+        if missing != self._missing:
+            self._missing = missing
+            self.tell({"kind": "missing", "text": missing.text} | asdict(missing))
+
+    def _choose(self) -> None:
+        """Tell those traces that have values."""
+        schema = self._schema
+        names = [] if schema is None else [n for n in self._asked if is_there(schema, n)]
+        if names != self._names:
+            self._names = names
+            self._number = (self._number + 1) & 0xFFFF
 
     def _tell_watching(self) -> int:
         """Tell what stands in the binary messages that follow; return the base of their times."""
@@ -118,7 +203,11 @@ class Tab:
 
     def _shoot(self, begin: int, hit: int, end: int) -> None:
         base_ns = self._tell_watching()
+        begin = max(begin, self._hub.since)
         chunks = self._hub.memory.between(begin, end)
+        if hit < chunks[0].at:
+            self.tell({"kind": "refused", "text": "the cycle of the hit is not kept: show fewer"})
+            return
         columns = wire.cut(chunks, self._names, base_ns, begin, end)
         at = hit - max(begin, chunks[0].at)
         head = wire.head(wire.SHOT, self._number, columns.shape[1], columns.shape[0], hit=at)
@@ -126,6 +215,7 @@ class Tab:
         if self._armed is not None and self._armed.done:
             self._armed = None
             self.tell({"kind": "trigger", "state": "done"})
+            self._retune()
 
     def _queue(self, data: bytes | str, cycles: int) -> None:
         if _is_shot(data, cycles):
@@ -176,12 +266,7 @@ class _Armed:
     def search(self, chunk: Chunk) -> list[tuple[int, int, int]]:
         """Return begin, hit and end of the shots that are complete with this chunk."""
         shots = []
-        special = {"~latency": chunk.latencies_us, "~duration": chunk.durations_us}
-        columns = (
-            special[name] if name in special else chunk.values(name)
-            for name in self.trigger.signals
-        )  # fmt: skip
-        hits = self._search.hits(*columns) + chunk.at
+        hits = self._hits(chunk)
         while not self.done:
             if self._hit < 0:
                 left = hits[hits >= self._from]
@@ -196,3 +281,40 @@ class _Armed:
             self._hit = -1
             self.done = self.trigger.single
         return shots[-1:] if not self.done else shots
+
+    def _hits(self, chunk: Chunk) -> NDArray[np.int64]:
+        special = dict(zip(CYCLE, (chunk.latencies_us, chunk.durations_us), strict=True))
+        signals, schema = self.trigger.signals, chunk.batch.schema
+        if not all(name in special or is_there(schema, name) for name in signals):
+            # What it compared with is of another graph.
+            self._search = Search(self.trigger)
+            return np.zeros(0, np.int64)
+        columns = (special[name] if name in special else chunk.values(name) for name in signals)
+        return self._search.hits(*columns) + chunk.at
+
+
+@dataclass(frozen=True)
+class _Missing:
+    """Signals that a page asks for and does not get."""
+
+    names: tuple[str, ...] = ()  # of traces that the graph does not have
+    trigger: tuple[str, ...] = ()  # that the trigger looks at, likewise
+    over: tuple[str, ...] = ()  # traces above the most of a page
+
+    @property
+    def text(self) -> str:
+        """What to tell a person; empty: nothing is missing."""
+        parts = []
+        if self.names:
+            parts.append(f"no such signal, left out until there is: {_few(self.names)}")
+        if self.trigger:
+            parts.append(f"the trigger waits for a signal that is not there: {_few(self.trigger)}")
+        if self.over:
+            parts.append(f"a page shows {MOST_TRACES} traces at most, left out: {_few(self.over)}")
+        return "; ".join(parts)
+
+
+def _few(names: tuple[str, ...]) -> str:
+    more = len(names) - _NAMED
+    shown = ", ".join(line(name[:_LONGEST_NAMED]) for name in names[:_NAMED])
+    return f"{shown} and {more} more" if more > 0 else shown

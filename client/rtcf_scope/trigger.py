@@ -8,7 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from rtcf.streams.condition import Condition, ConditionError
 
+from rtcf_scope.chunk import column_of
+
 MOST_CYCLES = 200_000  # of one shot
+CYCLE = ("~latency", "~duration")  # what is known of each cycle itself
 KINDS = ("edge", "level", "window", "nan", "condition")
 _SLOPES = {"edge": ("rising", "falling", "either"), "level": ("above", "below"),
            "window": ("leaves", "enters"), "nan": ("",), "condition": ("",)}  # fmt: skip
@@ -57,12 +60,15 @@ def parse(told: Any) -> Trigger:
         )  # fmt: skip
     except ConditionError as error:
         raise TriggerError(str(error)) from None
-    except (KeyError, TypeError, AttributeError, OverflowError):
+    except (KeyError, TypeError, AttributeError, OverflowError, RecursionError):
         raise TriggerError("a trigger has signal, kind, before and after") from None
     except TriggerError:
         raise
     except ValueError as error:
         raise TriggerError(f"a trigger's numbers: {error}") from None
+    for signal in trigger.signals:
+        if signal not in CYCLE and not column_of(signal):
+            raise TriggerError(f"{signal[:80]!r} is no signal: these are named as in /wave.phase")
     if not np.isfinite([trigger.low, trigger.high]).all():
         raise TriggerError("a trigger's level is a number")
     if kind == "window" and not trigger.low < trigger.high:

@@ -3,8 +3,10 @@
 import http.client
 import json
 import signal
+import socket
 import subprocess
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -16,11 +18,15 @@ from rtcf.closing import Closing
 class ScopeProcess(Closing):
     """A scope of a daemon; ends at the end of its `with`."""
 
-    def __init__(self, daemon: Daemon, *arguments: str) -> None:
+    def __init__(
+        self, daemon: Daemon, *arguments: str, display: Mapping[str, str] | None = None
+    ) -> None:
+        """`display` is the environment that has a display, and a browser for it."""
         log = self.log = Path(tempfile.mkdtemp(dir=daemon.folder)) / "said"
         environment = daemon.environment() | {"XDG_STATE_HOME": str(daemon.folder / "home")}
-        for display in ("DISPLAY", "WAYLAND_DISPLAY"):
-            environment.pop(display, None)
+        for each in ("DISPLAY", "WAYLAND_DISPLAY"):
+            environment.pop(each, None)
+        environment |= display or {}
         with log.open("wb") as to:
             self.process = subprocess.Popen(
                 [str(BUILD_TREE / "bin" / "rtcfctl"), "scope", *arguments],
@@ -35,9 +41,16 @@ class ScopeProcess(Closing):
             return text if "token=" in text and text.endswith("\n") else ""
 
         self.said: str = wait_for(said, "the scope's address")
+        self._told = len(self.said)
         self.address = self.said.split()[0]
         self.port = urlsplit(self.address).port or 0
         self.token = self.address.partition("token=")[2]
+
+    def news(self) -> str:
+        """Return what it has said since this was asked last."""
+        said = self.log.read_text()
+        news, self._told = said[self._told :], len(said)
+        return news
 
     def close(self) -> None:
         self.process.send_signal(signal.SIGINT)
@@ -68,6 +81,23 @@ class ScopeProcess(Closing):
             return answer.status, answer.read()
         finally:
             connection.close()
+
+    def raw(self, data: bytes, patience_s: float = DEADLINE_S) -> tuple[int, bytes]:
+        """Send any bytes; return status and body of the answer: 0 if none comes for so long."""
+        with socket.create_connection(("127.0.0.1", self.port), timeout=patience_s) as connection:
+            answer = http.client.HTTPResponse(
+                connection, method=data.split(b" ")[0].decode("latin1")
+            )
+            try:
+                connection.sendall(data)
+                answer.begin()
+                return answer.status, answer.read()
+            except (http.client.HTTPException, OSError):
+                return 0, b""
+
+    def session(self) -> str:
+        """Return a new session."""
+        return str(self.told("/api/session", "POST")["session"])
 
     def told(self, path: str, method: str = "GET", body: str | None = None) -> Any:
         """Return what an answer tells in JSON."""

@@ -1,6 +1,7 @@
 """The scope's page in a browser, on a real loop."""
 
 import math
+import re
 from collections.abc import Callable, Iterator
 from urllib.parse import quote
 
@@ -77,6 +78,11 @@ def _press(page: Page, element: str) -> None:
     page.ask(f"document.querySelector({element!r}).click()")
 
 
+def _choose_runner(page: Page, runner: str) -> None:
+    select = "document.getElementById('runner')"
+    page.ask(f"{select}.value = {runner!r}; {select}.onchange()")
+
+
 def test_what_was_frozen_stays_while_the_loop_goes_on(visit: Opener, scope: ScopeProcess) -> None:
     page = visit(scope, '{"panes":[{"traces":["/w0.wave"]}],"span":1}')
     page.wait("scope.live.end > 2500")
@@ -119,6 +125,193 @@ def test_what_is_so_for_one_cycle_is_shown_in_the_middle(
     assert shot["count"] == 200
     # As many cycles on either side; a busy machine leaves some out, and these take time, too.
     assert abs(shot["begin"] + shot["end"]) < 0.2 * (shot["end"] - shot["begin"])
+    assert page.errors == []
+
+
+_TRIGGER = (
+    '{{"panes":[{{"traces":["/w0.phase"]}}],"mode":"trigger","trigger":{{"signal":"{}",'
+    '"kind":"level","slope":"above","low":{},"window":20,"position":50,"holdoff":0,"single":true}}}}'
+)
+_SIGNAL = "document.querySelector('#trigger [name=signal]')"
+_SAID = "document.querySelector('#trigger [name=state]').textContent"
+
+
+def test_a_bookmarked_trigger_is_armed_on_the_signal_that_it_says(
+    visit: Opener, scope: ScopeProcess
+) -> None:
+    page = visit(scope, _TRIGGER.format("/w3.wave", 1e9))
+    # Before the page knows what signals there are, and with them.
+    for known in ("", "&& scope.catalog.length > 2"):
+        page.wait(f"scope.mode === 'trigger' {known}")
+        _press(page, "#trigger [name=arm]")
+        page.wait("scope.trigger.state === 'armed'")
+        assert page.ask("scope.trigger.armed") == ["/w3.wave"]
+        assert page.ask(f"{_SIGNAL}.value") == "/w3.wave"
+        _press(page, "#trigger [name=arm]")
+        page.wait("scope.trigger.state === 'off'")
+    _press(page, "#roll")
+    _press(page, "#triggered")
+    assert page.ask(f"{_SIGNAL}.value") == "/w3.wave"
+    assert page.errors == []
+
+
+def test_a_trigger_whose_signal_has_gone_says_so_and_arms_no_other(
+    visit: Opener, scope: ScopeProcess
+) -> None:
+    page = visit(scope, _TRIGGER.format("/gone.wave", -1e9))
+    page.wait("scope.mode === 'trigger' && scope.catalog.length > 2")
+    assert page.ask(f"{_SIGNAL}.value") == "/gone.wave"
+    assert page.ask(f"{_SIGNAL}.selectedOptions[0].text") == "/gone.wave (not there)"
+    _press(page, "#trigger [name=arm]")
+    page.wait(f"{_SAID} === 'waiting for /gone.wave: not there'")
+    assert page.ask("scope.trigger.armed") == ["/gone.wave"]
+    assert page.ask("document.getElementById('trouble').textContent") == (
+        "the trigger waits for a signal that is not there: /gone.wave"
+    )
+    # Another one is chosen: it is armed, and hits.
+    page.ask(f"{_SIGNAL}.value = '/w2.wave'; {_SIGNAL}.onchange()")
+    page.wait("scope.trigger.state === 'done' && scope.shot")
+    page.wait("document.getElementById('trouble').hidden")
+    assert page.errors == []
+
+
+def test_what_is_armed_ends_with_a_layout_and_with_a_change_of_runner(
+    visit: Opener, scope: ScopeProcess, loop: Daemon
+) -> None:
+    page = visit(scope, _TRIGGER.format("/w3.wave", 1e9))
+    page.wait("scope.mode === 'trigger' && scope.catalog.length > 2")
+    with rtcf.Client(loop.socket) as client:
+        client.add_runner("second")
+        client.load(rtcf.component("rtcf_examples", "Wave", name="other"), runner="second")
+        try:
+            _press(page, "#trigger [name=arm]")
+            page.wait("scope.trigger.state === 'armed'")
+            page.ask("void document.getElementById('runner').onfocus()")
+            page.wait("document.getElementById('runner').options.length === 2")
+            _choose_runner(page, "second")
+            page.wait("scope.catalog.some((each) => each.name === '/other.wave')")
+            assert page.ask("[scope.trigger.state, scope.trigger.armed]") == ["off", []]
+            assert page.ask(f"{_SIGNAL}.selectedOptions[0].text") == "/w3.wave (not there)"
+            assert page.ask("document.getElementById('trouble').textContent") == (
+                "no such signal, left out until there is: /w0.phase"
+            )
+        finally:
+            client.remove_runner("second")
+    page.wait("document.getElementById('trouble').textContent.includes('second')")
+    _choose_runner(page, "rt_runner")
+    page.wait("document.getElementById('trouble').hidden && scope.catalog.length > 2")
+    _press(page, "#trigger [name=arm]")
+    page.wait("scope.trigger.state === 'armed'")
+    saved = _TRIGGER.format("/w4.wave", 1e9).replace('"single":true', '"single":false')
+    page.ask(f"fetch('/api/layouts/its', {{method: 'PUT', body: {saved!r}, headers: "
+             "{Authorization: `Bearer ${localStorage.getItem('session')}`}})")  # fmt: skip
+    page.ask("const l = document.getElementById('layouts'); l.append(new Option('its', '=its'));"
+             "l.value = '=its'; l.onchange({target: l})")  # fmt: skip
+    page.wait(f"{_SIGNAL}.value === '/w4.wave'")
+    page.wait("scope.trigger.state === 'off'")
+    _press(page, "#trigger [name=arm]")
+    page.wait("scope.trigger.state === 'armed' && scope.trigger.armed[0] === '/w4.wave'")
+    assert page.errors == []
+
+
+def test_the_legend_of_a_shot_tells_the_values_of_its_hit(
+    visit: Opener, scope: ScopeProcess
+) -> None:
+    page = visit(scope, _TRIGGER.format("/w0.phase", 0.5))
+    page.wait("scope.mode === 'trigger' && scope.rate === 2000")
+    _press(page, "#trigger [name=arm]")
+    page.wait("scope.shot")
+    told = page.ask(
+        """(async () => {
+          const { figure } = await import("/page/drawing/axes.js");
+          const { store } = scope.shot, column = store.column("/w0.phase");
+          scope.panes[0].tell();
+          return [scope.panes[0].traces[0].value.textContent,
+            figure(column.get(store.nearest(0)), ""), figure(column.get(store.end - 1), "")];
+        })()"""
+    )
+    assert told[0] == told[1] != told[2]
+
+
+def test_a_layout_with_a_signal_twice_is_right_in_the_rest(
+    visit: Opener, scope: ScopeProcess
+) -> None:
+    page = visit(
+        scope,
+        '{"panes":[{"traces":["/w0.wave"]},{"traces":["/w0.wave"]},{"traces":["/w0.wave","/w1.wave"],'
+        '"scale":{"low":-3,"high":3}},{"traces":[]},null,{"traces":"/w2.wave"}],"span":1}',
+    )  # fmt: skip
+    page.wait("scope.live.end > 100 && scope.live.column('/w1.wave')")
+    panes = page.ask(
+        "scope.panes.map((pane) => [pane.traces.map((each) => each.name), pane.scale])"
+    )
+    assert panes[:2] == [[["/w0.wave"], None], [["/w1.wave"], {"low": -3, "high": 3}]]
+    assert page.errors == []
+
+
+def test_a_bookmark_with_nonsense_opens(visit: Opener, scope: ScopeProcess) -> None:
+    for layout in (
+        "null", "3", '"x"', "[]", '{"panes":{}}',
+        '{"trigger":{"kind":"loud","low":"x"},"mode":"trigger"}',
+        '{"panes":[3,{"traces":[{}]}],"trigger":7,"span":"x","drawer":{}}',
+    ):  # fmt: skip
+        page = visit(scope, layout)
+        page.wait("scope.rate && scope.catalog.length > 2")
+        assert page.ask("document.getElementById('trouble').hidden")
+        assert page.errors == []
+
+
+def test_escape_ends_the_search(visit: Opener, scope: ScopeProcess) -> None:
+    page = visit(scope)
+    page.wait("document.querySelectorAll('#tree .leaf').length > 10")
+    all_of_them = page.ask("document.querySelectorAll('#tree .leaf').length")
+    page.ask("document.getElementById('search').focus()")
+    page.call("Input.insertText", text="w3.")
+    page.wait("document.querySelectorAll('#tree .leaf').length === 3")
+    for kind in ("keyDown", "keyUp"):
+        page.call("Input.dispatchKeyEvent", type=kind, key="Escape", code="Escape",
+                  windowsVirtualKeyCode=27)  # fmt: skip
+    assert page.ask("document.getElementById('search').value") == ""
+    assert page.ask("document.querySelectorAll('#tree .leaf').length") == all_of_them
+
+
+def test_cycles_before_a_page_was_opened_are_not_missed(visit: Opener, scope: ScopeProcess) -> None:
+    for _ in range(2):
+        page = visit(scope, '{"panes":[{"traces":["/w5.wave"]}]}')
+        page.wait("scope.live.end > 1000")
+        assert page.ask("scope.live.lost") == 0
+        assert "not seen" not in page.ask("document.getElementById('figures').textContent")
+        page.ask("scope.toggle('/w5.wave')")
+        page.wait("scope.traces().length === 0")
+
+
+def test_events_are_filtered_and_have_milliseconds(
+    visit: Opener, scope: ScopeProcess, loop: Daemon
+) -> None:
+    page = visit(scope)
+    page.wait("scope.rate")
+    _press(page, "footer [data-drawer=events]")
+    listed = "[...document.querySelectorAll('.drawer[data-drawer=events] li')]"
+    with rtcf.Client(loop.socket) as client:
+        for amplitude in ("9.5", "1.0"):
+            client.set_parameters("w6", [spec.parse_parameter(f"amplitude:={amplitude}")])
+    page.wait(f"{listed}.length >= 3")
+    whole = page.ask(f"{listed}.map((each) => each.textContent)")
+    assert all(re.match(r"\d\d?:\d\d:\d\d[.,]\d{3}", each) for each in whole), whole
+    assert any("warn" in each for each in whole) and any("parameters" in each for each in whole)
+    others = ("faults", "changes", "information")
+    for kind in others:
+        _press(page, f"[data-kind={kind}]")
+    page.wait(f"{listed}.length && {listed}.every((each) => each.textContent.includes('warn'))")
+    for kind in others:
+        _press(page, f"[data-kind={kind}]")
+    page.ask(
+        "const f = document.querySelector('[aria-label=\"filter events\"]');"
+        "f.value = 'parameters W6'; f.oninput()"
+    )
+    page.wait(
+        f"{listed}.length && {listed}.every((each) => each.textContent.includes('parameters'))"
+    )
     assert page.errors == []
 
 

@@ -56,11 +56,17 @@ class Condition:
             tree = ast.parse(source, mode="eval")
         except (SyntaxError, RecursionError, MemoryError):
             raise ConditionError(_no_condition(text)) from None
-        if _depth(tree) > _DEEPEST:
+        if _is_deep(tree):
             raise ConditionError(f'"{_line(text[:40])}…" has too many parentheses')
+        functions = set()
         for node in ast.walk(tree):
             if not isinstance(node, _NODES):
                 raise ConditionError(_no_condition(text))
+            if isinstance(node, ast.Call):
+                functions.add(_called_function(node))
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Name) and node.id in _FUNCTIONS and node not in functions:
+                raise ConditionError(f"{node.id} is a function: write {node.id}(…)")
         self._tree = tree.body
         if not self.signals:
             raise ConditionError(
@@ -137,8 +143,11 @@ def _matched(pattern: re.Pattern[str], text: str, at: int) -> re.Match[str]:
     return found
 
 
-def _depth(node: ast.AST) -> int:
-    return 1 + max((_depth(each) for each in ast.iter_child_nodes(node)), default=0)
+def _is_deep(tree: ast.AST) -> bool:
+    level = [tree]
+    for _ in range(_DEEPEST):
+        level = [child for each in level for child in ast.iter_child_nodes(each)]
+    return bool(level)
 
 
 def _is_truth(node: ast.expr) -> bool:
@@ -194,12 +203,19 @@ def _value(node: ast.expr, values: "list[NDArray[Any]]") -> Any:
     raise ConditionError("a condition calls functions by their names")
 
 
+def _called_function(call: ast.Call) -> ast.Name:
+    """Return the function of a call; raises ConditionError of one that cannot be."""
+    if not isinstance(call.func, ast.Name) or call.func.id not in _FUNCTIONS:
+        raise ConditionError(f"the functions of a condition are {', '.join(_FUNCTIONS)}")
+    count = 2 if call.func.id in ("min", "max") else 1
+    if len(call.args) != count or call.keywords:
+        raise ConditionError(f"{call.func.id}() takes {count} value{'s' if count > 1 else ''}")
+    return call.func
+
+
 def _called(function: str, given: list[Any]) -> Any:
     import numpy as np
 
-    count = 2 if function in ("min", "max") else 1
-    if len(given) != count:
-        raise ConditionError(f"{function}() takes {count} value{'s' if count > 1 else ''}")
     if function == "isnan":
         return np.isnan(np.asarray(given[0], float))
     if function in ("min", "max"):

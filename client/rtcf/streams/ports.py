@@ -1,7 +1,7 @@
 """Values of ports and declared state of every cycle, as NumPy columns."""
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -199,13 +199,15 @@ def _column(data: bytes, count: int, size: int, signal: Signal, offset: int) -> 
 class PortStream(Closing):
     """An iterator over PortBatch; made by Client.watch_ports, used by one thread.
 
-    `schema` is that of the batches to come, as far as is known.  Raises RefusedError, and
+    `schema` is that of the batches to come, as far as is known; `on_schema` is called in the
+    thread that reads when it is another one, also of a loop that stands.  Raises RefusedError, and
     DaemonUnreachableError if the connection is lost.
     """
 
     def __init__(self, method: Any, socket: str, request: ports_pb2.WatchPortsRequest) -> None:
         _numpy()
         self.schema = PortSchema()
+        self.on_schema: Callable[[PortSchema], None] | None = None
         self._socket = socket
         self._every = max(request.every, 1)
         self._min_max = request.min_max
@@ -239,6 +241,8 @@ class PortStream(Closing):
             raise failures.from_grpc(error, self._socket) from None
         if response is not None and response.WhichOneof("kind") == "schema":
             self.schema = schema_of(response.schema)
+            if self.on_schema is not None:
+                self.on_schema(self.schema)
         return response
 
 

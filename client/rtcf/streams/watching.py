@@ -84,13 +84,16 @@ class Watching(Connection):
         *,
         min_max: bool = False,
         component_times: bool = False,
+        allow_missing: bool = False,
     ) -> "PortStream":
         """Watch values of outputs and declared state, of each `every`-th cycle, or (`min_max`) the
         minima and maxima of each `every` cycles, which hide no value: see PortBatch.minima().
 
         `selection` names them with the wildcards of a shell, e.g. "/arm/*.effort"; all without.
-        With `component_times` each cycle also tells when the update() of each component ended: see
-        PortBatch.turns_ns; not with `min_max`.
+        With `component_times` each cycle also has the time at which the update() of each component
+        ended: see PortBatch.turns_ns; not with `min_max`.
+        A pattern that matches nothing is an error; with `allow_missing` it applies to components
+        that are loaded later.
         Nothing is missed from here on; what the caller does not take in time is counted.
         """
         # Few commands need it, and each import is time.
@@ -105,5 +108,6 @@ class Watching(Connection):
                 every=every,
                 min_max=min_max,
                 component_times=component_times,
+                allow_missing=allow_missing,
             ),
         )

@@ -1,6 +1,6 @@
 // Files of what is in sight: a picture, a table, or the recording of it.
 import { colour, ink } from "./drawing/palette.js";
-import { query } from "./server.js";
+import { query, request } from "./server.js";
 
 function hand(blob, name) {
   const link = document.createElement("a");
@@ -58,7 +58,6 @@ export async function toMcap(scope, runner) {
   const { store, view } = scope;
   if (scope.mode === "recording") throw new Error("this is a recording already");
   const first = store.cycle(Math.min(store.find(view.begin), store.end - 1)), last = store.cycle(Math.min(store.find(view.end), store.end - 1));
-  const response = await fetch(`/api/mcap?${query({ runner, first, last })}`);
-  if (!response.ok) throw new Error((await response.json()).refused);
+  const response = await request(`/api/mcap?${query({ runner, first, last })}`);
   hand(await response.blob(), `${runner}.mcap`);
 }

@@ -12,20 +12,38 @@ export function taken(scope, runner, drawer) {
   };
 }
 
+// What a layout may say of a trigger.
+const TRIGGER = { signal: "string", kind: "string", slope: "string", condition: "string", low: "number", high: "number",
+  window: "number", position: "number", holdoff: "number", single: "boolean" };
+
+// The panes' traces by name; a signal is in the first pane that has it.
+function panesOf(layout) {
+  const seen = new Set();
+  return layout.panes.slice(0, 12).map((pane) => {
+    const { traces, scale } = pane ?? {};
+    const names = (Array.isArray(traces) ? traces : []).filter((name) => typeof name === "string");
+    const own = names.filter((name) => !seen.has(name) && seen.add(name));
+    return { traces: own, scale, asked: names.length };
+  }).filter(({ traces, asked }) => traces.length || !asked);
+}
+
 export function given(scope, layout) {
   if (Array.isArray(layout.panes) && layout.panes.length) {
     while (scope.panes.length > 1) scope.removePane(scope.panes.at(-1));
     const [first] = scope.panes;
     for (const { name } of [...first.traces]) first.remove(name);
-    layout.panes.slice(0, 12).forEach(({ traces = [], scale }, i) => {
+    panesOf(layout).forEach(({ traces, scale }, i) => {
       const pane = i ? scope.addPane() : first;
-      for (const name of traces) if (typeof name === "string" && !scope.traces().some((each) => each.name === name)) pane.add(name);
-      pane.scale = scale && scale.low < scale.high ? { low: scale.low, high: scale.high } : null;
+      for (const name of traces) pane.add(name);
+      pane.scale = Number.isFinite(scale?.low) && Number.isFinite(scale.high) && scale.low < scale.high ? { low: scale.low, high: scale.high } : null;
     });
     scope.activate(scope.panes[0]);
   }
-  if (layout.span > 0) scope.view.span = scope.rollSpan = layout.span;
-  if (layout.trigger && typeof layout.trigger === "object") Object.assign(scope.trigger.told, layout.trigger);
+  if (layout.span > 0 && Number.isFinite(layout.span)) scope.view.span = scope.rollSpan = layout.span;
+  for (const [name, type] of Object.entries(TRIGGER)) {
+    const value = layout.trigger?.[name];
+    if (typeof value === type && (type !== "number" || Number.isFinite(value))) scope.trigger.told[name] = value;
+  }
   scope.onTraces();
   scope.changed();
 }

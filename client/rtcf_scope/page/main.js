@@ -13,7 +13,7 @@ import { Spectrum } from "./panels/spectrum.js";
 import { Tree } from "./panels/tree.js";
 import { TriggerPanel } from "./panels/trigger.js";
 import { isForInformation, Scope } from "./scope.js";
-import { Stream, ask, query } from "./server.js";
+import { Stream, ask, enter, onSession, query } from "./server.js";
 import { DURATION, LATENCY } from "./data/store.js";
 
 const SLOW_MS = 250; // between two looks at figures
@@ -40,24 +40,33 @@ window.figures = figures;
 
 function trouble(source, text) {
   if (text) troubles.set(source, text); else troubles.delete(source);
-  const [first] = troubles.values();
-  $("trouble").hidden = !first;
-  $("trouble").textContent = first ?? "";
+  $("trouble").hidden = !troubles.size;
+  $("trouble").textContent = [...troubles.values()].join(" · ");
 }
 
 function arm(trigger) {
-  if (trigger) { scope.shots = []; scope.shotNumber = -1; }
-  stream.want({ trigger });
+  if (trigger) scope.clearShots();
+  stream?.want({ trigger });
 }
 
-// What the panes show is watched; with nothing of it the first signal, for the numbers of cycles.
+// What the panes show is watched: said once, however much is changed at a time.
+let watching = false;
 function watch() {
-  const names = scope.traces().map((each) => each.name);
-  const ports = names.filter((name) => !name.startsWith("~"));
-  if (names.length && !ports.length && liveCatalog.length) ports.push(liveCatalog[0].name);
-  stream?.want({ watch: ports });
-  scope.live.keep(names);
+  if (watching) return;
+  watching = true;
+  queueMicrotask(() => {
+    watching = false;
+    const names = [...new Set(scope.traces().map((each) => each.name))];
+    stream?.want({ watch: names });
+    scope.live.keep(names);
+  });
 }
+
+function triggerIs(words) {
+  Object.assign(scope.trigger, words);
+  triggering.tell();
+}
+const OFF = { state: "off", armed: [], missing: [] };
 
 scope.onTraces = () => {
   watch();
@@ -65,15 +74,26 @@ scope.onTraces = () => {
   if (scope.mode === "trigger") triggering.show();
   if (scope.mode === "recording" && recordings.open.length) recordings.load().catch((error) => told.trouble(error.message));
 };
-scope.onLayout = () => layout.toAddress(() => layout.taken(scope, told.runner(), drawer));
 
 function connect(runner) {
   stream?.close();
   scope.live.clear();
+  scope.clearShots();
   scope.events = [];
   generation = -1;
+  liveCatalog = [];
+  for (const source of ["rtcfd", "missing", "graph"]) trouble(source, "");
+  triggerIs(OFF);
   stream = new Stream(runner, {
-    connected: (is) => trouble("connection", is ? "" : "no connection to the scope's server: it is tried again"),
+    connected: (is, why) => {
+      trouble("connection", why);
+      if (is) {
+        for (const source of ["rtcfd", "missing"]) trouble(source, "");
+        generation = -1; // what has changed meanwhile is asked for
+      }
+      // One that waits is armed again with the connection.
+      else if (scope.trigger.state !== "armed") stream.wanted.trigger = null;
+    },
     message: hear,
     cycles: (message, names) => {
       if (message.kind === 2) { scope.addShot(message, names); triggering.tell(); }
@@ -81,13 +101,15 @@ function connect(runner) {
     },
   });
   watch();
+  catalog();
 }
 
 function hear(message) {
   if (message.kind === "trouble") trouble("rtcfd", message.text);
+  else if (message.kind === "missing") { trouble("missing", message.text); triggerIs({ missing: message.trigger }); }
   else if (message.kind === "refused") told.trouble(message.text);
   else if (message.kind === "watching") rebase(BigInt(message.base_ns));
-  else if (message.kind === "trigger") { scope.trigger.state = message.state; triggering.tell(); }
+  else if (message.kind === "trigger") triggerIs(message.state === "armed" ? { state: "armed", armed: message.signals } : { ...OFF, state: message.state });
   else if (message.kind === "state") state(message);
   else if (message.kind === "event" || message.kind === "record") {
     scope.events.push(message);
@@ -110,25 +132,44 @@ function state(message) {
   $("state").textContent = message.frequency_hz ? `${message.state}, ${scaled(message.frequency_hz, "Hz")}` : message.state;
   $("state").className = message.state;
   $("state").title = [message.status, ...(message.degraded ?? [])].filter(Boolean).join("\n");
-  if (message.generation !== undefined && message.generation !== generation) { generation = message.generation; renew(true); }
+  if (message.generation === undefined) { if (generation !== -1) runners().catch(() => {}); generation = -1; } // it has gone
+  else if (message.generation !== generation) { generation = message.generation; renew(true); }
+}
+
+// The runners there are, and the one that is shown, whether it is there or not.
+async function runners() {
+  const about = await ask("/api/about");
+  const names = about.runners.map(({ runner }) => runner);
+  const shown = told.runner();
+  const all = shown && !names.includes(shown) ? [...names, shown] : names;
+  const options = all.map((name) => new Option(names.includes(name) ? name : `${name} (not there)`, name));
+  // A list that is open stays.
+  if (options.map((each) => each.text).join() !== [...$("runner").options].map((each) => each.text).join()) {
+    $("runner").replaceChildren(...options);
+    if (shown) $("runner").value = shown;
+  }
+  return about;
 }
 
 // Asks again what the graph is (all of it, or values of parameters alone).
 async function renew(all) {
+  const runner = told.runner();
   try {
-    const found = await ask(`/api/graph?${query({ runner: told.runner() })}`);
+    const found = await ask(`/api/graph?${query({ runner })}`);
+    if (runner !== told.runner()) return;
     liveCatalog = found.signals;
     for (const { name, unit } of found.signals) scope.units.set(name, unit);
     if (all) { catalog(); parameters.show(found.components); graph.show(found); watch(); }
     else parameters.tell(found.components);
     await parameters.who();
     trouble("graph", "");
-  } catch (error) { trouble("graph", error.message); }
+  } catch (error) { if (runner === told.runner()) trouble("graph", error.message); }
 }
 
 function catalog() {
   scope.catalog = [...CYCLES, ...(scope.mode === "recording" ? recordings.catalog() : liveCatalog)];
   tree.show();
+  if (scope.mode === "trigger") triggering.show();
 }
 
 function mode(name) {
@@ -141,7 +182,6 @@ function show() {
   $("roll").setAttribute("aria-pressed", String(scope.mode === "roll"));
   $("triggered").setAttribute("aria-pressed", String(scope.mode === "trigger"));
   $("trigger").hidden = scope.mode !== "trigger";
-  if (scope.mode === "trigger") triggering.show();
   catalog();
 }
 
@@ -166,7 +206,8 @@ async function slow() {
       try {
         cycles.figures = await ask(`/api/statistics?${query({ runner: told.runner() })}`);
         graph.tell(cycles.figures);
-      } catch (error) { trouble("graph", error.message); }
+        trouble("figures", "");
+      } catch (error) { trouble("figures", error.message); }
     }
   }
   if (scope.mode === "recording") recordings.look();
@@ -201,13 +242,14 @@ async function chooseLayout(choice) {
 }
 
 function apply(found) {
-  if ([...$("runner").options].some((each) => each.value === found.runner) && found.runner !== told.runner()) {
+  if (typeof found?.runner === "string" && found.runner && found.runner !== told.runner()) {
+    if (![...$("runner").options].some((each) => each.value === found.runner)) $("runner").append(new Option(`${found.runner} (not there)`, found.runner));
     $("runner").value = found.runner;
     connect(found.runner);
-  }
-  layout.given(scope, found);
-  mode(found.mode === "trigger" ? "trigger" : "roll");
-  if (["measurements", "spectrum", "cycles", "graph", "events"].includes(found.drawer)) open(found.drawer);
+  } else arm(null); // the layout's is another
+  layout.given(scope, found ?? {});
+  mode(found?.mode === "trigger" ? "trigger" : "roll");
+  if (["measurements", "spectrum", "cycles", "graph", "events"].includes(found?.drawer)) open(found.drawer);
 }
 
 const systemsLight = matchMedia("(prefers-color-scheme: light)");
@@ -237,6 +279,7 @@ function buttons() {
   $("theme").onclick = other;
   $("help").onclick = () => $("keys").showModal();
   $("runner").onchange = () => connect(told.runner());
+  $("runner").onfocus = () => runners().catch(() => {}); // the stream says what is wrong
   $("trigger").onsubmit = (event) => event.preventDefault();
   $("layouts").onchange = ({ target }) => { const choice = target.value; target.value = ""; trying(() => chooseLayout(choice)); };
   $("export").onchange = ({ target }) => {
@@ -265,18 +308,23 @@ async function begin() {
   systemsLight.onchange = theme;
   buttons();
   const asked = layout.ofAddress();
-  const about = await ask("/api/about");
+  await enter();
+  const about = await runners();
   told.right = about.right;
-  $("runner").replaceChildren(...about.runners.map(({ runner }) => new Option(runner, runner)));
   connect(told.runner());
   if (asked) apply(asked);
+  // Not before: the address has what is asked for until then.
+  scope.onLayout = () => layout.toAddress(() => layout.taken(scope, told.runner(), drawer));
   await Promise.all([layouts(), recordings.show()]);
   new ResizeObserver(() => scope.changed()).observe($("panes"));
   setInterval(slow, SLOW_MS);
   requestAnimationFrame(frame);
 }
 
-begin().catch((error) => trouble("page", error.message));
+begin().catch((error) => {
+  trouble("page", error.message);
+  onSession(() => location.reload());
+});
 // A file that is opened has other signals than the stream.
 const shown = scope.showRecordings.bind(scope);
 scope.showRecordings = (found) => { shown(found); show(); };

@@ -23,7 +23,9 @@ export class Scope {
     this.shotNumber = -1;
     this.recordings = []; // {name, store}: one, or two over each other
     this.events = []; // newest last
-    this.trigger = { told: { kind: "edge", signal: "", slope: "rising", low: 0, high: 1 }, state: "off" };
+    // `told`: as it is set; `armed`: the signals that the server looks at; `missing`: those of them
+    // that the graph does not have.
+    this.trigger = { told: { kind: "edge", signal: "", slope: "rising", low: 0, high: 1 }, state: "off", armed: [], missing: [] };
     this.baseNs = 0n;
     this.onTraces = () => {}; // others are watched
     this.onLayout = () => {}; // something that a layout holds is another
@@ -43,6 +45,9 @@ export class Scope {
     if (this.mode === "trigger") return this.shot ? [this.shot.store] : [EMPTY];
     return [this.live];
   }
+
+  // The place whose values the legends tell where no cursor is: the hit, or the newest.
+  get readAt() { return this.mode === "trigger" ? this.store.nearest(0) : this.store.end - 1; }
 
   unit(name) { return this.units.get(name) ?? ""; }
   traces() { return this.panes.flatMap((pane) => pane.traces); }
@@ -125,6 +130,8 @@ export class Scope {
     if (this.shots.length > SHOTS) this.shots.shift();
     if (this.mode === "trigger") this.showShot(this.shots.length - 1);
   }
+
+  clearShots() { this.shots = []; this.shotNumber = -1; this.changed(); }
 
   showShot(number) {
     if (number < 0 || number >= this.shots.length) return;

@@ -2,8 +2,11 @@
 
 import argparse
 import asyncio
+import contextlib
 import os
+import shutil
 import sys
+import threading
 import webbrowser
 from pathlib import Path
 from typing import Any
@@ -37,18 +40,43 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Serve until Ctrl-C."""
     from rtcf_scope import service
+    from rtcf_scope.door import Door
+    from rtcf_scope.redirect import Redirect
 
     given = service.options(args, args.files)
+    with contextlib.ExitStack() as at_the_end:
 
-    def ready(address: str) -> None:
-        where = urlsplit(address)
-        print(address, flush=True)
-        if hint := _way_through_ssh(where.port or 80):
-            print(f"from your machine:  {hint}", file=sys.stderr)
-        if not args.no_browser and _has_display():
-            webbrowser.open(address)
+        def ready(address: str, door: Door) -> None:
+            print(f"{address}?token={given.token}", flush=True)
+            if hint := _way_through_ssh(urlsplit(address).port or 80):
+                print(f"from your machine:  {hint}", file=sys.stderr)
+            if args.no_browser or not _has_display():
+                return
+            try:
+                redirect = Redirect(f"{address}?token={door.ticket(lambda: redirect.remove())}")
+            except OSError as error:
+                print(f"no browser is opened: {error}: open the address above", file=sys.stderr)
+                return
+            at_the_end.callback(redirect.remove)
+            # Some browsers are waited for.
+            threading.Thread(target=_open, args=(redirect.file,), daemon=True).start()
 
-    asyncio.run(service.serve(given, ready))
+        asyncio.run(service.serve(given, ready))
+
+
+def _open(file: Path) -> None:
+    if _is_snap() or not webbrowser.open(file.as_uri()):
+        print("no browser was opened: open the address above", file=sys.stderr)
+
+
+def _is_snap() -> bool:
+    """Tell whether the browser is a snap, which reads no file of a runtime folder."""
+    try:
+        name = webbrowser.get().name
+    except webbrowser.Error:
+        return False
+    path = os.path.realpath(shutil.which(name) or "")
+    return path == "/usr/bin/snap" or path.startswith("/snap/")
 
 
 def _missing(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:

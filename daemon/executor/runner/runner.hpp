@@ -188,7 +188,8 @@ class Runner final : private RunnerView {
     std::vector<Probe::Value> probe(const std::string& name);
     /// Keeps the values of a watch in frames.
     /// @param watch unique number of the watch
-    void watch(std::uint64_t watch, Watch wanted);
+    /// @param allow_missing true = its selection may match nothing yet
+    void watch(std::uint64_t watch, Watch wanted, bool allow_missing);
     /// Ends a watch; does nothing if the number is unknown.
     void endWatch(std::uint64_t watch);
     /// The present settings.

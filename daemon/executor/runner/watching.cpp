@@ -16,8 +16,8 @@ constexpr std::chrono::milliseconds kLook{1};
 
 }  // namespace
 
-void Runner::watch(std::uint64_t watch, Watch wanted) {
-    requireMatches(wanted.selection, *plan_);
+void Runner::watch(std::uint64_t watch, Watch wanted, bool allow_missing) {
+    if (!allow_missing) requireMatches(wanted.selection, *plan_);
     watches_.emplace(watch, std::move(wanted));
     try {
         renewFrames();

@@ -282,9 +282,10 @@ void Server::beginWatch(std::uint64_t connection, const v1::Request& request) {
         return errorResponse(id, RefusalKind::Unavailable, "the stream has ended");
     };
     waiting_[{connection, id}] = {INT64_MAX, nothing, nullptr};
-    runner_->post([this, connection, id, watch, wanted] {
+    const bool allow_missing = request.watch_ports().allow_missing();
+    runner_->post([this, connection, id, watch, wanted, allow_missing] {
         try {
-            runner_->watch(watch, wanted);
+            runner_->watch(watch, wanted, allow_missing);
         } catch (const Refusal& refusal) {
             post(connection, errorResponse(id, refusal.kind(), refusal.what()), true);
         } catch (const std::exception& error) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "common/refusal.hpp"
 #include "watch/frame_layout.hpp"
@@ -53,14 +54,18 @@ std::vector<Candidate> candidatesOf(const Plan& plan) {
     return found;
 }
 
-bool watched(const Candidate& candidate, const Watches& watches) {
+// PortSelection::kNone of what nobody watches.
+std::size_t rankOf(const Candidate& candidate, const Watches& watches) {
     const std::string name = candidate.column.fullName();
-    return std::any_of(watches.begin(), watches.end(),
-                       [&](const auto& watch) { return watch.second.selection.matches(name); });
+    std::size_t least = PortSelection::kNone;
+    for (const auto& [number, watch] : watches) {
+        least = std::min(least, watch.selection.rank(name));
+    }
+    return least;
 }
 
-// Chooses all needed candidates, and others while there is room, watched ones first. The result is
-// in schedule order.
+// Chooses all needed candidates, and others while there is room: watched ones first, and of these
+// the first ones of each selection. The result is in schedule order.
 std::vector<Candidate> chosenOf(const Plan& plan, const FrameDemand& demand, FrameTable& table) {
     std::vector<Candidate> candidates = candidatesOf(plan);
     const bool all = demand.most_bytes != 0;
@@ -69,14 +74,17 @@ std::vector<Candidate> chosenOf(const Plan& plan, const FrameDemand& demand, Fra
     std::size_t bytes = 0;
     std::size_t left_out = 0;
     for (std::size_t i = 0; i < candidates.size(); ++i) chosen[i] = candidates[i].needed;
-    for (const bool first : {true, false}) {
-        for (std::size_t i = 0; i < candidates.size(); ++i) {
-            if (candidates[i].needed) continue;
-            if (watched(candidates[i], demand.watches) != first || (!first && !all)) continue;
-            const std::size_t size = (candidates[i].column.size + 7) / 8 * 8;
-            chosen[i] = bytes + size <= most;
-            chosen[i] ? bytes += size : ++left_out;
-        }
+    std::vector<std::pair<std::size_t, std::size_t>> ranked;  // rank and place
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+        if (candidates[i].needed) continue;
+        const std::size_t rank = rankOf(candidates[i], demand.watches);
+        if (all || rank != PortSelection::kNone) ranked.emplace_back(rank, i);
+    }
+    std::sort(ranked.begin(), ranked.end());
+    for (const auto& [rank, i] : ranked) {
+        const std::size_t size = (candidates[i].column.size + 7) / 8 * 8;
+        chosen[i] = bytes + size <= most;
+        chosen[i] ? bytes += size : ++left_out;
     }
     if (left_out != 0) {
         table.notes.push_back(fmt::format(

@@ -13,6 +13,10 @@ PortSelection::Pattern::Pattern(const std::string& text) : given_(text) {
     if (pattern[0] != '/' && pattern[0] != '*') pattern.insert(0, "/");
     const std::size_t dot = pattern.rfind('.');
     if (dot == std::string::npos || pattern.find('/', dot) != std::string::npos) pattern += ".**";
+    if (pattern.find_first_of("*?[") == std::string::npos) {
+        name_ = pattern;
+        return;
+    }
     for (std::size_t i = 0; i < pattern.size(); ++i) {
         Element element{{}, false};
         if (pattern[i] == '*') {
@@ -53,6 +57,7 @@ void PortSelection::Pattern::add(const Element& element) {
 // Tracks the prefix lengths of the name that the elements so far match, so time and memory are
 // bounded for any pattern.
 bool PortSelection::Pattern::matches(const std::string& name) const {
+    if (!name_.empty()) return name == name_;
     std::vector<char> taken(name.size() + 1, 0);
     taken[0] = 1;
     for (const Element& element : elements_) {
@@ -85,14 +90,24 @@ PortSelection::PortSelection(const std::vector<std::string>& patterns) {
                           "leave it out for all");
         }
         requireLength("a selection of ports", given, kLongestPattern);
-        patterns_.emplace_back(given);
+        const Pattern& pattern = patterns_.emplace_back(given);
+        const std::size_t place = patterns_.size() - 1;
+        if (pattern.name().empty())
+            wild_.push_back(place);
+        else
+            names_.try_emplace(pattern.name(), place);
     }
 }
 
-bool PortSelection::matches(const std::string& name) const {
-    return patterns_.empty() ||
-           std::any_of(patterns_.begin(), patterns_.end(),
-                       [&](const Pattern& pattern) { return pattern.matches(name); });
+std::size_t PortSelection::rank(const std::string& name) const {
+    if (patterns_.empty()) return kNone - 1;
+    const auto named = names_.find(name);
+    std::size_t first = named == names_.end() ? kNone : named->second;
+    for (const std::size_t place : wild_) {
+        if (place >= first) break;
+        if (patterns_[place].matches(name)) first = place;
+    }
+    return first;
 }
 
 }  // namespace rtcf::executor

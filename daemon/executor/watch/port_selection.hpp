@@ -4,7 +4,10 @@
 
 #include <bitset>
 #include <climits>
+#include <cstddef>
+#include <cstdint>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 namespace rtcf::executor {
@@ -26,6 +29,8 @@ class PortSelection {
         explicit Pattern(const std::string& text);
         /// The text of the user.
         const std::string& given() const noexcept { return given_; }
+        /// The single name that it matches; empty for a component, or a pattern with wildcards.
+        const std::string& name() const noexcept { return name_; }
         /// @param name see PortSelection::matches()
         bool matches(const std::string& name) const;
 
@@ -38,14 +43,21 @@ class PortSelection {
         void add(const Element& element);
 
         std::string given_;
-        std::vector<Element> elements_;
+        std::string name_;
+        std::vector<Element> elements_;  // none of a name
     };
     const std::vector<Pattern>& patterns() const noexcept { return patterns_; }
     /// @param name full name of the component, '.', and name of the output or state
-    bool matches(const std::string& name) const;
+    bool matches(const std::string& name) const { return rank(name) != kNone; }
+    /// The index of the first pattern that matches, or kNone. Names come before the patterns and
+    /// components that select several values.
+    std::size_t rank(const std::string& name) const;
+    static constexpr std::size_t kNone = SIZE_MAX;
 
    private:
     std::vector<Pattern> patterns_;
+    std::vector<std::size_t> wild_;                       // places of those that are no names
+    std::unordered_map<std::string, std::size_t> names_;  // thousands cost as little as one
 };
 
 }  // namespace rtcf::executor

@@ -61,7 +61,7 @@ CALLS = {
     "GetHistory": Call(Level.OBSERVE),
     "WatchEvents": Call(Level.OBSERVE),
     "WatchLogs": Call(Level.OBSERVE, _LISTS),
-    "WatchPorts": Call(Level.OBSERVE),
+    "WatchPorts": Call(Level.OBSERVE, _LISTS),
     "ListIncidents": Call(Level.OBSERVE),
     "ReadIncident": Call(Level.OBSERVE),
     "TakeIncident": Call(Level.OPERATE),

@@ -10,7 +10,9 @@ from rtcfd.common.refusals import InvalidArgument
 from rtcfd.runners.runner import Runner
 
 _MOST = 8 * 1024 * 1024  # bytes in the queue to the caller
-_MOST_NAMES = 256  # each is compared with each output and state, whenever the graph changes
+_MOST_PATTERNS = 256  # each is compared with each output and state, whenever the graph changes
+_MOST_NAMES = 16384  # names of single outputs and states, which are looked up
+_WILD = frozenset("*?[")
 
 
 class _Waiting:
@@ -78,12 +80,16 @@ async def watch_ports(
     runner: Runner, request: ports_pb2.WatchPortsRequest
 ) -> AsyncGenerator[ports_pb2.WatchPortsResponse, None]:
     """Yield schemas and batches, without end; raises the executor's error, or that of its end."""
-    if len(request.selection) > _MOST_NAMES:
-        raise InvalidArgument(
-            f"{len(request.selection)} selections of ports are too many, {_MOST_NAMES} at most: "
-            "use wildcards",
-            errors_pb2.REASON_REQUEST_TOO_LARGE,
-        )
+    patterns = sum(1 for each in request.selection if _is_pattern(each))
+    for count, most, what in (
+        (patterns, _MOST_PATTERNS, "components and patterns of ports"),
+        (len(request.selection) - patterns, _MOST_NAMES, "names of ports"),
+    ):
+        if count > most:
+            raise InvalidArgument(
+                f"{count} {what} are too many, {most} at most: use wildcards",
+                errors_pb2.REASON_REQUEST_TOO_LARGE,
+            )
     waiting = _Waiting(request.every)
     telling = asyncio.ensure_future(runner.watch_ports(request, waiting.put))
     telling.add_done_callback(lambda _: waiting.some.set())
@@ -98,3 +104,8 @@ async def watch_ports(
     finally:
         telling.cancel()
         await asyncio.gather(telling, return_exceptions=True)
+
+
+def _is_pattern(selection: str) -> bool:
+    """Tell whether it may match several outputs or states."""
+    return "." not in selection.rpartition("/")[2] or not _WILD.isdisjoint(selection)

@@ -73,8 +73,14 @@ def test_what_is_lost_is_counted_over_graphs_of_which_nothing_waits(
     assert list(lost.batch.values) == [b""] * 20
 
 
-def test_so_many_names_are_refused() -> None:
-    names = [f"/c{number}" for number in range(257)]
+def test_more_patterns_or_names_than_are_compared_are_refused() -> None:
+    components = [f"/c{number}" for number in range(257)]
+    assert read([schema("a")], components[:-1])
+    with pytest.raises(InvalidArgument, match="257 components and patterns .*, 256 at most"):
+        read([schema("a")], components)
+    with pytest.raises(InvalidArgument, match="257 components and patterns .*, 256 at most"):
+        read([schema("a")], [f"/c*.p{number}" for number in range(257)])
+    names = [f"/c{number}.p" for number in range(16385)]
     assert read([schema("a")], names[:-1])
-    with pytest.raises(InvalidArgument, match="257 selections of ports are too many, 256 at most"):
+    with pytest.raises(InvalidArgument, match="16385 names of ports are too many, 16384 at most"):
         read([schema("a")], names)

@@ -4,6 +4,7 @@ import asyncio
 from typing import Any
 
 import numpy as np
+import pytest
 import rtcf
 from rtcf.streams.ports import PortBatch, PortSchema
 from rtcf.v1 import ports_pb2
@@ -26,20 +27,50 @@ def _batch(first: int, count: int, lost: int = 0) -> PortBatch:
 class _Ear:
     """A listener that remembers."""
 
-    columns: frozenset[str] = frozenset({"/a.b"})
+    wants = True
+    columns: tuple[str, ...] = ("/a.b",)
 
     def __init__(self) -> None:
         self.chunks: list[Chunk] = []
+        self.troubles: list[str] = []
 
     def take(self, chunk: Chunk) -> None:
         self.chunks.append(chunk)
 
+    def know(self, schema: PortSchema) -> None:
+        pass
+
     def tell(self, message: dict[str, Any]) -> None:
         pass
+
+    def trouble(self, text: str) -> None:
+        self.troubles.append(text)
+
+
+class _Loop:
+    """An event loop in which no time passes."""
+
+    def call_later(self, *_: object) -> None:
+        pass
+
+    def time(self) -> float:
+        return 0.0
 
 
 class _Reader:
     """A stream as the hub sees one."""
+
+    loop = _Loop()
+    schema = PortSchema()
+    opened = 0.0
+    trouble = ""
+
+    def __init__(self, *columns: str) -> None:
+        self.columns = frozenset(columns)
+
+    @property
+    def is_open(self) -> bool:
+        return not self.trouble
 
     def taken(self) -> None:
         pass
@@ -48,41 +79,127 @@ class _Reader:
         pass
 
 
-def _hub(ear: _Ear) -> Any:
+def _hub(*ears: _Ear) -> Any:
     hub: Any = Hub(rtcf.Client("/nowhere"), "it")
-    hub._tabs.add(ear)
+    hub._tabs.update(dict.fromkeys(ears))
     return hub
+
+
+def _two(ear: _Ear) -> tuple[Any, Any, Any]:
+    """Return a hub, its stream, and one of another selection that has been opened."""
+    hub = _hub(ear)
+    hub._reader, hub._next = _Reader("/a.b"), _Reader("/a.b", "/a.c")
+    return hub, hub._reader, hub._next
+
+
+def _told(ear: _Ear) -> list[int]:
+    return [int(cycle) for chunk in ear.chunks for cycle in chunk.cycles]
 
 
 def test_cycles_that_two_streams_told_are_told_once() -> None:
     ear = _Ear()
-    hub = _hub(ear)
-    old, new = _Reader(), _Reader()
-    hub._reader, hub._next = old, new
+    hub, old, new = _two(ear)
     hub.take(old, _batch(0, 10))
     hub.take(new, _batch(5, 10))
     hub.take(old, _batch(10, 5))  # too late
     hub.take(new, _batch(15, 5))
-    assert np.array_equal(np.hstack([each.cycles for each in ear.chunks]), np.arange(20))
+    assert _told(ear) == list(range(20))
     assert [each.at for each in ear.chunks] == [0, 10, 15]
+    assert not any(each.lost for each in ear.chunks)
+
+
+def test_a_stream_takes_over_once_the_one_before_has_told_all_before_it() -> None:
+    ear = _Ear()
+    hub, old, new = _two(ear)
+    hub.take(old, _batch(0, 10))
+    hub.take(new, _batch(14, 4))
+    hub.take(new, _batch(18, 4))
+    hub.take(old, _batch(10, 2))
+    hub.take(old, _batch(12, 2))
+    hub.take(new, _batch(22, 2))
+    assert _told(ear) == list(range(24))
     assert not any(each.lost for each in ear.chunks)
 
 
 def test_cycles_between_two_streams_are_counted() -> None:
     ear = _Ear()
-    hub = _hub(ear)
-    old, new = _Reader(), _Reader()
-    hub._reader, hub._next = old, new
+    hub, old, new = _two(ear)
     hub.take(old, _batch(0, 10))
     hub.take(new, _batch(12, 3))
+    hub.trouble(old, "it has ended")  # so that nothing comes of it any more
     assert ear.chunks[-1].lost == 2
+
+
+def test_cycles_that_a_stream_misses_are_counted() -> None:
+    ear = _Ear()
+    hub, old, _ = _two(ear)
+    hub.take(old, _batch(0, 10))
+    hub.trouble(old, "rtcfd restarts")
+    hub.opened(old, PortSchema())
+    hub.take(old, _batch(15, 5))
+    hub.take(old, _batch(20, 0, lost=7))
+    hub.take(old, _batch(27, 5))
+    assert [each.lost for each in ear.chunks] == [0, 5, 7]
+
+
+def test_trouble_of_another_pages_signals_is_that_pages() -> None:
+    one, other = _Ear(), _Ear()
+    other.columns = ("/a.b", "/a.c")
+    hub = _hub(one, other)
+    hub._reader, hub._next = _Reader("/a.b"), _Reader("/a.b", "/a.c")
+    hub.trouble(hub._next, "too many streams")
+    assert (one.troubles[-1], other.troubles[-1]) == ("", "too many streams")
+    hub.trouble(hub._reader, "rtcfd is away")
+    assert (one.troubles[-1], other.troubles[-1]) == ("rtcfd is away", "rtcfd is away")
+
+
+def test_a_page_that_fails_keeps_nothing_from_the_others(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    class Failing(_Ear):
+        def take(self, chunk: Chunk) -> None:
+            raise ArithmeticError("no such cycle")
+
+    ears = [_Ear(), Failing(), _Ear()]
+    hub = _hub(*ears)
+    hub._reader = _Reader("/a.b")
+    hub.take(hub._reader, _batch(0, 10))
+    assert _told(ears[0]) == _told(ears[2]) == list(range(10))
+    assert capsys.readouterr().err == (
+        "rtcf-scope: a page of it failed: ArithmeticError('no such cycle')\n"
+    )
+
+
+def test_cycles_before_a_page_was_opened_are_not_lost_to_it() -> None:
+    async def late() -> None:
+        hub = _hub(_Ear())
+        tab = Tab(hub)
+        tab._shows = True
+        for first, lost in ((1000, 900), (1110, 100)):
+            tab.take(Chunk(_batch(first, 10), first, lost))
+        waiting: Any = tab._waiting
+        heads = [wire._HEAD.unpack_from(data) for data, cycles in waiting if cycles]
+        assert [head[6] for head in heads] == [0, 100]
+
+    asyncio.run(late())
+
+
+def test_cycles_while_nothing_is_watched_are_not_lost() -> None:
+    ear = _Ear()
+    hub = _hub(ear)
+    for first in (0, 5000):
+        hub._reader = _Reader("/a.b")
+        hub.take(hub._reader, _batch(first, 10))
+        hub.close()
+    assert [each.lost for each in ear.chunks] == [0, 0]
+    assert hub.since == 20
 
 
 def test_a_slow_tab_loses_the_oldest_cycles_and_is_told_how_many() -> None:
     async def slow() -> None:
         hub = _hub(_Ear())
         tab = Tab(hub)
-        tab._names = ["/a.b"]
+        tab._shows = True
         tab.tell({"kind": "first"})
         for number in range(2000):
             tab.take(Chunk(_batch(number * 1000, 1000), number * 1000, 0))
@@ -103,7 +220,7 @@ def test_a_slow_tab_loses_the_oldest_cycles_and_is_told_how_many() -> None:
 def test_a_shot_waits_for_a_slow_tab_however_large_it_is() -> None:
     async def slow() -> None:
         tab = Tab(_hub(_Ear()))
-        tab._names = ["/a.b"]
+        tab._shows = True
         tab.tell({"kind": "first"})
         shots = [bytes([number]) * 9_000_000 for number in (1, 2)]
         for shot in shots:
@@ -142,3 +259,14 @@ def test_a_trace_is_of_an_output_or_state_and_an_element() -> None:
     assert split_element("/arm.q[x]") == ("/arm.q[x]", 0)
     assert column_of("/arm.cmd.twist.linear.x") == "/arm.cmd"
     assert column_of("/arm.q[2]") == "/arm.q"
+    assert column_of("/arm.q[state][2]") == "/arm.q"
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["", "/", "arm.q", "/arm", "/arm.", "/*.q", "/arm.*", "**", "/a[bc].q", "/arm?.q", "/\ud800.q",
+     "/arm.q" + "x" * 1000, "/ä.q", "/arm\n.q"],
+)  # fmt: skip
+def test_what_is_no_name_of_a_signal_is_not_asked_for(name: str) -> None:
+    assert column_of(name) == ""
+    assert split_element(name + "[" + "9" * 5000 + "]") == (name + "[" + "9" * 5000 + "]", 0)

@@ -86,7 +86,7 @@ export class Pane {
   tell() {
     const { scope } = this, { a } = scope.cursors;
     const store = scope.sources()[0];
-    const at = a !== null ? store.nearest(a) : scope.mode === "trigger" ? store.nearest(0) : store.end - 1;
+    const at = a === null ? scope.readAt : store.nearest(a);
     for (const trace of this.traces) {
       const column = store.column(trace.name), isThere = column && at >= store.begin;
       const text = isThere && column.isOdd(at) && Number.isNaN(column.get(at)) ? "NaN"

@@ -10,6 +10,7 @@ export class Tree {
     this.box = box;
     this.search = search;
     search.oninput = () => this.show();
+    search.addEventListener("keydown", ({ key }) => { if (key === "Escape") { search.value = ""; this.show(); } });
   }
 
   show() {

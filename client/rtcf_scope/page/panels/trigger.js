@@ -18,12 +18,12 @@ export class TriggerPanel {
   // Fills in the signals there are, and what is set.
   show() {
     const { told } = this.scope.trigger;
-    const names = [...new Set([...this.scope.traces().map((each) => each.name), ...this.scope.catalog.map((each) => each.name)])];
-    if (!told.signal) told.signal = names[0] ?? "";
-    this.part("signal").replaceChildren(...names.map((name) => new Option(name, name, false, name === told.signal)));
+    if (!(told.kind in SLOPES)) told.kind = "edge";
+    this.#signals();
     for (const name of ["kind", "low", "high", "single", "window", "position", "holdoff", "condition"]) {
       const input = this.part(name);
-      if (told[name] === undefined) continue;
+      // What somebody is typing is theirs.
+      if (told[name] === undefined || input === document.activeElement) continue;
       if (input.type === "checkbox") input.checked = told[name]; else input.value = told[name];
     }
     const slopes = SLOPES[told.kind];
@@ -37,11 +37,30 @@ export class TriggerPanel {
     this.tell();
   }
 
+  // Those that are shown, those there are, and the one that is set, whether it is there or not.
+  #signals() {
+    const { told } = this.scope.trigger;
+    const there = this.scope.catalog.map((each) => each.name);
+    if (!told.signal) told.signal = this.scope.traces()[0]?.name ?? there.find((name) => !name.startsWith("~")) ?? there[0] ?? "";
+    const known = new Set(there);
+    const are = there.some((name) => !name.startsWith("~")); // the graph is known
+    const names = [...new Set([told.signal, ...this.scope.traces().map((each) => each.name), ...there])].filter(Boolean);
+    const options = names.map((name) => [name, are && !known.has(name) ? `${name} (not there)` : name]);
+    const select = this.part("signal");
+    // A list that is open stays.
+    if (JSON.stringify(options) !== this.listed) {
+      this.listed = JSON.stringify(options);
+      select.replaceChildren(...options.map(([name, text]) => new Option(text, name)));
+    }
+    select.value = told.signal;
+  }
+
   tell() {
     const { trigger, shot, shots, shotNumber } = this.scope;
     const state = this.part("state");
-    state.textContent = shot ? `hit at cycle ${shot.cycle} (${shotNumber + 1} of ${shots.length})`
-      : trigger.state === "armed" ? "waiting" : "not armed";
+    const armed = trigger.state === "armed";
+    state.textContent = armed && trigger.missing.length ? `waiting for ${trigger.missing.join(", ")}: not there`
+      : shot ? `hit at cycle ${shot.cycle} (${shotNumber + 1} of ${shots.length})` : armed ? "waiting" : "not armed";
     state.className = shot ? "hit" : trigger.state;
     this.part("arm").textContent = trigger.state === "armed" ? "Disarm" : "Arm";
     this.part("earlier").disabled = shotNumber <= 0;

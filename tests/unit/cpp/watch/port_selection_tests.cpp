@@ -67,6 +67,24 @@ TEST(PortSelection, HardPatternsEndSoon) {
     EXPECT_FALSE(selects(pattern, "/" + std::string(250, 'a') + ".b"));
 }
 
+TEST(PortSelection, TakesNamesAndPatternsTogether) {
+    const PortSelection selection({"arm/pid.effort", "/leg/*.out", "/arm/pid.error"});
+    EXPECT_TRUE(selection.matches("/arm/pid.effort"));
+    EXPECT_TRUE(selection.matches("/arm/pid.error"));
+    EXPECT_TRUE(selection.matches("/leg/pid.out"));
+    EXPECT_FALSE(selection.matches("/arm/pid.integral"));
+    EXPECT_FALSE(selection.matches("/leg/pid.in"));
+    ASSERT_EQ(selection.patterns().size(), 3U);
+    EXPECT_EQ(selection.patterns()[0].given(), "arm/pid.effort");
+    EXPECT_EQ(selection.patterns()[0].name(), "/arm/pid.effort");
+    EXPECT_TRUE(selection.patterns()[1].name().empty());
+    EXPECT_EQ(selection.rank("/arm/pid.error"), 2U);
+    EXPECT_EQ(selection.rank("/leg/pid.out"), 1U);
+    EXPECT_EQ(selection.rank("/leg/pid.in"), PortSelection::kNone);
+    EXPECT_LT(selection.rank("/arm/pid.error"), PortSelection({}).rank("/arm/pid.error"));
+    EXPECT_EQ(PortSelection({"a.b", "a.*", "a.c"}).rank("/a.c"), 1U) << "the first that matches";
+}
+
 TEST(PortSelection, RefusesWhatIsEmptyOrTooLong) {
     EXPECT_THROW(PortSelection({""}), Refusal);
     EXPECT_THROW(PortSelection({std::string(2000, 'a')}), Refusal);
