@@ -204,12 +204,11 @@ class Site:
             writer.close()
             return file.getvalue()
 
+        name = quote(runner, errors="replace")
         return web.Response(
             body=await self._ask(write),
             content_type="application/octet-stream",
-            headers={
-                "Content-Disposition": f'attachment; filename="{quote(runner, errors="replace")}.mcap"'
-            },
+            headers={"Content-Disposition": f'attachment; filename="{name}.mcap"'},
         )
 
     async def _stream(self, request: web.Request) -> web.StreamResponse:

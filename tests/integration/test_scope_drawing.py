@@ -90,7 +90,8 @@ def test_a_picture_that_grew_for_a_minute_is_the_one_drawn_at_once(
             while (source.time < now / 1000)
               made.live.push(source.next(1 + Math.floor(random() * 60)), names);
             made.frame(now);
-            if (random() < 6 / (length * 60)) {{ found.push(...drawing.differences(made, now)); checks++; }}
+            if (random() < 6 / (length * 60)) {{
+              found.push(...drawing.differences(made, now)); checks++; }}
           }}
           found.push(...drawing.differences(made, now));
           return {{ found: found.slice(0, 5), checks, end: made.live.end, lost: made.live.lost,
@@ -150,21 +151,23 @@ def test_what_the_ring_no_longer_holds_goes_from_the_picture(visit: Opener) -> N
 
 
 @pytest.mark.parametrize(("width", "height"), [(1280, 800), (1920, 1080), (420, 500)])
-def test_each_spike_of_one_cycle_of_a_loop_is_drawn(
-    visit: Opener, width: int, height: int
-) -> None:
+def test_each_spike_of_one_cycle_of_a_loop_is_drawn(visit: Opener, width: int, height: int) -> None:
     layout = '{"panes":[{"traces":["/ragged.spikes"]},{"traces":["/ragged.holes"]}],"span":5}'
     page = visit(layout, width=width, height=height)
     page.wait("scope.live.end > 14000 && scope.panes.length === 2")
     for span in (5, 2, 0.5, 0.1):
         page.ask(f"scope.view.span = {span}; scope.changed()")
-        page.wait(f"Math.abs(scope.panes[0].sight.seconds * scope.panes[0].sight.width - {span}) < 1e-9")
+        page.wait(
+            f"Math.abs(scope.panes[0].sight.seconds * scope.panes[0].sight.width - {span}) < 1e-9"
+        )
         found = page.ask(
             """(async () => {
               scope.frame();
               const wrong = drawing.differences(scope);
-              const { count, found } = await drawing.unseen(scope, "/ragged.spikes", (value) => value === 3);
-              return { wrong: wrong.slice(0, 5), count, found: found.slice(0, 5), lost: scope.live.lost };
+              const { count, found } = await drawing.unseen(scope, "/ragged.spikes",
+                (value) => value === 3);
+              return { wrong: wrong.slice(0, 5), count, found: found.slice(0, 5),
+                lost: scope.live.lost };
             })()"""
         )
         assert found["wrong"] == []
@@ -188,10 +191,13 @@ def test_values_that_are_no_numbers_have_a_mark(visit: Opener) -> None:
           const paper = columns.get(sight.first)[2];
           const bottom = sight.height - 5;
           for (const [column, pixels] of columns)
-            if (pixels.slice(bottom, bottom + 4).some((each) => each !== paper && each !== columns.get(column)[2])) marked.add(column);
+            if (pixels.slice(bottom, bottom + 4).some((each) => each !== paper
+              && each !== columns.get(column)[2])) marked.add(column);
           if (holes.size < 20) return null;
-          return { holes: holes.size, unmarked: [...holes].filter((each) => columns.has(each) && !marked.has(each)).length,
-            wrong: [...marked].filter((each) => ![-1, 0, 1].some((by) => holes.has(each + by))).length };
+          const unmarked = [...holes].filter((each) => columns.has(each) && !marked.has(each));
+          const wrong = [...marked].filter((each) =>
+            ![-1, 0, 1].some((by) => holes.has(each + by)));
+          return { holes: holes.size, unmarked: unmarked.length, wrong: wrong.length };
         })()"""
     )
     assert found["unmarked"] == 0
@@ -209,7 +215,8 @@ def test_missing_cycles_are_shown_from_the_last_to_the_next(visit: Opener) -> No
           const batch = (first, count, lost) => {
             const times = Float64Array.from({ length: count }, (_, i) => (first + i) / 1000);
             const zeros = new Float64Array(count);
-            return { count, lost, times, cycles: times.map((time) => Math.round(time * 1000)), latencies: zeros,
+            return { count, lost, times, cycles: times.map((time) => Math.round(time * 1000)),
+              latencies: zeros,
               durations: zeros, traces: [zeros] };
           };
           made.view.span = 2;
@@ -220,9 +227,11 @@ def test_missing_cycles_are_shown_from_the_last_to_the_next(visit: Opener) -> No
           made.view.end = 2;
           made.changed();
           made.frame(1);
-          const { sight } = made.panes[0], [columns] = drawing.pixels(made), paper = pixel(ink("paper"));
+          const { sight } = made.panes[0], [columns] = drawing.pixels(made),
+            paper = pixel(ink("paper"));
           const ground = (time) => columns.get(Math.floor(sight.column(time)))[3];
-          return { before: ground(0.9) === paper, within: [1.01, 1.1, 1.19].every((time) => ground(time) !== paper),
+          return { before: ground(0.9) === paper,
+            within: [1.01, 1.1, 1.19].every((time) => ground(time) !== paper),
             after: ground(1.3) === paper, gaps: made.live.gaps };
         })()"""
     )
@@ -294,13 +303,17 @@ def test_a_wave_of_one_hertz_reads_one_hertz(visit: Opener) -> None:
     page = _blank(visit)
     found = page.ask(
         """(async () => {
-          const f = await import("/page/data/fft.js"), { hertzText } = await import("/page/panels/spectrum.js");
+          const f = await import("/page/data/fft.js"),
+            { hertzText } = await import("/page/panels/spectrum.js");
           const told = (hertz, seconds, rate, phase) => {
-            const values = Float64Array.from({ length: seconds * rate }, (_, i) => 2 + 3 * Math.sin(2 * Math.PI * hertz * i / rate + phase));
-            const of = f.spectrum(values, rate), { frequency, amplitude } = f.peak(of, f.highest(of));
+            const values = Float64Array.from({ length: seconds * rate },
+              (_, i) => 2 + 3 * Math.sin(2 * Math.PI * hertz * i / rate + phase));
+            const of = f.spectrum(values, rate),
+              { frequency, amplitude } = f.peak(of, f.highest(of));
             return [hertzText(frequency, of.resolution), amplitude];
           };
-          return [told(1, 5, 2000, 0.3), told(1, 7.3, 2000, 1), told(1.7, 10, 2000, 2), told(50, 5, 2000, 0), told(123.4, 2, 1000, 1)];
+          return [told(1, 5, 2000, 0.3), told(1, 7.3, 2000, 1), told(1.7, 10, 2000, 2),
+            told(50, 5, 2000, 0), told(123.4, 2, 1000, 1)];
         })()"""
     )
     assert [text for text, _ in found] == ["1 Hz", "1 Hz", "1.7 Hz", "50 Hz", "123.4 Hz"]
@@ -315,16 +328,15 @@ def test_what_comes_back_has_no_settling_time(visit: Opener) -> None:
           const { step } = await import("/page/data/measure.js");
           const times = Array.from({ length: 10000 }, (_, i) => i / 2000);
           const square = (t) => Math.sign(Math.sin(2 * Math.PI * (t * 1.1 + 0.52)));
-          return { square: step(times, times.map(square)), once: step(times, times.map((t) => t < 2 ? 0 : 1)) };
+          return { square: step(times, times.map(square)),
+            once: step(times, times.map((t) => t < 2 ? 0 : 1)) };
         })()"""
     )
     assert found["square"] == {"rise": None, "overshoot": None, "settling": None}
     assert found["once"]["settling"] is not None
 
 
-def test_events_are_lines_with_a_label_in_the_top_pane(
-    visit: Opener, loop: Daemon
-) -> None:
+def test_events_are_lines_with_a_label_in_the_top_pane(visit: Opener, loop: Daemon) -> None:
     page = visit('{"panes":[{"traces":["/ragged.spikes"]},{"traces":["/ragged.holes"]}],"span":20}')
     page.wait("scope.rate && !scope.live.empty && scope.panes.length === 2")
     with rtcf.Client(loop.socket) as client:
@@ -372,14 +384,18 @@ def test_only_the_second_of_two_recordings_is_dashed(visit: Opener) -> None:
           made.frame();
           // How many kinds of pixels a flat line has, and whether the ground is among them; the
           // symbols of the second eight, with their rim, are a few columns of each.
-          const { sight } = made.panes[0], [columns] = drawing.pixels(made), paper = pixel(ink("paper"));
+          const { sight } = made.panes[0], [columns] = drawing.pixels(made),
+            paper = pixel(ink("paper"));
           const told = (value) => {
             const row = Math.floor(sight.row(value)), counts = new Map();
-            for (const pixels of columns.values()) counts.set(pixels[row], (counts.get(pixels[row]) ?? 0) + 1);
+            for (const pixels of columns.values()) counts.set(pixels[row],
+              (counts.get(pixels[row]) ?? 0) + 1);
             const often = [...counts.values()].filter((each) => each > columns.size / 8);
-            return { kinds: often.length, ground: counts.get(paper) ?? 0, symbols: counts.size > 2 };
+            return { kinds: often.length, ground: counts.get(paper) ?? 0,
+              symbols: counts.size > 2 };
           };
-          return { first: names.map((_, i) => told(i)), second: names.slice(0, 8).map((_, i) => told(i + 0.5)) };
+          return { first: names.map((_, i) => told(i)),
+            second: names.slice(0, 8).map((_, i) => told(i + 0.5)) };
         })()"""
     )
     assert [each["kinds"] for each in found["first"]] == [1] * 18

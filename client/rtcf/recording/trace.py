@@ -68,7 +68,7 @@ class Trace:
         `on_late` gets the number of each late one, its deadline, its beginning, its end, and by
         how much it was late, ns."""
         message = batch.message
-        turns = batch.turns_ns.tolist() if batch.schema.turns else []
+        turns: Any = batch.turns_ns.tolist() if batch.schema.turns else []
         names = [json.dumps(each, ensure_ascii=False) for each in batch.schema.turns]
         for index, stamp_ns in enumerate(message.stamps_ns):
             cycle = batch.first_cycle + index * batch.every

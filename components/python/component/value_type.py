@@ -69,7 +69,8 @@ class ValueType:
 def value_type(declared: Any) -> ValueType:
     """Return the type of `X` in `Input[X]`, where X is `type` or `type, size, …`."""
     element, *sizes = declared if isinstance(declared, tuple) else (declared,)
-    if typing.get_origin(element) in (typing.Union, types.UnionType):
+    origin: Any = typing.get_origin(element)
+    if origin in (typing.Union, types.UnionType):
         others = [each for each in typing.get_args(element) if each is not types.NoneType]
         if len(others) == 1 and len(typing.get_args(element)) == 2:
             return replace(value_type((others[0], *sizes)), optional=True)

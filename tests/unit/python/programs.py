@@ -69,6 +69,7 @@ class Programs(Component):
         self.w[:] = self.bytes.value
         which = self.which.value % {count}
 """
+_TO_ONE = ("sum", "mean", "std", "max")
 _VECTORS = ("self.a", "self.b")
 _MATRICES = ("self.m", "self.k")
 _LONG, _SIDE = 6, 3
@@ -234,7 +235,7 @@ class Program:
                     f"self.a[:] = {single} * self.b",
                     f"self.a[:] = {single} * {self._float_of_python(scope)}",
                     f"self.x = float({single}[{index}]) * self.y",
-                    f"self.x = float(np.{self._draw.choice(['sum', 'mean', 'std', 'max'])}({single}))",
+                    f"self.x = float(np.{self._draw.choice(_TO_ONE)}({single}))",
                     f"self.u[:] = {small}",
                     f"self.u {self._draw.choice(['+', '-', '*', '&', '|', '^', '>>'])}= {byte}",
                     f"self.u[{index}] {self._draw.choice('+-*')}= {byte}",
@@ -250,7 +251,9 @@ class Program:
 
     def _float_of_python(self, scope: _Scope) -> str:
         number = f"{self._draw.uniform(-4, 4):.2f}"
-        return self._draw.choice(["self.x", "self.y", "self.n", number, f"float({self._float(scope, 1)})"])
+        return self._draw.choice(
+            ["self.x", "self.y", "self.n", number, f"float({self._float(scope, 1)})"]
+        )
 
     def _single(self, scope: _Scope, depth: int) -> str:
         """Return a vector of float32."""
@@ -589,7 +592,9 @@ class Program:
             one, other = self._int(scope, depth - 1), self._int(scope, depth - 1)
             return f"({one} {self._draw.choice(['+', '-', '*'])} {other})"
         if draw < 0.65:
-            how = self._draw.choice(["<< 2", ">> 1", f">> {self._int(scope, 0)}", "<< (self.n % 8)"])
+            how = self._draw.choice(
+                ["<< 2", ">> 1", f">> {self._int(scope, 0)}", "<< (self.n % 8)"]
+            )
             return f"({self._int(scope, depth - 1)} {how})"
         if draw < 0.72:
             how = f"{self._draw.choice(['//', '%'])} {self._draw.choice([2, 3, -3])}"

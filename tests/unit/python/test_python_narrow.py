@@ -60,31 +60,38 @@ VALUES = [
     *("f + g", "f * g / 3.0", "f * d", "f + k", "f * b", "f + u", "f + i", "f + j", "-f * 0.1"),
     *("f // 0.3", "f % 0.7", "f ** 2", "f ** 0.5", "f * g[0]"),
     *("u + 1", "u * 2", "u - 1", "200 + u", "u + w", "u * w", "u - w", "u // 7", "u % 9", "u / 7"),
-    *("u * 0.5", "u + f", "u + i", "u + j", "u + d", "-u", "u & 15", "u | w", "u ^ w", "~u", "u ** 2"),
+    *("u * 0.5", "u + f", "u + i", "u + j", "u + d", "-u", "u & 15", "u | w", "u ^ w", "~u"),
+    "u ** 2",
     *("i * 3", "i + 1", "j * 2", "j + k", "l + 1", "l * l", "l // 3", "l % 7", "i // 5", "i % 5"),
     *("f < 0.1", "f <= x", "f == g", "f > d", "u < 7", "u > 300", "u == n", "i < x", "f > 1"),
-    *("f[0] + g[1]", "f[0] * g[0] - f[2]", "f[0] / g[0]", "u[0] + w[0]", "u[0] * w[1]", "u[0] - w[0]"),
+    *("f[0] + g[1]", "f[0] * g[0] - f[2]", "f[0] / g[0]", "u[0] + w[0]", "u[0] * w[1]"),
+    "u[0] - w[0]",
     *("-u[0] + w[0]", "abs(i[0])", "f[0] * f[1] * f[2]", "u[0] * 0.5"),
     *("f[0] > 0.5", "f[0] < 0", "u[0] > 100", "u[0] == n", "f[0] < g[0]", "i[0] > u[0]"),
-    *("float(f[0]) * 0.1", "int(u[0]) + 200", "float(f[0]) < x", "s * 0.1", "s * s", "t + 200", "-t"),
+    *("float(f[0]) * 0.1", "int(u[0]) + 200", "float(f[0]) < x", "s * 0.1", "s * s", "t + 200"),
+    "-t",
     *("t - 255", "self.small + 250", "s + x", "math.sqrt(abs(f[0]))", "max(f[0], g[0])"),
     *("np.sum(f)", "f.sum()", "np.sum(m, axis=0)", "np.sum(m, axis=1)", "np.mean(f)", "f.mean()"),
     *("np.mean(m, axis=0)", "np.mean(m, axis=1)", "np.std(f)", "np.var(m, axis=1)", "np.std(m)"),
     *("np.median(f)", "np.max(f) * g[0]", "np.ptp(f)", "np.prod(f)", "np.cumsum(f)", "np.sum(u)"),
     *("np.mean(u)", "np.std(i)", "np.max(u)", "np.ptp(i)", "np.cumsum(u)", "np.sum(u) * 0.5"),
     *("np.minimum(f, 0.1)", "np.maximum(0.3, f)", "np.clip(f, -0.1, 0.1)", "np.clip(u, 5, 200)"),
-    *("np.clip(f, -x * x, x * x)", "np.minimum(f, g) * 0.1", "np.clip(u, 1, w)", "np.clip(f, 0, 1)"),
+    *("np.clip(f, -x * x, x * x)", "np.minimum(f, g) * 0.1", "np.clip(u, 1, w)"),
+    "np.clip(f, 0, 1)",
     *("np.where(b, f, 0.1)", "np.where(b, f, g)", "np.where(b, 0.5, f) * 0.1", "np.where(b, u, 7)"),
     *("np.where(b, f, d)", "np.sqrt(abs(f))", "np.floor(f)", "np.abs(f) * 0.1", "np.sign(f)"),
     *("np.isfinite(f)", "np.interp(x, [0.0, 1.0], [f[0], f[1]])", "np.argsort(f, kind='stable')"),
     *("np.sort(f) * 0.1", "np.concatenate((f, g)) * 0.1", "np.concatenate((f, d))", "np.diff(f)"),
-    *("f[::-1] * 0.1", "f[b] * 0.1", "m.T[0] * 0.1", "np.array([f[0], 0.1])", "f + [0.1, 0.2, 0.3, 0.4]"),
+    *("f[::-1] * 0.1", "f[b] * 0.1", "m.T[0] * 0.1", "np.array([f[0], 0.1])"),
+    "f + [0.1, 0.2, 0.3, 0.4]",
     *("np.array([f[0], g[0]]) * 0.1", "f.astype(float) * 0.1", "d.astype(np.float32) * 0.1"),
     *("np.float32(x) * f", "np.float32(x) * np.float32(0.1)", "np.zeros(4, np.float32) + 0.1"),
     *("TABLE * 0.1", "TABLE + f", "np.add(f, 0.1)", "np.multiply(u, 2)"),
     *("scaled(f, x)", "f * math.sin(x)", "f * (x if n > 0 else 0.5)", "f * min(x, 0.1)"),
-    *("f * float(d[0])", "f * abs(x)", "u + len(u)", "np.square(f) * 0.1", "np.outer(f[:2], g[:3])"),
-    *("np.roll(f, 1) * 0.1", "np.count_nonzero(u)", "np.any(f > 0.1)", "np.searchsorted(np.sort(f), x)"),
+    *("f * float(d[0])", "f * abs(x)", "u + len(u)", "np.square(f) * 0.1"),
+    "np.outer(f[:2], g[:3])",
+    *("np.roll(f, 1) * 0.1", "np.count_nonzero(u)", "np.any(f > 0.1)"),
+    "np.searchsorted(np.sort(f), x)",
     *("np.cross(f[:3], g[:3])", "np.trace(m[:, :3])", "divmod(n, 7)[1]", "np.hstack((f, g)) * 0.1"),
 ]  # fmt: skip
 # Statements that change the state.
@@ -161,8 +168,6 @@ FAULTS = {
     "self.out[:4] = u + n": "a number does not fit uint8",
     "self.bytes[1] += n": "a number does not fit uint8",
 }
-
-
 
 
 def _component(folder: Path, ways: list[str]) -> Any:
@@ -265,7 +270,7 @@ def test_a_uint64_beyond_int64_is_a_fault(tmp_path: Path) -> None:
     file.write_text(f"{source}\n    def update(self):\n        self.out[0] = self.t.value >> 1\n")
     (cls,) = modules.components(modules.load(file))
     inside = Inside(lowering.compile_component(cls))
-    component = cls()
+    component: Any = cls()
     component.t.put(2**63 - 1)
     record = component._record.copy()
     assert inside.call("update", record) is None

@@ -246,7 +246,7 @@ def test_ints_are_shifted_as_in_python(text: str, shifts: Any) -> None:
             record = cls()._record
             record["which"], record["x"], record["n"], record["small"] = which, x, n, x % 5 - 3
             said = compiled.call("update", record)
-            names = {"x": x, "n": n, "halved": lambda x, n: x >> n}
+            names: dict[str, Any] = {"x": x, "n": n, "halved": lambda x, n: x >> n}
             plain = text.replace("self.small", str(x % 5 - 3)).replace("self.x", "x")
             try:
                 if "=" in text:
@@ -262,7 +262,10 @@ def test_ints_are_shifted_as_in_python(text: str, shifts: Any) -> None:
 @pytest.mark.parametrize("text", OF_VECTORS)
 def test_arrays_are_shifted_as_by_numpy(text: str, shifts: Any) -> None:
     cls, compiled, steps = shifts
-    names = {"k": np.array([1, -1, 77, -(2**63), 2**62]), "b": np.array([1, 2, 8, 9, 200], np.uint8)}
+    names = {
+        "k": np.array([1, -1, 77, -(2**63), 2**62]),
+        "b": np.array([1, 2, 8, 9, 200], np.uint8),
+    }
     for n in COUNTS:
         for c in ([0, 1, 63, 64, 65], [-1, 3, 1000, -64, 2]):
             record = cls()._record

@@ -104,7 +104,7 @@ def test_a_statement_does_what_it_does_in_python(text: str, both: tuple[Any, Any
 
 
 def test_the_comparison_runs_them_as_python_does(both: tuple[Any, Any]) -> None:
-    component, changed = both[0](), verify._interpreted(both[0])()
+    component, changed = both[0](), verify._interpreted(both[0], ())()
     for which in range(len(STATEMENTS)):
         for _ in range(5):
             for each in (component, changed):

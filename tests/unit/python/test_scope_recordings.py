@@ -22,7 +22,7 @@ _HEAD = 40
 _BEGIN_NS = 10**18
 
 
-def _record(file: Path, values: NDArray[np.float64], lost: int) -> None:
+def _record(file: Path, values: NDArray[Any], lost: int) -> None:
     """Record a state, with so many cycles lost in the middle."""
     column = ports_pb2.PortColumn(
         component="/a", name="x", kind=ports_pb2.PortColumn.KIND_STATE, type="double", size=8

@@ -99,7 +99,7 @@ def _with_array(operation: Callable[..., Any], left: Operand, right: Operand) ->
         for each in (_weak(array.dtype, number.dtype), number.dtype)
     )
     if number.is_narrow:
-        # A number of NumPy: its type does not count in the older release if it is of no higher kind.
+        # In the older release the type of a NumPy number only counts if its kind is higher.
         if as_python != as_numpy and _order(number) <= _order(array):
             _differ(array, number)
         return _of_types(left, right)
@@ -117,8 +117,9 @@ def _of_types(left: Operand, right: Operand) -> Meeting:
     if np.promote_types(left.dtype, right.dtype) != np.float64:
         return Meeting()
     to = np.dtype(np.float64)
-    narrow = (each.dtype == np.float32 for each in (left, right))
-    return Meeting(*(to if each else None for each in narrow))
+    return Meeting(
+        to if left.dtype == np.float32 else None, to if right.dtype == np.float32 else None
+    )
 
 
 def _order(each: Operand) -> int:

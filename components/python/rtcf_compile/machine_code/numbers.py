@@ -175,7 +175,7 @@ class Numbers:
         return [value.value] if isinstance(value, ir.Expr) and value.op == "cast" else []
 
     def _becomes_float(self, assignment: Any) -> bool:
-        """Tell whether ints are set to a variable that is a float, or are the largest beside one."""
+        """Tell whether ints are set to a float variable, or are the largest beside one."""
         value, sources = assignment.value, self._sources(assignment)
         if isinstance(value, ir.Expr) and value.op == "call":
             sources = list(value.args) if self.function(value.func) in (max, min) else []
@@ -346,10 +346,12 @@ class Numbers:
             raise self.stop(what, way_out) from None
         for to, variable in ((meeting.left, variables[0]), (meeting.right, variables[1])):
             constant = self.constant(variable)
-            if to is not None and to.kind in "iu" and type(constant) is int:
-                if not operators.fits(constant, to):
-                    raise self.stop(f"{constant} does not fit {to.name}", "convert the array: "
-                                    "x.astype(int)")  # fmt: skip
+            if to is None or to.kind not in "iu" or type(constant) is not int:
+                continue
+            if not operators.fits(constant, to):
+                raise self.stop(
+                    f"{constant} does not fit {to.name}", "convert the array: x.astype(int)"
+                )
         if meeting.weak is not None and not self.is_python(variables[meeting.weak]):
             array, number = (one, other) if one.is_array else (other, one)
             raise self.stop(
@@ -464,7 +466,6 @@ class Numbers:
             return {value.lhs.name, value.rhs.name} <= known
         return False
 
-
     def _item(self, value: Any) -> Any:
         """Return the variable that an element of several values is; None if it is not known."""
         made = self._assigned.get(value.value.name, [])
@@ -541,7 +542,7 @@ class Bounds:
                 for each in self._numbers.operands(value)
                 if isinstance(self._numbers.type_of(each.name), types.Float)
             ] or names
-        return names[0].partition(".")[0]
+        return str(names[0]).partition(".")[0]
 
     def _line(self, assignment: Any) -> int:
         """Return where an int comes to what joins several values, else the assignment's line."""

@@ -20,7 +20,6 @@ from rtcf_compile.machine_code.overloads import (
     require_kind,
     words,
 )
-from rtcf_compile.rewriting import helpers
 from rtcf_compile.rewriting import operators as own
 
 _DIVISIONS = (operator.truediv, operator.floordiv, operator.mod)

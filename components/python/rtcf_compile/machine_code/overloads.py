@@ -75,9 +75,7 @@ def _refuse_narrow(helper: Callable[..., Any], kind: Any, refused: str) -> None:
     other = number is not None and (number.is_narrow or number.is_bool)
     if number is not None and other and number.dtype.kind in refused:
         way_out = "convert it: x.astype(float)" if number.is_array else plain_of(number)
-        raise TypingError(
-            f"RTCF:{NAMES.get(helper.__name__, 'this')} of {number.words}:{way_out}"
-        )
+        raise TypingError(f"RTCF:{NAMES.get(helper.__name__, 'this')} of {number.words}:{way_out}")
 
 
 def _again(helper: Callable[..., Any], names: list[str], changed: dict[str, str]) -> Any:

@@ -491,7 +491,10 @@ _LIBM = ctypes.CDLL(ctypes.util.find_library("m") or "libm.so.6")
 def _of_the_c_library(function: Function, name: str) -> Function:
     count = 2 if name in ("atan2", "hypot", "pow") else 1
     by_type = {}
-    for suffix, c_type, dtype in (("", ctypes.c_double, np.float64), ("f", ctypes.c_float, np.float32)):
+    for suffix, c_type, dtype in (
+        ("", ctypes.c_double, np.float64),
+        ("f", ctypes.c_float, np.float32),
+    ):
         c_function = _LIBM[name + suffix]
         c_function.argtypes, c_function.restype = [c_type] * count, c_type
         by_type[np.dtype(dtype)] = np.vectorize(c_function, otypes=[dtype])

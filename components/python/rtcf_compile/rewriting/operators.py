@@ -19,7 +19,10 @@ WIDE = frozenset(np.dtype(each) for each in (np.bool_, np.int64, np.float64))
 # Shifts by more have no bit left, and Python makes no endless number of it.
 _LONGEST_SHIFT = 4096
 _DIVISIONS = (operator.truediv, operator.floordiv, operator.mod)
-_COMPARISONS = (operator.lt, operator.le, operator.gt, operator.ge, operator.eq, operator.ne)
+_COMPARISONS: tuple[Function, ...] = (
+    *(operator.lt, operator.le, operator.gt, operator.ge),
+    *(operator.eq, operator.ne),
+)
 
 
 def is_narrow(dtype: np.dtype[Any]) -> bool:
@@ -118,10 +121,11 @@ COMPARISONS: dict[type[ast.cmpop], Function] = {
     **{ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge},
     **{ast.Eq: operator.eq, ast.NotEq: operator.ne},
 }
-EXTREMES = (np.minimum, np.maximum)
+EXTREMES: tuple[Function, ...] = (np.minimum, np.maximum)
+_OPERATORS: tuple[Function, ...] = (*BINARY.values(), *_COMPARISONS)
 # Functions in the place of operators, by these.
 OF: dict[Function, Function] = {
-    **{each: _operated(each) for each in (*BINARY.values(), *_COMPARISONS)},
+    **{each: _operated(each) for each in _OPERATORS},
     **{each: _shifted(each) for each in SHIFTS.values()},
     **{each: _extreme(each) for each in EXTREMES},
 }
@@ -134,9 +138,7 @@ COMPARED: frozenset[type[ast.AST]] = frozenset(
 )
 # `x[i] += value` of an element; what does not fit it goes round, as it does when it is stored.
 OF_ELEMENTS: dict[type[ast.operator], Function] = {
-    node: _stored(operation)
-    for node, operation in BINARY.items()
-    if operation not in _DIVISIONS
+    node: _stored(operation) for node, operation in BINARY.items() if operation not in _DIVISIONS
 }
 # Functions of NumPy that are operators.
 UFUNCS: dict[Function, Function] = {
@@ -170,7 +172,9 @@ def rtcf_divmod(left: Any, right: Any) -> Any:
     return divmod(left, right)
 
 
-BY_NAME: dict[str, Function] = {
-    each.__name__: each
-    for each in (*OF.values(), *OF_ELEMENTS.values(), rtcf_plain, rtcf_negative, rtcf_divmod)
-}
+_ALL: tuple[Function, ...] = (
+    *OF.values(),
+    *OF_ELEMENTS.values(),
+    *(rtcf_plain, rtcf_negative, rtcf_divmod),
+)
+BY_NAME: dict[str, Function] = {each.__name__: each for each in _ALL}

@@ -20,10 +20,9 @@ from rtcf_compile.source.mistake import at
 from rtcf_compile.source.modules import Source, is_own
 
 _Node = TypeVar("_Node", bound=ast.AST)
-_OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
-    node: operators.OF[operation]
-    for by_node in (operators.BINARY, operators.SHIFTS, operators.COMPARISONS)
-    for node, operation in by_node.items()
+_BY_NODE: tuple[Any, ...] = (operators.BINARY, operators.SHIFTS, operators.COMPARISONS)
+_OPERATORS: dict[type[ast.AST], operators.Function] = {
+    node: operators.OF[operation] for by_node in _BY_NODE for node, operation in by_node.items()
 }
 _STANDS_FOR = [*INSTEAD.items(), *numpy_functions.STANDS_FOR]
 # Temporaries of a cycle in the real-time thread, bytes.
@@ -429,7 +428,7 @@ class Products(ast.NodeTransformer):
                 for each in (self.visit(each) for each in node.args)
             ]
             return node
-        if operators.NARROW == self._functions and isinstance(target, np.ufunc):
+        if self._functions == operators.NARROW and isinstance(target, np.ufunc):
             of = operators.UFUNCS.get(target)
             if of is not None and len(node.args) == target.nin and not node.keywords:
                 return self._instead(node, operators.OF[of], node.args)
@@ -472,7 +471,7 @@ class Products(ast.NodeTransformer):
             )
         if self._is_other(node, target):
             self.others.append(node)
-        if operators.NARROW == self._functions and getattr(target, "__module__", "") == "math":
+        if self._functions == operators.NARROW and getattr(target, "__module__", "") == "math":
             node.args = [like(each, call_of("rtcf_plain", self.visit(each))) for each in node.args]
             return node
         self.generic_visit(node)
@@ -768,7 +767,7 @@ class Products(ast.NodeTransformer):
         is_function = type(node.op) in self._functions and type(node.op) not in IN_PLACE
         if in_parts or is_function or isinstance(node.op, ast.MatMult | ast.Pow):
             value: ast.expr = ast.BinOp(loaded(target), node.op, node.value)
-            if in_parts and operators.NARROW == self._functions:
+            if in_parts and self._functions == operators.NARROW:
                 value = changed_elements(loaded(target), node.op, node.value)
             # An array is changed, whatever names it has.
             if isinstance(target, ast.Name) and not isinstance(node.op, ast.MatMult):
@@ -867,7 +866,7 @@ def _has_walrus(node: ast.AST) -> bool:
     return any(isinstance(each, ast.NamedExpr) for each in ast.walk(node))
 
 
-def _place(node: ast.AST) -> tuple[int, int]:
+def _place(node: Any) -> tuple[int, int]:
     return node.lineno, node.col_offset
 
 
@@ -875,7 +874,7 @@ def _is_before(node: ast.AST, other: ast.AST) -> bool:
     return _place(node) < _place(other)
 
 
-def _contains(node: ast.AST, other: ast.AST) -> bool:
+def _contains(node: Any, other: ast.AST) -> bool:
     end = (node.end_lineno, node.end_col_offset)
     return _place(node) <= _place(other) < end
 

@@ -78,7 +78,7 @@ class Hook(Ports):
         )
         return like(tree, ast.FunctionDef(tree.name, arguments, body, []))
 
-    def visit(self, node: ast.AST) -> Any:
+    def visit(self, node: Any) -> Any:
         """Note the line before a statement that calls something: what it calls has other lines."""
         calls = (ast.Call, ast.Subscript, ast.BinOp)
         simple = (ast.Expr, ast.Assign, ast.AugAssign, ast.Return)

@@ -30,10 +30,11 @@ def at(file: str, node: ast.AST, what: str, way_out: str) -> Mistake:
 
 def written(file: str, node: ast.AST) -> str:
     """Return a short expression of one line as the source has it; else nothing."""
-    line, begin, end = (
-        getattr(node, each, None) for each in ("lineno", "col_offset", "end_col_offset")
+    line, last, begin, end = (
+        getattr(node, each, None)
+        for each in ("lineno", "end_lineno", "col_offset", "end_col_offset")
     )
-    if line is None or begin is None or end is None or node.end_lineno != line:
+    if line is None or begin is None or end is None or last != line:
         return ""
     text = linecache.getline(file, line).encode()[begin:end].decode(errors="replace").strip()
     return text if len(text) <= 60 else ""
