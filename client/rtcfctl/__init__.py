@@ -1,1 +1,1 @@
-"""rtcfctl, the command line of rtcf: a module per noun, a room per subject."""
+"""rtcfctl, the command line of rtcf: a package for each subject, a module for each noun."""

@@ -1,4 +1,4 @@
-"""`python3 -m rtcfctl`."""
+"""Runs rtcfctl as `python3 -m rtcfctl`."""
 
 import sys
 

@@ -1,7 +1,7 @@
 """Completes command lines for shells: verbs and options from the parser, names from rtcfd.
 
-The shell calls `rtcfctl __complete WORD...` with the words after rtcfctl, the
-last one being completed (see completion/rtcfctl); answers are lines.
+The shell calls `rtcfctl __complete WORD...` with the words after rtcfctl, of which
+it completes the last one (see completion/rtcfctl).  Each candidate is one line.
 """
 
 import argparse
@@ -16,7 +16,7 @@ from rtcf.v1 import graph_pb2
 
 
 def candidates(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str]:
-    """Return what the last word may become; nothing where that is a file or a free value."""
+    """Return the candidates for the last word; empty for a file or a free value."""
     *before, prefix = words or [""]
     line = _Line(parser)
     for word in before:
@@ -24,22 +24,22 @@ def candidates(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[st
     try:
         return sorted({word for word in line.next(prefix) if word.startswith(prefix)})
     except rtcf.RtcfError:
-        return []  # a shell's prompt is no place for errors
+        return []  # do not print errors at a shell's prompt
 
 
 def _asleep(socket: str) -> bool:
-    """Tell whether a connection would wake the system's daemon up: a shell's prompt must not."""
+    """Return whether a connection would start the system's rtcfd, which completion must not do."""
     if socket != DEFAULT_SOCKET:
         return False
     try:
         asked = subprocess.run(["systemctl", "is-active", "--quiet", "rtcfd.service"])
     except OSError:
-        return False  # no systemd, nobody to be woken up
+        return False  # without systemd, no socket activation
     return asked.returncode != 0
 
 
 def _declared(client: rtcf.Client, package: str, type_name: str, source: str) -> Iterator[str]:
-    """Yield the parameters, ports or inputs of a type that is being loaded."""
+    """Yield the parameters, ports or inputs of the component type to load."""
     for each in client.list_types(package).types:
         if each.type != type_name:
             continue
@@ -53,7 +53,7 @@ def _declared(client: rtcf.Client, package: str, type_name: str, source: str) ->
 
 
 def _ports(client: rtcf.Client, runner: str, direction: graph_pb2.Direction) -> Iterator[str]:
-    """Yield the ports of all components that are of one direction."""
+    """Yield the ports of one direction of all components."""
     for component in client.list_components(runner):
         name = component.full_name.removeprefix("/")
         yield from (
@@ -62,7 +62,7 @@ def _ports(client: rtcf.Client, runner: str, direction: graph_pb2.Direction) -> 
 
 
 class _Line:
-    """What the words before the one that is completed mean."""
+    """The meaning of the words before the completed one."""
 
     def __init__(self, parser: argparse.ArgumentParser) -> None:
         self._parser = parser
@@ -72,7 +72,7 @@ class _Line:
         self._values: dict[str, str] = {}
 
     def take(self, word: str) -> None:
-        """Take one word."""
+        """Parse one word."""
         if self._option is not None:
             self._values[self._option.dest] = word
             self._option = None
@@ -86,13 +86,13 @@ class _Line:
                     self._option = action
         elif (below := self._sub_parsers()) is not None:
             self._verbs.append(word)
-            # After a verb that is not known nothing can follow.
+            # An unknown verb has no candidates.
             self._parser = below.get(word, argparse.ArgumentParser(add_help=False))
         else:
             self._given.append(word)
 
     def next(self, prefix: str) -> Iterator[str]:
-        """Yield all that may follow."""
+        """Yield the candidates for the next word."""
         if self._option is not None:
             yield from self._of(self._option)
         elif prefix.startswith("-"):
@@ -125,12 +125,12 @@ class _Line:
         if source == "NAME" and ("runner" in self._verbs or action.dest == "runner"):
             source = "RUNNER"
         if "host" in self._values:
-            return []  # no TAB asks for a password
+            return []  # ssh might ask for a password
         with rtcf.Client(self._values.get("socket")) as client:
             return [] if _asleep(client.socket) else list(self._live(client, source))
 
     def _live(self, client: rtcf.Client, source: str) -> Iterator[str]:
-        """Yield names that rtcfd knows."""
+        """Yield names from rtcfd."""
         runner = self._values.get("runner", "")
         if source == "RUNNER":
             yield from (str(each.runner) for each in client.get_status().runners)

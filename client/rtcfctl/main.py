@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 DONE, REFUSED, USAGE, UNREACHABLE = range(4)
 
-# The module of each verb; only that of the one that is called is imported, as each import is time.
+# The module of each verb.  Only the module of the called verb is imported: imports take time.
 _MODULES = {
     "status": "loop.status",
     "runner": "loop.runner",
@@ -69,10 +69,10 @@ _MODULES = {
     "new": "machine.new",
 }
 _COMPLETION = "__complete"
-# Global options that are followed by a word of theirs.
+# Global options that take the next word as their value.
 _WITH_VALUE = ("-H", "--host", "--socket", "-r", "--runner", "-o", "--output")
 _WITH_EQUALS = ("--host=", "--socket=", "--runner=", "--output=")
-# Verbs that are about the machine they run on.
+# Verbs that work only on the local machine.
 _OF_THIS_MACHINE = ("check", "doctor", "run")
 
 
@@ -91,7 +91,7 @@ def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None)
     from rtcfctl.terminal.output import Output
 
     output = Output(args.output, args.verbose)
-    # By the command, until here and after us.
+    # The program rtcfctl sets SIG_DFL, which holds before and after this call.
     minds = signal.getsignal(signal.SIGINT) is signal.SIG_DFL
     try:
         if minds:
@@ -103,17 +103,18 @@ def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None)
                 signal.setitimer(signal.ITIMER_REAL, 0.0)
                 signal.signal(signal.SIGINT, signal.SIG_DFL)
     except KeyboardInterrupt:
-        return _fail("interrupted; a change that had begun goes on", REFUSED)
+        return _fail("interrupted; a change that had started continues", REFUSED)
 
 
-# Python's import system, by whatever name its frames have.
+# Modules of Python's import system, to recognise their frames.
 _IMPORTS = [sys.modules[name] for name in ("_frozen_importlib", "_frozen_importlib_external")]
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    """Take Ctrl-C once: the next one ends us at once, whatever we are doing then.
+    """Raise KeyboardInterrupt at the first Ctrl-C; the next one kills the process at once.
 
-    An import is finished first: an exception there is lost, or taken for a module that is missing.
+    During an import, try again 20 ms later: the import system would lose the exception, or
+    report a missing module.
     """
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     while frame is not None:
@@ -126,13 +127,13 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def _run(args: argparse.Namespace, output: "Output") -> int:
-    """Do what a command line says; return the exit code."""
+    """Run the parsed command; return the exit code."""
     try:
         with ExitStack() as ways:
             if args.host is not None:
                 ways.enter_context(_another_machine(args))
             client = ways.enter_context(rtcf.Client(args.socket))
-            # What a verb returns is its own verdict, e.g. doctor's.
+            # A verb may return an exit code of its own, as doctor does.
             code = args.run(client, args, output)
             sys.stdout.flush()
             return code or DONE
@@ -143,9 +144,9 @@ def _run(args: argparse.Namespace, output: "Output") -> int:
     except ValueError as error:
         return _fail(error, USAGE)
     except BrokenPipeError:
-        _drop_output()  # its reader has seen enough
+        _drop_output()  # the reader has closed the pipe
     except OSError as error:
-        # Of a file that is not ours to name here, as a disk that is full.
+        # If flushing standard output fails, the error is there, e.g. a full disk.
         try:
             sys.stdout.flush()
         except OSError:
@@ -158,12 +159,12 @@ def _run(args: argparse.Namespace, output: "Output") -> int:
 
 @contextmanager
 def _another_machine(args: argparse.Namespace) -> Iterator[None]:
-    """Have the socket of another machine for ours."""
+    """Forward the control socket of another machine, and use it as args.socket."""
     from rtcfctl.machine import remote
 
     if args.verb in _OF_THIS_MACHINE:
         raise ValueError(
-            f"{args.verb} is about the machine it runs on: ssh {args.host} rtcfctl {args.verb}"
+            f"{args.verb} works on the local machine: use ssh {args.host} rtcfctl {args.verb}"
         )
     there = args.socket or DEFAULT_SOCKET
     with remote.control_socket_of(args.host, args.socket) as here:
@@ -177,24 +178,24 @@ def _another_machine(args: argparse.Namespace) -> Iterator[None]:
 
 
 def _drop_output() -> None:
-    """Write nothing more to standard output: Python would complain once more at exit."""
+    """Discard further standard output; else Python reports the error again at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def parser(verb: str = "") -> argparse.ArgumentParser:
-    """Return the parser of the whole command line, or of a line with that verb."""
+    """Return the parser of all commands, or only of the given verb."""
     result = argparse.ArgumentParser(
         prog="rtcfctl",
         description="Controls the real-time loops of rtcfd.",
-        epilog="Exit codes: 0 done, 1 refused, 2 usage, 3 rtcfd not reachable.",
+        epilog="Exit codes: 0 success, 1 error, 2 usage error, 3 rtcfd cannot be reached.",
     )
     result.add_argument("--version", action="version", version=f"rtcfctl {rtcf.__version__}")
     _global_options(result, defaults=True)
     verbs = result.add_subparsers(metavar="COMMAND", required=True)
-    # Global options may also stand behind the verb; there they have no default,
-    # which would hide one that was given before it.
+    # Global options may also follow the verb.  There they have no default, which would
+    # override a value given before the verb.
     for module in [_MODULES[verb]] if verb else dict.fromkeys(_MODULES.values()):
-        # Of its own: a verb for which -o is a file takes that word away from it.
+        # A new parser for each module: verbs that use -o for a file remove it from the parser.
         common = argparse.ArgumentParser(add_help=False)
         _global_options(common, defaults=False)
         importlib.import_module(f"rtcfctl.{module}").register(verbs, common)
@@ -202,7 +203,7 @@ def parser(verb: str = "") -> argparse.ArgumentParser:
 
 
 def verb_of(words: Sequence[str]) -> str:
-    """Return the verb of a command line, or nothing where it takes the whole parser to tell."""
+    """Return the verb of a command line, or "" if only the whole parser can find it."""
     left = iter(words)
     for word in left:
         if word in _MODULES:
@@ -223,7 +224,7 @@ def _global_options(to: argparse.ArgumentParser, defaults: bool) -> None:
         "--host",
         metavar="[USER@]HOST",
         default=default(None),
-        help="rtcfd of another machine, by way of ssh",
+        help="use rtcfd of another machine, through ssh",
     )
     to.add_argument(
         "--socket",
@@ -236,7 +237,7 @@ def _global_options(to: argparse.ArgumentParser, defaults: bool) -> None:
         "--runner",
         metavar="NAME",
         default=default(""),
-        help="the runner meant (default: rt_runner)",
+        help="select the runner (default: rt_runner)",
     )
     to.add_argument(
         "-o",
@@ -250,7 +251,7 @@ def _global_options(to: argparse.ArgumentParser, defaults: bool) -> None:
         "--verbose",
         action="store_true",
         default=default(False),
-        help="show what long calls are doing (always on a terminal, and after 10 s)",
+        help="print the progress of long calls (always on a terminal, and after 10 s)",
     )
 
 

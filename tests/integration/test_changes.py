@@ -125,7 +125,7 @@ def test_a_replacement_keeps_the_parameters_that_it_does_not_name(
     client.start()
     assert daemon.ctl("set", "knobs", "count:=4", "label:=mine").returncode == 0
     done = daemon.ctl("replace", "knobs", "rtcf_test", "Knobs", "--param", "label:=theirs")
-    assert done.stdout == "replaced knobs by /knobs, which keeps count 4, rate 2.5\n"
+    assert done.stdout == "replaced knobs by /knobs; kept count 4, rate 2.5\n"
     assert _values(client, "knobs") == {
         "enabled": True, "count": 4, "rate": 2.5, "label": "theirs", "mode": "run",
     }  # fmt: skip

@@ -136,7 +136,7 @@ def test_what_ends_the_process_is_told_as_what_it_is(name: str, said: str) -> No
 
 def test_outputs_that_carry_nan_are_told() -> None:
     done = check_plainly("rtcf_faults", "WritesNan", "--cycles", "50")
-    assert "rtcf_faults/WritesNan: output value carried NaN or infinity\n" in done.stdout
+    assert "rtcf_faults/WritesNan: output value had NaN or infinity\n" in done.stdout
     found = json.loads(check_plainly("rtcf_faults", "WritesNan", "-o", "json").stdout)
     assert found["not_finite"] == ["value"]
     assert check_plainly("rtcf_faults", "WritesNan", "--cycles", "9").stdout == (

@@ -75,7 +75,7 @@ def test_a_loop_that_does_not_run_is_no_silence(running: Daemon, tmp_path: Path,
     )
     assert process.stderr is not None
     assert process.stderr.readline() == (
-        "rtcfctl: note: the loop of rt_runner does not run: its values come once it is started "
+        "rtcfctl: note: the loop of rt_runner does not run: no values until it is started "
         "(`rtcfctl -r rt_runner start`)\n"
     )
     assert running.ctl("start").returncode == 0

@@ -135,7 +135,7 @@ def test_a_short_chain_is_drawn_from_left_to_right(
 @pytest.mark.parametrize(
     ("file", "code", "said"),
     [
-        ("x.gif", 2, "a picture is .svg, .png, .dot"),
+        ("x.gif", 2, "use one of .svg, .png, .dot"),
         ("no/x.dot", 1, "No such file or directory"),
     ],
 )
@@ -154,6 +154,6 @@ def test_without_graphviz_it_is_said_how_to_get_it(loaded: Daemon, tmp_path: Pat
                       str(tmp_path / "x.svg"))  # fmt: skip
     assert done.returncode == 1
     assert done.stderr == (
-        "rtcfctl: no Graphviz to draw it: sudo apt install graphviz, or write a .dot file\n"
+        "rtcfctl: Graphviz not found: sudo apt install graphviz, or write a .dot file\n"
     )
     assert not (tmp_path / "x.svg").exists()

@@ -164,7 +164,7 @@ def test_a_file_is_exported_and_removed(
     assert daemon.ctl("incident", "export", incident.name, "--to", str(to)).returncode == 0
     assert to.read_bytes() == Path(incident.file).read_bytes()
     again = daemon.ctl("incident", "export", incident.name, "--to", str(to))
-    assert again.returncode != 0 and "is there already" in again.stderr
+    assert again.returncode != 0 and "exists: choose another file" in again.stderr
     refused = daemon.ctl("incident", "rm", incident.name, "other")
     assert refused.returncode == 1 and "no incident other" in refused.stderr
     assert Path(incident.file).exists(), "all of them or none"

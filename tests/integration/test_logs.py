@@ -142,7 +142,7 @@ def test_following_goes_on_until_ctrl_c(daemon: Daemon, client: rtcf.Client) -> 
         (("logs", "wav"), 1, "no component /wav in runner rt_runner, and no log record of one; "
          'did you mean "/wave"? (components: /mimo, /wave)'),
         (("logs", "--level", "loud"), 2, "invalid choice: 'loud'"),
-        (("logs", "-n", "-1"), 2, "-1: a whole number from 0"),
+        (("logs", "-n", "-1"), 2, "-1: use a whole number from 0"),
         (("-r", "nobody", "logs"), 1, 'no runner "nobody" (runners: rt_runner)'),
     ],
 )  # fmt: skip

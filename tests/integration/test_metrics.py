@@ -134,7 +134,7 @@ def test_they_are_served_and_say_when_rtcfd_is_gone(counted: Daemon) -> None:
 def test_what_is_no_port_is_refused(daemon: Daemon, place: str) -> None:
     done = daemon.ctl("metrics", "--listen", place)
     assert done.returncode == 2
-    assert done.stderr == f"rtcfctl: --listen {place}: a port, or ADDRESS:PORT\n"
+    assert done.stderr == f"rtcfctl: --listen {place}: use PORT or ADDRESS:PORT\n"
 
 
 @pytest.mark.parametrize(
@@ -218,7 +218,7 @@ def test_bars_in_the_terminal_show_an_outlier_and_the_others(
         ("calculation duration", figures.duration), ("wake-up latency", figures.latency),
     ):  # fmt: skip
         after = done.stdout.partition(f"\n{title} (µs), ")[2]
-        assert after.startswith(f"{found.count} cycles; bars are logarithmic\n")
+        assert after.startswith(f"{found.count} cycles, logarithmic bars\n")
         bars = re.findall(
             r"^ *([\d.]+) to +([\d.]+) ([█▏▎▍▌▋▊▉]*) +(\d[\d ]*?)(?:  (.*))?$",
             after.partition("\n\n")[0], re.MULTILINE,
@@ -246,10 +246,10 @@ def test_programs_get_the_buckets(counted: Daemon) -> None:
 
 def test_pictures_that_cannot_be_are_refused(daemon: Daemon, tmp_path: Path) -> None:
     for words, code, said in (
-        (("loop.gif",), 2, "loop.gif: a picture is .svg, .png, .pdf"),
-        (("loop.png", "--watch"), 2, "--plot draws one picture: give it without --watch"),
-        ((), 1, "rt_runner has run no cycle: there is nothing to draw"),
-        (("loop.png",), 1, "rt_runner has run no cycle: there is nothing to draw"),
+        (("loop.gif",), 2, "loop.gif: use one of .svg, .png, .pdf"),
+        (("loop.png", "--watch"), 2, "--plot cannot be used with --watch"),
+        ((), 1, "rt_runner has run no cycles: nothing to draw"),
+        (("loop.png",), 1, "rt_runner has run no cycles: nothing to draw"),
     ):
         done = daemon.ctl("stats", "--plot", *words)
         assert done.returncode == code

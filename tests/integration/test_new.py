@@ -116,15 +116,15 @@ def test_catkin_builds_it(tmp_path: Path, environment: dict[str, str]) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("Arm Pi", "package 'Arm': small letters, digits and _, as ROS names packages: my_arm"),
-        ("../arm Pi", "package '../arm': small letters"),
-        ("my__arm Pi", "package 'my__arm': small letters"),
-        ("test Pi", "package test: CMake has a target of that name; choose another"),
-        ("my_arm pi", "component 'pi': letters and digits, a capital first"),
-        ("my_arm 'Pi;'", "component 'Pi;': letters and digits"),
-        ("my_arm Input", "component Input: rtcf has a class of that name"),
-        ("my_arm Json --python", "its module would be json.py, and hide Python's json"),
-        ("there Pi", "there is there already: name another package, or move it"),
+        ("Arm Pi", "package 'Arm': use lower-case letters, digits and _, e.g. my_arm"),
+        ("../arm Pi", "package '../arm': use lower-case letters"),
+        ("my__arm Pi", "package 'my__arm': use lower-case letters"),
+        ("test Pi", "package test: CMake has a target of this name; choose another"),
+        ("my_arm pi", "component 'pi': use letters and digits with a capital first"),
+        ("my_arm 'Pi;'", "component 'Pi;': use letters and digits"),
+        ("my_arm Input", "component Input: rtcf has a class of this name"),
+        ("my_arm Json --python", "its module json.py would hide Python's module json"),
+        ("there Pi", "there exists: choose another name, or move it"),
     ],
 )
 def test_refused_in_a_line_and_nothing_is_left(

@@ -122,12 +122,12 @@ def test_ctrl_c_ends_what_is_watched_and_leaves_nothing(
 @pytest.mark.parametrize(
     ("host", "words", "code", "said"),
     [
-        ("-oProxyCommand=false", ("status",), 2, "a host, or USER@HOST, as for ssh"),
-        ("", ("status",), 2, "a host, or USER@HOST, as for ssh"),
+        ("-oProxyCommand=false", ("status",), 2, "use HOST or USER@HOST, as for ssh"),
+        ("", ("status",), 2, "use HOST or USER@HOST, as for ssh"),
         ("robot", ("doctor",), 2,
-         "doctor is about the machine it runs on: ssh robot rtcfctl doctor"),
-        ("robot", ("--socket", "here", "status"), 2, "a path from / on, without a colon"),
-        ("nobody@robot", ("status",), 3, "ssh does not get through to nobody@robot"),
+         "doctor works on the local machine: use ssh robot rtcfctl doctor"),
+        ("robot", ("--socket", "here", "status"), 2, "use an absolute path without a colon"),
+        ("nobody@robot", ("status",), 3, "ssh cannot connect to nobody@robot"),
         ("robot", ("--socket", "/nowhere/s", "status"), 3, "/nowhere/s of robot"),
     ],
 )  # fmt: skip

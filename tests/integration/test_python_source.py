@@ -129,8 +129,8 @@ def test_what_was_tuned_stays_when_a_source_is_saved(
         assert daemon.ctl("set", "Tuned", "kp:=50").returncode == 0
         # Another default of a tuned or given parameter changes nothing.
         _save(source, TUNED.format(kp=2.0, most=90.0, ki=0.75))
-        watching.wait_for("replaced /Tuned")
-        assert f"replaced /Tuned by {source} as it is now, which keeps kp 50\n" in watching.said
+        watching.wait_for("reloaded /Tuned")
+        assert f"reloaded /Tuned from {source}; kept kp 50\n" in watching.said
         assert _parameters(client) == {"kp": 50.0, "ki": 0.5}
         history = [("load", "ki", 0.5), ("set", "kp", 50.0)]
         assert _history(client) == history, "a save sets nothing"
@@ -139,7 +139,7 @@ def test_what_was_tuned_stays_when_a_source_is_saved(
         assert daemon.ctl("set", "Tuned", "kp:=50", "ki:=3").returncode == 0
         history += [("undo", "kp", 1.0), ("set", "kp", 50.0), ("set", "ki", 3.0)]
         _save(source, TUNED.format(kp=3.0, most=9.0, ki=0.75))
-        watching.wait_for("replaced /Tuned", 2)
+        watching.wait_for("reloaded /Tuned", 2)
         note = "rtcfctl: note: /Tuned: kp = 50.0 does not fit: 0 to 9; it is 3.0 now\n"
         assert watching.said.count(note) == 1
         assert _parameters(client) == {"kp": 3.0, "ki": 3.0}
@@ -147,7 +147,7 @@ def test_what_was_tuned_stays_when_a_source_is_saved(
         assert _history(client) == history
         # Nobody has tuned it by now: its default counts.
         _save(source, TUNED.format(kp=4.0, most=9.0, ki=1.0))
-        watching.wait_for("replaced /Tuned", 3)
+        watching.wait_for("reloaded /Tuned", 3)
         assert _parameters(client)["kp"] == 4.0
         assert _history(client)[: len(history)] == history
 
@@ -162,8 +162,8 @@ def test_code_that_differs_from_the_interpreter_is_refused_unless_asked_for(
         assert done.returncode == 1
         assert re.fullmatch(
             rf"rtcfctl: {source}: Counts: update, cycle \d+: \w+ is -?\d+ compiled, -?\d+ in "
-            rf"the interpreter; `rtcf-compile {source} --verify` shows more, --no-verify takes it "
-            rf"as it is\n",
+            rf"the interpreter; `rtcf-compile {source} --verify` shows details, --no-verify "
+            rf"skips this\n",
             done.stderr,
         ), done.stderr
         # The library of --no-verify is no reason to trust it.
@@ -180,7 +180,7 @@ def test_a_source_that_differs_when_it_is_saved_leaves_the_loop_as_it_is(
         watching.wait_for("loaded /Counts")
         client.step(10)
         source.write_text(COUNTS.replace("STEP", OVERFLOW))
-        watching.wait_for("--no-verify takes it as it is")
+        watching.wait_for("--no-verify skips this")
         client.step(10)
         assert _states(client) == {"count": "20"}
         endless = "1\n        while self.count > 0:\n            self.count += 1"
@@ -190,7 +190,7 @@ def test_a_source_that_differs_when_it_is_saved_leaves_the_loop_as_it_is(
             "end within 2 s"
         )
         source.write_text(COUNTS.replace("STEP", "1000"))
-        watching.wait_for("replaced /Counts")
+        watching.wait_for("reloaded /Counts")
         client.step(1)
         assert _states(client) == {"count": "1020"}
 
@@ -252,7 +252,7 @@ def test_a_source_is_loaded_swapped_when_it_is_saved_and_kept(
         client.step(10)
         assert _states(client) == {"count": "20"}
         source.write_text(COUNTS.replace("STEP", "1000"))
-        wait_for(lambda: "replaced /Counts" in said.read_text(), "the swap", COMPILE_DEADLINE_S)
+        wait_for(lambda: "reloaded /Counts" in said.read_text(), "the swap", COMPILE_DEADLINE_S)
         client.step(1)
         assert _states(client) == {"count": "1020"}
         assert library.stat().st_mtime_ns > first
@@ -442,4 +442,4 @@ def test_a_source_that_is_wrong_is_refused_in_one_line(own_cache: Path, daemon: 
     assert done.returncode == 1
     assert re.fullmatch(r"rtcfctl: .*counts\.py:9: .*: .+\n", done.stderr), done.stderr
     done = daemon.ctl("load", "rtcf_examples", "Mimo", "--watch")
-    assert done.returncode == 2 and "--watch is for a Python source" in done.stderr
+    assert done.returncode == 2 and "--watch requires a Python source" in done.stderr

@@ -239,8 +239,8 @@ def test_a_disk_that_takes_nothing_is_named_and_left_as_it_was(
     full = "No space left on device"
     for verb, what in {
         "record --duration 0.5 -o": f"{full}: no cycle was written",
-        "trace --cycles 100 -o": f" is not written: {full}",
-        "incident export --to": f" is not written: {full}",
+        "trace --cycles 100 -o": f" cannot be written: {full}",
+        "incident export --to": f" cannot be written: {full}",
     }.items():
         to = full_disk / "out"
         done = running.ctl(*verb.split(), str(to))
@@ -348,10 +348,10 @@ def test_what_is_around_a_moment_is_in_the_file(running: Daemon, tmp_path: Path)
     ("words", "said"),
     [
         (("--size", "0"), "--size 0: more than 0 MiB"),
-        (("--split",), "--split: after how much? give --duration or --size"),
-        (("--pre", "1s"), "--pre and --post are before and after a --trigger"),
+        (("--split",), "--split requires --duration or --size"),
+        (("--pre", "1s"), "--pre and --post require --trigger"),
         (("--trigger", "wave.phase > 1", "--pre=-1s"), "--pre -1: 0 or more"),
-        (("--trigger", "wave.phase > 1", "--duration", "1s"), "not --duration or --split"),
+        (("--trigger", "wave.phase > 1", "--duration", "1s"), "instead of --duration or --split"),
         (("--trigger", "wave.phase >"), "is no condition"),
         (("--trigger", "wave.nothing > 1"), "/wave.nothing is no number of this stream"),
     ],

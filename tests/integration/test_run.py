@@ -98,7 +98,7 @@ def test_a_graph_file_runs_until_ctrl_c_and_is_applied_again_when_it_is_saved(
         with rtcf.Client(loop.socket) as client:
             assert amplitude(client) == 1.5
             file.write_text(GRAPH.format(amplitude=2.5))
-            loop.wait_for("swapped in: graph.yaml")
+            loop.wait_for("reloaded graph.yaml")
             assert amplitude(client) == 2.5
             file.write_text(GRAPH.format(amplitude="[much"))
             loop.wait_for("rtcfctl: graph.yaml:")
@@ -126,7 +126,7 @@ def test_what_was_tuned_stays_when_a_graph_file_is_saved(tmp_path: Path) -> None
             client.set_parameters("wave", tuned)
             before = client.get_history("wave")
             file.write_text("# saved\n" + GRAPH.format(amplitude=1.5))
-            loop.wait_for("swapped in: graph.yaml")
+            loop.wait_for("reloaded graph.yaml")
             assert "/wave keeps amplitude = 3.5, rate = 7.0, set since" in loop.said
             assert (values()["amplitude"], values()["rate"]) == (3.5, 7.0)
             assert client.get_history("wave") == before, "a save sets nothing"
@@ -153,7 +153,7 @@ def test_a_rebuilt_library_is_swapped_in(tmp_path: Path) -> None:
             begun = library.with_suffix(".part")
             shutil.copy(library, begun)
             begun.rename(library)
-            loop.wait_for("swapped in: 1 component of a rebuilt library")
+            loop.wait_for("reloaded 1 component of rebuilt libraries")
             (status,) = client.get_status().runners
             assert status.overruns < status.iteration
             (wave,) = client.list_components()
@@ -175,7 +175,7 @@ def test_a_python_source_is_compiled_and_swapped_in_when_it_is_saved(tmp_path: P
             source.write_text(COUNTS.format(step="[]"))
             loop.wait_for("rtcfctl: ")
             source.write_text(COUNTS.format(step=-1))
-            loop.wait_for("swapped in: counts.py")
+            loop.wait_for("reloaded counts.py")
             with client.watch_ports(["/Counts.out"]) as stream:
                 values = next(iter(stream))["/Counts.out"]
     assert (values[1:] < values[:-1]).all()
@@ -187,7 +187,7 @@ def test_a_python_source_that_differs_from_the_interpreter_is_not_run(tmp_path: 
     source.write_text(COUNTS.format(step=differs))
     with running(tmp_path, "counts.py", "Counts") as loop:
         assert loop.process.wait() == 1
-        assert "--no-verify takes it as it is" in loop.said
+        assert "--no-verify skips this" in loop.said
     with running(tmp_path, "counts.py", "Counts", "--no-verify") as loop:
         loop.wait_for("running; Ctrl-C ends it")
 
@@ -200,10 +200,10 @@ def test_a_python_source_that_differs_when_it_is_saved_leaves_the_loop_as_it_is(
     with running(tmp_path, "counts.py", "Counts") as loop:
         loop.wait_for("running; Ctrl-C ends it")
         source.write_text(COUNTS.format(step="1 + self.count * 10**18 % 7"))
-        loop.wait_for("--no-verify takes it as it is")
+        loop.wait_for("--no-verify skips this")
         source.write_text(COUNTS.format(step=-1))
-        loop.wait_for("swapped in: counts.py")
-    assert loop.said.count("--no-verify takes it as it is") == 1, "said once"
+        loop.wait_for("reloaded counts.py")
+    assert loop.said.count("--no-verify skips this") == 1, "said once"
 
 
 def test_a_loop_may_be_left_stopped(tmp_path: Path) -> None:
@@ -268,8 +268,8 @@ def test_nothing_is_asked_at_a_socket_of_another_user(tmp_path: Path) -> None:
     [
         (("none.yaml",), 1, "none.yaml: No such file or directory"),
         (("none.py", "Counts"), 1, "none.py: no such file"),
-        (("graph.yaml", "Counts"), 2, "run: a graph file, or FILE.py and its CLASS"),
-        (("counts.py",), 2, "run: a graph file, or FILE.py and its CLASS"),
+        (("graph.yaml", "Counts"), 2, "run: specify a graph file, or FILE.py and CLASS"),
+        (("counts.py",), 2, "run: specify a graph file, or FILE.py and CLASS"),
         (("graph.yaml", "--path", "nowhere"), 2, "--path nowhere: no such folder"),
         (("wrong.yaml",), 1, 'no package "none"'),
     ],

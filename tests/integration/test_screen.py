@@ -81,7 +81,7 @@ def test_all_of_the_head_fits_a_terminal(
 def test_all_components_can_be_scrolled_to(many: Daemon, terminals: list[Terminal]) -> None:
     terminals.append(terminal := Terminal(many, "top", "--interval", "60s"))
     names = [graphs.name(number) for number in range(_MANY)]
-    picture = terminal.see(r"^1 to \d+ of 200 components, in the order of the schedule$")
+    picture = terminal.see(r"^1 to \d+ of 200 components, in the order in which they run$")
     room = len(rows(picture))
     assert 5 < room < 24 and rows(picture) == names[:room]
 
@@ -105,7 +105,7 @@ def test_all_components_can_be_scrolled_to(many: Daemon, terminals: list[Termina
     terminal.press(b"n")
     terminal.see(rf"^1 to {room} of 200 components, by name$")
     terminal.press(b"w")
-    terminal.see(rf"^1 to {room} of 200 components, by the worst$")
+    terminal.see(rf"^1 to {room} of 200 components, by maximum$")
     terminal.press(b"\x1b")
     assert terminal.end() == 0
     assert b"Traceback" not in terminal.shown
@@ -191,7 +191,7 @@ def test_plot_draws_curves(running: Daemon, terminals: list[Terminal]) -> None:
         (("top", "-r", "nobody"), 1, '"nobody"'),
         (("plot", "nobody"), 1, "nobody matches no output of fixed size and no state"),
         (("plot", "wave", "--span", "0"), 2, "--span 0: more than 0"),
-        (("plot", "wave", "-o", "json"), 2, "a plot is for people"),
+        (("plot", "wave", "-o", "json"), 2, "plot has no output for programs"),
     ],
 )
 def test_refused_in_a_line(running: Daemon, words: tuple[str, ...], code: int, said: str) -> None:

@@ -233,7 +233,7 @@ def test_an_executor_that_dies_leaves_the_trace(
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        (("-o", "there.json"), 2, "is there already: --force writes over it"),
+        (("-o", "there.json"), 2, "exists: use --force to overwrite it"),
         (("-o", "none/trace.json"), 1, "No such file or directory"),
         (("-o", "trace.json", "--cycles", "0"), 2, "--cycles 0: at least 1"),
         (("-o", "trace.json", "-r", "nobody"), 1, 'no runner "nobody"'),

@@ -152,6 +152,6 @@ def test_refused_in_a_line(running: Daemon, client: rtcf.Client, tmp_path: Path)
     done = subprocess.run(command, capture_output=True, text=True, env=clean_environment())
     assert done.returncode == 2
     assert done.stderr == (
-        "rtcfctl: --kernel: the loop of rt_runner does not run: start it first\n"
+        "rtcfctl: --kernel: the loop of rt_runner does not run; start it first\n"
     )
     assert not list(tmp_path.glob("*t.json*"))

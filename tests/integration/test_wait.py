@@ -38,7 +38,7 @@ def test_wait_gives_up(running: Daemon) -> None:
         (("get", "nobody"), 1, "/nobody"),
         (("get", "wave.nothing"), 1, "/wave has no nothing; it has amplitude, rate, "),
         (("hz", "wave", "-n", "0"), 2, "-n 0: at least 1"),
-        (("hz", "wave", "--window", "0"), 2, "--window 0: from 0 to 3600 s"),
+        (("hz", "wave", "--window", "0"), 2, "--window 0: more than 0, at most 3600 s"),
         (("hz", "nobody"), 1, "nobody matches no output of fixed size and no state"),
     ],
 )

@@ -1,1 +1,1 @@
-"""Verbs about what a loop consists of: components, wires, parameters, state, graph files."""
+"""Verbs for the graph: components, connections, parameters, state, graph files."""

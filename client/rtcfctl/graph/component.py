@@ -13,7 +13,7 @@ from rtcfctl.terminal import words
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.plain import enumerator
 
-_LOOKS_PER_CHECK = 5  # at a source that is watched, until one whether its component is there
+_LOOKS_PER_CHECK = 5  # looks at a watched source per check that its component still exists
 _STYLES = {
     graph_pb2.COMPONENT_STATE_FAULTED: "bold red",
     graph_pb2.COMPONENT_STATE_LEFT_OUT: "bold red",
@@ -24,13 +24,11 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verbs."""
     loading = verbs.add_parser("load", parents=[common], help="load a component")
     _component_options(loading)
-    loading.add_argument(
-        "--wait", action="store_true", help="for a ROS master, if the component needs one"
-    )
+    loading.add_argument("--wait", action="store_true", help="wait for a ROS master if needed")
     loading.add_argument(
         "--watch",
         action="store_true",
-        help="of a Python source: put it into the loop anew whenever it is saved, until Ctrl-C",
+        help="with FILE.py: reload the component whenever the file is saved, until Ctrl-C",
     )
     loading.set_defaults(run=load)
 
@@ -39,17 +37,19 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     unloading.set_defaults(run=unload)
 
     replacing = verbs.add_parser(
-        "replace", parents=[common], help="put a new component in the place of an old one"
+        "replace", parents=[common], help="replace a component by a new one"
     )
     replacing.add_argument("old", metavar="NAME")
     replacing.add_argument(
-        "--rebuilt", action="store_true", help="by its own type, from its library as it is now"
+        "--rebuilt",
+        action="store_true",
+        help="use its own type, from the present file of its library",
     )
     _component_options(replacing, needed=False)
     replacing.add_argument(
         "--reset-parameters",
         action="store_true",
-        help="begin with defaults, not with the old component's values",
+        help="start with default parameters instead of the old component's",
     )
     replacing.set_defaults(run=replace)
 
@@ -59,10 +59,10 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     releasing.add_argument("names", metavar="NAME", nargs="+")
     releasing.set_defaults(run=release)
 
-    listing = verbs.add_parser("list", parents=[common], help="all components")
+    listing = verbs.add_parser("list", parents=[common], help="list all components")
     listing.set_defaults(run=show_all)
 
-    info = verbs.add_parser("info", parents=[common], help="one component, with values")
+    info = verbs.add_parser("info", parents=[common], help="show one component, with values")
     info.add_argument("component", metavar="NAME")
     info.set_defaults(run=show)
 
@@ -70,7 +70,7 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 def load(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Load a component."""
     if args.watch and not python_source.is_one(args.package):
-        raise ValueError("--watch is for a Python source: rtcfctl load FILE.py COMPONENT --watch")
+        raise ValueError("--watch requires a Python source: rtcfctl load FILE.py COMPONENT --watch")
     looks = python_source.looks(args.package) if args.watch else None
     result = client.load(_spec(args, output), args.runner, output.progress, wait=args.wait)
     output.changed(f"loaded {result.component}", result)
@@ -86,7 +86,7 @@ def watch(
     name: str,
     looks: Iterable[bool],
 ) -> None:
-    """Put a Python source in the place of a component whenever it is saved."""
+    """Replace a component whenever its Python source is saved."""
     for at, saved in enumerate(looks):
         if at % _LOOKS_PER_CHECK == 0:
             _require(client, args.runner, name)
@@ -94,18 +94,18 @@ def watch(
             continue
         try:
             spec = _spec(args, output)
-            # The command line gives the same each time; tuned values stay.
+            # As the command line does not change, tuned parameters keep their values.
             result = client.replace(name, spec, args.runner, output.progress, given_before=spec)
         except (rtcf.RefusedError, python_source.NotCompiledError) as error:
-            # What runs goes on; the next time may be better.
+            # The loop continues with the present component.
             output.line(f"rtcfctl: {error}", to=sys.stderr)
         else:
-            output.changed(f"replaced {name} by {args.package} as it is now{_kept(result)}", result)
+            output.changed(f"reloaded {name} from {args.package}{_kept(result)}", result)
             sys.stdout.flush()
 
 
 def _require(client: rtcf.Client, runner: str, name: str) -> None:
-    """Refuse to go on with a component that is not there any more, or whose runner is not."""
+    """Raise RefusedError if the component or its runner does not exist any more."""
     try:
         client.get_component(name, runner)
     except rtcf.DaemonUnreachableError:
@@ -124,7 +124,7 @@ def unload(client: rtcf.Client, args: argparse.Namespace, output: Output) -> Non
 def replace(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Replace a component."""
     if args.rebuilt == bool(args.type):
-        raise ValueError("replace: name PKG COMPONENT, or --rebuilt")
+        raise ValueError("replace: specify PKG COMPONENT or --rebuilt")
     result = client.replace(
         args.old,
         _spec(args, output),
@@ -137,7 +137,7 @@ def replace(client: rtcf.Client, args: argparse.Namespace, output: Output) -> No
 
 def _kept(result: control_pb2.ChangeResult) -> str:
     kept = ", ".join(f"{each.name} {words.value(each.value)}" for each in result.kept)
-    return f", which keeps {kept}" if kept else ""
+    return f"; kept {kept}" if kept else ""
 
 
 def release(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
@@ -147,7 +147,7 @@ def release(client: rtcf.Client, args: argparse.Namespace, output: Output) -> No
 
 
 def show_all(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Print all components in order of the schedule."""
+    """Print all components in the order in which they run."""
     components = client.list_components(args.runner)
     if not output.for_people:
         output.data(components)
@@ -182,12 +182,12 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     if left_out(found):
         output.line(f"  left out of the loop: {found.fault}", "bold red")
         return
-    output.line(f"  {enumerator(found, 'state')}, {found.position} in the schedule")
+    output.line(f"  {enumerator(found, 'state')}, position {found.position} in the order")
     output.line(f"  from {found.library}")
     if found.library_changed:
         output.line(
-            "  which is another file now than it was loaded from: "
-            f"`rtcfctl replace {found.full_name} --rebuilt` takes it",
+            "  this file has changed since the component was loaded: "
+            f"`rtcfctl replace {found.full_name} --rebuilt` loads it",
             "yellow",
         )
     if found.fault:
@@ -255,27 +255,25 @@ def print_states(states: list[graph_pb2.StateInfo], output: Output) -> None:
 
 
 def left_out(found: graph_pb2.ComponentInfo) -> bool:
-    """Tell whether a component belongs to the graph but is not loaded."""
+    """Return whether a component of the graph is not loaded."""
     return bool(found.state == graph_pb2.COMPONENT_STATE_LEFT_OUT)
 
 
 def _component_options(to: argparse.ArgumentParser, needed: bool = True) -> None:
     maybe: dict[str, Any] = {} if needed else {"nargs": "?", "default": ""}
-    to.add_argument(
-        "package", metavar="PKG", help="a package, or FILE.py, which is compiled", **maybe
-    )
-    to.add_argument("type", metavar="COMPONENT", help="a component type of the package", **maybe)
+    to.add_argument("package", metavar="PKG", help="package, or FILE.py to compile", **maybe)
+    to.add_argument("type", metavar="COMPONENT", help="component type of the package", **maybe)
     python_source.add_option(to)
-    to.add_argument("--name", default="", help="its name (default: the type's)")
-    to.add_argument("--ns", default="", help="its namespace (default: /)")
+    to.add_argument("--name", default="", help="set its name (default: the type's name)")
+    to.add_argument("--ns", default="", help="set its namespace (default: /)")
     to.add_argument("--remap", action="append", default=[], metavar="FROM:=TO")
     to.add_argument("--param", action="append", default=[], metavar="NAME:=VALUE")
-    to.add_argument("--first", action="store_true", help="all connections into it are loop breaks")
+    to.add_argument("--first", action="store_true", help="make all connections into it loop breaks")
     to.add_argument(
         "--ignore",
         default="",
         metavar="REGEX",
-        help="connections of these mapped names are loop breaks for it",
+        help="make connections into it loop breaks if their whole mapped name matches",
     )
     to.add_argument(
         "--break",
@@ -283,7 +281,7 @@ def _component_options(to: argparse.ArgumentParser, needed: bool = True) -> None
         action="append",
         default=[],
         metavar="PORT",
-        help="the connection into this input is a loop break",
+        help="make the connection into this input a loop break",
     )
     to.add_argument(
         "--every", type=words.whole, default=0, metavar="N", help="run in each N-th cycle"
@@ -292,10 +290,10 @@ def _component_options(to: argparse.ArgumentParser, needed: bool = True) -> None
         "--phase",
         type=words.whole,
         metavar="N",
-        help="with --every: in which of them, from 0 (default: chosen to spread load)",
+        help="with --every: first cycle in which it runs, from 0 (default: spreads the load)",
     )
     to.add_argument(
-        "--optional", action="store_true", help="after a fault the loop goes on without it"
+        "--optional", action="store_true", help="continue the loop without it after a fault"
     )
 
 

@@ -1,4 +1,7 @@
-"""A drawing of a loop's graph in Graphviz's language: values go from left to right."""
+"""Drawing of a loop's graph in the DOT language; values flow from left to right.
+
+Pure functions.
+"""
 
 import itertools
 import math
@@ -10,27 +13,30 @@ from rtcf.v1 import graph_pb2
 from rtcfctl.graph.folding import Cell, Link, Point, Sizes, place, route, shape
 from rtcfctl.graph.loop_graph import Line, LoopGraph, topic, type_of
 
-_MOST_WORDS = 60  # components, of which each can have its type and its connections' names
-# Of a graph that Graphviz lays out: components one after the other, and beside each other.
+_MOST_WORDS = 60  # components; larger graphs are drawn without types and connection names
+# Largest graph that Graphviz lays out: components in series and in parallel.
 _MOST_LAYERS, _MOST_BESIDE = 12, 30
 _MOST_COLUMNS = 48
-_ASPECT = 1.6  # width by height of a folded drawing, about
+_ASPECT = 1.6  # approximate width / height of a folded drawing
 _LONGEST_NAME = 32
-_LETTER, _LINE = 0.6, 1.25  # width and height of one, by the size of its font
-_POINTS = 72.0  # of an inch
-_ARROW = 0.7  # of Graphviz's, which is 10 points long
-_ROUND = 5.0  # radius of a line's corners
-_SHORTEST_MARKED = 16.0  # of a line's stretches
-# From the cheapest to what takes most: light to dark blue, told apart without colours, too.
+_LETTER, _LINE = 0.6, 1.25  # width of a letter and height of a line, as multiples of font size
+_POINTS = 72.0  # per inch
+_ARROW = 0.7  # scale of Graphviz's arrow head, which is 10 points long
+_ROUND = 5.0  # radius of a line's corners, in points
+_SHORTEST_MARKED = 16.0  # shortest segment of a line that has the mark 1/z, in points
+# By share of the duration, from least to most.  They differ in lightness, not in hue.
 _FILLS = ("#ffffff", "#e3eef7", "#c3dcef", "#94c2e2", "#5ba3d0", "#2b7bba")
-_DARK = 5  # from this one on the text is white
+_DARK = 5  # index of the first fill with white text
 _BREAK = 'color="#b04a00", fontcolor="#b04a00"'
 _TOPIC = 'shape=ellipse, fillcolor="#fff4de", color="#b04a00"'
 
 
 def dot(graph: LoopGraph) -> str:
-    """Return the drawing.  Where it would be too long or too high, it is folded: everything has
-    its place then, in rows that turn, and Graphviz lays out nothing."""
+    """Return the drawing as DOT text.
+
+    A graph that would be too long or too high is folded into rows of alternating direction;
+    then this module computes all positions instead of Graphviz.
+    """
     sources, sinks = graph.topics(subscribed=True), graph.topics(subscribed=False)
     names = [
         *map(topic, sources), *(each.full_name for each in graph.components), *map(topic, sinks)
@@ -141,7 +147,7 @@ class _Drawing:
         status = self._graph.status
         title = f"{status.runner}, {status.settings.frequency_hz:g} Hz"
         if any(each.broken for each in self._lines):
-            title += "; dashed, 1/z: loop break, the value of the cycle before"
+            title += "; dashed, 1/z: loop break (value of the previous cycle)"
         return title
 
     def _label(self, component: graph_pb2.ComponentInfo, name: str) -> list[str]:
@@ -165,7 +171,7 @@ class _Drawing:
 
 
 def _well_shaped(names: Sequence[str], links: Sequence[Link], sizes: Sizes) -> dict[str, Cell]:
-    """Return the places that come nearest to the aspect of a screen."""
+    """Return the cells of the layout whose aspect ratio is nearest to _ASPECT."""
 
     def badness(cells: dict[str, Cell]) -> float:
         wide = sizes.left(1 + max(each.column for each in cells.values()))
@@ -183,7 +189,7 @@ def _edge(line: Line, words: Sequence[str]) -> str:
 
 
 def _spline(way: Sequence[Point]) -> str:
-    """Return corners as Graphviz's curves, rounded, the arrow's tip first."""
+    """Return a line with rounded corners as a Graphviz spline; the arrow's tip is first."""
     tip = way[-1]
     ends = [*way[:-1], _towards(tip, way[-2], 10 * _ARROW)]
     points = [ends[0]]
@@ -201,7 +207,7 @@ def _towards(start: Point, end: Point, distance: float) -> Point:
 
 
 def _mark(way: Sequence[Point]) -> Point:
-    """Return the middle of the stretch by which a line comes to its reader, or of its longest."""
+    """Return the middle of the segment before the reader's, or of the longest if that is short."""
     stretches = list(itertools.pairwise(way))
     last = stretches[-2:][0]
     is_long = len(stretches) > 1 and math.dist(*last) >= _SHORTEST_MARKED

@@ -19,10 +19,10 @@ _STYLES = {
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verbs."""
     applying = verbs.add_parser(
-        "apply", parents=[common], help="make the graph what a file says, at one cycle"
+        "apply", parents=[common], help="change the graph to match a graph file, at one cycle"
     )
-    applying.add_argument("file", metavar="FILE", help="a graph file; - is standard input")
-    applying.add_argument("--dry-run", action="store_true", help="only show what would change")
+    applying.add_argument("file", metavar="FILE", help="graph file; - is standard input")
+    applying.add_argument("--dry-run", action="store_true", help="only show the changes")
     applying.add_argument(
         "--rebuilt",
         action="store_true",
@@ -30,14 +30,14 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     )
     applying.set_defaults(run=apply)
 
-    saving = verbs.add_parser("save", parents=[common], help="write the graph as `apply` reads it")
+    saving = verbs.add_parser("save", parents=[common], help="write the graph as a graph file")
     saving.add_argument("file", metavar="FILE", nargs="?", default="-")
-    saving.add_argument("--all", action="store_true", help="the graphs of all runners")
+    saving.add_argument("--all", action="store_true", help="save the graphs of all runners")
     saving.set_defaults(run=save)
 
 
 def apply(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Apply a graph file; of several runners none is changed if one is refused."""
+    """Apply a graph file.  With several runners, change none if one of their graphs is invalid."""
     graphs = _chosen(rtcf.read_graphs(*read(args.file)), args)
     if args.dry_run or len(graphs) > 1:
         dry = [_apply(client, graph, True, args.rebuilt, output) for graph in graphs]
@@ -49,7 +49,7 @@ def apply(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None
 
 
 def save(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Write graphs with the values that parameters have now."""
+    """Write graphs with the present values of parameters."""
     runners = client.get_status("" if args.all else args.runner or "rt_runner").runners
     text = rtcf.write_graphs(
         rtcf.Graph(
@@ -76,7 +76,7 @@ def _apply(
 
 
 def _chosen(graphs: list[rtcf.Graph], args: argparse.Namespace) -> list[rtcf.Graph]:
-    """Return the graphs of the runner that --runner names, or all."""
+    """Return the graph of the runner given by --runner, or all graphs."""
     if len(graphs) == 1 and (args.runner or not graphs[0].runner):
         graphs[0].runner = args.runner
     if not args.runner:
@@ -85,7 +85,7 @@ def _chosen(graphs: list[rtcf.Graph], args: argparse.Namespace) -> list[rtcf.Gra
     if not found:
         names = ", ".join(graph.runner for graph in graphs)
         raise rtcf.GraphFileError(
-            f"{args.file}: it has no runner {args.runner} (runners: {names or 'none'})"
+            f"{args.file}: no runner {args.runner} (runners: {names or 'none'})"
         )
     return found
 
@@ -120,18 +120,18 @@ def _print(
 
 
 def read(file: str) -> tuple[str, str]:
-    """Return the text of a file, and its name for messages.  Raises GraphFileError."""
+    """Return the text of a file and its name for messages.  Raises GraphFileError."""
     name = "standard input" if file == "-" else file
     try:
         return bounded_file.read(file).decode(), name
     except OSError as error:
         raise rtcf.GraphFileError(f"{name}: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise rtcf.GraphFileError(f"{name}: it is not UTF-8 text") from None
+        raise rtcf.GraphFileError(f"{name}: not UTF-8 text") from None
 
 
 def _write(file: str, text: str) -> None:
-    """Replace a file at once: half a graph would be another graph."""
+    """Replace a file atomically: a partial file would be a different valid graph."""
     try:
         durable.write_named(file, text.encode())
     except OSError as error:

@@ -1,7 +1,9 @@
-"""Places of components on a grid, for graphs that are too long or too wide for one row or column:
-values go from left to right, at the end of a row it turns, and lines run between the boxes.
+"""Layout of large graphs on a grid of boxes.
 
-Pure functions.  The scope's page does the same in JavaScript (page/panels/graph_layout.js).
+Values flow from left to right; a chain longer than a row continues in the next row in the opposite
+direction.  Lines run in the gaps between the boxes.
+
+Pure functions.  The scope's page has the same layout in JavaScript (page/panels/graph_layout.js).
 """
 
 import math
@@ -9,58 +11,59 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-_ROWS = 8  # a layer of more components than that may have several columns
-# Lines that run side by side, from the middle of a gap outwards.
+_ROWS = 8  # largest layer, in components, that has only one column
+# Lanes of parallel lines in a gap, from its middle outwards.
 _LANES_DOWN = (0, 1, -1, 2, -2, 3, -3)
 _LANES_ACROSS = (0, 1, -1, 2, -2)
 
-Point = tuple[float, float]  # from the left, from the top
+Point = tuple[float, float]  # distance from the left, from the top
 
 
 @dataclass(frozen=True)
 class Link:
     """One reader of a connection."""
 
-    net: str  # the connection and its writer: lines of one net may lie on each other
-    writer: str | None  # None = from outside
+    net: str  # connection and writer; lines of the same net may overlap
+    writer: str | None  # None: outside the loop
     reader: str
-    broken: bool = False  # the value of the cycle before
+    broken: bool = False  # loop break: it has the value of the previous cycle
 
 
 @dataclass(frozen=True)
 class Cell:
-    """The place of a component."""
+    """The grid position of a component."""
 
     column: int
     row: int
-    turned: bool = False  # values go from right to left here
+    turned: bool = False  # values flow from right to left in this row
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """Of boxes and of the gaps between them."""
+    """Sizes of boxes and of the gaps between them, in any unit of length."""
 
     wide: float
     high: float
     gap_x: float
     gap_y: float
-    lane_x: float  # between lines in a gap
+    lane_x: float  # distance of lines in a gap
     lane_y: float
-    port: float  # between lines at a box
+    port: float  # distance of lines at a box
 
     def left(self, column: int) -> float:
-        """Return where a column's boxes begin."""
+        """Return the left edge of a column's boxes."""
         return self.gap_x + column * (self.wide + self.gap_x)
 
     def top(self, row: int) -> float:
-        """Return where a row's boxes begin."""
+        """Return the upper edge of a row's boxes."""
         return self.gap_y + row * (self.high + self.gap_y)
 
 
 def place(names: Sequence[str], links: Iterable[Link], columns: int) -> dict[str, Cell]:
-    """Return a place for each component.
+    """Return the cell of each component.
 
-    `names` are in the order of the schedule; `columns` is how many there may be, at least 2.
+    `names` are in the order in which the components run; `columns` is the largest number of
+    columns, at least 2.
     """
     links = list(links)
     found: dict[str, Cell] = {}
@@ -78,7 +81,7 @@ def place(names: Sequence[str], links: Iterable[Link], columns: int) -> dict[str
 
 
 def shape(names: Sequence[str], links: Iterable[Link]) -> tuple[int, int]:
-    """Return the number of layers of a graph, and of components in the largest one."""
+    """Return the number of layers of a graph and the number of components in its largest layer."""
     layers: dict[int, int] = defaultdict(int)
     for each in _layers(names, list(links)).values():
         layers[each] += 1
@@ -86,7 +89,7 @@ def shape(names: Sequence[str], links: Iterable[Link]) -> tuple[int, int]:
 
 
 def _islands(names: Sequence[str], links: Sequence[Link]) -> list[list[str]]:
-    """Return groups that nothing connects; components of their own last."""
+    """Return the connected groups of components; single components are last."""
     group = {name: [name] for name in names}
     for link in links:
         if link.writer is None or group[link.writer] is group[link.reader]:
@@ -101,7 +104,7 @@ def _islands(names: Sequence[str], links: Sequence[Link]) -> list[list[str]]:
 
 
 def _layers(names: Sequence[str], links: Sequence[Link]) -> dict[str, int]:
-    """Return the longest way to each component from one that reads no other, in this cycle."""
+    """Return the layer of each component: the longest path to it, without loop breaks."""
     sources: dict[str, list[str]] = {name: [] for name in names}
     readers: dict[str, list[str]] = {name: [] for name in names}
     for link in links:
@@ -113,7 +116,7 @@ def _layers(names: Sequence[str], links: Sequence[Link]) -> dict[str, int]:
     found: dict[str, int] = {}
     for name in names:
         found[name] = 1 + max((found.get(each, -1) for each in sources[name]), default=-1)
-    # What reads nothing stands before its first reader.
+    # A component without inputs from others is in the layer before its first reader.
     for name in names:
         if not sources[name] and readers[name]:
             found[name] = max(0, min(found[each] for each in readers[name]) - 1)
@@ -133,7 +136,7 @@ def _place_island(names: Sequence[str], links: Sequence[Link], columns: int) -> 
         if link.writer is not None and not link.broken:
             sources[link.reader].append(link.writer)
     rows: dict[str, int] = {}
-    blocks: list[list[list[str]]] = []  # columns of each layer
+    blocks: list[list[list[str]]] = []  # the columns of each layer
     for number in sorted(layers):
         wanted = {
             name: _mean([rows[each] for each in sources[name] if each in rows])
@@ -163,7 +166,7 @@ def _place_island(names: Sequence[str], links: Sequence[Link], columns: int) -> 
 
 
 def _rows(column: Sequence[str], wanted: dict[str, float], most: int) -> dict[str, int]:
-    """Return a row for each of a column, beside where its values come from if that is free."""
+    """Return the row of each component of a column, near the mean row of its writers."""
     rows: list[int] = []
     for name in column:
         rows.append(max(math.floor(wanted[name] + 0.5), rows[-1] + 1 if rows else 0))
@@ -175,7 +178,7 @@ def _rows(column: Sequence[str], wanted: dict[str, float], most: int) -> dict[st
 
 
 def _bands(blocks: Sequence[list[list[str]]], columns: int) -> list[list[list[str]]]:
-    """Cut the layers into stretches, each of so many columns at most and about as long."""
+    """Split the layers into bands of similar width, each of at most `columns` columns."""
     total = sum(map(len, blocks))
     room = math.ceil(total / math.ceil(total / columns))
     bands: list[list[list[str]]] = [[]]
@@ -191,7 +194,7 @@ def _mean(numbers: Sequence[int]) -> float:
 
 
 class _Lanes:
-    """The lines in gaps: those of different nets do not lie on each other while there is room."""
+    """Lanes of lines in gaps.  Lines of different nets overlap only if all lanes are taken."""
 
     def __init__(self, numbers: Sequence[int]) -> None:
         self._numbers = numbers
@@ -199,7 +202,7 @@ class _Lanes:
         self._nets: dict[str, int] = {}
 
     def take(self, gap: int, begin: float, end: float, net: str) -> int:
-        """Return the lane of a line from `begin` to `end` in a gap."""
+        """Reserve a lane for a line from `begin` to `end` in a gap; return it."""
         begin, end = min(begin, end), max(begin, end)
         for lane in self._numbers:
             beside = [each for each in self._used[gap, lane] if each[0] <= end and begin <= each[1]]
@@ -212,7 +215,7 @@ class _Lanes:
 
 
 def route(cells: dict[str, Cell], links: Sequence[Link], sizes: Sizes) -> list[list[Point]]:
-    """Return the way of each link: corners, the reader's end last.  No line crosses a box."""
+    """Return the corners of each link from writer to reader.  No line crosses a box."""
     outs = _ports(((each.writer, each.net) for each in links), sizes)
     ins = _ports(((each.reader, each.net) for each in links), sizes)
     down, across = _Lanes(_LANES_DOWN), _Lanes(_LANES_ACROSS)
@@ -236,7 +239,7 @@ def route(cells: dict[str, Cell], links: Sequence[Link], sizes: Sizes) -> list[l
             x = _middle(gap, sizes) + sizes.lane_x * down.take(gap, y1, y2, link.net)
             ways.append([(x1, y1), (x, y1), (x, y2), (x2, y2)])
             continue
-        # Above the reader, or below it where the line comes from there or goes back.
+        # The line runs above the reader's row, or below it if it comes from below or goes back.
         above = to.row > start.row or (to.row == start.row and not link.broken)
         aisle = to.row + (not above)
         lane = across.take(aisle, _middle(gap, sizes), _middle(gap_to, sizes), link.net)
@@ -254,7 +257,7 @@ def _middle(gap: int, sizes: Sizes) -> float:
 def _ports(
     ends: Iterable[tuple[str | None, str]], sizes: Sizes
 ) -> dict[tuple[str | None, str], float]:
-    """Return how far from the middle of a box each net begins or ends there."""
+    """Return the offset of each net's end from the middle of the box, by component and net."""
     nets: dict[str | None, dict[str, None]] = defaultdict(dict)
     for component, net in ends:
         nets[component][net] = None

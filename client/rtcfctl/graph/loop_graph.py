@@ -1,4 +1,4 @@
-"""The components and connections of a runner, with what they cost."""
+"""The components and connections of a runner, with the durations of the components."""
 
 from collections import defaultdict
 from dataclasses import dataclass
@@ -11,22 +11,25 @@ from rtcfctl.terminal.words import microseconds
 
 @dataclass(frozen=True)
 class Line:
-    """One reader of one writer of a connection; a topic is either end of its values."""
+    """A line of a drawing, from one writer to one reader of a connection.
 
-    name: str  # of the connection
-    writer: str  # node: a component's full name, or topic()
+    Each end is a component or a ROS topic.
+    """
+
+    name: str  # mapped name of the connection
+    writer: str  # node: full name of a component, or topic()
     reader: str
-    tip: str  # both ports
+    tip: str  # text of the tooltip: both ports
     broken: bool = False  # a loop break
 
 
 def topic(name: str) -> str:
-    """Return the node of a topic."""
+    """Return the name of a topic's node in a drawing."""
     return f"topic {name}"
 
 
 class LoopGraph:
-    """What was asked for once; `components` are in the order of the schedule."""
+    """Queried once, by the constructor; `components` are in the order in which they run."""
 
     def __init__(self, client: rtcf.Client, runner: str) -> None:
         (self.status,) = client.get_status(runner).runners
@@ -41,7 +44,7 @@ class LoopGraph:
             self._costs = {each.component: each for each in statistics.components}
 
     def text(self) -> list[str]:
-        """Return each component in its order, with where its outputs go."""
+        """Return the components in their order, each with the readers of its outputs."""
         goes: dict[tuple[str, str], list[str]] = defaultdict(list)
         comes: dict[str, list[str]] = defaultdict(list)
         for each in self.connections:
@@ -69,7 +72,7 @@ class LoopGraph:
         return lines
 
     def lines(self) -> list[Line]:
-        """Return what goes from where to where."""
+        """Return a line for each pair of writer and reader, ROS topics included."""
         found = []
         for each in self.connections:
             for writer in _writers(each):
@@ -88,7 +91,7 @@ class LoopGraph:
         return found
 
     def topics(self, *, subscribed: bool) -> list[str]:
-        """Return the topics that are read, or those that are only published."""
+        """Return the topics that the loop subscribes to, or those that it only publishes."""
         return [
             each.name
             for each in self.connections
@@ -96,7 +99,7 @@ class LoopGraph:
         ]
 
     def notes(self, component: graph_pb2.ComponentInfo) -> list[str]:
-        """Return what is to be known of a component beside its type."""
+        """Return the notes on a component: rate, device I/O, mean duration, fault."""
         notes = []
         if component.spec.every > 1:
             notes.append(f"every {component.spec.every}")
@@ -106,23 +109,23 @@ class LoopGraph:
         if cost is not None and cost.duration.count:
             notes.append(f"{microseconds(cost.duration.mean_ns)} µs")
         if component.state == graph_pb2.COMPONENT_STATE_FAULTED:
-            notes.append("taken out by a fault")
+            notes.append("taken out after a fault")
         return notes
 
     def is_device(self, name: str) -> bool:
-        """Tell whether a component talks to a device."""
+        """Return whether a component does device I/O."""
         cost = self._costs.get(name)
         return cost is not None and cost.device_calls > 0
 
     def share(self, name: str) -> float:
-        """Return a component's share of what all cost, from 0 to 1."""
+        """Return the share, 0 to 1, of a component in the sum of the mean durations."""
         total = sum(each.duration.mean_ns for each in self._costs.values())
         cost = self._costs.get(name)
         return cost.duration.mean_ns / total if cost is not None and total > 0.0 else 0.0
 
 
 def type_of(component: graph_pb2.ComponentInfo) -> str:
-    """Return package and type."""
+    """Return PACKAGE/TYPE of a component."""
     return f"{component.spec.package}/{component.spec.type}"
 
 

@@ -1,4 +1,4 @@
-"""`rtcfctl graph`: what runs after what and who feeds whom, as text or as a picture."""
+"""`rtcfctl graph`: components in their order and their connections, as text or as a drawing."""
 
 import argparse
 import subprocess
@@ -20,21 +20,21 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     graph = verbs.add_parser(
         "graph",
         parents=[common],
-        help="what runs after what and who feeds whom, as text or as a picture",
-        # -o is the file here; --output stays.
+        help="show components and their connections, as text or as a drawing",
+        # -o is the file for this verb; --output remains.
         conflict_handler="resolve",
     )
     graph.add_argument(
-        "-o", dest="file", metavar="FILE", type=Path, help="a picture: .svg, .png, or .dot"
+        "-o", dest="file", metavar="FILE", type=Path, help="write a drawing: .svg, .png or .dot"
     )
     graph.set_defaults(run=show)
 
 
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Print the graph, or write its picture."""
+    """Print the graph, or write a drawing of it."""
     kind = args.file.suffix.removeprefix(".") if args.file is not None else ""
     if args.file is not None and kind not in _FORMATS:
-        raise ValueError(f"{args.file}: a picture is {', '.join(f'.{each}' for each in _FORMATS)}")
+        raise ValueError(f"{args.file}: use one of {', '.join(f'.{each}' for each in _FORMATS)}")
     graph = LoopGraph(client, args.runner or "rt_runner")
     if args.file is None:
         if output.for_people:
@@ -55,14 +55,14 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 
 def _drawn(drawing: str, kind: str) -> bytes:
-    """Have Graphviz draw it."""
+    """Return the drawing, rendered by Graphviz."""
     try:
         done = subprocess.run(["dot", f"-T{kind}"], input=drawing.encode(), capture_output=True)
     except FileNotFoundError:
         raise rtcf.RtcfError(
-            "no Graphviz to draw it: sudo apt install graphviz, or write a .dot file"
+            "Graphviz not found: sudo apt install graphviz, or write a .dot file"
         ) from None
     if done.returncode != 0:
-        why = done.stderr.decode(errors="replace").strip().splitlines() or ["it says nothing"]
-        raise rtcf.RtcfError(f"Graphviz does not draw it: {why[-1]}")
+        why = done.stderr.decode(errors="replace").strip().splitlines() or ["no error message"]
+        raise rtcf.RtcfError(f"Graphviz failed: {why[-1]}")
     return done.stdout

@@ -1,5 +1,5 @@
-"""A Python source in the place of a package: compiled, compared with the interpreter, and kept for
-the next time.
+"""Compiles a Python source that is given instead of a package, compares the machine code with the
+interpreter, and caches the library.
 """
 
 import argparse
@@ -19,17 +19,17 @@ import rtcf
 from rtcf_shared.folders import compiled_folder
 
 _LOOK_S = 0.2
-_VERIFY = "1s"  # of processor time
-_DIFFERENT = 3  # exit status of rtcf-compile
+_VERIFY = "1s"  # processor time of the comparison
+_DIFFERENT = 3  # exit status of rtcf-compile if machine code and interpreter differ
 _VERIFIED = " verified"
 
 
 class NotCompiledError(rtcf.RtcfError):
-    """A source that cannot be compiled; the text is one line."""
+    """The source cannot be compiled; the message is one line."""
 
 
 def is_one(package: str) -> bool:
-    """Tell whether what stands in the place of a package is a Python source."""
+    """Return whether the package argument is a Python source."""
     return package.endswith(".py")
 
 
@@ -38,16 +38,17 @@ def add_option(to: argparse.ArgumentParser) -> None:
     to.add_argument(
         "--no-verify",
         action="store_true",
-        help="of a Python source: do not compare the machine code with the interpreter",
+        help="with FILE.py: do not compare the machine code with the interpreter",
     )
 
 
 def compiled(
     source: str, build_tree: Path | None, progress: Callable[[str], None], verify: bool = True
 ) -> str:
-    """Return the package of a source, which private daemons find; compile it if it is new.
+    """Return the package of a source; compile it unless the cached library is up to date.
 
-    With `verify`, the machine code of each source is compared with the interpreter once.
+    Private daemons find the package.  With `verify`, the machine code of each version of the
+    source is compared with the interpreter once.  Raises NotCompiledError.
     """
     file = Path(source).resolve()
     if not file.is_file():
@@ -55,7 +56,7 @@ def compiled(
     place = hashlib.sha256(os.fsencode(file)).hexdigest()[:8]
     package = f"{_ros_name(file.stem)}_{place}"
     library = compiled_folder() / package / f"{file.stem}.so"
-    # Beside the package, not in it: only libraries belong there.
+    # The fingerprint is beside the package: its folder has only libraries.
     known = compiled_folder() / f".{package}"
     print_of_it = fingerprint(file)
     kept = known.read_text() if library.is_file() and known.is_file() else ""
@@ -71,9 +72,10 @@ def compiled(
     if done.returncode != 0:
         said = done.stderr.strip() or f"rtcf-compile ended with status {done.returncode}"
         if done.returncode == _DIFFERENT:
-            said += f"; `rtcf-compile {source} --verify` shows more, --no-verify takes it as it is"
+            said += f"; `rtcf-compile {source} --verify` shows details, --no-verify skips this"
         raise NotCompiledError(said.removeprefix("rtcf-compile: "))
-    # rtcfd takes libraries only where others cannot write, whatever our umask is.
+    # rtcfd loads libraries only from folders without write permission for others; the umask may
+    # permit more.
     for each in (library, library.parent, library.parents[1]):
         each.chmod(0o755)
     known.write_text(print_of_it + (_VERIFIED if verify else ""))
@@ -81,15 +83,15 @@ def compiled(
 
 
 def _ros_name(stem: str) -> str:
-    """Return the beginning of a package's name, of which 64 characters are allowed."""
+    """Return the first part of the package's name; the whole name has at most 64 characters."""
     name = re.sub(r"[^A-Za-z0-9_]", "_", stem)[:48]
     return name if name[:1].isalpha() else f"source_{name}"
 
 
 def looks(source: str) -> Iterator[bool]:
-    """Yield again and again whether a source, or a Python file beside it, has been saved with other
-    content since the last time; of what is saved from this call on nothing is missed, while the
-    source is compiled for instance."""
+    """Yield, every 0.2 s, whether the content of a source or of a Python file beside it has changed
+    since the last time.  The first comparison is with the content at the time of this call, so
+    that a change during a compilation is not missed."""
     file = Path(source).resolve()
     return _changes(file, fingerprint(file))
 
@@ -103,10 +105,10 @@ def _changes(file: Path, last: str) -> Iterator[bool]:
 
 
 def fingerprint(source: Path) -> str:
-    """Return what a library of it depends on, as a hash: files beside it, the compiler's, and the
-    runtime that is in each library.
+    """Return a hash of everything that the compiled library depends on: the Python files in the
+    source's folder, the compiler, and the runtime that is linked into each library.
     """
-    # Libraries that it needs have other names in another release of Debian.
+    # The names of its shared libraries depend on the release of Debian.
     digest = hashlib.sha256(f"{rtcf.__version__} {_release()}\n".encode())
     compiler = importlib.util.find_spec("rtcf_compile")
     files = sorted(source.parent.glob("*.py"))
@@ -118,13 +120,13 @@ def fingerprint(source: Path) -> str:
         try:
             content = file.read_bytes()
         except OSError:
-            continue  # just being saved
+            continue  # it is being saved
         digest.update(f"{file.name} {len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 
 def _runtime(compiler: Path) -> str:
-    """Return what distinguishes the runtime beside a compiler: of a build tree, or installed."""
+    """Return the size and time of the runtime of a compiler, in a build tree or installed."""
     triplet = sysconfig.get_config_var("MULTIARCH") or ""
     for folder in (compiler.parents[1] / "lib", Path("/usr/lib") / triplet):
         try:
@@ -139,7 +141,7 @@ def _compiler(build_tree: Path | None) -> str:
     own = build_tree / "bin" / "rtcf-compile" if build_tree else Path("/usr/bin/rtcf-compile")
     found = str(own) if own.is_file() else shutil.which("rtcf-compile")
     if found is None:
-        raise NotCompiledError("no rtcf-compile to compile it: sudo apt install rtcf-python")
+        raise NotCompiledError("rtcf-compile not found: sudo apt install rtcf-python")
     return found
 
 

@@ -1,6 +1,6 @@
-"""`rtcfctl run`: a loop in a daemon of one's own, until Ctrl-C.
+"""`rtcfctl run`: runs a loop in a private daemon until Ctrl-C.
 
-What is saved or rebuilt meanwhile is swapped in; the daemon logs to our standard error.
+It reloads saved files and rebuilt libraries; the daemon logs to the standard error of rtcfctl.
 """
 
 import argparse
@@ -24,25 +24,25 @@ _LOOK_S = 0.5
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
     run = verbs.add_parser(
-        "run", parents=[common], help="a loop in a daemon of its own until Ctrl-C, for development"
+        "run", parents=[common], help="run a loop in a private daemon until Ctrl-C, for development"
     )
-    run.add_argument("file", metavar="FILE", help="a graph file, or a component in Python")
-    run.add_argument("type", metavar="CLASS", nargs="?", help="of FILE.py")
+    run.add_argument("file", metavar="FILE", help="graph file, or FILE.py with a component")
+    run.add_argument("type", metavar="CLASS", nargs="?", help="component class in FILE.py")
     run.add_argument(
         "--path", action="append", default=[], metavar="FOLDER", type=Path,
-        help=f"where libraries are (default: {', '.join(BUILT)} here, those that there are)",
+        help=f"search libraries in this folder (default: {', '.join(BUILT)}, if they exist)",
     )  # fmt: skip
-    run.add_argument("--no-start", action="store_true", help="leave the loop stopped")
+    run.add_argument("--no-start", action="store_true", help="do not start the loop")
     python_source.add_option(run)
     run.set_defaults(run=show)
 
 
 def show(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Run it."""
+    """Run the loop until Ctrl-C.  Raises ValueError, and RtcfError if the daemon ends."""
     if python_source.is_one(args.file) != bool(args.type):
-        raise ValueError("run: a graph file, or FILE.py and its CLASS")
+        raise ValueError("run: specify a graph file, or FILE.py and CLASS")
     work = _Work(args, output)
-    graphs = work.read()  # a file with a mistake is told before anything begins
+    graphs = work.read()  # report errors in the file before the daemon starts
     try:
         folders = component_folders(args.path)
     except ValueError as error:
@@ -80,18 +80,18 @@ def _full_name(spec: graph_pb2.ComponentSpec) -> str:
 
 
 class _Work:
-    """What is run, and whether it is another by now."""
+    """The graph file or Python source, its last applied version, and the last reported error."""
 
     def __init__(self, args: argparse.Namespace, output: Output) -> None:
         self._args = args
         self._output = output
         self._last = self._content()
         self._refused = ""
-        # What the file said when it was applied, by runner and full name.
+        # The specs of the file when it was last applied, by runner and full name.
         self._given: dict[str, dict[str, graph_pb2.ComponentSpec]] = {}
 
     def read(self) -> list[rtcf.Graph]:
-        """Return what the file says now; raises RtcfError."""
+        """Return the graphs of the file's present content.  Raises RtcfError."""
         file = self._args.file
         if self._args.type:
             package = python_source.compiled(
@@ -105,7 +105,7 @@ class _Work:
         return graphs
 
     def apply(self, client: rtcf.Client, graphs: list[rtcf.Graph]) -> list[str]:
-        """Make the graphs so, with libraries as they are now; return the runners."""
+        """Apply the graphs with the present files of libraries; return the names of the runners."""
         known = {str(each.runner) for each in client.get_status().runners}
         names = []
         for graph in graphs:
@@ -122,7 +122,7 @@ class _Work:
         return names
 
     def look(self, client: rtcf.Client) -> None:
-        """Swap in what was saved or rebuilt; a refusal is said once, and what runs goes on."""
+        """Apply a saved file or rebuilt libraries.  Print an error once; the loop continues."""
         content = self._content()
         try:
             rebuilt = [
@@ -134,7 +134,7 @@ class _Work:
             if content != self._last:
                 self.apply(client, self.read())
             elif rebuilt:
-                # One by one: other components stay.
+                # Replace only the components of rebuilt libraries.
                 for runner, name in rebuilt:
                     given = self._given.get(runner, {}).get(name)
                     result = client.replace(
@@ -145,7 +145,8 @@ class _Work:
             else:
                 return
         except (rtcf.RefusedError, rtcf.GraphFileError, python_source.NotCompiledError) as error:
-            # A library or a file that is just being written may be whole at the next look.
+            # The file may be incomplete because it is being written: report only an error that
+            # occurs twice in a row.
             said = f"{content!r} {error}"
             if said == self._refused or isinstance(error, python_source.NotCompiledError):
                 self._last = content
@@ -153,12 +154,12 @@ class _Work:
             self._refused = said
             return
         self._refused = ""
-        what = f"{counted(len(rebuilt), 'component')} of a rebuilt library"
-        _say(f"swapped in: {what if content == self._last else self._args.file}")
+        what = f"{counted(len(rebuilt), 'component')} of rebuilt libraries"
+        _say(f"reloaded {what if content == self._last else self._args.file}")
         self._last = content
 
     def _content(self) -> object:
-        """Return what tells another content of the file."""
+        """Return a value that changes with the file's content; None if there is no file."""
         if self._args.type:
             return python_source.fingerprint(Path(self._args.file).resolve())
         try:

@@ -1,4 +1,4 @@
-"""`rtcfctl snapshot|restore`: all that a runner's next cycle depends on, in a file."""
+"""`rtcfctl snapshot|restore`: the state, parameters and values of a runner in a file."""
 
 import argparse
 from pathlib import Path
@@ -20,7 +20,7 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     taking.add_argument("file", metavar="FILE", type=Path)
     taking.set_defaults(run=take)
     restoring = verbs.add_parser(
-        "restore", parents=[common], help="go on from a snapshot, from one cycle to the next"
+        "restore", parents=[common], help="continue from a snapshot, from one cycle to the next"
     )
     restoring.add_argument("file", metavar="FILE", type=Path)
     restoring.set_defaults(run=restore)
@@ -55,7 +55,7 @@ def restore(client: rtcf.Client, args: argparse.Namespace, output: Output) -> No
 
 
 def _write(file: Path, snapshot: bytes) -> None:
-    """Replace a file at once: half a snapshot is none."""
+    """Replace a file atomically, so that it always has a complete snapshot."""
     try:
         durable.write_named(file, snapshot)
     except OSError as error:

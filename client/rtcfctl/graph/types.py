@@ -12,9 +12,11 @@ from rtcfctl.terminal.output import Output
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
-    types = verbs.add_parser("types", parents=[common], help="component types that can be loaded")
+    types = verbs.add_parser(
+        "types", parents=[common], help="list the component types that can be loaded"
+    )
     types.add_argument("package", metavar="PKG", nargs="?", default="")
-    types.add_argument("--long", action="store_true", help="with ports and parameters")
+    types.add_argument("--long", action="store_true", help="also show ports and parameters")
     types.set_defaults(run=show)
 
 

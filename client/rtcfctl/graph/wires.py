@@ -12,13 +12,15 @@ from rtcfctl.terminal.output import Output
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verbs."""
-    order = verbs.add_parser("order", parents=[common], help="the schedule")
+    order = verbs.add_parser(
+        "order", parents=[common], help="list the components in the order in which they run"
+    )
     order.set_defaults(run=show_order)
-    connections = verbs.add_parser("connections", parents=[common], help="all connections")
+    connections = verbs.add_parser("connections", parents=[common], help="list all connections")
     connections.set_defaults(run=show_connections)
     for verb, broken, text in (
         ("break", True, "make connections into inputs loop breaks"),
-        ("unbreak", False, "make them ordinary connections again"),
+        ("unbreak", False, "remove loop breaks from inputs"),
     ):
         breaking = verbs.add_parser(verb, parents=[common], help=text)
         breaking.add_argument("ports", metavar="COMPONENT.PORT", nargs="+")
@@ -68,7 +70,7 @@ def show_connection(client: rtcf.Client, args: argparse.Namespace, output: Outpu
         output.data(found)
         return
     output.line(f"{found.name}: {found.type}", "bold")
-    output.line(f"  written by {_writers(found) or 'nobody here'}")
+    output.line(f"  written by {_writers(found) or 'no component'}")
     for reader in found.readers:
         output.line(f"  read by {_end(reader)}")
     if ros := _ros(found):

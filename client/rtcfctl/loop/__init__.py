@@ -1,1 +1,1 @@
-"""Verbs about a runner and its loop: whether it runs, how fast, and what it cost."""
+"""Verbs for runners and their loops: state, settings, statistics."""

@@ -1,7 +1,6 @@
-"""How often a loop took how long: `rtcfctl stats --plot`, as bars in a terminal or as a picture.
+"""Histograms of `rtcfctl stats --plot`, as bars in a terminal or as an image file.
 
-Both have logarithmic axes: a cycle in a million that takes a hundred times as long as the others is
-seen, and so are the others.
+All axes are logarithmic, so that one slow cycle in a million is visible beside the others.
 """
 
 import io
@@ -19,20 +18,20 @@ from rtcf_shared import durable
 from rtcfctl.terminal.pictures import bar
 
 _FORMATS = (".svg", ".png", ".pdf")
-_LEAST_NS = 10.0  # what is shorter, or early, is counted with that
-# Bins are wider than the buckets that they are made of, which are 3.2 % wide.
+_LEAST_NS = 10.0  # shorter and negative times count as this
+# Bins per decade, finest first.  All are wider than the buckets of rtcfd, which are 3.2 % wide.
 _BINS_OF_DECADE = (40, 20, 10, 5, 2, 1)
 _MOST_BINS, _MOST_LINES = 120, 24
-_FEWEST_FOLDED = 3  # empty lines that one with … stands for
+_FEWEST_FOLDED = 3  # fewest successive empty lines that are replaced by …
 _LONGEST_BAR, _SHORTEST_BAR = 60, 10
-_LOWEST, _SHARE_OF_BARS = 0.7, 0.7  # of the picture: cycles at the bottom, and height of the bars
+_LOWEST, _SHARE_OF_BARS = 0.7, 0.7  # image: lower limit in cycles, largest height of bars
 _MARKS = (("50 %", "p50_ns"), ("99 %", "p99_ns"), ("99.9 %", "p999_ns"), ("max", "max_ns"))
-_DASHES = (":", "--", "-.", "-")  # of their lines
+_DASHES = (":", "--", "-.", "-")  # line styles of the marks
 
 
 @dataclass(frozen=True)
 class Bin:
-    """Cycles that took more than `low_ns`, and `high_ns` at most."""
+    """The number of cycles that took more than `low_ns` and at most `high_ns`."""
 
     low_ns: float
     high_ns: float
@@ -40,8 +39,8 @@ class Bin:
 
 
 def bins(buckets: Sequence[runner_pb2.Bucket], most: int, most_filled: int) -> list[Bin]:
-    """Return bins side by side, equally wide on a logarithmic axis: at most so many, and so many
-    that are not empty."""
+    """Return adjacent bins of equal width on a logarithmic axis: at most `most`, of which at most
+    `most_filled` are not empty."""
     uppers = [max(each.upper_ns, _LEAST_NS) for each in buckets]
     for of_decade in _BINS_OF_DECADE:
         numbers = [math.ceil(of_decade * math.log10(each) - 1e-6) for each in uppers]
@@ -57,24 +56,24 @@ def bins(buckets: Sequence[runner_pb2.Bucket], most: int, most_filled: int) -> l
 
 
 def require_cycles(found: runner_pb2.RunnerStatistics) -> None:
-    """Raises RtcfError if there is nothing to draw."""
+    """Raise RtcfError if the loop has run no cycle."""
     if not found.duration.count:
-        raise rtcf.RtcfError(f"{found.runner} has run no cycle: there is nothing to draw")
+        raise rtcf.RtcfError(f"{found.runner} has run no cycles: nothing to draw")
 
 
 def lines(found: runner_pb2.RunnerStatistics, width: int) -> Iterator[str]:
-    """Yield bars for a terminal, whose lengths are the logarithms of their counts."""
+    """Yield histograms for a terminal; lengths of bars are logarithmic."""
     for title, buckets, figures in _panels(found):
         if buckets:
-            yield f"{title} (µs), {_grouped(figures.count)} cycles; bars are logarithmic"
+            yield f"{title} (µs), {_grouped(figures.count)} cycles, logarithmic bars"
             yield from _bars(bins(buckets, _MOST_BINS, _MOST_LINES), figures, width)
             yield ""
 
 
 def draw(found: runner_pb2.RunnerStatistics, file: Path) -> None:
-    """Write a picture.  Raises ValueError of a file name, and RtcfError."""
+    """Write an image file.  Raises ValueError for an unknown suffix, and RtcfError."""
     if file.suffix not in _FORMATS:
-        raise ValueError(f"{file}: a picture is {', '.join(_FORMATS)}")
+        raise ValueError(f"{file}: use one of {', '.join(_FORMATS)}")
     require_cycles(found)
     try:
         import matplotlib
@@ -82,9 +81,7 @@ def draw(found: runner_pb2.RunnerStatistics, file: Path) -> None:
         matplotlib.use("Agg")
         from matplotlib import pyplot
     except ImportError:
-        raise rtcf.RtcfError(
-            "nothing here draws histograms: sudo apt install python3-matplotlib"
-        ) from None
+        raise rtcf.RtcfError("Matplotlib not found: sudo apt install python3-matplotlib") from None
     figure, axes = pyplot.subplots(1, 2, figsize=(11, 4.5), layout="constrained")
     figure.suptitle(f"{found.runner}, {_grouped(found.iterations)} cycles")
     for axis, letter, (title, buckets, figures) in zip(axes, "ab", _panels(found), strict=True):
@@ -93,7 +90,7 @@ def draw(found: runner_pb2.RunnerStatistics, file: Path) -> None:
         if buckets:
             _draw(axis, title, bins(buckets, _MOST_BINS, _MOST_BINS), figures)
     picture = io.BytesIO()
-    # In an SVG, text that can be searched for.
+    # Text in an SVG file remains text, which can be searched.
     with matplotlib.rc_context({"svg.fonttype": "none"}):
         figure.savefig(picture, dpi=150, format=file.suffix.removeprefix("."))
     pyplot.close(figure)
@@ -135,10 +132,10 @@ def _draw(axis: Any, title: str, found: Sequence[Bin], figures: runner_pb2.Distr
         )  # fmt: skip
         line.set_gid(f"{title.split()[0]} mark {name}")
     low, high = found[0].low_ns / 1e3, found[-1].high_ns / 1e3
-    # A narrow distribution is shown as one.
+    # Show at least a decade, so that a narrow distribution looks narrow.
     room = max(math.sqrt(10 * low / high), 1.1)
     axis.set_xlim(low / room, high * room)
-    # Above the bars there is room for the legend.
+    # Leave room for the legend above the bars.
     most = max(each.count for each in found)
     axis.set_ylim(_LOWEST, _LOWEST * (most / _LOWEST) ** (1 / _SHARE_OF_BARS))
     plain = ticker.FuncFormatter(lambda value, _: f"{value:g}")
@@ -178,7 +175,7 @@ def _bars(found: Sequence[Bin], figures: runner_pb2.Distribution, width: int) ->
 
 
 def _marks(found: Sequence[Bin], figures: runner_pb2.Distribution) -> list[str]:
-    """Return what is to stand beside each bin; figures are inexact by the width of a bucket."""
+    """Return the marks beside each bin; percentiles are accurate to the width of a bucket."""
     names: list[list[str]] = [[] for _ in found]
     filled = [number for number, each in enumerate(found) if each.count]
     for name, field in _MARKS:

@@ -1,4 +1,4 @@
-"""`rtcfctl replay`: a recording through the loop."""
+"""`rtcfctl replay`: replays a bag in a stopped loop."""
 
 import argparse
 from pathlib import Path
@@ -13,11 +13,11 @@ from rtcfctl.terminal.output import Output
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
     replaying = verbs.add_parser(
-        "replay", parents=[common], help="run a bag through a stopped loop, on its recorded time"
+        "replay", parents=[common], help="replay a bag in a stopped loop, at its recorded times"
     )
     replaying.add_argument("bag", metavar="BAG", type=Path)
     replaying.add_argument(
-        "--write", metavar="BAG", type=Path, help="write what the mapped outputs give"
+        "--write", metavar="BAG", type=Path, help="write the mapped outputs to a bag"
     )
     replaying.set_defaults(run=run)
 

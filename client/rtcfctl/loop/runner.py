@@ -13,7 +13,7 @@ from rtcfctl.loop.status import print_runners
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import amount
 
-# Fields of RunnerSettings whose values are words.
+# Enum fields of RunnerSettings.
 _CHOICES = {
     "realtime": choices(runner_pb2.Realtime.DESCRIPTOR),
     "overrun": choices(runner_pb2.OverrunPolicy.DESCRIPTOR),
@@ -22,7 +22,7 @@ _CHOICES = {
     "sim_time": choices(runner_pb2.SimTime.DESCRIPTOR),
 }
 _RIGHTS = choices(runner_pb2.Right.DESCRIPTOR)
-# Options that are fields of RunnerSettings and of RosSettings.
+# Other fields of RunnerSettings and RosSettings; each has an option.
 _FIELDS = ("frequency_hz", "cpu", "priority", "spin_us", "spin_auto", "max_overruns",
            "warmup_cycles", "stall_timeout_ms", "orphan_timeout_s", "lock_memory", "heap_kb",
            "stack_kb", "max_clock_jump_s", "log_limit", "frame_kb")  # fmt: skip
@@ -36,10 +36,10 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     noun = verbs.add_parser("runner", help="list, add, set, restart or remove runners")
     actions = noun.add_subparsers(metavar="ACTION", required=True)
 
-    listing = actions.add_parser("list", parents=[common], help="all runners")
+    listing = actions.add_parser("list", parents=[common], help="list all runners")
     listing.set_defaults(run=show)
 
-    add = actions.add_parser("add", parents=[common], help="add a runner, start its executor")
+    add = actions.add_parser("add", parents=[common], help="add a runner and start its executor")
     add.add_argument("name", metavar="NAME")
     _settings_options(add)
     add.set_defaults(run=add_runner)
@@ -50,12 +50,14 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     change.set_defaults(run=set_runner)
 
     again = actions.add_parser(
-        "restart", parents=[common], help="a fresh executor with the same graph, not started"
+        "restart",
+        parents=[common],
+        help="start a new executor with the same graph, without starting its loop",
     )
     again.add_argument("name", metavar="NAME")
     again.set_defaults(run=restart_runner)
 
-    remove = actions.add_parser("remove", parents=[common], help="stop a runner and forget it")
+    remove = actions.add_parser("remove", parents=[common], help="stop a runner and remove it")
     remove.add_argument("name", metavar="NAME")
     remove.set_defaults(run=remove_runner)
 
@@ -70,9 +72,9 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 
 def _named(args: argparse.Namespace) -> str:
-    """Return the runner that a line names, in one place or the other."""
+    """Return the runner given by -r or NAME.  Raises ValueError if they differ."""
     if args.runner and args.name and args.runner != args.name:
-        raise ValueError(f"-r {args.runner} and {args.name}: name one runner")
+        raise ValueError(f"-r {args.runner} and {args.name}: specify one runner")
     return str(args.name or args.runner)
 
 
@@ -86,7 +88,7 @@ def set_runner(client: rtcf.Client, args: argparse.Namespace, output: Output) ->
     """Change settings."""
     settings = settings_of(args)
     if not settings.ListFields():
-        raise ValueError("runner set: no setting named; see `rtcfctl runner set --help`")
+        raise ValueError("runner set: no setting given; see `rtcfctl runner set --help`")
     status = client.set_runner(settings, _named(args), output.progress)
     _changed(output, f"runner {status.runner} set", status)
 
@@ -107,7 +109,7 @@ def remove_runner(client: rtcf.Client, args: argparse.Namespace, output: Output)
 
 
 def settings_of(args: argparse.Namespace) -> runner_pb2.RunnerSettings:
-    """Return the settings that were given as options."""
+    """Return the settings given as options."""
     settings = runner_pb2.RunnerSettings()
     for field in _FIELDS:
         _take(settings, field, getattr(args, field))
@@ -133,121 +135,130 @@ def _take(message: Any, field: str, value: Any) -> None:
 
 def _settings_options(to: argparse.ArgumentParser) -> None:
     switch = argparse.BooleanOptionalAction
-    add_quantity(to, "--frequency", "frequency_hz", "cycles a second, e.g. 2kHz")
-    to.add_argument("--cpu", type=int, metavar="N", help="CPU of the loop; -1: one with few loops")
-    add_quantity(to, "--priority", "priority", "of SCHED_FIFO; the default is that at 1 kHz")
-    add_quantity(to, "--spin", "spin_us", "busy wait before each deadline, e.g. 30us")
+    add_quantity(to, "--frequency", "frequency_hz", "cycles per second, e.g. 2kHz")
+    to.add_argument(
+        "--cpu", type=int, metavar="N", help="pin the loop to this CPU; -1: one with few loops"
+    )
+    add_quantity(to, "--priority", "priority", "priority of SCHED_FIFO; the default is for 1 kHz")
+    add_quantity(to, "--spin", "spin_us", "wait in a busy loop before each deadline, e.g. 30us")
     to.add_argument(
         "--spin-auto", action=switch, help="choose --spin from the observed wake-up latency"
     )
-    to.add_argument("--realtime", choices=_CHOICES["realtime"], help="may the loop run without it?")
-    to.add_argument("--overrun", choices=_CHOICES["overrun"], help="what follows a late cycle")
-    add_quantity(to, "--max-overruns", "max_overruns", "stop the loop above; 0: never")
-    add_quantity(to, "--warmup-cycles", "warmup_cycles", "first cycles, kept out of the statistics")
+    to.add_argument(
+        "--realtime",
+        choices=_CHOICES["realtime"],
+        help="reject a start without real-time rights, or only warn",
+    )
+    to.add_argument("--overrun", choices=_CHOICES["overrun"], help="what to do after a late cycle")
+    add_quantity(to, "--max-overruns", "max_overruns", "stop after more than N overruns; 0: never")
+    add_quantity(
+        to, "--warmup-cycles", "warmup_cycles", "exclude the first N cycles from the statistics"
+    )
     add_quantity(
         to,
         "--stall-timeout",
         "stall_timeout_ms",
-        "end the executor when a cycle makes no progress for so long, e.g. 2s; 0: never",
+        "end the executor if a cycle makes no progress for this time, e.g. 2s; 0: never",
     )
     add_quantity(
         to,
         "--orphan-timeout",
         "orphan_timeout_s",
-        "stop the loop when rtcfd has been gone for so long",
+        "stop the loop if rtcfd is absent for this time",
     )
     to.add_argument(
         "--on-boot",
         choices=_CHOICES["on_boot"],
-        help="of a loop at boot: what was stopped stays so",
+        help="what to do with the loop when rtcfd starts",
     )
+    to.add_argument("--on-crash", choices=_CHOICES["on_crash"], help="what to do after a crash")
     to.add_argument(
-        "--on-crash", choices=_CHOICES["on_crash"], help="of a loop whose executor crashed"
-    )
-    to.add_argument(
-        "--sim-time", choices=_CHOICES["sim_time"], help="follow /clock; auto: if /use_sim_time"
+        "--sim-time",
+        choices=_CHOICES["sim_time"],
+        help="follow /clock; auto: if /use_sim_time is true",
     )
     add_quantity(
         to,
         "--max-clock-jump",
         "max_clock_jump_s",
-        "a simulated clock that goes further at once begins anew",
+        "re-base the loop if the simulated clock jumps ahead by more than this",
     )
     add_quantity(
         to,
         "--log-limit",
         "log_limit",
-        "records of one line of a component in a second, the others are counted; 0: any number",
+        "forward at most N log records per second of a source line; 0: no limit",
     )
     to.add_argument("--lock-memory", action=switch, help="lock the executor's memory")
-    add_quantity(to, "--heap-kb", "heap_kb", "heap touched at start")
+    add_quantity(to, "--heap-kb", "heap_kb", "heap allocated at the start")
     add_quantity(to, "--stack-kb", "stack_kb", "stack of the real-time thread")
     add_quantity(
-        to, "--frame-kb", "frame_kb", "larger values that each cycle keeps; 0: only watched ones"
+        to,
+        "--frame-kb",
+        "frame_kb",
+        "limit the larger values that each cycle copies; 0: only watched ones",
     )
     to.add_argument(
         "--refuse-out-of-range",
         dest="ros_refuse_out_of_range",
         action=switch,
-        help="fail a call of dynamic_reconfigure instead of taking the nearest value",
+        help="fail dynamic_reconfigure with a value out of range, or take the nearest value",
     )
-    to.add_argument("--ros", dest="ros_enabled", action=switch, help="have a ROS node")
-    to.add_argument("--master-uri", dest="ros_master_uri", metavar="URI", help="the ROS master")
+    to.add_argument("--ros", dest="ros_enabled", action=switch, help="create a ROS node")
+    to.add_argument("--master-uri", dest="ros_master_uri", metavar="URI", help="set the ROS master")
     to.add_argument(
         "--hostname",
         dest="ros_hostname",
         metavar="HOST",
-        help="name or address by which ROS peers reach the loop's node",
+        help="name or address under which ROS peers reach the loop's node",
     )
     to.add_argument(
         "--namespace",
         dest="ros_ns",
         metavar="NAMESPACE",
-        help="of cycles and the runner's services; \"\": the runner's name",
+        help="namespace of cycles and the runner's services; \"\": the node's name",
     )
     to.add_argument(
         "--whitelist",
         dest="ros_whitelist",
         metavar="REGEX",
-        help="connections that become ROS topics (whole mapped names)",
+        help="make connections ROS topics if their whole mapped name matches",
     )
     to.add_argument(
-        "--blacklist", dest="ros_blacklist", metavar="REGEX", help="exceptions from --whitelist"
+        "--blacklist", dest="ros_blacklist", metavar="REGEX", help="exclude names from --whitelist"
     )
-    add_quantity(to, "--queue", "ros_queue", "messages kept for a slow subscriber")
+    add_quantity(to, "--queue", "ros_queue", "keep at most N messages for a slow subscriber")
     to.add_argument(
         "--latch",
         dest="ros_latch",
         metavar="REGEX",
-        help="published connections whose last message late subscribers get",
+        help="send the last message of these connections to late subscribers",
     )
-    add_quantity(
-        to, "--decimation", "ros_decimation", "of the values of outputs, publish each n-th"
-    )
+    add_quantity(to, "--decimation", "ros_decimation", "publish each N-th value of outputs")
     to.add_argument(
         "--decimate",
         dest="ros_decimate",
         metavar="REGEX",
-        help="published connections that --decimation holds for (default: .*)",
+        help="apply --decimation to these connections (default: .*)",
     )
     to.add_argument(
         "--stamped",
         dest="ros_stamped",
         metavar="REGEX",
-        help="published numbers and bools that go with the time of their cycle in a header",
+        help="publish these numbers and bools with the time of their cycle in a header",
     )
     add_quantity(
-        to, "--largest-message", "ros_largest_message_kb", "of variable size, in both directions"
+        to, "--largest-message", "ros_largest_message_kb", "drop larger messages of variable size"
     )
     to.add_argument(
         "--ros-peers",
         choices=_RIGHTS,
-        help="what ROS peers may do: ROS knows no users",
+        help="right of all ROS peers (ROS does not identify users)",
     )
 
 
 def add_quantity(to: argparse.ArgumentParser, option: str, dest: str, text: str) -> None:
-    """Add an option for a setting that is a number, with its unit and range."""
+    """Add an option for a numeric setting, with its unit, range and default."""
     ros = dest.startswith("ros_")
     quantity = ROS[dest.removeprefix("ros_")] if ros else RUNNER[dest]
 
@@ -255,7 +266,7 @@ def add_quantity(to: argparse.ArgumentParser, option: str, dest: str, text: str)
         number = amount(quantity.unit)(text)
         if isinstance(quantity.default, int):
             if not math.isfinite(number) or number != int(number):
-                raise argparse.ArgumentTypeError(f"{text} is no whole number of {quantity.unit}")
+                raise argparse.ArgumentTypeError(f"{text} is not a whole number of {quantity.unit}")
             return int(number)
         return number
 

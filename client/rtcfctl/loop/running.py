@@ -20,23 +20,23 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="start though this component, which is not optional, is left out",
+        help="start even if this component, which is not optional, is left out",
     )
     begin.add_argument(
-        "--partial", action="store_true", help="start whichever components are left out"
+        "--partial", action="store_true", help="start even if any components are left out"
     )
     begin.set_defaults(run=start)
     end = verbs.add_parser("stop", parents=[common], help="end the loop at the next cycle")
     end.add_argument(
         "--all",
         action="store_true",
-        help="of all runners at once, whether rtcfd answers or not",
+        help="end the loops of all runners at once, even if rtcfd does not answer",
     )
     end.set_defaults(run=stop)
     stepping = verbs.add_parser(
         "step", parents=[common], help="run cycles of a stopped loop on a simulated clock"
     )
-    stepping.add_argument("cycles", metavar="N", type=int, help="how many, as fast as they go")
+    stepping.add_argument("cycles", metavar="N", type=int, help="cycles, run as fast as possible")
     stepping.set_defaults(run=step)
 
 
@@ -49,7 +49,7 @@ def start(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None
 
 
 def stop(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Stop the loop, or all."""
+    """Stop the loop, or the loops of all runners."""
     if args.all:
         _stop_all(client, output)
         return
@@ -86,7 +86,7 @@ def _stop_all(client: rtcf.Client, output: Output) -> None:
 def step(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Run cycles of a stopped loop."""
     if args.cycles < 1:
-        raise ValueError(f"step {args.cycles}: name at least 1 cycle")
+        raise ValueError(f"step {args.cycles}: at least 1 cycle")
     if args.cycles > _MOST_CYCLES:
         raise ValueError(f"step {args.cycles}: at most {_MOST_CYCLES} cycles at once")
     result = client.step(args.cycles, args.runner, output.progress)

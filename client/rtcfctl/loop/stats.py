@@ -13,22 +13,22 @@ from rtcfctl.terminal.words import amount, counted, microseconds
 
 _FIGURES = ("min_ns", "mean_ns", "p50_ns", "p99_ns", "p999_ns", "max_ns")
 _SHORTEST_WATCH_S, _LONGEST_WATCH_S = 0.1, 86400.0
-_HERE = Path()  # of a picture: in the terminal
-_WIDTH = 80  # where there is no terminal
+_HERE = Path()  # --plot without a file: draw in the terminal
+_WIDTH = 80  # columns if standard output is not a terminal
 _COLUMNS = ("count", "min", "mean", "p50", "p99", "p99.9", "max")
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
-    stats = verbs.add_parser("stats", parents=[common], help="durations, latencies, overruns")
-    stats.add_argument("--reset", action="store_true", help="begin the figures anew afterwards")
+    stats = verbs.add_parser("stats", parents=[common], help="show durations, latencies, overruns")
+    stats.add_argument("--reset", action="store_true", help="reset the statistics afterwards")
     stats.add_argument(
         "--watch",
         type=amount("s"),
         nargs="?",
         const=1.0,
         metavar="S",
-        help="again and again, each second or each S seconds (or 500ms), until Ctrl-C",
+        help="update each second, or each S seconds (or 500ms), until Ctrl-C",
     )
     stats.add_argument(
         "--plot",
@@ -36,16 +36,16 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
         type=Path,
         nargs="?",
         const=_HERE,
-        help="draw how often the loop took how long, too: here, or as a picture",
+        help="also draw histograms, in the terminal or to FILE",
     )
     stats.set_defaults(run=show)
 
 
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Print the figures of a loop and of its components."""
+    """Print the statistics of a loop and of its components."""
     if args.watch is not None:
         if args.plot is not None:
-            raise ValueError("--plot draws one picture: give it without --watch")
+            raise ValueError("--plot cannot be used with --watch")
         _watch(client, args, output)
         return
     found = client.get_statistics(args.runner, buckets=args.plot is not None)
@@ -68,7 +68,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 
 def _watch(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Print the figures until the user has had enough; on a terminal in one place."""
+    """Print the statistics until Ctrl-C; a terminal is cleared before each update."""
     if not _SHORTEST_WATCH_S <= args.watch <= _LONGEST_WATCH_S:
         raise ValueError(
             f"--watch {args.watch:g}: at least {_SHORTEST_WATCH_S} s, at most {_LONGEST_WATCH_S:g}"
@@ -106,17 +106,17 @@ def _print(found: runner_pb2.RunnerStatistics, output: Output) -> None:
         "bold red" if found.major_faults else "",
     )
     causes = (
-        (found.late_wake_ups, "began late: the machine woke the loop late"),
-        (found.exchange_overruns, "were late by changes or values that were taken over"),
-        (found.frame_overruns, "were late by copying values into frames: lower frame_kb"),
-        (found.catching_up, "were late by the overrun before (catch_up)"),
+        (found.late_wake_ups, "began late because the machine woke the loop late"),
+        (found.exchange_overruns, "were caused by adopting changes or exchanging values"),
+        (found.frame_overruns, "were caused by copying values into frames; lower frame_kb"),
+        (found.catching_up, "were caused by a previous overrun (catch_up)"),
     )
     for count, cause in causes:
         if count:
             output.line(f"{count} of {counted(found.overruns, 'overrun')} {cause}", "yellow")
     for count, what in ((found.log_dropped, "log record"), (found.tap_dropped, "mapped value")):
         if count:
-            output.line(f"{counted(count, what)} lost in full rings", "yellow")
+            output.line(f"{counted(count, what)} dropped (ring full)", "yellow")
     output.line("")
     output.table(
         ("component (µs)", *_COLUMNS, "overruns"),

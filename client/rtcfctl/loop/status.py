@@ -21,13 +21,13 @@ STYLES = {
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
     status = verbs.add_parser(
-        "status", parents=[common], help="what rtcfd and its runners are doing"
+        "status", parents=[common], help="show the state of rtcfd and its runners"
     )
     status.set_defaults(run=show)
 
 
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Print the status of rtcfd and of all runners, or of the one named."""
+    """Print the status of rtcfd and of all runners, or of the selected one."""
     response = client.get_status(args.runner)
     if not output.for_people:
         output.data(response)
@@ -49,7 +49,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 
 def print_runners(runners: list[runner_pb2.RunnerStatus], output: Output) -> None:
-    """Print a table of runners, and which of them share a CPU."""
+    """Print a table of runners, and a line for each CPU that runners share."""
     numbers = ("Hz", "CPU", "prio", "components", "iteration", "overruns", "missed", "pid")
     output.table(
         ("runner", "state", *numbers),
@@ -85,24 +85,24 @@ def shared_cpus(runners: list[runner_pb2.RunnerStatus]) -> list[str]:
         order = sorted(loops, key=lambda name: (-loops[name], name))
         names = ", ".join(f"{name} (priority {loops[name]})" for name in order)
         if len(set(loops.values())) == len(loops):
-            says = "each runs before those after it"
+            says = "each loop runs before the loops after it"
         else:
             says = (
-                "those of equal priority delay each other: "
-                "`rtcfctl runner set NAME --cpu N` or `--priority N` parts them"
+                "loops of equal priority delay each other; "
+                "use `rtcfctl runner set NAME --cpu N` or `--priority N`"
             )
         lines[runner.loop_cpu] = f"CPU {runner.loop_cpu} has several loops, {names}: {says}"
     return [lines[cpu] for cpu in sorted(lines)]
 
 
 def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
-    """Print what a table has no room for."""
+    """Print status lines that are not in the table."""
     if runner.status:
         output.line(f"{runner.runner}: {runner.status}", "yellow")
     if runner.faults:
         output.line(
             f"{runner.runner}: {counted(runner.faults, 'fault')} of components since its loop "
-            "began: `rtcfctl list` shows whose",
+            "started: see `rtcfctl list`",
             "yellow",
         )
     if runner.incident:
@@ -112,8 +112,8 @@ def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
         )
     for library in runner.libraries_changed:
         output.line(
-            f"{runner.runner}: {library} is another file now than components were loaded from: "
-            "`rtcfctl list` shows which, `rtcfctl replace NAME --rebuilt` takes it",
+            f"{runner.runner}: {library} has changed since its components were loaded: "
+            "`rtcfctl list` shows them, `rtcfctl replace NAME --rebuilt` loads the new file",
             "yellow",
         )
     if runner.holder:
@@ -123,7 +123,7 @@ def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
         state = (
             f"registered at {ros.master_uri}, "
             f"{ros.publications} topics published, {ros.subscriptions} subscribed"
-            + (f", {ros.passed_over} messages passed over for newer ones" * bool(ros.passed_over))
+            + (f", {ros.passed_over} unread messages replaced" * bool(ros.passed_over))
             if ros.connected
             else f"no master at {ros.master_uri}"
         )
@@ -132,14 +132,14 @@ def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
         output.line(f"{runner.runner}: ROS: {ros.problem}", "yellow")
     if ros.too_large:
         output.line(
-            f"{runner.runner}: {ros.too_large} messages were larger than "
-            f"{runner.settings.ros.largest_message_kb} KiB: allow more by "
+            f"{runner.runner}: {ros.too_large} messages dropped: larger than "
+            f"{runner.settings.ros.largest_message_kb} KiB; raise the limit with "
             "`rtcfctl runner set --largest-message`",
             "yellow",
         )
     for count, what in ((runner.log_dropped, "log record"), (runner.tap_dropped, "mapped value")):
         if count:
-            output.line(f"{runner.runner}: {counted(count, what)} lost in full rings", "yellow")
+            output.line(f"{runner.runner}: {counted(count, what)} dropped (ring full)", "yellow")
 
 
 def _cpu(runner: runner_pb2.RunnerStatus) -> str:

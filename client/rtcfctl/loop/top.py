@@ -1,4 +1,4 @@
-"""`rtcfctl top`: what a loop costs, while it runs."""
+"""`rtcfctl top`: live statistics of a loop and its components."""
 
 import argparse
 import math
@@ -21,12 +21,12 @@ from rtcfctl.terminal.screen import Screen
 from rtcfctl.terminal.words import amount, counted, microseconds
 
 _SHORTEST_S, _LONGEST_S = 0.1, 3600.0
-_KEPT = 200  # values of a row of blocks
-_SPARK, _SHORTEST_SPARK = 16, 6  # of them that a component's row shows
+_KEPT = 200  # values per spark line
+_SPARK, _SHORTEST_SPARK = 16, 6  # largest and smallest width of a component's spark line
 _TITLE = "COMPONENT µs"
 _NARROWEST_NAME, _READABLE_NAME = len(_TITLE), 18
-_ELSEWHERE = 80  # columns where there is no terminal
-# The first one that fits is shown.
+_ELSEWHERE = 80  # columns if standard output is not a terminal
+# The first line that fits the terminal is shown.
 _HELPS = (
     "q end  ↑ ↓ PgUp PgDn Home End scroll  s sort: m mean p p99 w worst v overruns n name o order"
     "  r reset  TAB next runner",
@@ -45,10 +45,10 @@ _SORTS: dict[str, Key] = {
 }
 _ORDERS = ("order", *_SORTS)
 _SORT_WORDS = {
-    "order": "in the order of the schedule",
+    "order": "in the order in which they run",
     "mean": "by mean",
-    "p99": "by the 99 % mark",
-    "max": "by the worst",
+    "p99": "by the 99 % percentile",
+    "max": "by maximum",
     "over": "by overruns",
     "name": "by name",
 }
@@ -57,23 +57,23 @@ _SORT_KEYS = {"m": "mean", "p": "p99", "w": "max", "v": "over", "n": "name", "o"
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
-    top = verbs.add_parser("top", parents=[common], help="what a loop costs, while it runs")
+    top = verbs.add_parser("top", parents=[common], help="show live statistics of a loop")
     top.add_argument(
-        "--interval", type=amount("s"), default=1.0, metavar="S", help="between looks (1)"
+        "--interval", type=amount("s"), default=1.0, metavar="S", help="update each S seconds (1)"
     )
-    top.add_argument("-n", type=int, metavar="N", help="end after so many looks")
-    top.add_argument("--sort", choices=_ORDERS, default="order", help="of the components (order)")
+    top.add_argument("-n", type=int, metavar="N", help="end after N updates")
+    top.add_argument("--sort", choices=_ORDERS, default="order", help="sort the components (order)")
     top.set_defaults(run=show)
 
 
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Look again and again: in one place of a terminal, else one table after the other."""
+    """Show live statistics on a terminal, else print one table after the other."""
     if not _SHORTEST_S <= args.interval <= _LONGEST_S:
         raise ValueError(f"--interval {args.interval:g}: from {_SHORTEST_S:g} to {_LONGEST_S:g} s")
     if args.n is not None and args.n < 1:
         raise ValueError(f"-n {args.n}: at least 1")
     top = _Top(client, args.runner or "rt_runner", args.sort)
-    top.look()  # a refusal is told before the screen changes
+    top.look()  # report an error before the screen changes
     try:
         if output.for_people and sys.stdout.isatty():
             with Screen() as screen:
@@ -121,12 +121,12 @@ def _print(top: "_Top", args: argparse.Namespace, output: Output) -> None:
 
 @dataclass(frozen=True)
 class _Column:
-    """One of the figures of a component."""
+    """A column of the table of components."""
 
     title: str
     width: int
-    sort: str  # the order that it is the key of; empty = of none
-    text: Callable[[runner_pb2.ComponentStatistics, float], str]  # of its share, too
+    sort: str  # key in _SORTS; empty: not sortable
+    text: Callable[[runner_pb2.ComponentStatistics, float], str]  # statistics, share
 
 
 _COLUMNS = (
@@ -137,17 +137,17 @@ _COLUMNS = (
     _Column("SHARE", 6, "", lambda _, share: f"{share:.1%}"),
     _Column("OVER", 6, "over", lambda each, _: str(each.overruns)),
 )
-# Where there is not room for all.
+# Columns to leave out, the first set that fits the terminal.
 _LEFT_OUT = ((), ("P50",), ("P50", "P99"), ("P50", "P99", "SHARE"))
 
 
 @dataclass(frozen=True)
 class _Layout:
-    """What of the components' figures fits into a width."""
+    """The width of the name, the columns and the spark line that fit a terminal."""
 
     name: int
     columns: Sequence[_Column]
-    spark: int  # 0 = none
+    spark: int  # width; 0: none
 
     @classmethod
     def of(cls, width: int, longest_name: int) -> "_Layout":
@@ -164,7 +164,7 @@ class _Layout:
 
 
 class _Means:
-    """What a distribution that grows took on average since the last look, look by look."""
+    """The mean of a distribution between successive updates."""
 
     def __init__(self) -> None:
         self.kept: deque[float] = deque(maxlen=_KEPT)
@@ -173,28 +173,28 @@ class _Means:
     def take(self, found: runner_pb2.Distribution) -> None:
         total = found.count * found.mean_ns
         if found.count < self._count:
-            self._count, self._sum = 0, 0.0  # it began anew
+            self._count, self._sum = 0, 0.0  # it was reset
         more = found.count - self._count
         self.kept.append((total - self._sum) / more if more else math.nan)
         self._count, self._sum = found.count, total
 
 
 class _Top:
-    """What is shown of one runner, and what was seen before."""
+    """The newest status and statistics of a runner, its history, and the scroll position."""
 
     def __init__(self, client: rtcf.Client, runner: str, sort: str) -> None:
         self._client = client
         self._runner = runner
         self._sort = sort
         self._trouble = ""
-        self._above = 0  # components that are scrolled out of sight
-        self._room = 1  # components that were in sight
+        self._above = 0  # components above the visible ones
+        self._room = 1  # components that fit the screen
         self.status = runner_pb2.RunnerStatus()
         self.found = runner_pb2.RunnerStatistics()
         self._means: dict[str, _Means] = {}
 
     def look(self) -> None:
-        """Ask again; what is wrong is shown, and raised only the first time."""
+        """Query status and statistics.  Raise an error the first time; later, show it."""
         try:
             (self.status,) = self._client.get_status(self._runner).runners
             self.found = self._client.get_statistics(self._runner)
@@ -212,7 +212,7 @@ class _Top:
             self._mean(each.component).take(each.duration)
 
     def press(self, key: str) -> None:
-        """Do what a key says."""
+        """Handle a key."""
         page = max(self._room - 1, 1)
         steps = {
             "up": -1, "k": -1, "down": 1, "j": 1, "page up": -page, "page down": page, " ": page,
@@ -234,10 +234,9 @@ class _Top:
             self._trouble = str(error)
 
     def lines(self, width: int, height: int) -> list[str]:
-        """Return what a terminal shows: as many components as it has room for, where among all
-        those are, and the keys."""
+        """Return the lines of the screen: head, visible components, their position, and keys."""
         head = self._head(width)
-        # Of the troubles the end is left out before all components are.
+        # If the terminal is too low, cut the head, so that some components are visible.
         head = head[: max(height - 6, 1)]
         if height - len(head) > 6:
             head.append("")
@@ -254,7 +253,7 @@ class _Top:
         ]  # fmt: skip
 
     def table(self, width: int) -> list[str]:
-        """Return all of it, as it stands where nothing scrolls."""
+        """Return the whole table, for output without scrolling."""
         return [*self._head(width), "", self._columns(width), *self._components(width)]
 
     def _order(self, sort: str) -> None:
@@ -302,7 +301,7 @@ class _Top:
             ("wake-up", self.found.latency, "~latency"),
         ):
             if not figures.count:
-                lines.append(f"{title:<12} nothing yet")
+                lines.append(f"{title:<12} no cycles yet")
                 continue
             text = (
                 f"{title:<12} mean {microseconds(figures.mean_ns):>8}  "
@@ -321,7 +320,7 @@ class _Top:
             f"{counted(faults, 'page fault')}"
         )
         if losses:
-            text += f", {losses} records and values lost"
+            text += f", {losses} records and values dropped"
         bad = found.overruns or found.missed or losses
         return _folded(text, width, "bold red" if bad else "")
 

@@ -1,1 +1,1 @@
-"""Verbs about the machine and the code on it: doctor, check."""
+"""Verbs for the machine and for authors of components: doctor, check, metrics, new."""

@@ -1,4 +1,4 @@
-"""`rtcfctl check`: is a component safe in real time?"""
+"""`rtcfctl check`: checks whether a component is real-time safe."""
 
 import argparse
 import linecache
@@ -12,7 +12,7 @@ from rtcf.sanitizer import Frame, Violation
 
 from rtcfctl.terminal.output import Output
 
-_EXECUTOR_FRAMES = 5  # of a stack that is not the component's
+_EXECUTOR_FRAMES = 5  # printed frames of a stack without the component
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
@@ -24,7 +24,9 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     )
     checking.add_argument("package", metavar="PKG")
     checking.add_argument("type", metavar="COMPONENT")
-    checking.add_argument("--cycles", type=int, default=1000, metavar="N", help="default: 1000")
+    checking.add_argument(
+        "--cycles", type=int, default=1000, metavar="N", help="run N updates (default: 1000)"
+    )
     checking.add_argument("--param", action="append", default=[], metavar="NAME:=VALUE")
     checking.add_argument(
         "--path",
@@ -32,16 +34,16 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="DIR",
-        help="look for packages here first (repeatable)",
+        help="search packages in this folder first (repeatable)",
     )
-    checking.add_argument("--executor", type=Path, metavar="FILE", help="executor to run it in")
+    checking.add_argument("--executor", type=Path, metavar="FILE", help="use this executor")
     checking.set_defaults(run=run)
 
 
 def run(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Check a component; violations are a refusal."""
+    """Check a component.  Raises RtcfError if there are violations."""
     if args.cycles < 1:
-        raise ValueError(f"--cycles {args.cycles}: name at least 1")
+        raise ValueError(f"--cycles {args.cycles}: at least 1")
     for parameter in args.param:
         rtcf.parse_parameter(parameter)
     executor = args.executor or executor_of(args.build_tree)
@@ -69,15 +71,15 @@ def run(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         for line in found.log:
             print(line, file=sys.stderr)
         for port in found.not_finite:
-            output.line(f"{name}: output {port} carried NaN or infinity", "yellow")
+            output.line(f"{name}: output {port} had NaN or infinity", "yellow")
         for member in found.undeclared:
             print(
-                f"{name}: note: a member changes that is not declared ({member}): as an "
-                "rtcf::State it would be kept by replace and snapshot",
+                f"{name}: note: a member changes but is not declared as state ({member}): replace "
+                "and snapshot keep only rtcf::State",
                 file=sys.stderr,
             )
     unsafe = (
-        f"{len(found.violations)} calls that are not safe in real time" if found.violations else ""
+        f"{len(found.violations)} calls that are not real-time safe" if found.violations else ""
     )
     if found.ended:
         raise rtcf.RtcfError(f"{name}: {found.ended}{unsafe and f'; and {unsafe}'}")
@@ -88,20 +90,20 @@ def run(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 
 def _print(number: int, violation: Violation, output: Output) -> None:
-    """Print one violation: the call, the way to it, the line of the source."""
+    """Print one violation: the call, the stack, and the source line of the component."""
     output.line(f"{number}. {violation.called or violation.kind}", "bold red")
     frames = violation.short_frames
     if violation.of_executor:
         output.line("   in the executor itself, not in the component:")
         frames = violation.frames[:_EXECUTOR_FRAMES]
     elif not frames:
-        output.line("   by what update() calls last, which leaves no frame of it")
+        output.line("   in a tail call of update(), which leaves no frame of the component")
     shown = False
     for frame in frames:
         place = f"  {frame.file}:{frame.line}" if frame.file else ""
         output.line(f"   {frame.function}{place}")
         source = _source(frame)
-        # The innermost one of the component, not of a library's header.
+        # Print the source line of the component's innermost frame, not of a library header.
         if source and not shown and not frame.of_library:
             output.line(f"   > {source}", "yellow")
             shown = True

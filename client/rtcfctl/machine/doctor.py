@@ -1,4 +1,4 @@
-"""`rtcfctl doctor`: what stands between this machine and real time."""
+"""`rtcfctl doctor`: checks everything that keeps a machine from real time."""
 
 import argparse
 import os
@@ -18,9 +18,9 @@ from rtcfctl.terminal.words import amount
 
 _SECONDS = 10.0
 _FREQUENCY_HZ = 1000.0
-# Of wake-up latency, µs: what a loop of 1 kHz notices, and what it cannot live with.
+# Largest good wake-up latency; up to the period of 1 kHz is a warning, more is bad.
 _GOOD_US = 100.0
-# Besides 0 to 3, which mean the same with all verbs.
+# Exit codes of doctor, besides 0 to 3, which all verbs have.
 WEAK, UNFIT = 4, 5
 _EXIT_CODES = {Grade.GOOD: 0, Grade.UNKNOWN: 0, Grade.WARNING: WEAK, Grade.BAD: UNFIT}
 _STYLES = {Grade.GOOD: "green", Grade.UNKNOWN: "", Grade.WARNING: "yellow", Grade.BAD: "bold red"}
@@ -29,20 +29,20 @@ _STYLES = {Grade.GOOD: "green", Grade.UNKNOWN: "", Grade.WARNING: "yellow", Grad
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
     doctor = verbs.add_parser(
-        "doctor", parents=[common], help="what stands between this machine and real time"
+        "doctor", parents=[common], help="check everything that keeps this machine from real time"
     )
     doctor.add_argument(
         "--seconds",
         type=amount("s"),
         default=_SECONDS,
         metavar="S",
-        help="how long to measure wake-up latency; 0: not at all (default: 10)",
+        help="measure the wake-up latency for S seconds; 0: do not (default: 10)",
     )
     doctor.set_defaults(run=run)
 
 
 def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> int:
-    """Look, measure, judge; return the verdict as an exit code."""
+    """Check the machine, measure the latency, print the findings; return the exit code."""
     if not 0.0 <= args.seconds <= 3600.0:
         raise ValueError(f"--seconds {args.seconds:g}: use 0 to 3600")
     host = Host()
@@ -61,14 +61,14 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> int:
 class _Answer:
     """The answer of rtcfd, or the reason for none."""
 
-    runner: runner_pb2.RunnerStatus | None = None  # the one that is meant
+    runner: runner_pb2.RunnerStatus | None = None  # the selected runner
     every: Sequence[runner_pb2.RunnerStatus] = ()
-    notes: Sequence[str] = ()  # on rtcfd itself
+    notes: Sequence[str] = ()  # notes on rtcfd itself
     trouble: rtcf.RtcfError | None = None
 
     @property
     def keeps_silent(self) -> bool:
-        """Tell whether it may serve well, and only tells us nothing."""
+        """Whether rtcfd may work but does not answer us, e.g. because of missing rights."""
         if isinstance(self.trouble, rtcf.DaemonUnreachableError):
             return self.trouble.denied
         return self.trouble is not None
@@ -98,32 +98,32 @@ def _loop(host: Host, found: _Answer) -> Loop:
 
 
 def _of_rtcfd(found: _Answer) -> list[Finding]:
-    """Say what rtcfd itself says."""
+    """Return the findings that rtcfd itself reports."""
     if found.trouble is not None:
         text = str(found.trouble)
-        if found.keeps_silent:  # the line names the missing rights
+        if found.keeps_silent:  # the message names the missing rights
             return [Finding("rtcfd", Grade.UNKNOWN, text, "the right to observe")]
-        return [Finding("rtcfd", Grade.BAD, text, "it serves", "systemctl start rtcfd")]
+        return [Finding("rtcfd", Grade.BAD, text, "it answers", "systemctl start rtcfd")]
     assert found.runner is not None
     status, topic = found.runner, f"runner {found.runner.runner}"
-    findings = [Finding("rtcfd", Grade.WARNING, note, "nothing to say") for note in found.notes]
+    findings = [Finding("rtcfd", Grade.WARNING, note, "no notes") for note in found.notes]
     if lines := [str(line) for line in status.degraded]:
         text = "; ".join(lines)
         findings.append(Finding(topic, Grade.WARNING, f"degraded: {text}", "real time"))
     if status.status:
-        findings.append(Finding(topic, Grade.WARNING, status.status, "nothing to say"))
+        findings.append(Finding(topic, Grade.WARNING, status.status, "no notes"))
     if not status.degraded and not status.status:
-        text = f"serves; its loop is {runner_pb2.RunnerState.Name(status.state)[13:].lower()}"
+        text = f"answers; its loop is {runner_pb2.RunnerState.Name(status.state)[13:].lower()}"
         findings.append(Finding(topic, Grade.GOOD, text))
     return findings
 
 
 @dataclass(frozen=True)
 class _Latency:
-    """What was measured, or why nothing was."""
+    """The measured wake-up latency, or the reason for no measurement."""
 
     figures: runner_pb2.Distribution | None = None
-    of: str = ""  # what loop
+    of: str = ""  # description of the measured loop
     why_not: str = ""
 
 
@@ -135,16 +135,16 @@ def _measure(
     seconds: float,
     output: Output,
 ) -> _Latency:
-    """Return the wake-up latency of the loop if it runs, else of an empty one in its place.
+    """Return the wake-up latency of the loop if it runs, else of an empty loop on its CPU.
 
-    No second loop is put beside one that runs: the two would make each other late.
+    If another loop runs on that CPU, do not measure: the two loops would delay each other.
     """
     status = found.runner
     assert status is not None
     try:
         if _runs(status):
             latency = client.get_statistics(status.runner).latency
-            return _Latency(latency, f"of the loop that runs, {latency.count} cycles")
+            return _Latency(latency, f"of the running loop, {latency.count} cycles")
         for other in found.every:
             if _runs(other) and _cpu_of(host, other, found.every) == cpu:
                 return _Latency(why_not=f"the loop of {other.runner} runs on CPU {cpu}")
@@ -163,7 +163,7 @@ def _of_an_empty_loop(
     seconds: float,
     output: Output,
 ) -> runner_pb2.Distribution:
-    """Run one by a hold: however we end, rtcfd removes it."""
+    """Run an empty loop under a lease, so that rtcfd removes it if this process dies."""
     name = f"doctor_{os.getpid()}"
     settings = runner_pb2.RunnerSettings(
         frequency_hz=_FREQUENCY_HZ,
@@ -190,7 +190,7 @@ def _of_an_empty_loop(
         return client.get_statistics(name).latency
     finally:
         hold.end()
-        for _ in messages:  # until it is gone
+        for _ in messages:  # until rtcfd has removed the runner
             pass
 
 
@@ -201,8 +201,10 @@ def _runs(status: runner_pb2.RunnerStatus) -> bool:
 def _cpu_of(
     host: Host, status: runner_pb2.RunnerStatus, every: Sequence[runner_pb2.RunnerStatus]
 ) -> int:
-    """Return the CPU of a runner's real-time thread, or the one it would get beside the loops of
-    `every` runner."""
+    """Return the CPU of a runner's real-time thread.
+
+    If it has none, return the CPU that rtcfd would choose, given the loops of `every` runner.
+    """
     thread = f"/proc/{status.pid}/task/{status.realtime_tid}/status"
     found = re.search(r"^Cpus_allowed_list:\s*(\d+)$", host.read(thread) or "", re.MULTILINE)
     if status.realtime_tid and found:
@@ -226,11 +228,11 @@ def _judge(latency: _Latency) -> Finding:
     if worst_us <= _GOOD_US:
         return Finding(topic, Grade.GOOD, found)
     grade = Grade.WARNING if worst_us <= 1e6 / _FREQUENCY_HZ else Grade.BAD
-    return Finding(topic, grade, found, f"below {_GOOD_US:g} µs", "mend what is named above first")
+    return Finding(topic, grade, found, f"below {_GOOD_US:g} µs", "correct the findings above")
 
 
 def verdict(findings: list[Finding]) -> tuple[Grade, str]:
-    """Return the worst grade and what it means, in a line."""
+    """Return the worst grade and a sentence about it."""
     bad = [each.topic for each in findings if each.grade == Grade.BAD]
     warned = [each.topic for each in findings if each.grade == Grade.WARNING]
     if bad:
@@ -241,7 +243,7 @@ def verdict(findings: list[Finding]) -> tuple[Grade, str]:
 
 
 def report(findings: list[Finding], latency: runner_pb2.Distribution | None, output: Output) -> int:
-    """Print all that was found, and what it means; return that as an exit code."""
+    """Print all findings and the verdict; return the exit code."""
     grade, sentence = verdict(findings)
     if not output.for_people:
         document: dict[str, Any] = {
@@ -271,6 +273,6 @@ def report(findings: list[Finding], latency: runner_pb2.Distribution | None, out
         if each.wanted and each.grade != Grade.GOOD:
             output.line(f"{'':<8} should be: {each.wanted}")
         if each.remedy and each.grade != Grade.GOOD:
-            output.line(f"{'':<8} mend it:   {each.remedy}")
+            output.line(f"{'':<8} remedy:    {each.remedy}")
     output.line(sentence, _STYLES[grade])
     return _EXIT_CODES[grade]

@@ -1,4 +1,4 @@
-"""`rtcfctl metrics`: all runners' figures as Prometheus takes them, once or at a port."""
+"""`rtcfctl metrics`: statistics of all runners for Prometheus, printed once or served at a port."""
 
 import argparse
 import threading
@@ -15,27 +15,29 @@ if TYPE_CHECKING:
     from prometheus_client.core import Metric
 
 LOOPBACK = "127.0.0.1"
-# Of seconds; the same in each answer, as Prometheus asks.
+# Bounds of buckets in seconds; Prometheus requires the same ones in each answer.
 _BOUNDS = tuple(step * 10.0**power for power in range(-7, 0) for step in (1, 2, 5))
 _QUANTILES = (("0.5", "p50_ns"), ("0.99", "p99_ns"), ("0.999", "p999_ns"), ("1", "max_ns"))
 
-# Name, what it is, and where it is found: each is counted from the start of the loop, or from
+# Name, description and value.  Counters start with the loop, or with the last
 # `rtcfctl stats --reset`.
 _COUNTERS: tuple[tuple[str, str, Callable[[runner_pb2.RunnerStatistics], int]], ...] = (
     ("rtcf_cycles", "Cycles of the loop", lambda found: found.iterations),
-    ("rtcf_overruns", "Cycles that ended after the next should have begun",
+    ("rtcf_overruns", "Cycles that ended after the start of the next period",
      lambda found: found.overruns),
-    ("rtcf_missed_cycles", "Cycles that were left out, as others took too long",
+    ("rtcf_missed_cycles", "Cycles left out because others took too long",
      lambda found: found.missed),
-    ("rtcf_late_wake_ups", "Overruns that the machine caused by waking the loop late",
+    ("rtcf_late_wake_ups", "Overruns because the machine woke the loop late",
      lambda found: found.late_wake_ups),
-    ("rtcf_lost_values", "Mapped values lost in full rings", lambda found: found.tap_dropped),
-    ("rtcf_lost_log_records", "Log records lost in full rings", lambda found: found.log_dropped),
+    ("rtcf_lost_values", "Mapped values dropped because a ring was full",
+     lambda found: found.tap_dropped),
+    ("rtcf_lost_log_records", "Log records dropped because a ring was full",
+     lambda found: found.log_dropped),
     ("rtcf_major_page_faults", "Page faults of the real-time thread with disk access",
      lambda found: found.major_faults),
     ("rtcf_minor_page_faults", "Page faults of the real-time thread without disk access",
      lambda found: found.minor_faults),
-    ("rtcf_involuntary_context_switches", "Times that the real-time thread was put aside",
+    ("rtcf_involuntary_context_switches", "Times that the kernel preempted the real-time thread",
      lambda found: found.involuntary_switches),
 )  # fmt: skip
 
@@ -43,27 +45,27 @@ _COUNTERS: tuple[tuple[str, str, Callable[[runner_pb2.RunnerStatistics], int]], 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
     metrics = verbs.add_parser(
-        "metrics", parents=[common], help="figures of all runners for Prometheus"
+        "metrics", parents=[common], help="print or serve statistics of all runners for Prometheus"
     )
     metrics.add_argument(
         "--listen", metavar="[ADDRESS:]PORT",
-        help=f"serve them until Ctrl-C; at {LOOPBACK} unless an address is given",
+        help=f"serve them until Ctrl-C (default address: {LOOPBACK})",
     )  # fmt: skip
     metrics.set_defaults(run=run)
 
 
 def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Print them, or serve them."""
+    """Print or serve the metrics."""
     try:
         import prometheus_client
     except ImportError:
         raise rtcf.RtcfError(
-            "nothing here knows Prometheus's format: sudo apt install python3-prometheus-client"
+            "prometheus_client not found: sudo apt install python3-prometheus-client"
         ) from None
     figures = prometheus_client.CollectorRegistry()
     figures.register(_Figures(lambda: rtcf.Client(args.socket)))  # type: ignore[arg-type]
     if args.listen is None:
-        client.get_status()  # a refusal is told in its own words
+        client.get_status()  # raises an error of rtcfd; collect() hides it
         print(prometheus_client.generate_latest(figures).decode(), end="")
         return
     address, port = _place(args.listen)
@@ -83,19 +85,19 @@ def _place(text: str) -> tuple[str, int]:
     address, _, port = text.rpartition(":")
     address = address.removeprefix("[").removesuffix("]")
     if not port.isascii() or not port.isdigit() or not 0 < int(port) < 65536:
-        raise ValueError(f"--listen {text}: a port, or ADDRESS:PORT")
+        raise ValueError(f"--listen {text}: use PORT or ADDRESS:PORT")
     return address or LOOPBACK, int(port)
 
 
 class _Figures:
-    """What Prometheus collects; each time by a client of its own, one after the other."""
+    """A collector for prometheus_client, called by its threads; each call uses a new client."""
 
     def __init__(self, connect: Callable[[], rtcf.Client]) -> None:
         self._connect = connect
         self._lock = threading.Lock()
 
     def collect(self) -> "Iterator[Metric]":
-        """Ask for them, and give them; without rtcfd that it is not there."""
+        """Yield the metrics; without rtcfd only rtcf_up, which is 0."""
         from prometheus_client.core import GaugeMetricFamily
 
         with self._lock:
@@ -119,7 +121,7 @@ def _asked(
     for each in runners:
         try:
             statistics.append(client.get_statistics(each.runner, buckets=True))
-        except rtcf.RefusedError:  # it is down, or was removed meanwhile
+        except rtcf.RefusedError:  # the runner is down or was removed
             continue
     return runners, statistics
 
@@ -130,10 +132,10 @@ def _of_runners(runners: list[runner_pb2.RunnerStatus]) -> "Iterator[Metric]":
     kinds = runner_pb2.RunnerState.DESCRIPTOR
     names = [word(kinds, number) for number in runner_pb2.RunnerState.values() if number]
     states = GaugeMetricFamily(
-        "rtcf_runner_state", "1 of the state that the runner is in", labels=("runner", "state")
+        "rtcf_runner_state", "1 for the present state of a runner", labels=("runner", "state")
     )
     rates = GaugeMetricFamily(
-        "rtcf_frequency_hertz", "Cycles a second that the runner is set to", labels=("runner",)
+        "rtcf_frequency_hertz", "Configured cycles per second", labels=("runner",)
     )
     for runner in runners:
         now = word(kinds, runner.state)
@@ -153,10 +155,10 @@ def _of_loops(statistics: list[runner_pb2.RunnerStatistics]) -> "Iterator[Metric
             counter.add_metric((found.runner,), figure(found))
         yield counter
     durations = HistogramMetricFamily(
-        "rtcf_cycle_duration_seconds", "Calculation of a cycle", labels=("runner",)
+        "rtcf_cycle_duration_seconds", "Calculation duration of a cycle", labels=("runner",)
     )
     latencies = HistogramMetricFamily(
-        "rtcf_wake_up_latency_seconds", "Wake-up after the deadline", labels=("runner",)
+        "rtcf_wake_up_latency_seconds", "Wake-up latency after the deadline", labels=("runner",)
     )
     for found in statistics:
         for family, buckets, all_of_it in (
@@ -169,7 +171,7 @@ def _of_loops(statistics: list[runner_pb2.RunnerStatistics]) -> "Iterator[Metric
 
 
 def _cumulated(buckets: Sequence[runner_pb2.Bucket]) -> list[tuple[str, float]]:
-    """Return how many values are not above each bound."""
+    """Return the number of values up to each bound."""
     rows = []
     at = below = 0
     for bound in _BOUNDS:
@@ -190,13 +192,13 @@ def _of_components(statistics: list[runner_pb2.RunnerStatistics]) -> "Iterator[M
 
     labels = ("runner", "component")
     durations = SummaryMetricFamily(
-        "rtcf_component_update_seconds", "update() of a component", labels=labels
+        "rtcf_component_update_seconds", "Duration of update() of a component", labels=labels
     )
     overruns = CounterMetricFamily(
         "rtcf_component_overruns", "Overruns while the component was running", labels=labels
     )
     faults = CounterMetricFamily(
-        "rtcf_component_faults", "Faults that the loop went on after", labels=labels
+        "rtcf_component_faults", "Faults that did not stop the loop", labels=labels
     )
     for found in statistics:
         for each in found.components:

@@ -1,4 +1,4 @@
-"""`rtcfctl new`: a package with a component, its build and its test, to be made one's own."""
+"""`rtcfctl new`: creates a package with a component, a build file, a test and a graph file."""
 
 import argparse
 import re
@@ -14,7 +14,7 @@ from rtcfctl.terminal.output import Output
 
 _PACKAGE = re.compile(r"[a-z][a-z0-9_]*[a-z0-9]")
 _COMPONENT = re.compile(r"[A-Z][A-Za-z0-9]*")
-# Targets that CMake has, or that catkin adds.
+# Names of targets of CMake and catkin.
 _TARGETS = {"all", "clean", "doxygen", "edit_cache", "help", "install", "list_install_components",
             "package", "rebuild_cache", "rtcf", "run_tests", "test", "tests"}  # fmt: skip
 
@@ -22,16 +22,16 @@ _TARGETS = {"all", "clean", "doxygen", "edit_cache", "help", "install", "list_in
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
     new = verbs.add_parser(
-        "new", parents=[common], help="a package with a component, its build and its test"
+        "new", parents=[common], help="create a package with a component, its build and its test"
     )
-    new.add_argument("package", metavar="NEW_PACKAGE", help="its folder is made here")
-    new.add_argument("type", metavar="NEW_COMPONENT", help="the class, as LowPass")
-    new.add_argument("--python", action="store_true", help="in Python instead of C++")
+    new.add_argument("package", metavar="NEW_PACKAGE", help="name and folder of the package")
+    new.add_argument("type", metavar="NEW_COMPONENT", help="class of the component, e.g. LowPass")
+    new.add_argument("--python", action="store_true", help="use Python instead of C++")
     new.set_defaults(run=run)
 
 
 def run(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Write it, whole or not at all."""
+    """Create the folder atomically, and print the next commands."""
     name = _name_of(args.type)
     _check(args.package, args.type, name, args.python)
     folder = Path(args.package)
@@ -43,14 +43,14 @@ def run(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
                 (whole / path).parent.mkdir(parents=True, exist_ok=True)
                 (whole / path).write_text(text)
             if folder.exists() or folder.is_symlink():
-                raise ValueError(f"{folder} is there already: name another package, or move it")
+                raise ValueError(f"{folder} exists: choose another name, or move it")
             whole.rename(folder)
     except OSError as error:
         raise rtcf.RtcfError(f"{folder}: {error.strerror or error}") from None
     if not output.for_people:
         output.data({"folder": str(folder.absolute()), "files": sorted(made)})
         return
-    output.line(f"made {folder}/:")
+    output.line(f"created {folder}/:")
     for path in sorted(made):
         output.line(f"- {path}")
     needs = "rtcf-python python3-pytest" if args.python else "librtcf-dev libgtest-dev"
@@ -58,7 +58,7 @@ def run(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     output.line(f"  cd {folder}")
     output.line("  cmake -S . -B build && cmake --build build")
     output.line("  ctest --test-dir build")
-    output.line("run it until Ctrl-C, with what is rebuilt meanwhile, and look from elsewhere:")
+    output.line("run it until Ctrl-C (reloads after each build), query it from another terminal:")
     output.line("  rtcfctl --socket /tmp/rtcf.sock run graph.yaml")
     output.line("  rtcfctl --socket /tmp/rtcf.sock status")
 
@@ -71,19 +71,17 @@ def _name_of(component: str) -> str:
 
 def _check(package: str, component: str, name: str, python: bool) -> None:
     if not _PACKAGE.fullmatch(package) or "__" in package or len(package) > 100:
-        raise ValueError(
-            f"package {package!r}: small letters, digits and _, as ROS names packages: my_arm"
-        )
+        raise ValueError(f"package {package!r}: use lower-case letters, digits and _, e.g. my_arm")
     if package in _TARGETS:
-        raise ValueError(f"package {package}: CMake has a target of that name; choose another")
+        raise ValueError(f"package {package}: CMake has a target of this name; choose another")
     if not _COMPONENT.fullmatch(component) or len(component) > 100:
         raise ValueError(
-            f"component {component!r}: letters and digits, a capital first, as of a class: LowPass"
+            f"component {component!r}: use letters and digits with a capital first, e.g. LowPass"
         )
     if component in templates.TAKEN:
-        raise ValueError(f"component {component}: rtcf has a class of that name; choose another")
+        raise ValueError(f"component {component}: rtcf has a class of this name; choose another")
     if python and (name in sys.stdlib_module_names or name in ("numpy", "rtcf", "pytest")):
         raise ValueError(
-            f"component {component}: its module would be {name}.py, and hide Python's {name}; "
+            f"component {component}: its module {name}.py would hide Python's module {name}; "
             "choose another name"
         )

@@ -1,4 +1,4 @@
-"""`rtcfctl -H HOST`: the control socket of another machine, by way of ssh."""
+"""`rtcfctl -H HOST`: forwards the control socket of another machine through ssh."""
 
 import os
 import shlex
@@ -13,28 +13,28 @@ from subprocess import PIPE
 import rtcf
 from rtcf.connection import DEFAULT_SOCKET
 
-_THROUGH = "rtcfctl is through"  # what a login shell says before that is not ours
+_THROUGH = "rtcfctl is through"  # marks the connection; a login shell may print before it
 _END_S = 5.0
 
 
 @contextmanager
 def control_socket_of(host: str, socket: str | None) -> Iterator[str]:
-    """Give a socket of ours behind which is that of the other machine.
+    """Yield the path of a local socket that ssh forwards to the socket of the other machine.
 
-    rtcfd there sees whom ssh has logged in.  What ssh asks and complains of is between it and the
-    terminal.  Raises ValueError, and DaemonUnreachableError if ssh does not come through.
+    rtcfd there sees the user of the ssh session.  ssh uses the terminal for its prompts and error
+    messages.  Raises ValueError, and DaemonUnreachableError if ssh cannot connect.
     """
     if not host or host.startswith("-") or not host.isprintable():
-        raise ValueError(f"-H {host!r}: a host, or USER@HOST, as for ssh")
+        raise ValueError(f"-H {host!r}: use HOST or USER@HOST, as for ssh")
     there = socket or DEFAULT_SOCKET
     if not there.startswith("/") or ":" in there:
-        raise ValueError(f"--socket {there}: with -H, a path from / on, without a colon")
+        raise ValueError(f"--socket {there}: with -H, use an absolute path without a colon")
     with tempfile.TemporaryDirectory(prefix="rtcfctl-") as folder:
         here = Path(folder) / "control.sock"
         with _ssh("-L", f"{here}:{there}", "--", host, f"echo {_THROUGH} && exec cat") as process:
             assert process.stdout is not None
             if not any(line.rstrip() == _THROUGH for line in process.stdout):
-                raise rtcf.DaemonUnreachableError(f"ssh does not get through to {host}")
+                raise rtcf.DaemonUnreachableError(f"ssh cannot connect to {host}")
             yield str(here)
 
 
@@ -54,7 +54,7 @@ def _ssh(*words: str) -> Iterator["subprocess.Popen[str]"]:
             yield process
         finally:
             assert process.stdin is not None
-            process.stdin.close()  # which ends what runs there, and with it ssh
+            process.stdin.close()  # ends cat on the other machine, and then ssh
             try:
                 process.wait(_END_S)
             except subprocess.TimeoutExpired:

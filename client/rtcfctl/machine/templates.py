@@ -1,4 +1,4 @@
-"""The files of a new package of components: what `rtcfctl new` writes, to be made one's own."""
+"""Templates of the files that `rtcfctl new` creates."""
 
 from string import Template
 
@@ -15,7 +15,7 @@ _PACKAGE = """\
 """
 
 _GRAPH = """\
-# rtcfctl apply graph.yaml makes a runner run this; see rtcf-graph(5).
+# Apply it to a runner with `rtcfctl apply graph.yaml`; see rtcf-graph(5).
 components:
   - name: $name
     package: $package
@@ -174,12 +174,12 @@ _PYTHON_FILES = {
     "src/$name.py": _PYTHON,
     "test/test_$name.py": _PYTHON_TEST,
 }
-# What the templates themselves import or include.
+# Class names that the templates import or include.
 TAKEN = ("Component", "Input", "Output", "Parameter")
 
 
 def files(package: str, component: str, name: str, python: bool) -> dict[str, str]:
-    """Return the text of each file; `name` is the component's in files and in a graph."""
+    """Return the text of each file; `name` names the source file and the component in the graph."""
     words = {"package": package, "component": component, "name": name}
     return {
         Template(path).substitute(words): Template(text).substitute(words)

@@ -1,1 +1,1 @@
-"""Verbs about what happens in a loop: values of every cycle, recordings, incidents, events."""
+"""Verbs for the values and events of a loop: echo, plot, record, trace, incidents, logs."""

@@ -1,4 +1,4 @@
-"""`rtcfctl convert`: a recording as a file of other programs."""
+"""`rtcfctl convert`: converts a recording to CSV or to a bag, or repairs it."""
 
 import argparse
 from pathlib import Path
@@ -14,18 +14,18 @@ from rtcfctl.terminal.words import counted
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
     converting = verbs.add_parser(
-        "convert", parents=[common], help="a recording, or an incident, as CSV or as a bag"
+        "convert", parents=[common], help="convert a recording or incident to CSV or a bag"
     )
-    converting.add_argument("recording", metavar="FILE", type=Path, help="of rtcfctl record")
+    converting.add_argument("recording", metavar="FILE", type=Path, help="recording or incident")
     converting.add_argument(
-        "to", metavar="TO", type=Path, help="a file, .csv or .bag; with --repair .mcap"
+        "to", metavar="TO", type=Path, help="output file: .csv or .bag; with --repair .mcap"
     )
     converting.add_argument(
         "--repair",
         action="store_true",
-        help="as a recording that is ended in order, of one whose writer was killed",
+        help="write a complete recording from one whose recorder was killed",
     )
-    converting.add_argument("--force", action="store_true", help="write over a file that is there")
+    converting.add_argument("--force", action="store_true", help="overwrite an existing file")
     converting.set_defaults(run=run)
 
 
@@ -46,7 +46,7 @@ def run(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         )
         return
     what = counted(written, "message" if args.to.suffix == ".bag" else "cycle")
-    end = "" if whole else "; the recording was cut off: its last second may be missing"
+    end = "" if whole else "; the recording is incomplete: its last second may be missing"
     if damaged:
         end += f"; {counted(damaged, 'damaged chunk')} left out"
     output.line(f"{args.to}: {what}, {size / 1e6:.1f} MB{end}")

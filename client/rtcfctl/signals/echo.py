@@ -13,40 +13,40 @@ from rtcfctl.signals.idle_loop import say_if_ended, say_if_idle
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import amount, counted, figure
 
-_TOLD_HZ = 10.0  # what a person can read
+_TOLD_HZ = 10.0  # default rate for people
 _MOST_EVERY = 2**32 - 1
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
     echo = verbs.add_parser(
-        "echo", parents=[common], help="values of outputs and state, cycle by cycle"
+        "echo", parents=[common], help="print values of outputs and state, cycle by cycle"
     )
     echo.add_argument(
         "selection",
         nargs="*",
         metavar="NAME",
-        help="a component, or an output or state of it; with *, ** and ? as in /arm/*.effort; "
-        "all without",
+        help="component, or one of its outputs or states, with *, ** and ?, e.g. /arm/*.effort "
+        "(default: all)",
     )
-    echo.add_argument("-n", type=int, metavar="N", help="end after so many cycles")
+    echo.add_argument("-n", type=int, metavar="N", help="end after N printed cycles")
     echo.add_argument(
         "--rate",
         type=amount("Hz"),
         metavar="HZ",
-        help=f"cycles to print a second, 0 = every cycle (default: {_TOLD_HZ:g} for people, every "
-        "cycle for machines)",
+        help=f"print HZ cycles per second, 0: every cycle (default: {_TOLD_HZ:g} for people, every "
+        "cycle for programs)",
     )
     echo.add_argument(
         "--min-max",
         action="store_true",
-        help="of the cycles between two that are printed, minima and maxima: nothing is hidden",
+        help="print minima and maxima over all cycles since the previous ones",
     )
     echo.set_defaults(run=show)
 
 
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Print values until the user has had enough."""
+    """Print values until Ctrl-C, or for some cycles."""
     if args.n is not None and args.n < 1:
         raise ValueError(f"-n {args.n}: at least 1")
     rate_hz = args.rate if args.rate is not None else _TOLD_HZ if output.for_people else 0.0
@@ -129,6 +129,6 @@ def _text(value: Any) -> str:
 
 def _say_lost(count: int, output: Output) -> None:
     if output.for_people:
-        output.line(f"{counted(count, 'cycle')} lost: they came faster than they were read", "red")
+        output.line(f"{counted(count, 'cycle')} lost: the reader is too slow", "red")
     else:
         output.record({"lost": count})

@@ -1,4 +1,4 @@
-"""How a command that writes a file until Ctrl-C ends."""
+"""Signal handling of commands that write a file until Ctrl-C."""
 
 import contextlib
 import signal
@@ -10,14 +10,14 @@ from rtcf.streams.ports import PortStream
 
 @contextlib.contextmanager
 def ended_by_signals(stream: PortStream) -> Iterator[None]:
-    """Let signals end the stream, and break off nothing that is being written.
+    """End the stream at SIGINT, SIGTERM or SIGHUP, so that the file is completed.
 
-    The second one ends us at once: the disk may be one that takes nothing any more.
+    The second signal kills the process at once, in case the disk hangs.
     """
 
     def end(number: int, _: object) -> None:
         signal.signal(number, signal.SIG_DFL)
-        # Whatever locks we hold just now.
+        # By a thread, because the interrupted code may hold locks of the stream.
         threading.Thread(target=stream.close, daemon=True).start()
 
     before = {}
@@ -30,6 +30,6 @@ def ended_by_signals(stream: PortStream) -> Iterator[None]:
         yield
     finally:
         for number, handler in before.items():
-            # Who has had enough does not wait for the rest either.
+            # After the first signal, keep SIG_DFL: another signal ends the rest of the command.
             if signal.getsignal(number) is end:
                 signal.signal(number, handler)

@@ -1,4 +1,4 @@
-"""`rtcfctl events`: what has happened, and what happens."""
+"""`rtcfctl events`: prints past and new events."""
 
 import argparse
 import sys
@@ -23,15 +23,15 @@ _STYLES = {
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
-    verb = verbs.add_parser(
-        "events", parents=[common], help="what has happened: states, faults, changes"
+    verb = verbs.add_parser("events", parents=[common], help="show events: states, faults, changes")
+    verb.add_argument(
+        "-f", "--follow", action="store_true", help="continue with new events until Ctrl-C"
     )
-    verb.add_argument("-f", "--follow", action="store_true", help="go on until Ctrl-C")
     verb.set_defaults(run=show)
 
 
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Print events; for machines a document each."""
+    """Print events; for programs, one document each."""
     runners = [args.runner] if args.runner else []
     with client.watch_events(runners, Place(), until_now=not args.follow) as events:
         for event in events:
@@ -44,7 +44,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 def _print(event: control_pb2.Event | Lost, output: Output) -> None:
     if isinstance(event, Lost):
-        output.line(f"{event.count} events of before are not kept", "yellow")
+        output.line(f"{event.count} older events are not kept", "yellow")
     else:
         output.line(_line(event), _STYLES.get(event.kind, ""))
 

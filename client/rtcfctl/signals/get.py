@@ -1,4 +1,4 @@
-"""`rtcfctl get`: one value as it is now."""
+"""`rtcfctl get`: prints present values of a component."""
 
 import argparse
 from typing import Any
@@ -14,16 +14,16 @@ from rtcfctl.terminal.plain import plain
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
     get = verbs.add_parser(
-        "get", parents=[common], help="a parameter, port or state of a component, as it is now"
+        "get", parents=[common], help="show present values of parameters, ports or state"
     )
     get.add_argument(
-        "name", metavar="NAME", help="COMPONENT for all, COMPONENT.PARAMETER, .PORT or .STATE"
+        "name", metavar="NAME", help="COMPONENT (all values), COMPONENT.PARAMETER, .PORT or .STATE"
     )
     get.set_defaults(run=show)
 
 
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Print one value, or all of a component by name."""
+    """Print one value, or all values of a component."""
     component, dot, name = args.name.partition(".")
     found = client.get_component(component, args.runner)
     values = _values(found)
@@ -41,8 +41,10 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 
 def _values(found: graph_pb2.ComponentInfo) -> dict[str, tuple[str, Any]]:
-    """Return the values as people and as programs read them, by name; a state that has the name
-    of a port or a parameter is told as `state.NAME`."""
+    """Return each value as text and as plain data, by name.
+
+    A state with the name of a port or parameter has the name `state.NAME`.
+    """
     values: dict[str, tuple[str, Any]] = {}
     for parameter in found.parameters:
         values[parameter.name] = (words.value(parameter.value), plain(parameter.value))
@@ -50,6 +52,6 @@ def _values(found: graph_pb2.ComponentInfo) -> dict[str, tuple[str, Any]]:
         text = words.port_value(port.value) if port.HasField("value") else "none yet"
         values.setdefault(port.name, (text, plain(port)["value"]))
     for state in found.states:
-        told = (state.value or "not told in time", plain(state)["value"])
+        told = (state.value or "no answer in time", plain(state)["value"])
         values[f"state.{state.name}" if state.name in values else state.name] = told
     return values

@@ -1,4 +1,4 @@
-"""`rtcfctl hz`: how often signals change, as `rostopic hz` tells of topics."""
+"""`rtcfctl hz`: measures rate and jitter of cycles, and how often signals change."""
 
 import argparse
 import math
@@ -19,32 +19,34 @@ _WINDOW_S = 1.0
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
     hz = verbs.add_parser(
-        "hz", parents=[common], help="rate and jitter of cycles, and how often signals change"
+        "hz",
+        parents=[common],
+        help="measure rate and jitter of cycles, and how often signals change",
     )
-    hz.add_argument("selection", nargs="*", metavar="NAME", help="as for echo; all without")
-    hz.add_argument("-n", type=int, metavar="N", help="end after so many tables")
+    hz.add_argument("selection", nargs="*", metavar="NAME", help="as for echo (default: all)")
+    hz.add_argument("-n", type=int, metavar="N", help="end after N tables")
     hz.add_argument(
         "--window", type=amount("s"), default=_WINDOW_S, metavar="S",
-        help=f"loop time that each table is about (default: {_WINDOW_S:g})",
+        help=f"loop time of each table (default: {_WINDOW_S:g})",
     )  # fmt: skip
     hz.set_defaults(run=show)
 
 
 @dataclass
 class _Window:
-    """What was seen of some cycles."""
+    """Counts and sums over the cycles of a window."""
 
     begin_ns: int = 0
     last_ns: int = 0
     intervals: int = 0
     lost: int = 0
-    square: float = 0.0  # of the intervals' deviations from `period`
+    square: float = 0.0  # sum of squared deviations of intervals from the period, ns²
     least_ns: float = math.inf
     most_ns: float = 0.0
 
 
 class _Meter:
-    """Counts changes of each signal, and measures when cycles woke up."""
+    """Counts changes of each signal, and measures the intervals between starts of cycles."""
 
     def __init__(self, window_s: float, period_ns: float) -> None:
         self._window_ns = window_s * 1e9
@@ -57,11 +59,11 @@ class _Meter:
         self.seen = _Window()
 
     def take(self, batch: PortBatch) -> bool:
-        """Count a batch; tell whether the window is full."""
+        """Add a batch; return whether the window is complete."""
         import numpy as np
 
         seen = self.seen
-        # When each cycle really began.
+        # Actual start of each cycle: deadline plus wake-up latency.
         woke = batch.stamps_ns + batch.latencies_ns
         if batch.lost or (seen.last_ns and woke[0] < seen.last_ns):
             seen.lost += batch.lost
@@ -87,7 +89,7 @@ class _Meter:
         return seen.last_ns - seen.begin_ns >= self._window_ns
 
     def taken(self) -> tuple[_Window, dict[str, int]]:
-        """Return the window and the changes in it, and begin the next."""
+        """Return the window and the changes in it, and start the next window."""
         found = self.seen, self.changes
         last_ns = self.seen.last_ns
         self._begin()
@@ -96,11 +98,11 @@ class _Meter:
 
 
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Print a table for each window until the user has had enough."""
+    """Print a table for each window until Ctrl-C, or N tables."""
     if args.n is not None and args.n < 1:
         raise ValueError(f"-n {args.n}: at least 1")
     if not 0 < args.window <= 3600:
-        raise ValueError(f"--window {args.window:g}: from 0 to 3600 s")
+        raise ValueError(f"--window {args.window:g}: more than 0, at most 3600 s")
     (runner,) = client.get_status(args.runner or "rt_runner").runners
     meter = _Meter(args.window, 1e9 / runner.settings.frequency_hz)
     left = args.n

@@ -1,4 +1,4 @@
-"""What those are told who look at values of a loop that runs no cycles: none will come."""
+"""Notes for commands that wait for values while the loop runs no cycles."""
 
 import sys
 
@@ -12,28 +12,28 @@ _RUNS = (runner_pb2.RUNNER_STATE_RUNNING, runner_pb2.RUNNER_STATE_STEPPING)
 
 
 def say_if_idle(client: rtcf.Client, runner: str, output: Output) -> None:
-    """Say so of a loop that does not run now."""
+    """Print a note if the loop does not run."""
     name = runner or "rt_runner"
     for found in client.get_status(name).runners:
         if found.state not in _RUNS:
             _say(
-                f"the loop of {name} does not run: its values come once it is started "
+                f"the loop of {name} does not run: no values until it is started "
                 f"(`rtcfctl -r {name} start`)",
                 output,
             )
 
 
 def say_if_ended(batch: PortBatch, runner: str, output: Output) -> None:
-    """Say so of a loop whose last cycle has come."""
+    """Print a note if a batch has the last cycle of its loop."""
     if batch.last_of_loop:
         _say(
             f"the loop of {runner or 'rt_runner'} ended in cycle "
-            f"{batch.first_cycle + (len(batch) - 1) * batch.every}: more values come once it is "
+            f"{batch.first_cycle + (len(batch) - 1) * batch.every}: no more values until it is "
             "started again",
             output,
         )
 
 
 def _say(text: str, output: Output) -> None:
-    sys.stdout.flush()  # what came before
+    sys.stdout.flush()  # print earlier output first
     output.line(f"rtcfctl: note: {text}", to=sys.stderr)

@@ -1,4 +1,4 @@
-"""`rtcfctl incident`: what ran just before faults, as files of rtcfd."""
+"""`rtcfctl incident`: files of rtcfd with the last cycles before faults."""
 
 import argparse
 import contextlib
@@ -19,34 +19,38 @@ from rtcf_shared.whole_file import whole_file
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import counted, date, microseconds
 
-_CYCLES = 10  # that are shown
-_SIGNALS = 40  # of the culprit, or of all
-_CHANGES = 5  # of parameters
-_EVENTS = 8
+_CYCLES = 10  # shown cycles
+_SIGNALS = 40  # shown signals of the faulting component, or of all components
+_CHANGES = 5  # shown parameter changes
+_EVENTS = 8  # shown events
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the noun and its verbs."""
-    noun = verbs.add_parser("incident", help="what ran just before faults: keep, list, show")
+    noun = verbs.add_parser("incident", help="take, list, show, export or remove incidents")
     actions = noun.add_subparsers(metavar="ACTION", required=True)
 
-    taking = actions.add_parser("take", parents=[common], help="keep the last cycles now")
-    taking.add_argument("--reason", default="", metavar="TEXT", help="why, for whoever reads it")
+    taking = actions.add_parser(
+        "take", parents=[common], help="write the last cycles to an incident now"
+    )
+    taking.add_argument("--reason", default="", metavar="TEXT", help="text shown with the incident")
     taking.set_defaults(run=take)
 
-    listing = actions.add_parser("list", parents=[common], help="those that are kept")
+    listing = actions.add_parser("list", parents=[common], help="list the incidents")
     listing.set_defaults(run=show_all)
 
-    showing = actions.add_parser("show", parents=[common], help="what happened, on a page")
+    showing = actions.add_parser("show", parents=[common], help="show a summary")
     _add_name(showing)
     showing.set_defaults(run=show)
 
-    exporting = actions.add_parser("export", parents=[common], help="a copy of the MCAP file")
+    exporting = actions.add_parser("export", parents=[common], help="copy the MCAP file")
     _add_name(exporting)
-    exporting.add_argument("--to", metavar="FILE", type=Path, help="default: here, by its name")
+    exporting.add_argument(
+        "--to", metavar="FILE", type=Path, help="output file (default: INCIDENT.mcap)"
+    )
     exporting.set_defaults(run=export)
 
-    removing = actions.add_parser("rm", parents=[common], help="remove them")
+    removing = actions.add_parser("rm", parents=[common], help="remove incidents")
     removing.add_argument("names", nargs="+", metavar="INCIDENT")
     removing.set_defaults(run=remove)
 
@@ -56,7 +60,7 @@ def _add_name(to: argparse.ArgumentParser) -> None:
 
 
 def take(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Keep one."""
+    """Take an incident."""
     kept = client.take_incident(args.runner, args.reason)
     if output.for_people:
         output.line(f"{kept.name} in {kept.file}: rtcfctl incident show {kept.name}")
@@ -65,7 +69,7 @@ def take(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 
 def show_all(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Print a table."""
+    """Print a table of incidents."""
     found = client.list_incidents(args.runner)
     if not output.for_people:
         output.data(found)
@@ -79,7 +83,7 @@ def show_all(client: rtcf.Client, args: argparse.Namespace, output: Output) -> N
 
 
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Print what happened."""
+    """Print a summary of an incident."""
     with (
         _received(client, args.name) as (incident, file),
         rtcf.read_recording(file.name) as recording,
@@ -92,18 +96,18 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 
 def export(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Copy the file."""
+    """Copy the file of an incident."""
     with _received(client, args.name) as (incident, received):
         to = args.to or Path(f"{incident.name}.mcap")
         try:
             with whole_file(to) as part, part.open("wb") as file:
                 shutil.copyfileobj(received, file)
         except FileExistsError:
-            raise ValueError(f"{to} is there already: name another file with --to") from None
+            raise ValueError(f"{to} exists: choose another file with --to") from None
         except (FileNotFoundError, NotADirectoryError, PermissionError) as error:
             raise ValueError(f"{to}: {error.strerror}") from None
         except OSError as error:
-            raise rtcf.RtcfError(f"{to} is not written: {error.strerror or error}") from None
+            raise rtcf.RtcfError(f"{to} cannot be written: {error.strerror or error}") from None
     if output.for_people:
         output.line(f"{incident.name} in {to}")
     else:
@@ -112,7 +116,7 @@ def export(client: rtcf.Client, args: argparse.Namespace, output: Output) -> Non
 
 @contextlib.contextmanager
 def _received(client: rtcf.Client, name: str) -> Iterator[tuple[incidents_pb2.Incident, IO[bytes]]]:
-    """Give an incident and its file, as a temporary one."""
+    """Yield an incident and its file, copied to a temporary file."""
     with contextlib.ExitStack() as stack:
         try:
             received = stack.enter_context(tempfile.NamedTemporaryFile(suffix=".mcap"))
@@ -121,13 +125,13 @@ def _received(client: rtcf.Client, name: str) -> Iterator[tuple[incidents_pb2.In
             received.seek(0)
         except OSError as error:
             raise rtcf.RtcfError(
-                f"an incident takes room in {tempfile.gettempdir()}: {error.strerror or error}"
+                f"cannot copy the incident to {tempfile.gettempdir()}: {error.strerror or error}"
             ) from None
         yield incident, received
 
 
 def remove(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Remove some."""
+    """Remove incidents."""
     gone = client.remove_incidents(args.names)
     if output.for_people:
         output.line(f"{counted(len(gone), 'incident')} removed")
@@ -139,11 +143,11 @@ def _told(incident: incidents_pb2.Incident, recording: "rtcf.Recording") -> dict
     about = recording.metadata.get("incident", {})
     cycles = recording.cycles
     cycle = int(about.get("cycle", 0))
-    # Ends at the faulting cycle, as the loop may have gone on.
+    # End at the faulting cycle; the loop may have continued after it.
     end = _end(cycles, cycle)
     last = slice(max(end - _CYCLES, 0), end)
     component = about.get("component", "")
-    # Of nobody in particular: of all.
+    # Without a faulting component, show the signals of all components.
     names = [name for name in recording.signals if name.startswith(f"{component}.")]
     names = names or list(recording.signals)
     values = {}
@@ -184,7 +188,7 @@ def _told(incident: incidents_pb2.Incident, recording: "rtcf.Recording") -> dict
 
 
 def _end(cycles: Any, cycle: int) -> int:
-    """Return how many there are up to and with one, or in all if that one is not among them."""
+    """Return the number of cycles up to and including `cycle`, or of all if it is not there."""
     found = (cycles == cycle).nonzero()[0]
     return int(found[-1]) + 1 if len(found) else len(cycles)
 
@@ -220,7 +224,7 @@ def _print(told: dict[str, Any], output: Output) -> None:
     if told["values_left_out"]:
         print(f"and {told['values_left_out']} more")
     if told["parameters"]:
-        print("\nparameters changed lately")
+        print("\nlast parameter changes")
         for each in told["parameters"]:
             when = _time(int(each.get("timeNs", 0)))
             name = f"{each.get('component')}.{each.get('parameter')}"
@@ -238,7 +242,7 @@ def _print(told: dict[str, Any], output: Output) -> None:
 
 
 def _parameter(value: Any) -> str:
-    """Return a parameter's value as JSON has it, by its kind."""
+    """Return the text of a ParameterValue in protobuf's JSON."""
     return _value(next(iter(value.values()), None)) if isinstance(value, dict) else "?"
 
 

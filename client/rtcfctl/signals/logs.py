@@ -1,4 +1,4 @@
-"""`rtcfctl logs`: what the components of a loop and its executor log."""
+"""`rtcfctl logs`: prints log records of the components and of the executor."""
 
 import argparse
 import contextlib
@@ -26,26 +26,31 @@ _STYLES = {
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
     verb = verbs.add_parser(
-        "logs", parents=[common], help="what components and the executor log, with cycle numbers"
+        "logs", parents=[common], help="show log records of components and the executor"
     )
     verb.add_argument(
-        "components", nargs="*", metavar="NAME", help="only of these components; all without"
-    )
-    verb.add_argument("-f", "--follow", action="store_true", help="go on until Ctrl-C")
-    verb.add_argument(
-        "-n", type=whole, metavar="N", help="of the past only the last N (default: all kept)"
+        "components", nargs="*", metavar="NAME", help="only of these components (default: all)"
     )
     verb.add_argument(
-        "--level", choices=LEVELS, default="debug", help="the lowest level (default: debug)"
+        "-f", "--follow", action="store_true", help="continue with new records until Ctrl-C"
+    )
+    verb.add_argument(
+        "-n", type=whole, metavar="N", help="show only the last N past records (default: all kept)"
+    )
+    verb.add_argument(
+        "--level",
+        choices=LEVELS,
+        default="debug",
+        help="show records of this level or above (default: debug)",
     )
     verb.set_defaults(run=show)
 
 
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Print records; for machines a document each."""
+    """Print records; for programs, one document each."""
     asked = (args.runner, args.components, args.level)
     with client.watch_logs(*asked, Place(), until_now=True) as past:
-        # What is not kept any more is news only to who wants all.
+        # With -n, the number of records that are no longer kept is not printed.
         found: Iterable[control_pb2.LogRecord | Lost] = past
         _print(found if args.n is None else deque(found, args.n), output)
     if args.follow:
@@ -58,7 +63,7 @@ def _print(records: Iterable[control_pb2.LogRecord | Lost], output: Output) -> N
         if not output.for_people:
             output.record({"lost": each.count} if isinstance(each, Lost) else each)
         elif isinstance(each, Lost):
-            output.line(f"{counted(each.count, 'record')} of before are not kept", "yellow")
+            output.line(f"{counted(each.count, 'older record')} not kept", "yellow")
         else:
             output.line(_line(each), _STYLES.get(each.level, ""))
         sys.stdout.flush()

@@ -1,4 +1,4 @@
-"""`rtcfctl plot`: signals as curves in the terminal, for a quick look."""
+"""`rtcfctl plot`: plots signals in the terminal."""
 
 import argparse
 import math
@@ -19,37 +19,35 @@ from rtcfctl.terminal.screen import Screen
 from rtcfctl.terminal.words import amount, figure
 
 _SPAN_S, _LONGEST_S = 5.0, 3600.0
-_MOST = 6  # curves, each in a colour
+_MOST = 6  # curves, each with its own colour
 _COLOURS = ("cyan", "yellow", "green", "magenta", "blue", "red")
 _LOOK_S = 0.1
-_LABEL = 10  # characters left of the curves
-_WIDTH, _HEIGHT = 80, 24  # where there is no terminal
+_LABEL = 10  # width of the labels at the left of the curves
+_WIDTH, _HEIGHT = 80, 24  # size if standard output is not a terminal
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
-    plot = verbs.add_parser(
-        "plot", parents=[common], help="signals as curves in the terminal, for a quick look"
-    )
+    plot = verbs.add_parser("plot", parents=[common], help="plot signals in the terminal")
     plot.add_argument("selection", nargs="+", metavar="NAME", help="as for echo")
     plot.add_argument(
         "--span", type=amount("s"), default=_SPAN_S, metavar="S",
-        help=f"loop time that is in sight ({_SPAN_S:g})",
+        help=f"loop time of the plot ({_SPAN_S:g})",
     )  # fmt: skip
-    plot.add_argument("--once", action="store_true", help="one picture of the next --span, and end")
+    plot.add_argument("--once", action="store_true", help="print one plot of the next --span")
     plot.set_defaults(run=show)
 
 
 @dataclass
 class _Window:
-    """What some cycles were, from the smallest to the largest, by signal."""
+    """The minimum and maximum of each signal over some cycles."""
 
     stamp_ns: int
     ends: dict[str, tuple[float, float]]
 
 
 class _Plot:
-    """The last windows of a stream, as many as there are dots beside each other."""
+    """The last windows of a stream, about one for each column of dots."""
 
     def __init__(self, span_s: float) -> None:
         self._span_s = span_s
@@ -61,7 +59,7 @@ class _Plot:
         self.trouble = ""
 
     def take(self, batch: PortBatch) -> None:
-        """Take windows; any thread."""
+        """Add windows.  Any thread."""
         signals = [name for name, signal in batch.schema.signals.items() if not signal.shape]
         names = signals[:_MOST]
         ends = {
@@ -77,7 +75,7 @@ class _Plot:
                 self._windows.popleft()
 
     def is_full(self) -> bool:
-        """Tell whether a whole span is there."""
+        """Return whether the windows cover the whole span."""
         with self._lock:
             return self._seconds() >= self._span_s
 
@@ -87,7 +85,7 @@ class _Plot:
         return (self._windows[-1].stamp_ns - self._windows[0].stamp_ns) / 1e9
 
     def lines(self, width: int, height: int) -> list[str]:
-        """Return the picture; the names are above it, the time below."""
+        """Return the lines of the plot: names, curves, time axis or error."""
         with self._lock:
             windows, names = list(self._windows), list(self.names)
         if not windows:
@@ -101,7 +99,7 @@ class _Plot:
             low, high = low - 1.0, high + 1.0
         head = _legend(names, windows[-1], width)
         if self.left_out:
-            head.append(f"{self.left_out} more are left out: name those that are wanted")
+            head.append(f"{self.left_out} more signals not shown: select fewer by NAME")
         room = max(height - len(head) - 1, 2)
         curves = Curves(width - _LABEL, room, low, high)
         dots = curves.columns
@@ -113,7 +111,7 @@ class _Plot:
                     continue
                 ago = (end_ns - each.stamp_ns) / (self._span_s * 1e9)
                 x = min(max(dots - 1 - round(ago * (dots - 1)), 0), dots - 1)
-                # Joined to the one before, as a line is.
+                # Extend the window to its predecessor, so that the curve is connected.
                 least, most = ends
                 if last is not None and least > last[1]:
                     least = last[1]
@@ -132,11 +130,11 @@ class _Plot:
 
 
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Draw until the user has had enough."""
+    """Draw until q or Ctrl-C, or print one plot."""
     if not 0 < args.span <= _LONGEST_S:
         raise ValueError(f"--span {args.span:g}: more than 0, at most {_LONGEST_S:g} s")
     if not output.for_people:
-        raise ValueError("a plot is for people: `rtcfctl echo -o json` gives values to programs")
+        raise ValueError("plot has no output for programs: use `rtcfctl echo -o json`")
     (runner,) = client.get_status(args.runner or "rt_runner").runners
     every = max(1, round(args.span * runner.settings.frequency_hz / (2 * _WIDTH)))
     plot = _Plot(args.span)
@@ -144,7 +142,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         for note in stream.schema.notes:
             output.line(f"rtcfctl: note: {note}", to=sys.stderr)
         if not any(not signal.shape for signal in stream.schema.signals.values()):
-            raise rtcf.RtcfError("nothing of that is one number: name one, as COMPONENT.PORT.FIELD")
+            raise rtcf.RtcfError("no scalar signal selected; use e.g. COMPONENT.PORT.FIELD")
         say_if_idle(client, args.runner, output)
         reader = threading.Thread(target=_read, args=(stream, plot), daemon=True)
         reader.start()
@@ -175,7 +173,7 @@ def _read(stream: PortStream, plot: _Plot) -> None:
 
 
 def _legend(names: list[str], newest: _Window, width: int) -> list[str]:
-    """Return the names with their newest values, in as many lines as they take."""
+    """Return lines with the names of the signals and their newest values."""
     lines: list[str] = [""]
     used = 0
     for number, name in enumerate(names):

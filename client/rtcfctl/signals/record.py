@@ -1,4 +1,4 @@
-"""`rtcfctl record`: values of every cycle into a file."""
+"""`rtcfctl record`: writes the values of every cycle to an MCAP file."""
 
 import argparse
 import sys
@@ -18,9 +18,9 @@ from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import amount, counted
 
 _TOLD_S = 1.0
-_LONGEST = 1e9  # s, MiB
-_AROUND_S = 1.0  # of a trigger
-_KEPT_S = 1.0  # in memory: what a writer that is killed loses at most
+_LONGEST = 1e9  # largest --duration in s, and --size in MiB
+_AROUND_S = 1.0  # default time before and after a trigger
+_KEPT_S = 1.0  # interval of flushes: the most that is lost if the recorder is killed
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
@@ -28,52 +28,52 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     record = verbs.add_parser(
         "record",
         parents=[common],
-        help="values of every cycle, into a file",
-        # -o is the file here; --output stays.
+        help="write the values of every cycle to a file",
+        # -o is the file for this verb; --output remains.
         conflict_handler="resolve",
     )
     record.add_argument(
-        "-o", dest="file", metavar="FILE", type=Path, required=True, help="the file, of MCAP"
+        "-o", dest="file", metavar="FILE", type=Path, required=True, help="MCAP file"
     )
     record.add_argument(
         "selection",
         nargs="*",
         metavar="NAME",
-        help="a component, or an output or state of it, as with rtcfctl echo; all without",
+        help="component, or one of its outputs or states, as for rtcfctl echo (default: all)",
     )
     record.add_argument(
-        "--duration", type=amount("s"), metavar="S", help="end after so much loop time"
+        "--duration", type=amount("s"), metavar="S", help="end after this loop time"
     )
     record.add_argument(
-        "--size", type=amount("MiB"), metavar="MIB", help="end when the file is that large"
+        "--size", type=amount("MiB"), metavar="MIB", help="end when the file has this size"
     )
     record.add_argument(
         "--split",
         action="store_true",
-        help="begin another file (FILE-1, FILE-2, …) after each --duration or --size",
+        help="continue in another file (FILE-1, FILE-2, …) after each --duration or --size",
     )
     record.add_argument(
         "--trigger",
         metavar="CONDITION",
-        help="only what is around the first cycle in which that is true, as in 'wave.phase > 0.9'",
+        help="record only around the first cycle in which it is true, e.g. 'wave.phase > 0.9'",
     )
     record.add_argument(
-        "--pre", type=amount("s"), metavar="S", help=f"with --trigger: before it ({_AROUND_S:g})"
+        "--pre", type=amount("s"), metavar="S", help=f"time before --trigger ({_AROUND_S:g})"
     )
     record.add_argument(
-        "--post", type=amount("s"), metavar="S", help=f"with --trigger: after it ({_AROUND_S:g})"
+        "--post", type=amount("s"), metavar="S", help=f"time after --trigger ({_AROUND_S:g})"
     )
-    record.add_argument("--force", action="store_true", help="write over a file that is there")
+    record.add_argument("--force", action="store_true", help="overwrite an existing file")
     record.set_defaults(run=run)
 
 
 def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Record until Ctrl-C, for a while, or around a moment."""
+    """Record until Ctrl-C, for a time, to a size, or around a trigger."""
     moment = _checked(args)
     selection = list(args.selection)
     if moment is not None and selection:
         selection += moment.condition.columns
-    # Refused before there is a file.
+    # Report errors before a file is created.
     with client.watch_ports(selection, args.runner) as stream:
         for note in stream.schema.notes:
             _note(output, note)
@@ -87,17 +87,17 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 
 def _checked(args: argparse.Namespace) -> Moment | None:
-    """Return the moment to wait for, if there is one; raises ValueError."""
+    """Check the options; return the trigger, if there is one.  Raises ValueError."""
     _require("--duration", args.duration, "s")
     _require("--size", args.size, "MiB")
     if args.split and args.duration is None and args.size is None:
-        raise ValueError("--split: after how much? give --duration or --size")
+        raise ValueError("--split requires --duration or --size")
     if args.trigger is None:
         if args.pre is not None or args.post is not None:
-            raise ValueError("--pre and --post are before and after a --trigger")
+            raise ValueError("--pre and --post require --trigger")
         return None
     if args.split or args.duration is not None:
-        raise ValueError("--trigger: --pre and --post say how long, not --duration or --split")
+        raise ValueError("--trigger: use --pre and --post instead of --duration or --split")
     _require("--pre", args.pre, "s", or_none=True)
     _require("--post", args.post, "s", or_none=True)
     pre_s, post_s = (_AROUND_S if each is None else each for each in (args.pre, args.post))
@@ -114,7 +114,7 @@ def _require(option: str, value: float | None, unit: str, *, or_none: bool = Fal
 def _tell(files: Files, moment: Moment | None, output: Output) -> None:
     lost = f"{counted(files.lost, 'cycle')} lost" if files.lost else "none lost"
     if moment is not None and moment.cut:
-        _note(output, "less than was asked for: more came before it than may be kept")
+        _note(output, "pre-trigger data truncated: memory limit reached")
     if not output.for_people:
         output.data(
             {"file": str(files.paths[0]), "files": [str(path) for path in files.paths],
@@ -175,7 +175,7 @@ def _follow(
 
 
 def _is_full(files: Files, batch: PortBatch, args: argparse.Namespace) -> bool:
-    """Tell whether a file has what it is to have."""
+    """Return whether a file has reached --size or --duration."""
     full = args.size is not None and files.size >= args.size * 1024 * 1024
     return full or (args.duration is not None and files.taken_ns(batch) >= args.duration * 1e9)
 

@@ -1,4 +1,4 @@
-"""`rtcfctl scope`: an oscilloscope in the browser, for one session."""
+"""`rtcfctl scope`: serves an oscilloscope for the browser until Ctrl-C."""
 
 import argparse
 import asyncio
@@ -16,16 +16,16 @@ import rtcf
 
 from rtcfctl.terminal.output import Output
 
-_PACKAGE = "rtcfctl scope is in a package of its own: apt install rtcf-scope"
+_PACKAGE = "rtcfctl scope requires a package: sudo apt install rtcf-scope"
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
     scope = verbs.add_parser(
-        "scope", parents=[common], help="an oscilloscope in the browser, until Ctrl-C"
+        "scope", parents=[common], help="serve an oscilloscope for the browser until Ctrl-C"
     )
     scope.add_argument(
-        "files", nargs="*", metavar="FILE", type=Path, help="recordings that the page may open"
+        "files", nargs="*", metavar="FILE", type=Path, help="recordings that the page can open"
     )
     try:
         from rtcf_scope import service
@@ -33,7 +33,7 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
         scope.set_defaults(run=_missing)
         return
     service.add_options(scope, 0)
-    scope.add_argument("--no-browser", action="store_true", help="print the address only")
+    scope.add_argument("--no-browser", action="store_true", help="only print the address")
     scope.set_defaults(run=run)
 
 
@@ -55,10 +55,10 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
             try:
                 redirect = Redirect(f"{address}?token={door.ticket(lambda: redirect.remove())}")
             except OSError as error:
-                print(f"no browser is opened: {error}: open the address above", file=sys.stderr)
+                print(f"cannot open a browser: {error}; open the address above", file=sys.stderr)
                 return
             at_the_end.callback(redirect.remove)
-            # Some browsers are waited for.
+            # By a thread, because some browsers block until they are closed.
             threading.Thread(target=_open, args=(redirect.file,), daemon=True).start()
 
         asyncio.run(service.serve(given, ready))
@@ -66,11 +66,11 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 def _open(file: Path) -> None:
     if _is_snap() or not webbrowser.open(file.as_uri()):
-        print("no browser was opened: open the address above", file=sys.stderr)
+        print("cannot open a browser; open the address above", file=sys.stderr)
 
 
 def _is_snap() -> bool:
-    """Tell whether the browser is a snap, which reads no file of a runtime folder."""
+    """Return whether the browser is a snap, which cannot read files of the runtime folder."""
     try:
         name = webbrowser.get().name
     except webbrowser.Error:
@@ -84,7 +84,7 @@ def _missing(client: rtcf.Client, args: argparse.Namespace, output: Output) -> N
 
 
 def _way_through_ssh(port: int) -> str:
-    """Return the command that brings the page to the machine that somebody sits at."""
+    """Return the ssh command that forwards the port to the user's machine; empty without ssh."""
     words = os.environ.get("SSH_CONNECTION", "").split()
     if len(words) != 4:
         return ""

@@ -1,4 +1,4 @@
-"""`rtcfctl trace`: what a loop does, cycle by cycle, for Perfetto and chrome://tracing."""
+"""`rtcfctl trace`: writes a timeline of a loop for Perfetto and chrome://tracing."""
 
 import argparse
 import contextlib
@@ -23,9 +23,9 @@ from rtcfctl.terminal.words import counted, whole
 if TYPE_CHECKING:
     from rtcf.kernel.late_cycles import LateCycles
 
-_EVERY_S = 0.5  # of what is asked for beside the cycles
-_FAULT_S = 10.0  # from the end of the cycles until rtcfd knows of what
-_SETTLE_S = 0.3  # from a cycle until rtcfd has what was logged in it
+_EVERY_S = 0.5  # interval of queries for events, log records and statistics
+_FAULT_S = 10.0  # longest wait for rtcfd's fault event after the executor has died
+_SETTLE_S = 0.3  # time until rtcfd has the log records of a cycle
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
@@ -33,30 +33,28 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     verb = verbs.add_parser(
         "trace",
         parents=[common],
-        help="cycles, changes and log records, into a file for Perfetto",
-        # -o is the file here; --output stays.
+        help="write a timeline of the loop to a file for Perfetto",
+        # -o is the file for this verb; --output remains.
         conflict_handler="resolve",
     )
+    verb.add_argument("-o", dest="file", metavar="FILE", type=Path, required=True, help="JSON file")
     verb.add_argument(
-        "-o", dest="file", metavar="FILE", type=Path, required=True, help="the file, of JSON"
-    )
-    verb.add_argument(
-        "--cycles", type=whole, metavar="N", help="end after so many (default: Ctrl-C)"
+        "--cycles", type=whole, metavar="N", help="end after N cycles (default: Ctrl-C)"
     )
     verb.add_argument(
         "--components",
         action="store_true",
-        help="what each component took in each cycle, too",
+        help="also write the duration of each component in each cycle",
     )
     verb.add_argument(
-        "--kernel", action="store_true", help="tell of each late cycle what ran instead (as root)"
+        "--kernel", action="store_true", help="find the cause of each late cycle (as root)"
     )
-    verb.add_argument("--force", action="store_true", help="write over a file that is there")
+    verb.add_argument("--force", action="store_true", help="overwrite an existing file")
     verb.set_defaults(run=run)
 
 
 def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Follow the loop until Ctrl-C, or for some cycles."""
+    """Trace the loop until Ctrl-C, or for some cycles."""
     if args.cycles == 0:
         raise ValueError("--cycles 0: at least 1")
     runner = args.runner or "rt_runner"
@@ -65,9 +63,9 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         with whole_file(args.file, force=args.force) as part:
             trace = Trace(part, runner, status.settings.frequency_hz)
             try:
-                # Refused where there is nothing to see.
+                # watch_ports() raises an error if the loop cannot be watched.
                 with (
-                    _kernel(trace, status, args) as late,  # before the first cycle
+                    _kernel(trace, status, args) as late,  # starts before the first cycle
                     client.watch_ports((), runner, component_times=args.components) as stream,
                     ended_by_signals(stream),
                 ):
@@ -80,9 +78,9 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
                 trace.abandon()
                 raise
     except FileExistsError:
-        raise ValueError(f"{args.file} is there already: --force writes over it") from None
+        raise ValueError(f"{args.file} exists: use --force to overwrite it") from None
     except OSError as error:
-        raise rtcf.RtcfError(f"{args.file} is not written: {error.strerror or error}") from None
+        raise rtcf.RtcfError(f"{args.file} cannot be written: {error.strerror or error}") from None
     _tell(trace, late, args, output)
     if error is not None:
         raise error
@@ -92,16 +90,16 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 def _kernel(
     trace: Trace, status: runner_pb2.RunnerStatus, args: argparse.Namespace
 ) -> "Iterator[LateCycles | None]":
-    """Trace the kernel meanwhile, if that is asked for."""
+    """Trace the kernel during the `with` block, if --kernel is given."""
     if not args.kernel:
         yield None
         return
     if args.host is not None:
         raise ValueError(
-            f"--kernel reads the trace of this machine: ssh {args.host} rtcfctl trace --kernel"
+            f"--kernel traces the local machine: use ssh {args.host} rtcfctl trace --kernel"
         )
     if not status.realtime_tid:
-        raise ValueError(f"--kernel: the loop of {status.runner} does not run: start it first")
+        raise ValueError(f"--kernel: the loop of {status.runner} does not run; start it first")
     cpu = status.loop_cpu if status.HasField("loop_cpu") else None
     from rtcf.kernel.late_cycles import LateCycles
     from rtcf.kernel.tracefs import KernelTrace
@@ -111,7 +109,7 @@ def _kernel(
 
 
 class _Beside:
-    """What is asked for beside the cycles: events, log records, figures."""
+    """Queries rtcfd for events, log records and statistics, and adds them to the trace."""
 
     def __init__(self, client: rtcf.Client, runner: str, trace: Trace) -> None:
         self._client = client
@@ -123,7 +121,7 @@ class _Beside:
         trace.add_figures(client.get_statistics(runner))
 
     def ask(self) -> None:
-        """Add what there is since the last call."""
+        """Add the events, records and statistics since the last call."""
         client, runner = self._client, self._runner
         with client.watch_events([runner], self._events, until_now=True) as events:
             self._trace.add_events(events)
@@ -143,7 +141,7 @@ def _follow(
     args: argparse.Namespace,
     output: Output,
 ) -> rtcf.RtcfError | None:
-    """Follow the loop; return what has ended it, of a trace that has cycles."""
+    """Trace the loop.  Return the error that ended it; raise the error if there are no cycles."""
     beside = _Beside(client, args.runner or "rt_runner", trace)
     try:
         _follow_cycles(stream, beside, trace, late, args, output)
@@ -152,7 +150,7 @@ def _follow(
     except rtcf.RtcfError as error:
         if not trace.cycles:
             raise
-        # An executor has died: what it did before is what the trace is for.
+        # The executor has died: complete the trace, and wait for the fault event.
         until = time.monotonic() + _FAULT_S
         with contextlib.suppress(rtcf.RtcfError):
             beside.ask()

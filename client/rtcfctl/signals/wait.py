@@ -1,4 +1,4 @@
-"""`rtcfctl wait`: until a condition on signals is true in a cycle; for scripts."""
+"""`rtcfctl wait`: waits until a condition on signals is true, e.g. in scripts."""
 
 import argparse
 import math
@@ -18,22 +18,22 @@ from rtcfctl.terminal.words import amount
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
     wait = verbs.add_parser(
-        "wait", parents=[common], help="until a condition on signals is true in a cycle"
+        "wait", parents=[common], help="wait until a condition on signals is true in a cycle"
     )
     wait.add_argument(
         "condition",
         nargs="+",
         metavar="CONDITION",
-        help="as in 'wave.phase > 0.9 and abs(pid.effort) < 2'; every cycle is looked at",
+        help="e.g. 'wave.phase > 0.9 and abs(pid.effort) < 2'; every cycle is checked",
     )
     wait.add_argument(
-        "--timeout", type=amount("s"), metavar="S", help="give up after so long (exit code 1)"
+        "--timeout", type=amount("s"), metavar="S", help="give up after this time (exit code 1)"
     )
     wait.set_defaults(run=run)
 
 
 def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Wait; raises RtcfError when the time is over."""
+    """Wait for the condition.  Raises RtcfError after the timeout."""
     condition = Condition(" ".join(args.condition))
     if args.timeout is not None and not 0 < args.timeout < math.inf:
         raise ValueError(f"--timeout {args.timeout:g}: more than 0 s")
@@ -64,11 +64,10 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 
 def _tell(condition: Condition, batch: PortBatch, output: Output) -> bool:
-    """Print the first cycle in which it is true, if there is one."""
+    """Print the first cycle in which the condition is true; return whether there is one."""
     if batch.lost:
         output.line(
-            f"rtcfctl: note: {batch.lost} cycles were not looked at: they came faster than they "
-            "were read",
+            f"rtcfctl: note: {batch.lost} cycles were not checked: the reader is too slow",
             to=sys.stderr,
         )
     found = condition.where(batch).nonzero()[0]

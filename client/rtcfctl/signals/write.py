@@ -1,4 +1,4 @@
-"""`rtcfctl write`: a value for an input that nobody feeds."""
+"""`rtcfctl write`: writes a value to an input without a writer."""
 
 import argparse
 from typing import Any
@@ -11,7 +11,7 @@ from rtcfctl.terminal.output import Output
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     """Add the verb."""
     write = verbs.add_parser(
-        "write", parents=[common], help="give an input that nobody feeds a value"
+        "write", parents=[common], help="write a value to an input without a writer"
     )
     write.add_argument("port", metavar="COMPONENT.PORT")
     write.add_argument(
@@ -21,6 +21,6 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 
 
 def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Write it."""
+    """Write the value."""
     result = client.write(args.port, args.value, args.runner, on_progress=output.progress)
     output.changed(f"{result.component}.{args.port.rpartition('.')[2]} written", result)

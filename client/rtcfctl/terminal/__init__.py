@@ -1,1 +1,1 @@
-"""How answers are written: tables, JSON and YAML, dates, sizes, and words with units."""
+"""Output formats: tables, JSON and YAML, dates, sizes, and numbers with units."""

@@ -1,6 +1,6 @@
-"""What rtcfctl prints: tables and sentences for people, JSON or YAML for machines.
+"""Output of rtcfctl: tables and sentences for people, JSON or YAML for programs.
 
-yaml and json are imported only where they are used: a call of rtcfctl is short.
+yaml and json are imported only when used, because imports take most of the time of a call.
 """
 
 import os
@@ -14,13 +14,13 @@ from rtcf.v1 import control_pb2
 from rtcfctl.terminal.plain import number, plain
 from rtcfctl.terminal.table import Cell, format_table
 
-_PATIENCE_S = 10.0  # of somebody who is told nothing
+_PATIENCE_S = 10.0  # time from the start until progress is printed without --verbose
 _ANSI = {"bold": "1", "red": "31", "green": "32", "yellow": "33", "blue": "34",
          "magenta": "35", "cyan": "36"}  # fmt: skip
 
 
 class Output:
-    """Prints in the format that was asked for; owned by main()."""
+    """Prints in the selected format; owned by main()."""
 
     def __init__(self, kind: str, verbose: bool = False) -> None:
         self._kind = kind
@@ -29,16 +29,16 @@ class Output:
 
     @property
     def for_people(self) -> bool:
-        """Tell whether tables and sentences are wanted."""
+        """Whether the output is tables and sentences."""
         return self._kind == "table"
 
     @property
     def width(self) -> int | None:
-        """Columns of the terminal; None where there is none."""
+        """Columns of the terminal; None if standard output is not a terminal."""
         return _width()
 
     def data(self, value: Any) -> None:
-        """Print messages, lists or dicts for machines."""
+        """Print messages, lists or dicts for programs."""
         document = _plain(value)
         if self._kind == "yaml":
             import yaml
@@ -50,7 +50,7 @@ class Output:
             print(json.dumps(document, indent=2, ensure_ascii=False))
 
     def record(self, value: Any) -> None:
-        """Print one of many documents: JSON on a line of its own, or a YAML document."""
+        """Print one of several documents: a line of JSON, or a YAML document."""
         if self._kind == "yaml":
             print("---")
             self.data(value)
@@ -60,7 +60,7 @@ class Output:
             print(json.dumps(_plain(value), ensure_ascii=False))
 
     def line(self, text: str, style: str = "", to: TextIO | None = None) -> None:
-        """Print a line for people; `style` is of words like "bold red"."""
+        """Print a line for people; `style` consists of words, e.g. "bold red"."""
         stream = to or sys.stdout
         print(styled(text, style, coloured(stream)), file=stream)
 
@@ -69,8 +69,8 @@ class Output:
     ) -> None:
         """Print a table; `right` names the columns of numbers.
 
-        A cell is a string, or a string and its style.  Columns in which nothing stands are
-        left out.  On a terminal it is folded to its width; elsewhere nothing is.
+        A cell is a string, or a string and its style.  Empty columns are left out.  On a
+        terminal, columns of text are folded to its width.
         """
         cells: list[list[Cell]] = [
             [(each[0], each[1]) if isinstance(each, tuple) else (str(each), "") for each in row]
@@ -81,8 +81,8 @@ class Output:
             print("".join(styled(text, style, in_colours) for text, style in text_of_line).rstrip())
 
     def begin_anew(self) -> None:
-        """Before output that takes the place of the last: clear a terminal; elsewhere begin
-        another YAML document (JSON documents just follow each other)."""
+        """Prepare for output that replaces the previous output: clear a terminal, or begin a YAML
+        document (JSON documents need no separator)."""
         if not self.for_people:
             if self._kind == "yaml":
                 print("---")
@@ -90,12 +90,12 @@ class Output:
             print("\x1b[2J\x1b[H", end="")
 
     def progress(self, line: str) -> None:
-        """Show what a long call is doing; unasked only if it takes very long."""
+        """Print the progress of a call, if verbose or after 10 s."""
         if self._verbose or time.monotonic() - self._since > _PATIENCE_S:
             print(line, file=sys.stderr)
 
     def alarm(self, runner: str, reasons: Iterable[str], to: TextIO | None = None) -> None:
-        """Say loudly what is missing for real time."""
+        """Print the reasons why a runner is not real time."""
         lines = list(reasons)
         if lines:
             self.line(f"!! {runner} IS NOT REAL TIME:", "bold red", to)
@@ -111,13 +111,13 @@ class Output:
         self.notes(result.notes)
 
     def notes(self, lines: Iterable[str]) -> None:
-        """Print what else the caller of a change should know."""
+        """Print the notes of a change on standard error."""
         for note in lines:
             print(f"rtcfctl: note: {note}", file=sys.stderr)
 
 
 def _width() -> int | None:
-    """Return how wide a table may be; None where it is not for a terminal."""
+    """Return the width of the terminal; None if standard output is not a terminal."""
     if not sys.stdout.isatty():
         return None
     try:
@@ -127,12 +127,12 @@ def _width() -> int | None:
 
 
 def coloured(stream: TextIO) -> bool:
-    """Tell whether a stream shows colours."""
+    """Return whether a stream shows colours."""
     return stream.isatty() and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"
 
 
 def styled(text: str, style: str, in_colours: bool) -> str:
-    """Return a text in a style of words like "bold red"."""
+    """Return a text in a style, e.g. "bold red"."""
     codes = ";".join(_ANSI[word] for word in style.split())
     return f"\x1b[{codes}m{text}\x1b[0m" if in_colours and codes and text.strip() else text
 

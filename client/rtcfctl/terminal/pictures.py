@@ -1,17 +1,17 @@
-"""Numbers as pictures of characters: a row of blocks, bars, and curves of braille dots."""
+"""Drawings made of characters: spark lines, bars, and curves of braille dots."""
 
 import math
 from collections.abc import Sequence
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
-_PARTS = " ▏▎▍▌▋▊▉"  # of a block, in eighths of its width
-# Of a braille character's 2 by 4 dots, by column and row.
+_PARTS = " ▏▎▍▌▋▊▉"  # parts of a block, in eighths of its width
+# Bits of a braille character's 2 by 4 dots, by column and row.
 _DOTS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
 _BLANK = 0x2800
 
 
 def spark(values: Sequence[float], width: int) -> str:
-    """Return the last values as blocks from zero to the largest; a space for what is no number."""
+    """Return the last values as blocks, scaled from 0 to the largest; NaN is a space."""
     shown = list(values)[-width:] if width > 0 else []
     most = max((each for each in shown if math.isfinite(each)), default=0.0)
 
@@ -24,13 +24,13 @@ def spark(values: Sequence[float], width: int) -> str:
 
 
 def bar(share: float, width: int) -> str:
-    """Return a bar from the left, of a share of so many characters."""
+    """Return a bar whose length is a share, 0 to 1, of `width` characters."""
     eighths = round(min(max(share, 0.0), 1.0) * width * 8)
     return (_BLOCKS[-1] * (eighths // 8) + _PARTS[eighths % 8]).rstrip()
 
 
 class Curves:
-    """A field of dots, two a column and four a line, for several curves."""
+    """A field of braille dots for several curves: each character has 2 by 4 dots."""
 
     def __init__(self, width: int, height: int, low: float, high: float) -> None:
         self._width, self._height = width, height
@@ -40,11 +40,11 @@ class Curves:
 
     @property
     def columns(self) -> int:
-        """Dots beside each other."""
+        """Width of the field in dots."""
         return 2 * self._width
 
     def column(self, x: int, low: float, high: float, owner: int) -> None:
-        """Set the dots from `low` to `high` in one of the columns of dots."""
+        """Set the dots from `low` to `high` in column `x` of dots, for curve `owner`."""
         if not (math.isfinite(low) and math.isfinite(high)):
             return
         top, bottom = self._row(high), self._row(low)
@@ -54,7 +54,7 @@ class Curves:
             self._owner[place] = owner
 
     def lines(self) -> list[list[tuple[str, int]]]:
-        """Return lines of runs of characters, each with its owner; -1 = nobody's."""
+        """Return the lines as runs of characters, each with its curve; -1: no curve."""
         found = []
         for line in range(self._height):
             runs: list[tuple[str, int]] = []
@@ -71,7 +71,7 @@ class Curves:
 
     def _row(self, value: float) -> int:
         rows = 4 * self._height
-        # By halves: the difference of two numbers may be none any more.
+        # Halves, because the difference of two large numbers may be infinite.
         span = self._high / 2 - self._low / 2
         above = min(max(value, self._low), self._high) / 2 - self._low / 2
         return rows - 1 - round(above / span * (rows - 1) if span > 0 else 0.0)

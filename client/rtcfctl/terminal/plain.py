@@ -1,8 +1,8 @@
 """Protobuf messages as plain dicts, lists, numbers and strings, for JSON and YAML.
 
-Other than in protobuf's own JSON, integers are numbers, all fields are there,
-an enumerator is its short name ("running"), the value of a parameter, of a port
-or of state is that value itself, and what has no value is null.
+Unlike protobuf's own JSON, integers are numbers, all fields are present, an enumerator is
+its short name ("running"), the value of a parameter, port or state is the plain value, and a
+missing value is null.
 """
 
 import math
@@ -12,7 +12,7 @@ from google.protobuf.descriptor import FieldDescriptor
 from rtcf_shared.enums import word
 
 _VALUE_MESSAGE = "rtcf.v1.ParameterValue"
-# Fields whose values travel as text.
+# Fields whose values are transmitted as text.
 _TEXTS = {"rtcf.v1.PortInfo": ("value",), "rtcf.v1.StateInfo": ("initial", "value")}
 
 
@@ -56,8 +56,8 @@ def _single(field: FieldDescriptor, value: Any) -> Any:
 
 
 def number(value: Any) -> Any:
-    """Return a number as JSON can hold it, anything else as it is."""
-    # JSON has no words for these.
+    """Return NaN and infinity as text, and any other value unchanged."""
+    # JSON has no NaN and infinity.
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     return value

@@ -1,4 +1,4 @@
-"""A terminal that is drawn again and again, and its keys; left as it was found, however it ends."""
+"""A full-screen terminal and its keys; the terminal is restored at the end, also after an error."""
 
 import codecs
 import contextlib
@@ -14,12 +14,12 @@ from types import FrameType
 from typing import Any, Self
 
 _ENTER, _LEAVE = "\x1b[?1049h\x1b[?25l\x1b[?7l", "\x1b[?7h\x1b[?25h\x1b[?1049l"
-# Terminals that know it show what comes between these at once.
+# Synchronized update: terminals that support it show the output between these at once.
 _BEGIN, _END = "\x1b[?2026h", "\x1b[?2026l"
 _HOME, _REST_OF_LINE, _BELOW = "\x1b[H", "\x1b[K", "\x1b[J"
 _ESCAPE = "\x1b"
-_WHOLE_S = 0.05  # in which the rest of a key's characters comes, also over ssh
-# What one key sends; ESC alone is one only if nothing follows.
+_WHOLE_S = 0.05  # time for the rest of a key's characters to arrive, also over ssh
+# Characters of one key; a single ESC is a key only if no characters follow in time.
 _KEY = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|O[ -~]|[^\[O\x1b])|\x1b(?=\x1b)|[^\x1b]")
 _NAMES = {
     "\t": "tab",
@@ -32,14 +32,16 @@ _NAMES = {
 
 
 class Screen:
-    """Owned by one `with`; only where standard output is a terminal.  SIGTERM and SIGHUP end the
-    process by SystemExit, in order."""
+    """A context manager; requires that standard output is a terminal.
+
+    SIGTERM and SIGHUP raise SystemExit, so that the terminal is restored.
+    """
 
     def __init__(self) -> None:
         self._keys = sys.stdin.fileno() if sys.stdin.isatty() else -1
-        self._typed = ""  # characters of keys that nobody has taken yet
+        self._typed = ""  # received characters that key() has not returned yet
         self._decoder = codecs.getincrementaldecoder("utf-8")("replace")
-        self._resized = -1, -1  # a pipe that the signal of a new size writes to
+        self._resized = -1, -1  # pipe to which the handler of SIGWINCH writes
         self._before: list[Any] = []
         self._handlers: dict[int, Any] = {}
 
@@ -71,7 +73,7 @@ class Screen:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Columns and lines, as they are now."""
+        """Present columns and lines."""
         try:
             found = os.get_terminal_size(sys.stdout.fileno())
         except OSError:
@@ -79,21 +81,21 @@ class Screen:
         return max(found.columns, 20), max(found.lines, 4)
 
     def draw(self, lines: list[str]) -> None:
-        """Show lines, which may be styled; what does not fit below is left out."""
+        """Show lines, which may be styled; lines below the last row are left out."""
         _, height = self.size
-        # A line is emptied before it is written: behind one that fills its row, the cursor is still
-        # on the last character, which would go, too.
+        # Clear a row before its text is written: after a text that fills the row, the cursor is
+        # still on the last character, which clearing would remove.
         shown = [f"{_REST_OF_LINE}{line}" for line in lines[:height]]
         below = [_BELOW] if len(shown) < height else []
         sys.stdout.write(_BEGIN + _HOME + "\n".join([*shown, *below]) + _END)
         sys.stdout.flush()
 
     def key(self, wait_s: float) -> str:
-        """Return the next key, by name if it has one, or "resize" when the terminal has another
-        size; empty if nothing comes in time."""
+        """Return the next key, by name if it has one, or "resize" if the size of the terminal has
+        changed; empty if there is none within `wait_s`."""
         until = time.monotonic() + wait_s
         while not (key := self._next_key()):
-            # What has begun goes on at once, or is a key of its own.
+            # The rest of an escape sequence follows at once; else ESC is a key itself.
             left = _WHOLE_S if self._typed else max(until - time.monotonic(), 0.0)
             ready, _, _ = select.select([end for end in self._ends if end >= 0], [], [], left)
             if self._resized[0] in ready:
@@ -104,7 +106,7 @@ class Screen:
                 return _NAMES.get(begun, "")
             text = os.read(self._keys, 1024)
             if not text:
-                return "q"  # of an empty terminal, as that of a connection that has ended
+                return "q"  # end of file, for instance when the connection has ended
             self._typed += self._decoder.decode(text)
         return key
 
@@ -113,7 +115,7 @@ class Screen:
         return self._keys, self._resized[0]
 
     def _next_key(self) -> str:
-        """Take the first key off what was typed; empty if none is whole."""
+        """Remove the first key from the received characters; empty if none is complete."""
         found = _KEY.match(self._typed)
         if found is None:
             return ""
@@ -121,7 +123,7 @@ class Screen:
         return _NAMES.get(found[0], found[0])
 
     def _note_size(self, _: int, __: FrameType | None) -> None:
-        with contextlib.suppress(BlockingIOError):  # it is full of such notes
+        with contextlib.suppress(BlockingIOError):  # the pipe is full of notes
             os.write(self._resized[1], b"!")
 
 

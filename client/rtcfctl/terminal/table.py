@@ -1,4 +1,4 @@
-"""Tables for people: columns as wide as what stands in them, folded where that is too much.
+"""Tables for people: columns fit their contents; text is folded to the width of the terminal.
 
 Pure functions.
 """
@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 
 Cell = tuple[str, str]  # text, style
 _WIDE_GAP, _NARROW_GAP = 2, 1
-_LEAST = 6  # characters that are left of a column that is folded
-_LEAST_OF_HEADING = 14  # of a column whose heading is longer than that
+_LEAST = 6  # smallest width of a folded column
+_LEAST_OF_HEADING = 14  # a heading keeps its column as wide as itself, up to this width
 
 
 def format_table(
@@ -18,10 +18,10 @@ def format_table(
     right: Sequence[str] = (),
     width: int | None = None,
 ) -> Iterator[list[Cell]]:
-    """Yield the lines of a table, each as pieces with their styles.
+    """Yield the lines of a table, each as cells with their styles.
 
     Columns that are empty in all rows are left out.  With `width`, columns of text are folded,
-    the widest first; those of numbers (named by `right`) never are.
+    the widest first; columns of numbers (named by `right`) are not.
     """
     used = [i for i in range(len(columns)) if not rows or any(row[i][0] for row in rows)]
     names = [columns[i] for i in used]
@@ -39,7 +39,7 @@ def format_table(
 
 
 def _fold(widths: list[int], texts: Sequence[int], room: int, names: Sequence[str]) -> None:
-    """Make columns of text narrower until all fits, or none can be any more."""
+    """Reduce the widths of text columns until the table fits, or all have their smallest width."""
     while sum(widths) > room:
         able = [i for i in texts if widths[i] > max(_LEAST, min(len(names[i]), _LEAST_OF_HEADING))]
         if not able:
@@ -69,5 +69,5 @@ def _row(
 def _lines(text: str, room: int) -> list[str]:
     if len(text) <= room and "\n" not in text:
         return [text]
-    # At spaces where there are any; a name that is longer than its column is cut.
+    # Break lines at spaces; break a word that is longer than the column.
     return [line for part in text.split("\n") for line in textwrap.wrap(part, room) or [""]]

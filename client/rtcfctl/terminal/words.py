@@ -1,4 +1,4 @@
-"""Figures and values as words for tables."""
+"""Numbers, times and values as text for tables."""
 
 import argparse
 import re
@@ -11,14 +11,14 @@ from rtcf_shared.quantities import parse
 
 from rtcfctl.terminal.plain import plain
 
-# Of what somebody has chosen, and of what is measured or computed.
+# Significant digits of parameters, and of measured or computed values.
 _CHOSEN_DIGITS, _MEASURED_DIGITS = 10, 6
 _LONG_NUMBER = re.compile(r"(?<![\w.])-?\d*\.\d{5,}(e[-+]?\d+)?(?![\w.])")
 _UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"), (1.0, "ns"))
 
 
 def age(nanoseconds: int) -> str:
-    """Return an age in the unit that suits it: "1.50 ms"."""
+    """Return an age with a suitable unit: "1.5 ms"."""
     for size, unit in _UNITS:
         if abs(nanoseconds) >= size:
             return f"{nanoseconds / size:.3g} {unit}"
@@ -26,7 +26,7 @@ def age(nanoseconds: int) -> str:
 
 
 def date(nanoseconds: int) -> str:
-    """Return a time since 1970 by the clock here: "2026-03-01 14:05:09"."""
+    """Return a time since 1970 in the local time zone: "2026-03-01 14:05:09"."""
     return time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(nanoseconds / 1e9))
 
 
@@ -36,7 +36,7 @@ def date_ms(nanoseconds: int) -> str:
 
 
 def amount(unit: str) -> Callable[[str], float]:
-    """Return what argparse reads a number by, with or without a unit of the kind of `unit`."""
+    """Return a type for argparse: a number with an optional unit; the result is in `unit`."""
 
     def value(text: str) -> float:
         try:
@@ -48,18 +48,18 @@ def amount(unit: str) -> Callable[[str], float]:
 
 
 def whole(text: str) -> int:
-    """Read a count, for argparse."""
+    """Parse a count, as a type for argparse."""
     try:
         number = int(text)
     except ValueError:
         number = -1
     if not 0 <= number < 2**32:
-        raise argparse.ArgumentTypeError(f"{text}: a whole number from 0 to {2**32 - 1}, please")
+        raise argparse.ArgumentTypeError(f"{text}: use a whole number from 0 to {2**32 - 1}")
     return number
 
 
 def microseconds(nanoseconds: float) -> str:
-    """Return a duration in µs, without the unit; of a long one the digits that matter."""
+    """Return a duration in µs, without the unit; long durations have fewer decimals."""
     size = abs(nanoseconds)
     return f"{nanoseconds / 1e3:.{2 if size < 1e6 else 1 if size < 1e7 else 0}f}"
 
@@ -80,8 +80,8 @@ def value(found: graph_pb2.ParameterValue) -> str:
 
 
 def port_value(text: str) -> str:
-    """Return a port's value, of a message with one field that field's, with the digits that
-    matter to the eye."""
+    """Return a port's value with at most six digits; a message with the single field `data` is
+    only the value of the field."""
     lines = text.split("\n")
     if len(lines) == 1:
         text = text.removeprefix("data: ")
@@ -89,10 +89,10 @@ def port_value(text: str) -> str:
 
 
 def figure(number: float) -> str:
-    """Return a number that was measured or computed, with the digits that matter to the eye."""
+    """Return a measured or computed number with at most six digits."""
     return f"{number:.{_MEASURED_DIGITS}g}"
 
 
 def yes(condition: bool, word: str = "yes") -> str:
-    """Return a word, or nothing."""
+    """Return a word if a condition is true, else an empty text."""
     return word if condition else ""

@@ -96,7 +96,7 @@ def test_violations_are_exit_code_1_with_their_stacks(executor: Path) -> None:
     assert "   Base::update()  /src/base.hpp:7\n" in done.stdout
     assert "loop.cpp" not in done.stdout
     assert done.stderr == (
-        "/checked: hello\nrtcfctl: pkg/T: 2 calls that are not safe in real time in 1000 cycles\n"
+        "/checked: hello\nrtcfctl: pkg/T: 2 calls that are not real-time safe in 1000 cycles\n"
     )
     found = json.loads(check(executor, "pkg", "T", "-o", "json", says=REPORT).stdout)
     assert [each["called"] for each in found["violations"]] == ["malloc", "wait()"]

@@ -83,12 +83,12 @@ def test_loops_that_share_a_cpu_are_named() -> None:
     one, two = shared_cpus(statuses)
     assert one == (
         "CPU 1 has several loops, left (priority 80), right (priority 80), slow (priority 60): "
-        "those of equal priority delay each other: "
-        "`rtcfctl runner set NAME --cpu N` or `--priority N` parts them"
+        "loops of equal priority delay each other; "
+        "use `rtcfctl runner set NAME --cpu N` or `--priority N`"
     )
     assert two == (
         "CPU 3 has several loops, leg (priority 82), arm (priority 80): "
-        "each runs before those after it"
+        "each loop runs before the loops after it"
     )
     # Of one that is looked at alone the others are known too.
     assert shared_cpus([statuses[0]]) == [two]

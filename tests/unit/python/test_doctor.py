@@ -260,7 +260,7 @@ def test_no_loop_is_put_beside_one_that_runs(daemon: DaemonUnderTest) -> None:
         assert "not measured: the loop of arm runs on CPU 0" in said
         # What runs tells more than an empty loop would.
         said = daemon.ctl("-r", "arm", "doctor", "--seconds", "60").stdout
-        assert "worst, of the loop that runs, 10 cycles" in said
+        assert "worst, of the running loop, 10 cycles" in said
 
 
 def test_it_leaves_nothing_behind_when_it_is_ended(daemon: DaemonUnderTest) -> None:

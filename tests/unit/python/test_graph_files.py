@@ -242,7 +242,7 @@ runners:
     assert daemon.ctl("-r", "arm", "apply", write(tmp_path, text)).returncode == 0
     assert client.get_order("arm") == ["/Fine"]
     wrong = daemon.ctl("-r", "leg", "apply", write(tmp_path, text))
-    assert "it has no runner leg (runners: arm, rt_runner)" in wrong.stderr
+    assert "no runner leg (runners: arm, rt_runner)" in wrong.stderr
 
 
 def test_save_writes_what_apply_reads(

@@ -47,9 +47,9 @@ def test_units_are_the_same_with_every_option(words: str, field: str, value: flo
             "--spin 30parsecs",
             "argument --spin: 30parsecs: give a number with one of ns, us, µs, ms, s",
         ),
-        ("--spin 1.5", "argument --spin: 1.5 is no whole number of µs"),
-        ("--spin 1e400us", "argument --spin: 1e400us is no whole number of µs"),
-        ("--priority 1e400", "argument --priority: 1e400 is no whole number"),
+        ("--spin 1.5", "argument --spin: 1.5 is not a whole number of µs"),
+        ("--spin 1e400us", "argument --spin: 1e400us is not a whole number of µs"),
+        ("--priority 1e400", "argument --priority: 1e400 is not a whole number"),
         ("--frequency fast", "argument --frequency: fast: give a number with one of Hz, kHz"),
     ],
 )

@@ -31,10 +31,10 @@ def test_a_library_that_changed_is_said_by_list_info_and_status_and_taken_by_rep
     assert not client.get_status().runners[0].libraries_changed
     rebuild(library)
     assert list(client.get_status().runners[0].libraries_changed) == [str(library)]
-    assert f"{library} is another file now" in daemon.ctl("status").stdout
+    assert f"{library} has changed since its components were loaded" in daemon.ctl("status").stdout
     assert [each.library_changed for each in client.list_components()] == [True, False]
     assert "library changed" in daemon.ctl("list").stdout
-    assert "`rtcfctl replace /a --rebuilt` takes it" in daemon.ctl("info", "a").stdout
+    assert "`rtcfctl replace /a --rebuilt` loads it" in daemon.ctl("info", "a").stdout
     done = daemon.ctl("replace", "a", "--rebuilt")
     assert done.stdout == "replaced a by /a\n", done.stderr
     assert not client.get_status().runners[0].libraries_changed
@@ -45,7 +45,7 @@ def test_replace_wants_a_type_or_the_rebuilt_library(daemon: DaemonUnderTest) ->
     for words in (["a"], ["a", "demo"], ["a", "demo", "Fine", "--rebuilt"]):
         done = daemon.ctl("replace", *words)
         assert done.returncode == 2, words
-        assert "name PKG COMPONENT, or --rebuilt" in done.stderr
+        assert "specify PKG COMPONENT or --rebuilt" in done.stderr
 
 
 def test_apply_says_that_it_left_old_code_running(

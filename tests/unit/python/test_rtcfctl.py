@@ -87,7 +87,7 @@ def test_ctrl_c_is_exit_code_1_and_what_had_begun_goes_on(
         process.send_signal(signal.SIGINT)
         said = process.stderr.read()
         assert process.wait() == 1
-    assert said == "rtcfctl: interrupted; a change that had begun goes on\n"
+    assert said == "rtcfctl: interrupted; a change that had started continues\n"
     go_on.touch()
     wait_for(lambda: client.get_order() == ["/Slow"], "the component")
 
@@ -321,8 +321,8 @@ def test_each_verb_is_found_in_the_module_that_is_said_to_have_it() -> None:
     ("words", "said"),
     [
         ("step 99999999999999999999", "at most 1000000000000000000 cycles"),
-        ("load demo Fine --every -1", "-1: a whole number from 0 to 4294967295, please"),
-        ("load demo Fine --phase 99999999999", "99999999999: a whole number from 0 to"),
+        ("load demo Fine --every -1", "-1: use a whole number from 0 to 4294967295"),
+        ("load demo Fine --phase 99999999999", "99999999999: use a whole number from 0 to"),
         ("echo --rate=-5", "--rate -5: 0 Hz or more"),
         ("echo --rate nan", "--rate nan: 0 Hz or more"),
         ("record -o x.mcap --duration 1e300", "--duration 1e+300: more than 0 s, and 1e+09 at"),
@@ -361,7 +361,7 @@ def test_a_line_names_one_runner(daemon: DaemonUnderTest, line: str) -> None:
         done = daemon.ctl("-r", *runner.split(), "runner", *line.split())
         assert (done.returncode, done.stderr) == (
             2,
-            "rtcfctl: -r nope and rt_runner: name one runner\n",
+            "rtcfctl: -r nope and rt_runner: specify one runner\n",
         )
     assert daemon.executor_pid() == pid
     assert daemon.ctl("-r", "rt_runner", "runner", "restart", "rt_runner").returncode == 0
